@@ -1,0 +1,322 @@
+"""YAML -> frozen, strict models. Unknown keys, wrong types and impossible values are errors that name file and key.
+
+Two files are read: the pool's config (target, thresholds) and the session's (instrument files, mounts, sigmas).
+Both keep the units of the contract (degrees, metres); code that computes converts at once to radians.
+"""
+
+import json
+import math
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Literal, TypeVar
+
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from pipeline.errors import ConfigError
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+Length = Annotated[float, Field(gt=0, le=100)]
+Lever = Annotated[float, Field(ge=-100, le=100)]
+Latency = Annotated[float, Field(ge=-10, le=10)]
+
+
+class Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+# --- the pool --------------------------------------------------------------------------------------------------------
+class Origin(Model):
+    """The target's centre: middle of the centre wall's front face."""
+
+    latitude_deg: Annotated[float, Field(ge=-90, le=90)]
+    longitude_deg: Annotated[float, Field(ge=-180, le=360)]
+    height_m: Annotated[float, Field(ge=-1000, le=10000, description="ellipsoidal")]
+
+
+class Target(Model):
+    """The target by design: CONVENTIONS.md, "The target"."""
+
+    a: Length
+    b: Length
+    c: Length
+    e: Length
+    low_side: Literal["south", "north"] = "south"
+    blocks_per_side: Annotated[int, Field(ge=1, le=200)] | None = None
+    first_base_m: Lever | None = None
+    stagger_m: Annotated[float, Field(ge=0, le=100)] | None = None
+    origin: Origin
+    azimuth_deg: Angle | None = None
+    water_level_m: Lever = 0.0
+
+    @model_validator(mode="after")
+    def _blocks_fit(self) -> "Target":
+        if self.blocks_per_side is None and self.a < 2 * self.e:
+            raise ValueError(f"a = {self.a} leaves no room for one block and gap of e = {self.e}: a must be >= 2 e")
+        return self
+
+
+class Ingest(Model):
+    max_gap_s: Positive = 5.0  # a longer gap in INS or soundings ends a pass
+    reversal_m: Positive = 1.0  # going back along the track by more than this ends a pass
+
+
+class Georeference(Model):
+    box_margin_m: Annotated[float, Field(ge=1.5, le=20)] = 1.5  # round the target; what lies outside is dropped
+    max_ins_interval_s: Annotated[float, Field(gt=0, le=1)] = 0.1  # never interpolate over a longer hole in the INS
+
+
+class Segment(Model):
+    margin_m: NotNegative = 0.03  # to a face's edges, beyond the footprint's half extent
+    gate_m: Positive = 0.05  # smallest gate round a face; widened to five times the robust scale
+    water_margin_m: NotNegative = 0.10  # no point nearer than this to the water line is used
+    min_grazing_deg: Annotated[float, Field(ge=0, lt=90)] = 5.0  # flatter rays are not used
+    search_horizontal_m: Positive = 0.5  # how wrong the configured origin may be
+    search_vertical_e: Annotated[float, Field(gt=0, le=0.5)] = 0.4  # the same vertically, as a share of e
+    search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
+    search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
+    search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
+    ambiguity_ratio: Annotated[float, Field(gt=0, lt=1)] = 0.9  # a rival this good makes the result ambiguous
+
+
+class FitPlanes(Model):
+    min_points: Annotated[int, Field(ge=10)] = 50  # a plane of fewer points is not fitted
+
+
+class AngleIterate(Model):
+    max_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
+    step_tolerance_deg: Positive = 1e-6
+    angle_tolerance_deg: Positive = 1e-6  # change of the angles between the normals in one step
+
+
+class Offsets(Model):
+    max_iterations: Annotated[int, Field(ge=1, le=10000)] = 500
+    step_tolerance_deg: Positive = 1e-7
+    step_tolerance_m: Positive = 1e-8
+    apply_x_first: bool = True  # Y is taken after X has been applied (an X error shows fully in Y on a 45° face)
+
+
+class Adjust(Model):
+    max_iterations: Annotated[int, Field(ge=1, le=100)] = 20
+    robust_k0: Positive = 3.0  # IGG III: full weight below, in sigmas
+    robust_k1: Positive = 6.0  # no weight above
+    moment_s: Positive = 0.1  # observations within this time share the INS's noise (covariance)
+    test_level: Annotated[float, Field(gt=0, lt=0.5)] = 0.001
+    test_tolerance_m: NotNegative = 0.003  # systematic residual per surface and pass that is not held against a session
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Adjust":
+        if self.robust_k1 <= self.robust_k0:
+            raise ValueError(f"robust_k1 = {self.robust_k1} must be greater than robust_k0 = {self.robust_k0}")
+        return self
+
+
+class Verdict(Model):
+    max_sigma_deg: Positive = 0.05
+    max_sigma_m: Positive = 0.005
+
+
+Method = Literal["patent_sequential", "patent_alternating", "adjustment"]
+
+
+class PoolConfig(Model):
+    """configs/<pool>.yaml"""
+
+    target: Target
+    ingest: Ingest = Ingest()
+    georeference: Georeference = Georeference()
+    segment: Segment = Segment()
+    fit_planes: FitPlanes = FitPlanes()
+    angle_iterate: AngleIterate = AngleIterate()
+    offsets: Offsets = Offsets()
+    adjust: Adjust = Adjust()
+    verdict: Verdict = Verdict()
+    result: Method = "adjustment"
+
+
+# --- the session -----------------------------------------------------------------------------------------------------
+def _inside(pattern: str) -> str:
+    path = PurePosixPath(pattern)
+    if not pattern or path.is_absolute() or ".." in path.parts or "\\" in pattern or "\0" in pattern:
+        raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
+    return pattern
+
+
+Files = Annotated[list[Annotated[str, AfterValidator(_inside)]], Field(min_length=1)]
+Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
+
+
+class Mount(Model):
+    """Angles and lever arm of a sensor on the body: R_body_from_sensor = Rz(yaw) Rx(pitch) Ry(roll)."""
+
+    roll_deg: Angle
+    pitch_deg: Angle
+    yaw_deg: Angle
+    x_m: Lever
+    y_m: Lever
+    z_m: Lever
+
+
+class Drift(Model):
+    """First-order Gauss-Markov errors of the INS: standard deviations and correlation time."""
+
+    horizontal_m: NotNegative = 0.015
+    vertical_m: NotNegative = 0.02
+    roll_pitch_deg: NotNegative = 0.01
+    heading_deg: NotNegative = 0.03
+    time_constant_s: Positive = 200.0
+
+
+class White(Model):
+    """White noise of the INS, per record."""
+
+    position_m: NotNegative = 0.002
+    attitude_deg: NotNegative = 0.002
+
+
+class Ins(Model):
+    files: Files
+    format: Literal["novatel", "sbet", "table"]
+    gps_week: Week = None
+    latency_s: Latency = 0.0
+    drift: Drift = Drift()
+    white: White = White()
+
+
+class Laser(Model):
+    files: Files
+    format: Literal["las", "table"]
+    gps_week: Week = None
+    frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
+    mount: Mount
+    range_sigma_m: Positive = 0.005
+    angle_sigma_deg: NotNegative = 0.003
+    latency_s: Latency = 0.0
+
+
+class Mbes(Model):
+    files: Files
+    format: Literal["r2sonic", "table"]
+    mount: Mount
+    sound_speed_m_s: Annotated[float, Field(ge=1300, le=1700)] | None = None
+    projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
+    range_sigma_m: Positive = 0.008
+    angle_sigma_deg: NotNegative = 0.06
+    beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # width across track, along track
+    latency_s: Latency = 0.0
+
+
+class SessionConfig(Model):
+    """SESSION/session.yaml"""
+
+    name: Annotated[str, Field(min_length=1, max_length=300)]
+    ins: Ins
+    laser: Laser
+    mbes: Mbes
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------
+M = TypeVar("M", bound=BaseModel)
+MAX_YAML_BYTES = 1_000_000
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """Safe YAML that refuses a key given twice (YAML would silently take the last) and aliases (no bombs)."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.events.AliasEvent):
+            raise yaml.YAMLError("aliases (*name) are not accepted")
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, (list, dict)):
+                raise yaml.YAMLError(f"line {key_node.start_mark.line + 1}: a key must be a plain word")
+            if key in seen:
+                raise yaml.YAMLError(f"line {key_node.start_mark.line + 1}: key {key!r} is given twice")
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """One mapping from a YAML file; every way this can fail is a ConfigError."""
+    try:
+        if path.stat().st_size > MAX_YAML_BYTES:
+            raise ConfigError(f"{path}: {path.stat().st_size} bytes is no config; name the YAML file meant")
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
+    try:
+        content = yaml.load(text, Loader=_StrictLoader)  # noqa: S506 (a SafeLoader, made stricter)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path}: holds {type(content).__name__}, not a mapping of keys; see README.md")
+    return content
+
+
+def parse(model: type[M], content: dict[str, Any], where: str) -> M:
+    """Check ``content`` against ``model``; the first fault becomes one line that names the key."""
+    try:
+        return model.model_validate_json(_to_json(content, where), strict=True)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in fault["loc"] if part != "function-after") or "(whole file)"
+        if fault["type"] == "extra_forbidden":
+            known = ", ".join(_known_keys(model, fault["loc"][:-1]))
+            raise ConfigError(f"{where}: {key}: unknown key; known here: {known}") from error
+        if fault["type"] == "missing":
+            raise ConfigError(f"{where}: {key}: is missing; add it") from error
+        message = fault["msg"].removeprefix("Value error, ")
+        shown = repr(fault["input"])
+        shown = shown if len(shown) <= 60 else shown[:57] + "..."
+        raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; mend this value") from error
+
+
+def _to_json(content: dict[str, Any], where: str) -> str:
+    """JSON between YAML and model: strict JSON mode reads lists as tuples and whole numbers as floats, nothing else."""
+    def check(value: Any, key: str) -> None:
+        if isinstance(value, dict):
+            for name, item in value.items():
+                if not isinstance(name, str):
+                    raise ConfigError(f"{where}: {key}{name!r}: a key must be a word; write it as text")
+                check(item, f"{key}{name}.")
+        elif isinstance(value, list):
+            for position, item in enumerate(value):
+                check(item, f"{key}{position}.")
+        elif isinstance(value, float) and not math.isfinite(value):
+            raise ConfigError(f"{where}: {key[:-1]} = {value}: is not a finite number; mend this value")
+        elif not isinstance(value, (str, int, float, bool, type(None))):
+            raise ConfigError(f"{where}: {key[:-1]} = {value}: is a {type(value).__name__}; put it in quotes")
+
+    check(content, "")
+    return json.dumps(content)
+
+
+def _known_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    current: Any = model
+    for part in location:
+        field = getattr(current, "model_fields", {}).get(part)
+        if field is None:
+            return ["see README.md"]
+        current = field.annotation
+    return sorted(getattr(current, "model_fields", {"see README.md": None}))
+
+
+def load_pool(path: Path) -> PoolConfig:
+    """The pool's config, checked."""
+    return parse(PoolConfig, read_yaml(path), str(path))
+
+
+def load_session(folder: Path) -> SessionConfig:
+    """The session's config, checked."""
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
+    path = folder / "session.yaml"
+    return parse(SessionConfig, read_yaml(path), str(path))

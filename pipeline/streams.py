@@ -1,0 +1,105 @@
+"""Streams: tables too long for memory, read part by part and batch by batch.
+
+A *batch* is a dict of equally long one-dimensional arrays. A *part* is the unit of work that is handed to a worker:
+a Parquet file, a stretch of a raw file, or (in campaigns and tests) a batch already in memory. A *stream* is an
+ordered tuple of parts that can be iterated any number of times.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+import numpy as np
+import pyarrow.parquet as pq
+
+Batch = Mapping[str, np.ndarray]
+BATCH_ROWS = 262_144
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """What a part yields: good rows as columns, and how many records were left out, by reason."""
+
+    columns: Batch
+    dropped: Mapping[str, int] = field(default_factory=dict)
+
+
+class Part(Protocol):
+    """The unit of work. Parts are picklable and hold no open file."""
+
+    @property
+    def name(self) -> str: ...
+
+    def chunks(self) -> Iterator[Chunk]: ...
+
+
+@dataclass(frozen=True)
+class ParquetPart:
+    """One Parquet file of a stream in a run folder."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        return self.path.name
+
+    def chunks(self) -> Iterator[Chunk]:
+        with pq.ParquetFile(self.path) as file:
+            for group in range(file.num_row_groups):
+                table = file.read_row_group(group, use_threads=False)
+                for start in range(0, table.num_rows, BATCH_ROWS):
+                    piece = table.slice(start, BATCH_ROWS)
+                    yield Chunk({name: piece[name].to_numpy() for name in piece.column_names})
+
+
+@dataclass(frozen=True)
+class MemoryPart:
+    """A batch already in memory: simulated campaigns and tests."""
+
+    name: str
+    columns: Batch
+
+    def chunks(self) -> Iterator[Chunk]:
+        rows = len(next(iter(self.columns.values())))
+        for start in range(0, rows, BATCH_ROWS):
+            yield Chunk({name: values[start : start + BATCH_ROWS] for name, values in self.columns.items()})
+
+
+class Mapper(Protocol):
+    """Applies a function to each item; results come back in order. ``executor.py`` has the parallel one."""
+
+    def __call__(self, function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]: ...
+
+
+@dataclass(frozen=True)
+class Stream:
+    """An ordered, repeatable sequence of parts, and how work on its parts is spread."""
+
+    parts: tuple[Part, ...]
+    mapper: Mapper = map
+
+    def batches(self) -> Iterator[Batch]:
+        """All rows in order, batch by batch; never more than one batch in memory."""
+        for part in self.parts:
+            for chunk in part.chunks():
+                yield chunk.columns
+
+    def fold(self, function: Callable[..., T], *arguments: object) -> list[T]:
+        """``function(batch, *arguments)`` of every batch, in order; parts run side by side."""
+        work = [(part, function, arguments) for part in self.parts]
+        return [result for results in self.mapper(_fold_part, work) for result in results]
+
+
+def _fold_part(work: tuple[Part, Callable[..., T], tuple[object, ...]]) -> list[T]:
+    part, function, arguments = work
+    return [function(chunk.columns, *arguments) for chunk in part.chunks()]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What a stage's ``run_batch`` makes of one chunk: rows for its output streams, and a small partial result."""
+
+    streams: Mapping[str, Batch]
+    partial: object
