@@ -56,6 +56,11 @@ class Document:
     name: str
 
 
+@dataclass(frozen=True)
+class Provenance:
+    """A stage input that says what the run is made from: digests of the raw files, and versions of the software."""
+
+
 def _xyz(frame: str, unit: str = "m", stem: str = "") -> tuple[Column, ...]:
     return tuple(Column(f"{stem}{axis}_{frame}_{unit}", F64, unit, f"{axis} in frame {frame}") for axis in "xyz")
 
@@ -104,7 +109,7 @@ PASSES = Artefact(
         Column("end_ns", I64, "ns", "last moment, GPS"),
         Column("duration_s", F64, "s", "length in time"),
         Column("length_m", F64, "m", "along-track length, + in the direction of the target's y axis"),
-        Column("speed_m_s", F64, "m/s", "median speed over ground"),
+        Column("speed_m_s", F64, "m/s", "mean along-track speed"),
         Column("azimuth_deg", F64, "deg", "mean heading, clockwise from true north"),
         Column("heading_swing_deg", F64, "deg", "standard deviation of the heading"),
         Column("distance_m", F64, "m", "median horizontal distance of the INS from the target's origin"),
@@ -131,6 +136,16 @@ GAPS = Artefact(
         Column("duration_s", F64, "s", "length of the gap"),
     ),
 )
+POOL_FRAME = Artefact(
+    "ingest", "pool_frame", "table", "the pool frame as used (azimuth as configured, or from the passes' headings)",
+    (
+        Column("latitude_deg", F64, "deg", "origin"),
+        Column("longitude_deg", F64, "deg", "origin"),
+        Column("height_m", F64, "m", "origin, ellipsoidal"),
+        Column("azimuth_deg", F64, "deg", "direction of +y, clockwise from true north"),
+        Column("azimuth_estimated", BOOL, "", "true: no azimuth was configured"),
+    ),
+)
 INGEST_COUNTS = Artefact("ingest", "counts", "table", "records used and left out, by reason", _COUNTS)
 
 # --- georeference ----------------------------------------------------------------------------------------------------
@@ -140,16 +155,6 @@ POSES = Artefact(
         _T,
         *_xyz("pool"),
         *(Column(f"q{axis}", F64, "1", f"quaternion of R_pool_from_body, component {axis}") for axis in "wxyz"),
-    ),
-)
-POOL_FRAME = Artefact(
-    "georeference", "pool_frame", "table", "the pool frame as used (azimuth as configured, or from the passes' headings)",
-    (
-        Column("latitude_deg", F64, "deg", "origin"),
-        Column("longitude_deg", F64, "deg", "origin"),
-        Column("height_m", F64, "m", "origin, ellipsoidal"),
-        Column("azimuth_deg", F64, "deg", "direction of +y, clockwise from true north"),
-        Column("azimuth_estimated", BOOL, "", "true: no azimuth was configured"),
     ),
 )
 LASER_POOL = Artefact(
@@ -256,8 +261,7 @@ SOUNDING_MOMENTS = Artefact(
         _PASS,
         Column("face", I16, "1", "number of the face"),
         Column("count", I64, "1", "soundings"),
-        Column("moments", FLOATS, "m², m, 1", "39 x 39, row by row: products of the lifted coordinates, summed"),
-        Column("R_body_from_target_sum", FLOATS, "1", "3 x 3, row by row: attitudes summed over the soundings"),
+        Column("moments", FLOATS, "m², m, 1", "40 x 40, row by row: products of the lifted coordinates, summed"),
     ),
 )
 
@@ -335,7 +339,7 @@ CORRECTIONS = Artefact(
 ESTIMATE = Artefact(
     "adjust", "estimate", "table", "every unknown of the adjustment",
     (
-        Column("unknown", TEXT, "", "rotation_x … lever_arm_z, then each surface's turn_1, turn_2, distance"),
+        Column("unknown", TEXT, "", "rotation_x … lever_arm_z, then each surface's turn_1, turn_2, shift"),
         Column("value", F64, "rad or m", "estimate (rotation: vector from coarse; surfaces: from the laser's planes)"),
         Column("sigma", F64, "rad or m", "standard deviation, noise common to a moment included"),
         Column("sigma_formal", F64, "rad or m", "standard deviation from independent observations"),
@@ -363,7 +367,7 @@ GROUPS = Artefact(
         Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal"),
         Column("count", I64, "1", "observations"), Column("redundancy", F64, "1", "their redundancy"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
-        Column("rms_m", F64, "m", "weighted RMS residual"),
+        Column("rms_normalised", F64, "1", "weighted RMS of residual / sigma"),
         Column("cut", I64, "1", "observations whose weight became zero"),
         Column("reduced", I64, "1", "observations whose weight was reduced"),
     ),

@@ -78,7 +78,7 @@ class Segment(Model):
     search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
-    ambiguity_ratio: Annotated[float, Field(gt=0, lt=1)] = 0.9  # a rival this good makes the result ambiguous
+    ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = 0.02  # a rival pose that explains nearly as many points
 
 
 class FitPlanes(Model):

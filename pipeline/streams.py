@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
+
+from pipeline.errors import ArtefactError
 
 Batch = Mapping[str, np.ndarray]
 BATCH_ROWS = 262_144
@@ -46,12 +49,18 @@ class ParquetPart:
         return self.path.name
 
     def chunks(self) -> Iterator[Chunk]:
-        with pq.ParquetFile(self.path) as file:
-            for group in range(file.num_row_groups):
-                table = file.read_row_group(group, use_threads=False)
-                for start in range(0, table.num_rows, BATCH_ROWS):
-                    piece = table.slice(start, BATCH_ROWS)
-                    yield Chunk({name: piece[name].to_numpy() for name in piece.column_names})
+        for table in self._groups():
+            for start in range(0, table.num_rows, BATCH_ROWS):
+                piece = table.slice(start, BATCH_ROWS)
+                yield Chunk({name: piece[name].to_numpy() for name in piece.column_names})
+
+    def _groups(self) -> Iterator[pa.Table]:
+        try:
+            with pq.ParquetFile(self.path) as file:
+                for group in range(file.num_row_groups):
+                    yield file.read_row_group(group, use_threads=False)
+        except (OSError, pa.ArrowException) as error:
+            raise ArtefactError(f"{self.path}: cannot be read ({error}); delete its folder and run again") from error
 
 
 @dataclass(frozen=True)
@@ -73,12 +82,17 @@ class Mapper(Protocol):
     def __call__(self, function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]: ...
 
 
+def serial(function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]:
+    """The plainest mapper: one item after another, here."""
+    return map(function, *items)
+
+
 @dataclass(frozen=True)
 class Stream:
     """An ordered, repeatable sequence of parts, and how work on its parts is spread."""
 
     parts: tuple[Part, ...]
-    mapper: Mapper = map
+    mapper: Mapper = serial
 
     def batches(self) -> Iterator[Batch]:
         """All rows in order, batch by batch; never more than one batch in memory."""
@@ -90,6 +104,9 @@ class Stream:
         """``function(batch, *arguments)`` of every batch, in order; parts run side by side."""
         work = [(part, function, arguments) for part in self.parts]
         return [result for results in self.mapper(_fold_part, work) for result in results]
+
+
+EMPTY = Stream(())
 
 
 def _fold_part(work: tuple[Part, Callable[..., T], tuple[object, ...]]) -> list[T]:

@@ -1,0 +1,84 @@
+# poolcal's front door. `make help` lists what there is; every target sets itself up first.
+# Variables are taken from make's command line alone, never from the environment.
+# The program decides by content what is out of date and exits with its own statuses; make turns each failure into 2.
+
+SESSION  = runs/demo-session
+CONFIG   = $(SESSION)/pool.yaml
+RUN      = runs/demo
+JOBS     =
+SEED     = 1
+
+POOLCAL := .venv/bin/poolcal
+PYTHON  := .venv/bin/python
+SETUP   := .venv/.setup
+STAGES  := ingest georeference segment fit_planes angle_iterate offsets adjust report
+DEMO    := runs/demo-session
+
+.DEFAULT_GOAL := help
+.SUFFIXES:
+MAKEFLAGS += --no-builtin-rules
+.PHONY: help setup demo calibrate stages test lint format bench montecarlo clean
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-18s %s\n", $$1, $$2}'
+	@echo 'Variables: SESSION CONFIG RUN JOBS SEED, e.g. make calibrate SESSION=dir CONFIG=configs/pool.yaml RUN=runs/name'
+
+setup: $(SETUP) ## .venv with everything; does nothing the second time
+$(SETUP): pyproject.toml constraints.txt tools/setup.sh
+	@tools/setup.sh
+
+# --- calibrating -----------------------------------------------------------------------------------------------------
+demo: $(DEMO)/.simulated ## simulate a pool session, calibrate it, compare with its truth
+	$(POOLCAL) run $(DEMO) --config $(DEMO)/pool.yaml --run runs/demo
+	$(POOLCAL) compare runs/demo $(DEMO).truth.json
+
+$(DEMO)/.simulated: $(SETUP) $(shell find pipeline/simulation configs/scenarios -name '*.py' -o -name '*.yaml')
+	rm -rf $(DEMO) $(DEMO).truth.json
+	$(POOLCAL) simulate $(DEMO) --seed $(SEED)
+	@touch $@
+
+calibrate: $(SETUP) ## all stages that are out of date: SESSION= CONFIG= RUN=
+	$(POOLCAL) run '$(SESSION)' --config '$(CONFIG)' --run '$(RUN)' $(if $(JOBS),--jobs $(JOBS))
+
+# The same, one rule a stage with real files as targets. (Paths with blanks: make cannot have them as targets;
+# `make calibrate` takes them.)
+ifeq ($(words $(SESSION) $(CONFIG) $(RUN)),3)
+stages: $(RUN)/report/manifest.json ## the same by files: one rule a stage, nothing runs when nothing is newer
+
+define STAGE_RULE
+$(RUN)/$(1)/manifest.json: stages/$(1).py $(2)
+	$$(POOLCAL) stage $(1) $(RUN) --session $(SESSION) --config $(CONFIG) $$(if $$(JOBS),--jobs $$(JOBS))
+endef
+RAW := $(filter-out %/.simulated,$(shell find $(SESSION) -type f 2>/dev/null))
+$(eval $(call STAGE_RULE,ingest,$(SETUP) $(CONFIG) $(SESSION)/session.yaml $(RAW)))
+$(eval $(call STAGE_RULE,georeference,$(RUN)/ingest/manifest.json))
+$(eval $(call STAGE_RULE,segment,$(RUN)/georeference/manifest.json))
+$(eval $(call STAGE_RULE,fit_planes,$(RUN)/segment/manifest.json))
+$(eval $(call STAGE_RULE,angle_iterate,$(RUN)/fit_planes/manifest.json))
+$(eval $(call STAGE_RULE,offsets,$(RUN)/angle_iterate/manifest.json))
+$(eval $(call STAGE_RULE,adjust,$(RUN)/offsets/manifest.json))
+$(eval $(call STAGE_RULE,report,$(RUN)/adjust/manifest.json))
+.PRECIOUS: $(STAGES:%=$(RUN)/%/manifest.json)
+endif
+
+# --- developing --------------------------------------------------------------------------------------------------------
+lint: $(SETUP) ## style, types, imports
+	.venv/bin/ruff check .
+	.venv/bin/mypy
+	.venv/bin/lint-imports --no-logo
+
+format: $(SETUP) ## what ruff can mend by itself
+	.venv/bin/ruff check --fix-only .
+
+test: lint ## lint, then every test
+	$(PYTHON) -m pytest -n 2 -q
+
+bench: $(SETUP) ## time the parts that must be fast
+	$(PYTHON) -m pytest tests/bench --benchmark-only --benchmark-disable-gc -q
+
+montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
+	$(PYTHON) -m tools.montecarlo
+
+clean: ## remove the demo and the tools' caches; results of other runs stay
+	rm -rf runs/demo runs/demo-session runs/demo-session.truth.json
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,33 @@
+"""Nearest points on a surface: the only importer of open3d beside the simulator's ray caster."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.targets import TargetModel
+
+Array = NDArray[np.float64]
+
+
+class ClosestSurface:
+    """Nearest point of a target model's faces; calls return points (n, 3) m and face numbers (n,).
+
+    Single precision (micrometres within tens of metres): for searching and labelling, never for a result.
+    """
+
+    def __init__(self, model: TargetModel) -> None:
+        import open3d as o3d  # half a second: only where needed
+
+        vertices, triangles = model.context()
+        self._tensor: Any = o3d.core.Tensor
+        self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+        self._scene.add_triangles(
+            self._tensor(vertices.astype(np.float32)), self._tensor(triangles.astype(np.uint32))
+        )
+        self._face_of_triangle = model.face_of_triangle()
+
+    def __call__(self, points_m: Array) -> tuple[Array, NDArray[np.int64]]:
+        answer = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=1)
+        triangles = answer["primitive_ids"].numpy().astype(np.int64)
+        return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]

@@ -1,0 +1,120 @@
+"""Files of a run folder: written whole or not at all, hashed once, removed safely.
+
+Whatever the disk refuses (full, read-only, not permitted, something in the way) is the user's to mend, so it becomes
+an :class:`~pipeline.errors.ArtefactError`; nothing else does.
+"""
+
+import contextlib
+import errno
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from pipeline.errors import ArtefactError
+from pipeline.streams import Mapper, serial
+
+_REMEDIES = {
+    errno.ENOSPC: "make room and run again",
+    errno.EDQUOT: "make room within the quota and run again",
+    errno.EROFS: "name a run folder on a disk that can be written",
+    errno.EACCES: "mend its permissions or name another run folder",
+    errno.EPERM: "mend its permissions or name another run folder",
+    errno.EEXIST: "move what is in the way, or name another run folder",
+    errno.ENOTDIR: "move what is in the way, or name another run folder",
+}
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Everything the operating system refuses inside becomes one line that names ``path`` and the remedy."""
+    try:
+        yield
+    except OSError as error:
+        number = error.errno if error.errno is not None else _errno_in(str(error))
+        reason = os.strerror(number) if number else str(error)
+        where = error.filename if isinstance(error.filename, str) else path
+        remedy = _REMEDIES.get(number or 0, "mend this or name another run folder")
+        raise ArtefactError(f"{where}: cannot be written ({reason}); {remedy}") from error
+
+
+def _errno_in(message: str) -> int | None:
+    """pyarrow says the number in words.
+
+    >>> _errno_in("Error writing bytes to file. Detail: [errno 28] No space left on device")
+    28
+    """
+    digits = message.lower().partition("[errno ")[2].partition("]")[0]
+    return int(digits) if digits.isdigit() else None
+
+
+def write_text(path: Path, text: str) -> None:
+    """UTF-8, and whole or not at all: written beside, then renamed over."""
+    beside = path.with_name(path.name + ".new")
+    with writing(path):
+        try:
+            beside.write_text(text, encoding="utf-8", newline="\n")
+            beside.replace(path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                beside.unlink()
+            raise
+
+
+def remove(path: Path) -> None:
+    """A file, link or folder, whether it is there or not."""
+    with writing(path):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file's content; a file that cannot be read is an ArtefactError."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); mend this and run again") from error
+
+
+class Digests:
+    """SHA-256 by file, remembered by path, size and times of change, so that large raw files are read once."""
+
+    def __init__(self, memory: Path | None, mapper: Mapper = serial) -> None:
+        self._memory = memory
+        self.mapper = mapper
+        self._known: dict[str, list[object]] = _read_memory(memory) if memory is not None else {}
+
+    def of(self, paths: Iterable[Path]) -> list[str]:
+        """The digests of ``paths``, in their order; unknown files are hashed side by side."""
+        asked = [path.absolute() for path in paths]
+        marks = {path: _mark(path) for path in asked}
+        stale = [path for path, mark in marks.items() if self._known.get(str(path), [None])[1:] != mark]
+        for path, digest in zip(stale, self.mapper(sha256, stale), strict=True):
+            self._known[str(path)] = [digest, *marks[path]]
+        if stale and self._memory is not None:
+            write_text(self._memory, json.dumps(self._known, indent=0, sort_keys=True) + "\n")
+        return [str(self._known[str(path)][0]) for path in asked]
+
+
+def _mark(path: Path) -> list[object]:
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); mend this and run again") from error
+    return [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
+
+
+def _read_memory(path: Path) -> dict[str, list[object]]:
+    """A damaged memory is forgotten: it only saves time."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    if not isinstance(content, dict):
+        return {}
+    return {name: entry for name, entry in content.items() if isinstance(entry, list) and len(entry) == 4}

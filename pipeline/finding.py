@@ -1,0 +1,220 @@
+"""Finds the target: its pose in the laser's points, then the mount with which the soundings fall onto it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipeline import config
+from pipeline.beams import beams_in_target
+from pipeline.clouds import ClosestSurface
+from pipeline.maths.labelling import Beams, label_points
+from pipeline.maths.registration import (
+    MountCorrection,
+    Refined,
+    TargetPose,
+    TiltedTarget,
+    refine,
+    score,
+    search,
+    settle,
+)
+from pipeline.maths.rotations import exp_so3, rotation_z
+from pipeline.maths.targets import TargetModel
+
+Array = NDArray[np.float64]
+SHARP_M = 0.06  # reach of the final score
+VOXEL_M = 0.1  # laser points are averaged over cubes of this size
+NARROW = (0.15, 0.1, 0.07, 0.05)
+
+
+@dataclass(frozen=True)
+class FoundTarget:
+    """R_target_from_pool (3, 3), origin of the target in the pool frame, and how sure that is."""
+
+    R_target_from_pool: Array
+    origin_pool_m: Array
+    azimuth_correction_rad: float
+    pose: Refined
+    tilt: Refined
+    score: float
+    rival_score: float
+    rival: str
+    ambiguous: bool
+
+
+def _planes(model: TargetModel) -> tuple[Array, Array]:
+    return np.array([face.normal for face in model.faces]), np.array([face.distance_m for face in model.faces])
+
+
+def find_target(
+    points_pool_m: Array, model: TargetModel, swapped: TargetModel, settings: config.Segment, azimuth_known: bool
+) -> FoundTarget:
+    """Pose of the target from dry laser points (n, 3) in the pool frame; rivals are the poses one block off.
+
+    Shifting by one period, or by half of it with the sides swapped, changes nothing but the ends of the stacks and the
+    wall's top edge: if those do not decide by ``ambiguity_margin`` of the points, the registration is ambiguous.
+    """
+    azimuth = np.radians(settings.search_azimuth_deg if azimuth_known else max(10.0, settings.search_azimuth_deg))
+    reach_xy, reach_z = settings.search_horizontal_m, settings.search_vertical_e * model.period_m / 2
+    sigmas = np.array([azimuth, reach_xy, reach_xy, reach_z])
+    placement = TargetPose(points_pool_m, sigmas)
+    normals, distances = _planes(model)
+    closest = ClosestSurface(model)
+    turns = np.linspace(-azimuth, azimuth, 5 if azimuth_known else 13)
+    steps = (-0.8, 0.0, 0.8)
+    starts = [
+        np.array([turn, reach_xy * x, reach_xy * y, reach_z * z]) for turn in turns for x in steps for y in steps for z in steps
+    ]
+    quarter = model.period_m / 4
+
+    def same(p: Array, q: Array) -> bool:
+        return bool(np.max(np.abs(p[1:] - q[1:])) < quarter)
+
+    found = search(placement, starts, closest, normals, same, 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02]), SHARP_M)
+
+    def label(_: Array, points: Array) -> NDArray[np.int16]:
+        dry = points[:, 2] > model.water_level_m + settings.water_margin_m
+        labels = label_points(model, points, Beams.head_on(len(points)), 0.05, 0.05 + settings.margin_m, 0.0)
+        return np.where(dry, labels.face, -1).astype(np.int16)
+
+    pose = refine(placement, found.parameters, label, normals, distances)
+    best = _agreement(placement, pose.parameters, model, closest)
+    tilted = TiltedTarget(placement.points(pose.parameters), np.array([0.1, 0.1, 0.1, 1.0, 1.0, 1.0]))
+    tilt = refine(tilted, np.zeros(6), label, normals, distances, rounds=2)
+    name, rival = _rivals(placement, pose.parameters, model, swapped)
+    R_target_from_pool = rotation_z(pose.parameters[0])
+    ambiguous = bool(rival > best * (1 - settings.ambiguity_margin))
+    return FoundTarget(
+        R_target_from_pool, pose.parameters[1:], pose.parameters[0], pose, tilt, best, rival, name, ambiguous
+    )
+
+
+def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, closest: ClosestSurface) -> float:
+    """Share of laser points explained by the model and of the model's dry upright faces covered by points, in [0, 1].
+
+    Both ways, because a model that reaches beyond the end of the stack explains every point as well.
+    """
+    points = placement.points(parameters)
+    explained = score(placement, parameters, closest, SHARP_M) * len(points)
+    grid = model.upright_grid(VOXEL_M, model.water_level_m + VOXEL_M)
+    distance, _ = cKDTree(points).query(grid)
+    covered = np.maximum(0.0, 1.0 - (distance / (2 * VOXEL_M)) ** 2).sum()
+    return float((explained + covered) / (len(points) + len(grid)))
+
+
+def _rivals(placement: TargetPose, best: Array, model: TargetModel, swapped: TargetModel) -> tuple[str, float]:
+    """The best of the poses one block off, and how well it agrees."""
+    rivals = []
+    for name, other, shifts in (
+        ("one block {}", model, (model.period_m, -model.period_m)),
+        ("low_side swapped, half a period {}", swapped, (model.period_m / 2, -model.period_m / 2)),
+    ):
+        closest = ClosestSurface(other)
+        # No prior here: the rival may settle where it fits best.
+        free = TargetPose(placement.points_pool_m, np.full(4, 1e3))
+        for shift in shifts:
+            start = best + np.array([0.0, 0.0, 0.0, shift])
+            settled = settle(free, start, closest, _planes(other)[0], NARROW)
+            agreement = _agreement(free, settled, other, closest)
+            rivals.append((name.format("higher" if shift > 0 else "lower"), agreement))
+    return max(rivals, key=lambda rival: rival[1])
+
+
+@dataclass(frozen=True)
+class SoundingSample:
+    """Soundings with their poses in the target frame: positions (n, 3), R (n, 3, 3); points_mbes_m (n, 3)."""
+
+    positions_m: Array
+    R_target_from_body: Array
+    points_mbes_m: Array
+
+
+@dataclass(frozen=True)
+class FoundMount:
+    """The mount for labelling: rotation vector from coarse (body), lever arm correction, and the gate that follows."""
+
+    rotation_vector_rad: Array
+    lever_arm_correction_m: Array
+    scale_m: float
+    gate_m: float
+    score: float
+    rival_score: float
+    ambiguous: bool
+
+
+def find_mount(
+    sample: SoundingSample,
+    model: TargetModel,
+    R_body_from_mbes: Array,
+    lever_arm_m: Array,
+    beam_rad: tuple[float, float],
+    settings: config.Segment,
+) -> FoundMount:
+    """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search limits.
+
+    First the wall: roll turns it about the track and x shifts it, nothing else moves it, so both follow from a vote over
+    the part of the wall that is the wall wherever the rest still stands. Then a search over yaw, y and z; blocks
+    repeat every period, so z is sought within the lever arm's limits and a rival there is reported.
+    """
+    angle, arm = np.radians(settings.search_mount_deg), settings.search_mount_m
+    sigmas = np.array([angle, angle, angle, arm, arm, arm])
+    body = sample.points_mbes_m @ R_body_from_mbes.T
+    placement = MountCorrection(sample.positions_m, sample.R_target_from_body, body, lever_arm_m, sigmas)
+    normals, distances = _planes(model)
+    closest = ClosestSurface(model)
+    roll, shift_x = _wall_vote(placement, model, settings)
+    base = np.array([0.0, roll, 0.0, shift_x, 0.0, 0.0])
+    starts = [
+        base + np.array([0.0, 0.0, yaw, 0.0, y, z])
+        for yaw in np.linspace(-angle, angle, 5)
+        for y in np.linspace(-arm, arm, 3)
+        for z in np.linspace(-arm, arm, 7)
+    ]
+
+    def same(p: Array, q: Array) -> bool:
+        return bool(np.max(np.abs(p[3:] - q[3:])) < model.period_m / 4)
+
+    found = search(placement, starts, closest, normals, same, 1.5 * sigmas, SHARP_M)
+    gate = 0.08
+
+    def label(parameters: Array, points: Array) -> NDArray[np.int16]:
+        R = exp_so3(parameters[:3]) @ R_body_from_mbes
+        beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, beam_rad)
+        wet = points[:, 2] < model.water_level_m - settings.water_margin_m
+        grazing = np.radians(settings.min_grazing_deg)
+        return np.where(wet, label_points(model, points, beams, gate, settings.margin_m, grazing).face, -1).astype(np.int16)
+
+    refined = refine(placement, found.parameters, label, normals, distances)
+    gate = max(settings.gate_m, 5 * refined.scale_m) if np.isfinite(refined.scale_m) else settings.gate_m
+    ambiguous = bool(found.rival_score > found.score * (1 - settings.ambiguity_margin))
+    return FoundMount(
+        refined.parameters[:3], refined.parameters[3:], refined.scale_m, gate, found.score, found.rival_score, ambiguous
+    )
+
+
+def _wall_vote(placement: MountCorrection, model: TargetModel, settings: config.Segment) -> tuple[float, float]:
+    """Roll correction (rad) and x shift (m) that gather most soundings of the wall's middle in one plane x = 0.
+
+    A turn ρ about body y moves a sounding by ρ T (e_y × m); only its x component matters on the wall.
+    """
+    points = placement.points(np.zeros(6))
+    wall = model.faces[model.family_faces("P2")[0]].vertices_m
+    spare = max(0.25 * wall[:, 1].max(), wall[:, 1].max() - settings.search_mount_m - 0.45)
+    low, high = wall[:, 2].min(), model.water_level_m - settings.water_margin_m
+    use = (np.abs(points[:, 1]) < spare) & (points[:, 2] > low) & (points[:, 2] < high) & (np.abs(points[:, 0]) < 1.0)
+    if use.sum() < 20:
+        return 0.0, 0.0
+    lever = np.cross([0.0, 1.0, 0.0], placement.points_body_m[use])
+    slope = np.einsum("nj,nj->n", placement.R_target_from_body[use, 0, :], lever)
+    bins = np.arange(-0.9, 0.9 + 1e-9, 0.02)
+    best = (-1.0, 0.0, 0.0)
+    reach = np.radians(1.2 * settings.search_mount_deg)
+    for roll in np.linspace(-reach, reach, 73):
+        votes = np.histogram(points[use, 0] + roll * slope, bins)[0].astype(float)
+        votes = votes[:-2] + 2 * votes[1:-1] + votes[2:]
+        top = int(np.argmax(votes))
+        if votes[top] > best[0]:
+            best = (float(votes[top]), float(roll), float(-(bins[top + 1] + 0.01)))
+    return best[1], best[2]

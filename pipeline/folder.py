@@ -1,0 +1,171 @@
+"""A run folder: locked while in use, every stage swapped in whole, what it was made from in run.yaml."""
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import yaml
+
+from pipeline import config, manifest
+from pipeline.errors import ArtefactError, ConfigError
+from pipeline.files import remove, write_text, writing
+
+RUN_YAML = "run.yaml"
+LOCK = ".lock"
+DIGESTS = "digests.json"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a run is made from: both configs, checked, and where the raw files are."""
+
+    session_folder: Path
+    pool: config.PoolConfig
+    session: config.SessionConfig
+
+    def resolved(self) -> dict[str, Any]:
+        """Every setting by the name under which a stage's Config asks for it."""
+        blocks = (self.pool, self.session)
+        return {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as plain values, defaults filled in."""
+        return {**self.pool.model_dump(mode="json"), **self.session.model_dump(mode="json")}
+
+
+def load_settings(session_folder: Path, config_path: Path) -> Settings:
+    """Both YAML files, read and checked."""
+    pool = config.load_pool(config_path)
+    return Settings(session_folder.resolve(), pool, config.load_session(session_folder))
+
+
+def refuse_overlap(run: Path, session_folder: Path) -> None:
+    """Raw data and results never share a folder: a run folder is swapped and cleared."""
+    inner, outer = run.resolve(), session_folder.resolve()
+    if inner.is_relative_to(outer) or outer.is_relative_to(inner):
+        raise ConfigError(f"--run {run}: lies in the session folder {session_folder}, or round it; name a folder apart")
+
+
+# --- run.yaml --------------------------------------------------------------------------------------------------------
+def write_settings(run: Path, settings: Settings) -> None:
+    content = {
+        "session_folder": str(settings.session_folder),
+        "config": settings.pool.model_dump(mode="json"),
+        "session": settings.session.model_dump(mode="json"),
+    }
+    head = "# Written by poolcal: the config and the session of this run, as used, defaults filled in.\n"
+    write_text(run / RUN_YAML, head + yaml.safe_dump(content, sort_keys=False, width=120))
+
+
+def read_settings(run: Path) -> Settings:
+    """What the run in this folder was made from."""
+    path = run / RUN_YAML
+    if not path.is_file():
+        raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
+    content = config.read_yaml(path)
+    folder = content.get("session_folder")
+    if set(content) != {"session_folder", "config", "session"} or not isinstance(folder, str):
+        raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
+    pool = config.parse(config.PoolConfig, content["config"], f"{path}: config")
+    return Settings(Path(folder), pool, config.parse(config.SessionConfig, content["session"], f"{path}: session"))
+
+
+# --- the lock --------------------------------------------------------------------------------------------------------
+@contextlib.contextmanager
+def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
+    """Make ``run`` if need be, keep every other process out of it, and tidy up after a process that was killed."""
+    with writing(run):
+        run.mkdir(parents=True, exist_ok=True)
+        strangers = sorted(entry.name for entry in run.iterdir() if entry.name not in (LOCK, DIGESTS))
+        if strangers and not (run / RUN_YAML).is_file() and strangers != [RUN_YAML + ".new"]:
+            raise ArtefactError(f"{run}: holds {strangers[0]} but no {RUN_YAML}, so it is no run folder; name another")
+        file = (run / LOCK).open("a+", encoding="utf-8")
+    with file:
+        _lock(file, run, fcntl.LOCK_EX)
+        with writing(run / LOCK):
+            file.truncate(0)
+            file.write(f"{os.getpid()}\n")
+            file.flush()
+        for stage in stages:
+            recover(run / stage)
+        yield
+
+
+@contextlib.contextmanager
+def reading(run: Path) -> Iterator[None]:
+    """Keep writers out while a run is checked. A folder that cannot be written needs no lock."""
+    try:
+        file = (run / LOCK).open(encoding="utf-8")
+    except OSError:
+        yield
+        return
+    with file:
+        _lock(file, run, fcntl.LOCK_SH)
+        yield
+
+
+def _lock(file: TextIO, run: Path, how: int) -> None:
+    try:
+        fcntl.flock(file, how | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        file.seek(0)
+        holder = file.read(20).strip()
+        by = f"process {holder}" if holder.isdigit() else "another process"
+        raise ArtefactError(f"{run}: is in use by {by}; wait for it to end, or name another run folder") from error
+    except OSError as error:
+        raise ArtefactError(f"{run}: cannot be locked ({error.strerror}); use a run folder on a local disk") from error
+
+
+# --- a stage's folder ------------------------------------------------------------------------------------------------
+def partial(stage: Path) -> Path:
+    return stage.with_name(stage.name + ".partial")
+
+
+def _old(stage: Path) -> Path:
+    return stage.with_name(stage.name + ".old")
+
+
+def swap_in(stage: Path) -> None:
+    """The finished partial folder takes the stage's place. Killed at any step, :func:`recover` finds a whole result."""
+    with writing(stage):
+        remove(_old(stage))
+        if os.path.lexists(stage):
+            stage.rename(_old(stage))
+        partial(stage).rename(stage)
+    remove(_old(stage))
+
+
+def recover(stage: Path) -> None:
+    """Bring a stage's folder into a whole state: the newest complete result stands, all else goes."""
+    with writing(stage):
+        if not os.path.lexists(stage):
+            for candidate in (partial(stage), _old(stage)):  # between the two renames: both are complete
+                if manifest.read(candidate) is not None:
+                    candidate.rename(stage)
+                    break
+        remove(partial(stage))
+        if os.path.lexists(stage):
+            remove(_old(stage))
+
+
+def touch(stage: Path) -> None:
+    """Tell make that a result was looked at and found current."""
+    with writing(stage / manifest.NAME):
+        (stage / manifest.NAME).touch()
+
+
+def calibration(run: Path) -> dict[str, Any]:
+    """RUN/report/calibration.json."""
+    path = run / "report" / "calibration.json"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ArtefactError(f"{path}: cannot be read ({error}); run poolcal run again") from error
+    if not isinstance(content, dict) or content.get("verdict") not in ("accepted", "rejected"):
+        raise ArtefactError(f"{path}: holds no verdict; run poolcal run again")
+    return content

@@ -1,0 +1,81 @@
+"""What is out of date in a run folder, and why: decided by content, never by times."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from pipeline import manifest, readers
+from pipeline.artefacts import Artefact, Document, Provenance, Raw
+from pipeline.errors import ArtefactError
+from pipeline.evaluate import declared, name_of
+from pipeline.executor import SERIAL, Workers
+from pipeline.files import Digests
+from pipeline.folder import Settings
+from pipeline.progress import Progress
+
+SENSORS = ("ins", "laser", "mbes")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run folder, open and locked."""
+
+    path: Path
+    settings: Settings
+    digests: Digests
+    workers: Workers = SERIAL
+    progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
+
+    def folder(self, stage: str) -> Path:
+        return self.path / stage
+
+
+def out_of_date(this: Run, stage: ModuleType) -> list[str]:
+    """Why the stage has to be run; empty when its result is current."""
+    old = manifest.read(this.folder(name_of(stage)))
+    if old is None:
+        return ["has no result yet"]
+    return manifest.reasons(old, key_of(this, stage), present(this, this.folder(name_of(stage)), old))
+
+
+def present(this: Run, where: Path, old: manifest.Manifest) -> dict[str, str | None]:
+    """The stage's files as they are now."""
+    there = [name for name in old.outputs if (where / name).is_file()]
+    found = dict(zip(there, this.digests.of(where / name for name in there), strict=True))
+    return {name: found.get(name) for name in old.outputs}
+
+
+def key_of(this: Run, stage: ModuleType) -> manifest.Key:
+    plain = this.settings.as_json()
+    raw: dict[str, str] = {}
+    inputs: dict[str, str] = {}
+    for marker in declared(stage.Inputs).values():
+        if isinstance(marker, Raw):
+            raw |= raw_digests(this, marker.sensor)
+        elif isinstance(marker, Provenance):
+            raw |= {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
+        else:
+            inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
+    config = {field.name: plain[field.name] for field in dataclasses.fields(stage.Config)}
+    return manifest.Key(config, raw, inputs, manifest.source_of(stage), manifest.versions())
+
+
+def raw_digests(this: Run, sensor: str) -> dict[str, str]:
+    """Digest by file of one sensor, relative to the session folder."""
+    root = this.settings.session_folder
+    paths = readers.raw_files(getattr(this.settings.session, sensor), root)
+    return dict(zip((path.relative_to(root).as_posix() for path in paths), this.digests.of(paths), strict=True))
+
+
+def _artefact_digest(this: Run, marker: Artefact | Document) -> str:
+    owner = manifest.read(this.folder(marker.owner))
+    found = manifest.artefact_digests(owner.outputs) if owner is not None else {}
+    name = file_name(marker)
+    if name not in found:
+        raise ArtefactError(f"{this.folder(marker.owner)}: has no complete {name}; run stage {marker.owner} first")
+    return found[name]
+
+
+def file_name(marker: Artefact | Document) -> str:
+    return f"{marker.name}.parquet" if isinstance(marker, Artefact) and marker.kind == "table" else marker.name

@@ -1,0 +1,191 @@
+"""A stage's manifest: what it was made from and what it made, and the reasons why that is out of date.
+
+A result is current when the same config section, the same input content, the same source of this program and the same
+versions of the libraries would be used again, and its files are still as they were written. Times are never compared.
+"""
+
+import functools
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pipeline
+from pipeline.files import sha256, write_text
+
+NAME = "manifest.json"
+SCHEMA = 1
+LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "pyxtf", "novatel-edie")
+ROOT = Path(pipeline.__file__).parent.parent
+NO_INFLUENCE = ("simulation/", "exports/", "progress.py", "executor.py")  # of pipeline/: cannot change a result
+
+
+@dataclass(frozen=True)
+class Key:
+    """Everything a stage's result follows from."""
+
+    config: Mapping[str, Any]  # by field of the stage's Config
+    raw: Mapping[str, str]  # digest by raw file, relative to the session folder
+    inputs: Mapping[str, str]  # digest by artefact, "owner/name"
+    source: Mapping[str, str]  # digest by file of this program
+    versions: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Manifest:
+    stage: str
+    key: Key
+    outputs: Mapping[str, Mapping[str, Any]]  # sha256, bytes and, of tables and parts, rows, by file in the folder
+    rows: Mapping[str, int]  # by artefact
+    counts: list[dict[str, Any]]  # points in and out, with the reason for every dropped one
+    git_commit: str | None
+    wall_s: float
+
+    def write(self, folder: Path) -> None:
+        content = {"schema": SCHEMA, **asdict(self)}
+        write_text(folder / NAME, json.dumps(content, indent=1, ensure_ascii=True) + "\n")
+
+
+def read(folder: Path) -> Manifest | None:
+    """The manifest in ``folder``; None when there is none, or none that makes sense."""
+    try:
+        content = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        if content.pop("schema") != SCHEMA:
+            return None
+        manifest = Manifest(**content | {"key": Key(**content["key"])})
+        plain = (manifest.key.config, manifest.key.raw, manifest.key.inputs, manifest.key.source, manifest.key.versions)
+        good = all(isinstance(m, dict) for m in (*plain, manifest.rows, manifest.outputs))
+        return manifest if good and all(_is_file(*item) for item in manifest.outputs.items()) else None
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
+
+
+def _is_file(name: str, entry: Any) -> bool:
+    inside = not Path(name).is_absolute() and ".." not in Path(name).parts
+    return inside and isinstance(entry, dict) and isinstance(entry.get("sha256"), str)
+
+
+def artefact_digests(outputs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """One digest for each table, document or stream; a stream's covers the names and digests of its parts.
+
+    >>> sorted(artefact_digests({"a.parquet": {"sha256": "1"}, "s/part-00000-000.parquet": {"sha256": "2"}}))
+    ['a.parquet', 's']
+    """
+    streams: dict[str, Any] = {}
+    found: dict[str, str] = {}
+    for name, entry in sorted(outputs.items()):
+        stream, _, part = name.rpartition("/")
+        if stream:
+            streams.setdefault(stream, hashlib.sha256()).update(f"{part} {entry['sha256']}\n".encode())
+        else:
+            found[name] = str(entry["sha256"])
+    return found | {name: digest.hexdigest() for name, digest in streams.items()}
+
+
+# --- what a result follows from, beside its inputs -------------------------------------------------------------------
+@functools.cache
+def versions() -> dict[str, str]:
+    """Of Python, this program and the libraries that can change a digit."""
+    found = {"poolcal": pipeline.__version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def source_of(stage: ModuleType) -> dict[str, str]:
+    """Digests of the stage's own files and of the library's."""
+    own = Path(str(stage.__file__))
+    files = list(own.parent.rglob("*")) if own.name == "__init__.py" else [own]
+    base = own.parent.parent.parent if own.name == "__init__.py" else own.parent.parent
+    mine = {path.relative_to(base).as_posix(): sha256(path) for path in files if _is_source(path)}
+    return dict(sorted({**_library(), **mine}.items()))
+
+
+@functools.cache
+def _library() -> dict[str, str]:
+    folder = Path(pipeline.__file__).parent
+    names = ((path.relative_to(folder).as_posix(), path) for path in folder.rglob("*") if _is_source(path))
+    return {f"pipeline/{name}": sha256(path) for name, path in names if not name.startswith(NO_INFLUENCE)}
+
+
+def _is_source(path: Path) -> bool:
+    hidden = any(part.startswith(".") or part == "__pycache__" for part in path.parts[-3:])
+    return path.is_file() and not hidden and path.suffix != ".pyc"
+
+
+@functools.cache
+def git_commit() -> str | None:
+    """The commit this program was checked out at, where git and a repository are there to tell."""
+    if not (ROOT / ".git").exists():
+        return None
+    command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.strip() or None
+
+
+# --- reasons ---------------------------------------------------------------------------------------------------------
+def reasons(old: Manifest, key: Key, digests: Mapping[str, str | None]) -> list[str]:
+    """Why ``old`` is out of date; empty: it is current. ``digests``: its files as they are now (None: gone)."""
+    written = {name: entry["sha256"] for name, entry in old.outputs.items()}
+    return [
+        *_file_changes(written, digests, "its result ", "edited"),
+        *_value_changes(_flat(old.key.config), _flat(key.config)),
+        *_file_changes(old.key.raw, key.raw, "", "changed"),
+        *_file_changes(old.key.inputs, key.inputs, "its input ", "changed"),
+        *_source_changes(old.key.source, key.source),
+        *_value_changes(old.key.versions, key.versions),
+    ]
+
+
+def _file_changes(old: Mapping[str, Any], new: Mapping[str, Any], what: str, verb: str) -> Iterator[str]:
+    for name in sorted(old.keys() | new.keys()):
+        if old.get(name) == new.get(name):
+            continue
+        word = "is new" if name not in old else "is gone" if new.get(name) is None else f"was {verb}" if what else verb
+        yield f"{what}{name} {word}"
+
+
+def _value_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    for name in sorted(old.keys() | new.keys()):
+        before, after = (_shown(values.get(name, "(none)")) for values in (old, new))
+        if old.get(name, "(none)") != new.get(name, "(none)"):
+            yield f"{name} {before} -> {after}"
+
+
+def _source_changes(old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[str]:
+    changed = sorted(name for name in old.keys() | new.keys() if old.get(name) != new.get(name))
+    if changed:
+        more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
+        yield f"poolcal changed ({changed[0]}{more})"
+
+
+def _shown(value: Any) -> str:
+    text = value if isinstance(value, str) else json.dumps(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested keys joined by dots.
+
+    >>> _flat({"segment": {"margin_m": 0.05}})
+    {'segment.margin_m': 0.05}
+    """
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping) and value:
+            flat |= _flat(value, f"{prefix}{name}.")
+        else:
+            flat[f"{prefix}{name}"] = value
+    return flat

@@ -1,0 +1,223 @@
+"""Finding the target in a cloud: a search over coarse poses, then Gauss-Newton onto the nearest surface.
+
+Both sensors use the same two steps; they differ in what moves: for the laser the target's pose (azimuth, x, y, z), for
+the soundings the mount (rotation, lever arm). A ``Placement`` hides which.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.rotations import exp_so3, rotation_z
+
+Array = NDArray[np.float64]
+Closest = Callable[[Array], tuple[Array, NDArray[np.int64]]]  # points -> nearest points on the model, face numbers
+
+
+class Placement(Protocol):
+    """Points in the target frame as a function of k parameters, and their derivatives."""
+
+    prior_sigmas: Array
+
+    def points(self, parameters: Array) -> Array:
+        """(k,) -> (n, 3) m."""
+        ...
+
+    def rows(self, parameters: Array, directions: Array) -> Array:
+        """Derivative of ``directions · point``, (n, 3) -> (n, k)."""
+        ...
+
+
+@dataclass(frozen=True)
+class TargetPose:
+    """Laser points in the pool frame, (n, 3) m; parameters (azimuth correction β rad, origin o of the target in pool).
+
+    x_target = Rz(β) (x_pool - o): with the target's y axis β further clockwise than configured, coordinates turn by +β.
+    d(g · x_target)/dβ = g · (e_z × x_target), d/do = -gᵀ Rz(β).
+    """
+
+    points_pool_m: Array
+    prior_sigmas: Array
+
+    def points(self, parameters: Array) -> Array:
+        return (self.points_pool_m - parameters[1:]) @ rotation_z(parameters[0]).T
+
+    def rows(self, parameters: Array, directions: Array) -> Array:
+        placed = self.points(parameters)
+        turn = directions[:, 1] * placed[:, 0] - directions[:, 0] * placed[:, 1]
+        return np.column_stack([turn, -directions @ rotation_z(parameters[0])])
+
+
+@dataclass(frozen=True)
+class MountCorrection:
+    """Soundings with poses (n, 3), (n, 3, 3) in the target frame, m = R_body_from_mbes(coarse) x_mbes (n, 3);
+    parameters (rotation vector δ, lever arm correction): x = p + T (Exp(δ) m + l + Δl).
+
+    Rows [u × g_body, g_body], u = Exp(δ) m, g_body = Tᵀ g: exact for the increment ε of Exp(ε) Exp(δ), and within
+    |δ| / 2 relative for δ itself, enough for an iteration.
+    """
+
+    positions_m: Array
+    R_target_from_body: Array
+    points_body_m: Array
+    lever_arm_m: Array
+    prior_sigmas: Array
+
+    def points(self, parameters: Array) -> Array:
+        body = self.points_body_m @ exp_so3(parameters[:3]).T + self.lever_arm_m + parameters[3:]
+        return self.positions_m + np.einsum("nij,nj->ni", self.R_target_from_body, body)
+
+    def rows(self, parameters: Array, directions: Array) -> Array:
+        turned = self.points_body_m @ exp_so3(parameters[:3]).T
+        g = np.einsum("nij,ni->nj", self.R_target_from_body, directions)
+        return np.hstack([np.cross(turned, g), g])
+
+
+def score(placement: Placement, parameters: Array, closest: Closest, reach_m: float) -> float:
+    """Share of points explained by the model: mean of max(0, 1 - (distance / reach)²), in [0, 1]."""
+    points = placement.points(parameters)
+    nearest, _ = closest(points)
+    squared = np.sum((points - nearest) ** 2, axis=1) / reach_m**2
+    return float(np.mean(np.maximum(0.0, 1.0 - squared)))
+
+
+def settle(
+    placement: Placement,
+    start: Array,
+    closest: Closest,
+    normals: Array,
+    reaches_m: Sequence[float] = (0.4, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05),
+    steps: int = 4,
+) -> Array:
+    """Gauss-Newton onto the nearest surface, within a reach that shrinks from step to step; (k,) parameters.
+
+    Each point's residual is its distance from the nearest point of the nearest face, along the line between them (along
+    the face's normal where they coincide), weighted (1 - (d / reach)²)² and nothing beyond the reach. The prior keeps
+    directions that the points leave open where they were.
+    """
+    parameters = start.copy()
+    prior = np.diag(0.05**2 / placement.prior_sigmas**2)  # as if one point with 5 cm said the same
+    for reach in reaches_m:
+        for _ in range(steps):
+            points = placement.points(parameters)
+            nearest, face = closest(points)
+            away = points - nearest
+            distance = np.linalg.norm(away, axis=1)
+            use = distance < reach
+            if use.sum() < len(parameters):
+                return parameters
+            direction = np.where(distance[:, None] > 1e-4, away / np.maximum(distance, 1e-12)[:, None], normals[face])
+            residual = np.sum(direction * away, axis=1)[use]
+            weight = (1 - (residual / reach) ** 2) ** 2
+            rows = placement.rows(parameters, direction)[use]
+            normal = (rows * weight[:, None]).T @ rows + prior
+            right = -(rows * weight[:, None]).T @ residual - prior @ parameters
+            step = np.linalg.solve(normal, right)
+            parameters = parameters + step
+            if np.max(np.abs(step)) < 1e-5:
+                break
+    return parameters
+
+
+@dataclass(frozen=True)
+class Found:
+    """A pose and what it explains, with the best rival that is another pose (not the same one found again)."""
+
+    parameters: Array
+    score: float
+    rival_score: float
+    rival_parameters: Array
+
+
+def search(
+    placement: Placement,
+    starts: Sequence[Array],
+    closest: Closest,
+    normals: Array,
+    same: Callable[[Array, Array], bool],
+    limits: Array,
+    reach_m: float = 0.06,
+    keep: int = 6,
+) -> Found:
+    """Best pose from many starts: all are scored with a wide reach, the ``keep`` best settle and are scored sharply.
+
+    ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells whether two settled poses are
+    the same solution.
+    """
+    ranked = sorted(starts, key=lambda p: -score(placement, p, closest, 0.25))[:keep]
+    settled = [settle(placement, start, closest, normals) for start in ranked]
+    allowed = [p for p in settled if np.all(np.abs(p) <= limits)] or [np.clip(settled[0], -limits, limits)]
+    scored = sorted(((score(placement, p, closest, reach_m), tuple(p)) for p in allowed), reverse=True)
+    best_score, best = scored[0][0], np.array(scored[0][1])
+    others = [(s, np.array(p)) for s, p in scored[1:] if not same(best, np.array(p))]
+    rival_score, rival = others[0] if others else (0.0, best)
+    return Found(best, best_score, rival_score, rival)
+
+
+@dataclass(frozen=True)
+class TiltedTarget:
+    """Points already in the target frame, (n, 3) m; parameters: a small rotation vector and a shift of the points.
+
+    d(g · x)/dω = x × g (from g · (ω × x)), d/ds = g: used once, at zero.
+    """
+
+    points_target_m: Array
+    prior_sigmas: Array
+
+    def points(self, parameters: Array) -> Array:
+        return self.points_target_m @ exp_so3(parameters[:3]).T + parameters[3:]
+
+    def rows(self, parameters: Array, directions: Array) -> Array:
+        return np.hstack([np.cross(self.points(parameters), directions), directions])
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Parameters (k,), covariance (k, k) from the residuals' robust scale, that scale, the RMS and how many points."""
+
+    parameters: Array
+    covariance: Array
+    scale_m: float
+    rms_m: float
+    count: int
+
+
+def refine(
+    placement: Placement,
+    start: Array,
+    label: Callable[[Array, Array], NDArray[np.int16]],
+    normals: Array,
+    distances_m: Array,
+    rounds: int = 6,
+) -> Refined:
+    """Point-to-plane least squares on labelled points only, relabelled each round: no bias from edges.
+
+    ``label(parameters, points)`` gives face numbers (-1: none). Residual r = n · x - d, Huber weights min(1, k s / |r|) with
+    k = 2 and s = 1.4826 · median |r|; covariance s² (Aᵀ W A + prior)⁻¹. With too few points the start comes back.
+    """
+    parameters = start.copy()
+    scale, rms, count = np.inf, np.nan, 0
+    covariance = np.diag(placement.prior_sigmas**2)
+    for _ in range(rounds):
+        points = placement.points(parameters)
+        face = label(parameters, points)
+        use = face >= 0
+        count = int(use.sum())
+        if count < 3 * len(parameters):
+            break
+        residual = np.sum(points[use] * normals[face[use]], axis=1) - distances_m[face[use]]
+        scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-9)
+        rms = float(np.sqrt(np.mean(residual**2)))
+        weight = np.minimum(1.0, 2 * scale / np.maximum(np.abs(residual), 1e-12))
+        directions = np.zeros_like(points)
+        directions[use] = normals[face[use]]
+        rows = placement.rows(parameters, directions)[use]
+        prior = np.diag((scale / placement.prior_sigmas) ** 2)
+        inverse = np.linalg.inv((rows * weight[:, None]).T @ rows + prior)
+        step = -inverse @ ((rows * weight[:, None]).T @ residual + prior @ parameters)
+        parameters = parameters + step
+        covariance = scale**2 * inverse
+    return Refined(parameters, covariance, scale, rms, count)

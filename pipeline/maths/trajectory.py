@@ -1,0 +1,119 @@
+"""Poses of the body between the INS's records: position linear, attitude on the rotation group."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
+from pipeline.maths.rotations import (
+    exp_coefficients,
+    exp_so3,
+    log_so3,
+    quaternion_from_rotation,
+    rotation_from_attitude,
+    rotation_from_quaternion,
+)
+
+Array = NDArray[np.float64]
+Times = NDArray[np.int64]
+BLOCK = 16_384  # points turned at a time: fits the cache
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Body poses in one fixed frame F (pool or target).
+
+    t_ns (n,) ascending; positions_m (n, 3) in F; R_frame_from_body (n, 3, 3). Between records k and k + 1, with
+    s in [0, 1]: position p_k + s (p_{k+1} - p_k), attitude R_k · Exp(s φ_k), φ_k = Log(R_kᵀ R_{k+1}) (slerp). At 200 Hz
+    and roll of 1° in 4 s this is within 1e-7 rad of the smooth motion.
+    """
+
+    t_ns: Times
+    positions_m: Array
+    R_frame_from_body: Array
+    steps_rad: Array
+
+    @classmethod
+    def build(cls, t_ns: Times, positions_m: Array, R_frame_from_body: Array) -> "Trajectory":  # noqa: N803
+        steps = log_so3(np.swapaxes(R_frame_from_body[:-1], -1, -2) @ R_frame_from_body[1:])
+        return cls(t_ns, positions_m, R_frame_from_body, np.concatenate([steps, np.zeros((1, 3))]))
+
+    def moved(self, R_new_from_frame: Array, shift_m: Array) -> "Trajectory":  # noqa: N803
+        """The same poses in another frame: x_new = R_new_from_frame · x + shift; steps are body vectors and stay."""
+        return Trajectory(
+            self.t_ns,
+            self.positions_m @ R_new_from_frame.T + shift_m,
+            R_new_from_frame @ self.R_frame_from_body,
+            self.steps_rad,
+        )
+
+    def _locate(self, t_ns: Times) -> tuple[NDArray[np.int64], Array]:
+        index = np.clip(np.searchsorted(self.t_ns, t_ns, side="right") - 1, 0, len(self.t_ns) - 2)
+        start = self.t_ns[index]
+        return index, (t_ns - start) / (self.t_ns[index + 1] - start)
+
+    def covers(self, t_ns: Times, max_interval_ns: int) -> NDArray[np.bool_]:
+        """Which moments lie between two records not further apart than ``max_interval_ns``; (n,)."""
+        if len(self.t_ns) < 2:
+            return np.zeros(len(t_ns), dtype=bool)
+        index, _ = self._locate(t_ns)
+        inside = (t_ns >= self.t_ns[0]) & (t_ns <= self.t_ns[-1])
+        return inside & (self.t_ns[index + 1] - self.t_ns[index] <= max_interval_ns)
+
+    def poses_at(self, t_ns: Times) -> tuple[Array, Array]:
+        """Positions (n, 3) and rotations R_frame_from_body (n, 3, 3) at ``t_ns`` (n,)."""
+        index, share = self._locate(t_ns)
+        positions = self.positions_m[index] + share[:, None] * (self.positions_m[index + 1] - self.positions_m[index])
+        return positions, self.R_frame_from_body[index] @ exp_so3(self.steps_rad[index] * share[:, None])
+
+    def place(self, t_ns: Times, points_body_m: Array) -> Array:
+        """Points fixed to the body, (n, 3) m, into the frame at their moments: p(t) + R(t) x; (n, 3) m.
+
+        R(t) x = R_k Exp(v) x with v = s φ_k is evaluated without forming the matrices (Rodrigues on the vector),
+        block by block so that the work stays in the cache.
+        """
+        placed = np.empty_like(points_body_m)
+        for start in range(0, len(t_ns), BLOCK):
+            rows = slice(start, start + BLOCK)
+            index, share = self._locate(t_ns[rows])
+            x = points_body_m[rows].T
+            v = self.steps_rad[index].T * share
+            first, second = exp_coefficients(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+            cross = _cross(v, x)
+            turned = x + first * cross + second * _cross(v, cross)
+            R = self.R_frame_from_body[index]
+            p = self.positions_m[index]
+            p = p + share[:, None] * (self.positions_m[index + 1] - p)
+            for axis in range(3):
+                placed[rows, axis] = (
+                    p[:, axis] + R[:, axis, 0] * turned[0] + R[:, axis, 1] * turned[1] + R[:, axis, 2] * turned[2]
+                )
+        return placed
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross product of (3, n) arrays (numpy's own is several times slower)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def poses_in_pool(
+    frame: PoolFrame,
+    latitude_rad: Array,
+    longitude_rad: Array,
+    height_m: Array,
+    roll_rad: Array,
+    pitch_rad: Array,
+    azimuth_rad: Array,
+) -> tuple[Array, Array]:
+    """INS records -> positions (n, 3) m and R_pool_from_body (n, 3, 3) [0034].
+
+    R_pool_from_body = R_pool_from_ecef · R_ecef_from_level(INS) · R_level_from_body: the level frame is the one at the
+    INS, not at the pool's origin (10 m apart they differ by 1.6e-6 rad).
+    """
+    positions = frame.points_from_ecef(ecef_from_geodetic(latitude_rad, longitude_rad, height_m))
+    R_ecef_from_body = rotation_ecef_from_level(latitude_rad, longitude_rad) @ rotation_from_attitude(
+        roll_rad, pitch_rad, azimuth_rad
+    )
+    # Through the quaternion: exactly orthonormal, and what is stored in Parquet is what is used.
+    return positions, rotation_from_quaternion(quaternion_from_rotation(frame.R_pool_from_ecef @ R_ecef_from_body))

@@ -1,0 +1,48 @@
+"""From the configuration's degrees to what the mathematics takes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.maths.rotations import mount_from_rotation, rotation_from_mount
+from pipeline.maths.targets import TargetModel, build_target
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mounted:
+    """A sensor on the body: R_body_from_sensor (3, 3), lever_arm_body_m (3,)."""
+
+    R_body_from_sensor: Array
+    lever_arm_body_m: Array
+
+    def settings(self) -> dict[str, float]:
+        """The contract's six numbers."""
+        names = ("roll_deg", "pitch_deg", "yaw_deg")
+        angles = (float(np.degrees(angle)) for angle in mount_from_rotation(self.R_body_from_sensor))
+        lever = (float(value) for value in self.lever_arm_body_m)
+        return dict(zip(names, angles, strict=True)) | dict(zip(("x_m", "y_m", "z_m"), lever, strict=True))
+
+
+def mount_of(mount: config.Mount) -> Mounted:
+    """Radians and matrices from a mount's settings."""
+    angles = np.radians([mount.roll_deg, mount.pitch_deg, mount.yaw_deg])
+    return Mounted(rotation_from_mount(*map(float, angles)), np.array([mount.x_m, mount.y_m, mount.z_m]))
+
+
+def target_of(target: config.Target, low_side: str | None = None) -> TargetModel:
+    """The target's faces; ``low_side`` overrides the configured one."""
+    return build_target(
+        target.a,
+        target.b,
+        target.c,
+        target.e,
+        low_side or target.low_side,
+        target.blocks_per_side,
+        target.first_base_m,
+        target.stagger_m,
+        target.water_level_m,
+    )

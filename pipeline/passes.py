@@ -1,0 +1,94 @@
+"""Passes: maximal intervals without gap or along-track reversal, and the direction of the track."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Times = NDArray[np.int64]
+Interval = tuple[int, int]
+
+
+def split_at_gaps(t_ns: Times, max_gap_ns: int) -> list[Interval]:
+    """First and last moment of each stretch of ascending times without a gap above ``max_gap_ns``.
+
+    >>> split_at_gaps(np.array([0, 1, 2, 10, 11]), 5)
+    [(0, 2), (10, 11)]
+    """
+    if len(t_ns) == 0:
+        return []
+    ends = np.flatnonzero(np.diff(t_ns) > max_gap_ns)
+    starts = np.concatenate([[0], ends + 1])
+    return [(int(t_ns[s]), int(t_ns[e])) for s, e in zip(starts, np.append(ends, len(t_ns) - 1), strict=True)]
+
+
+def reversals(t_ns: Times, along_m: Array, hysteresis_m: float) -> list[int]:
+    """Moments of turning: extremes of the along-track coordinate that are left by more than ``hysteresis_m``.
+
+    >>> reversals(np.arange(7), np.array([0.0, 1, 2, 3, 2, 1, 0]), 1.5)
+    [3]
+    """
+    turns: list[int] = []
+    if len(t_ns) == 0:
+        return turns
+    stride = max(1, len(t_ns) // max(1, int((t_ns[-1] - t_ns[0]) // 100_000_000)))  # 10 Hz is enough for a turn
+    times, values = t_ns[::stride].tolist(), along_m[::stride].tolist()
+    high = low = values[0]
+    high_t = low_t = times[0]
+    direction = 0
+    for t, value in zip(times, values, strict=True):
+        if value > high:
+            high, high_t = value, t
+        if value < low:
+            low, low_t = value, t
+        if direction >= 0 and high - value > hysteresis_m:
+            if direction > 0:
+                turns.append(int(high_t))
+            direction, low, low_t = -1, value, t
+        elif direction <= 0 and value - low > hysteresis_m:
+            if direction < 0:
+                turns.append(int(low_t))
+            direction, high, high_t = 1, value, t
+        if direction > 0:
+            low, low_t = value, t
+        elif direction < 0:
+            high, high_t = value, t
+    return turns
+
+
+def find_passes(
+    ins_t_ns: Times, along_m: Array, ping_t_ns: Times, max_gap_ns: int, reversal_m: float, shortest_ns: int = 1_000_000_000
+) -> list[Interval]:
+    """Intervals in which INS and soundings run without a gap and the boat does not turn back; ascending, disjoint."""
+    pings = split_at_gaps(ping_t_ns, max_gap_ns)
+    passes: list[Interval] = []
+    for start, end in split_at_gaps(ins_t_ns, max_gap_ns):
+        rows = slice(int(np.searchsorted(ins_t_ns, start)), int(np.searchsorted(ins_t_ns, end, side="right")))
+        cuts = [start, *reversals(ins_t_ns[rows], along_m[rows], reversal_m), end]
+        for leg_start, leg_end in zip(cuts[:-1], cuts[1:], strict=True):
+            for ping_start, ping_end in pings:
+                first, last = max(leg_start, ping_start), min(leg_end, ping_end)
+                if last - first >= shortest_ns:
+                    passes.append((first, last))
+    return passes
+
+
+def pass_of(t_ns: Times, starts_ns: Times, ends_ns: Times) -> NDArray[np.int16]:
+    """Number of the pass each moment lies in, -1 for none; (n,)."""
+    if len(starts_ns) == 0:
+        return np.full(len(t_ns), -1, dtype=np.int16)
+    index = np.searchsorted(starts_ns, t_ns, side="right") - 1
+    inside = (index >= 0) & (t_ns <= ends_ns[np.maximum(index, 0)])
+    return np.where(inside, index, -1).astype(np.int16)
+
+
+def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> float | None:
+    """Direction of the track past the origin, clockwise from north: mean heading while the origin is near, to starboard.
+
+    east, north (n,): the INS relative to the target's origin. None when the boat never had the target to starboard.
+    """
+    starboard = -(east_m * np.cos(azimuth_rad) - north_m * np.sin(azimuth_rad))
+    ahead = -(east_m * np.sin(azimuth_rad) + north_m * np.cos(azimuth_rad))
+    near = (starboard > 0) & (starboard < within_m) & (np.abs(ahead) < starboard)
+    if not near.any():
+        return None
+    return float(np.arctan2(np.sin(azimuth_rad[near]).mean(), np.cos(azimuth_rad[near]).mean()))

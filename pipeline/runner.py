@@ -1,0 +1,211 @@
+"""Read, run, write, remember: brings a run folder's stages up to date, and only those that are not.
+
+The stages themselves come from above (:mod:`stages`): this module knows their protocol (:mod:`pipeline.evaluate`),
+not their names.
+"""
+
+import dataclasses
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from pipeline import folder, manifest, readers, store
+from pipeline.artefacts import Artefact, Document, Provenance, Raw
+from pipeline.errors import ArtefactError, RawDataError
+from pipeline.evaluate import FolderSink, declared, evaluate, is_stream, name_of, sources
+from pipeline.executor import SERIAL, Stopped, Workers
+from pipeline.files import Digests, remove, write_text, writing
+from pipeline.folder import Settings
+from pipeline.freshness import SENSORS, Run, key_of, out_of_date, raw_digests
+from pipeline.progress import Progress
+from pipeline.streams import Chunk, ParquetPart, Part, Stream
+
+
+def run(
+    stages: Sequence[ModuleType],
+    session_folder: Path,
+    config_path: Path,
+    run_folder: Path,
+    workers: Workers = SERIAL,
+    progress: Progress | None = None,
+) -> list[str]:
+    """Bring every stage up to date; the names of those that had to be run."""
+    settings = folder.load_settings(session_folder, config_path)
+    folder.refuse_overlap(run_folder, session_folder)
+    with folder.locked(run_folder, [name_of(stage) for stage in stages]):
+        folder.write_settings(run_folder, settings)
+        this = _open(run_folder, settings, workers, progress)
+        return [name_of(stage) for stage in stages if _bring_up_to_date(this, stage)]
+
+
+def run_stage(
+    stages: Sequence[ModuleType],
+    name: str,
+    run_folder: Path,
+    settings: Settings | None = None,
+    workers: Workers = SERIAL,
+    progress: Progress | None = None,
+) -> bool:
+    """Bring one stage up to date; those before it must be. ``settings``: new ones, else those in run.yaml."""
+    names = [name_of(stage) for stage in stages]
+    if settings is None:
+        settings = folder.read_settings(run_folder)
+    folder.refuse_overlap(run_folder, settings.session_folder)
+    with folder.locked(run_folder, names):
+        folder.write_settings(run_folder, settings)
+        this = _open(run_folder, settings, workers, progress)
+        for stage in stages[: names.index(name)]:
+            if why := out_of_date(this, stage):
+                raise ArtefactError(f"{run_folder}: {name_of(stage)}: {why[0]}; run stage {name_of(stage)} first")
+        return _bring_up_to_date(this, stages[names.index(name)])
+
+
+def _open(path: Path, settings: Settings, workers: Workers, progress: Progress | None) -> Run:
+    digests = Digests(path / folder.DIGESTS, workers.here)
+    return Run(path, settings, digests, workers, progress or Progress(quiet=True))
+
+
+# --- reading, running, writing ---------------------------------------------------------------------------------------
+def _bring_up_to_date(this: Run, stage: ModuleType) -> bool:
+    name = name_of(stage)
+    reasons = out_of_date(this, stage)
+    if not reasons:
+        folder.touch(this.folder(name))
+        this.progress.note(f"{name}: up to date")
+        return False
+    this.progress.reasons(name, reasons)
+    with this.progress.stage(name):
+        _execute(this, stage)
+    return True
+
+
+def _execute(this: Run, stage: ModuleType) -> None:
+    start = time.perf_counter()
+    target = this.folder(name_of(stage))
+    partial = folder.partial(target)
+    key = key_of(this, stage)
+    settings = this.settings.resolved()
+    config = stage.Config(**{field.name: settings[field.name] for field in dataclasses.fields(stage.Config)})
+    inputs = stage.Inputs(**{name: _read(this, marker) for name, marker in declared(stage.Inputs).items()})
+    remove(partial)
+    try:
+        streams = _make_folders(partial, stage)
+        this.progress.begin(_rows_to_map(this, stage))
+        outputs = evaluate(stage, inputs, config, FolderSink(partial, streams), this.workers.map)
+        rows = _write(partial, stage, outputs)
+        if key_of(this, stage).raw != key.raw:
+            raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")
+        entries = _entries(this, partial)
+        counts = getattr(outputs, "counts", None)
+        manifest.Manifest(
+            stage=name_of(stage),
+            key=key,
+            outputs=entries,
+            rows=rows,
+            counts=[] if counts is None else counts.to_dict("records"),
+            git_commit=manifest.git_commit(),
+            wall_s=round(time.perf_counter() - start, 3),
+        ).write(partial)
+        folder.swap_in(target)
+    except BaseException:
+        _remove_quietly(partial)
+        raise
+
+
+def _remove_quietly(partial: Path) -> None:
+    """After a failure: what made the stage fail is the error to show, not what hinders the tidying up."""
+    try:
+        remove(partial)
+    except ArtefactError:
+        return
+
+
+def _make_folders(partial: Path, stage: ModuleType) -> dict[str, Artefact]:
+    streams = {n: m for n, m in declared(stage.Outputs).items() if isinstance(m, Artefact) and is_stream(m)}
+    with writing(partial):
+        partial.mkdir()
+        for marker in streams.values():
+            (partial / marker.name).mkdir()
+    return streams
+
+
+def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
+    """Rows of the streams that are mapped; None where raw files do not tell."""
+    markers = declared(stage.Inputs)
+    total = 0
+    for source in sources(stage):
+        marker = markers[source]
+        owner = manifest.read(this.folder(marker.owner)) if isinstance(marker, Artefact) else None
+        if owner is None or not isinstance(marker, Artefact):
+            return None
+        total += owner.rows.get(marker.name, 0)
+    return total
+
+
+def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
+    if isinstance(marker, Provenance):
+        raw = {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
+        return {"inputs": raw, "software": manifest.versions()}
+    if isinstance(marker, Raw):
+        settings = getattr(this.settings.session, marker.sensor)
+        return _stream(this, readers.raw_parts(marker.sensor, settings, this.settings.session_folder))
+    where = this.folder(marker.owner)
+    if isinstance(marker, Document):
+        return (where / marker.name).read_text(encoding="utf-8")
+    if marker.kind == "table":
+        return store.read_table(where / f"{marker.name}.parquet", marker)
+    owner = manifest.read(where)
+    names = sorted(owner.outputs) if owner is not None else []
+    return _stream(this, [ParquetPart(where / name) for name in names if name.startswith(f"{marker.name}/")])
+
+
+@dataclass(frozen=True)
+class _Watched:
+    """A part that counts its rows for the progress bar, and ends when the run has failed elsewhere."""
+
+    part: Part
+    this: Run
+
+    @property
+    def name(self) -> str:
+        return self.part.name
+
+    def chunks(self) -> Iterator[Chunk]:
+        for chunk in self.part.chunks():
+            if self.this.workers.stop.is_set():
+                raise Stopped
+            yield chunk
+            self.this.progress.advance(len(next(iter(chunk.columns.values()), ())))
+
+
+def _stream(this: Run, parts: Sequence[Part]) -> Stream:
+    watched = [_Watched(part, this) for part in parts] if this.workers.local else parts
+    return Stream(tuple(watched), this.workers.map)
+
+
+def _write(partial: Path, stage: ModuleType, outputs: Any) -> dict[str, int]:
+    """Write tables and documents (streams have been written part by part); rows by artefact."""
+    rows: dict[str, int] = {}
+    for name, marker in declared(stage.Outputs).items():
+        value = getattr(outputs, name)
+        if isinstance(marker, Document):
+            write_text(partial / marker.name, value)
+        elif isinstance(marker, Artefact) and marker.kind == "table":
+            store.write_table(partial / f"{marker.name}.parquet", store.to_arrow(value, marker))
+            rows[marker.name] = len(value)
+        elif isinstance(marker, Artefact):
+            rows[marker.name] = sum(store.rows_of(path) for path in sorted((partial / marker.name).iterdir()))
+    return rows
+
+
+def _entries(this: Run, partial: Path) -> dict[str, dict[str, Any]]:
+    paths = sorted(path for path in partial.rglob("*") if path.is_file())
+    return {
+        path.relative_to(partial).as_posix(): {"sha256": digest, "bytes": path.stat().st_size}
+        for path, digest in zip(paths, Digests(None, this.digests.mapper).of(paths), strict=True)
+    }
+
+

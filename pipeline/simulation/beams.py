@@ -1,0 +1,88 @@
+"""A fan of beams: the angles a head records, and what beams of finite width measure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.simulation.earth import Floats
+from pipeline.simulation.raycast import RayCaster
+from pipeline.simulation.scenario import MbesScenario
+
+LEAST_WEIGHT = 0.3  # this share of a beam must meet something, else there is no detection
+LONGEST_STEP = 60_000  # section A2: of 65535
+
+
+@dataclass(frozen=True)
+class Fan:
+    """Angles as a BTH0 packet holds them: evenly from first to last (A0), or first plus whole steps (A2)."""
+
+    first_rad: float  # exact in float32, as the last
+    last_rad: float
+    angles_rad: Floats
+    steps: NDArray[np.uint16] | None = None  # A2 only; the first is 0
+    step_scale_rad: float = 0.0
+
+
+def fan(scenario: MbesScenario) -> Fan:
+    """The recorded angles of all pings, port to starboard; equidistant: even in tan(angle), as on a flat floor."""
+    half = np.radians(scenario.sector_deg) / 2
+    first, last = float(np.float32(-half)), float(np.float32(half))
+    if scenario.spacing == "equi_angle":
+        return Fan(first, last, np.linspace(first, last, scenario.beams))
+    wished = np.arctan(np.linspace(-np.tan(half), np.tan(half), scenario.beams)) - first
+    scale = float(np.float32(np.diff(wished).max() / LONGEST_STEP))
+    steps = np.diff(np.rint(wished / scale), prepend=0.0).astype(np.uint16)
+    return Fan(first, last, first + np.cumsum(steps.astype(np.float64)) * scale, steps, scale)
+
+
+class Beams:
+    """Beams as bundles of rays over their -3 dB width, weighted with a Gaussian pattern."""
+
+    def __init__(self, scenario: MbesScenario, caster: RayCaster, water_level_m: float) -> None:
+        self.caster, self.water_level_m, self.max_range_m = caster, water_level_m, scenario.max_range_m
+        self.projector_m = np.array(scenario.projector_offset_m)
+        counts = (1, 1) if scenario.point_beams else scenario.sub_rays
+        across, along = (np.arange(n) - n // 2 for n in counts)
+        parts = [offsets / max(n - 1, 1) for offsets, n in zip((across, along), counts, strict=True)]  # of the width
+        grid_across, grid_along = (grid.ravel() for grid in np.meshgrid(*parts, indexing="ij"))
+        self.across_rad = grid_across * np.radians(scenario.beam_deg[0])
+        self.along_rad = grid_along * np.radians(scenario.beam_deg[1])
+        weights = np.exp(-4 * np.log(2) * (grid_across**2 + grid_along**2))
+        self.weights = weights / weights.sum()
+        self.rays = len(weights)
+        self.axis = self.rays // 2
+
+    def paths(self, origins_m: Floats, R_target_from_mbes: Floats, angles_rad: Floats) -> tuple[Floats, Floats]:
+        """Half the sound's path for (p, b) physical angles, inf where nothing answers; and the directions of the axes.
+
+        A beam that lies on one plane entirely is phase detected: its axis's range. Else its echo is the mean of what
+        its parts meet. Origins (p, 3) and R_target_from_mbes (p, 3, 3) are per ping, directions (p, b, 3).
+        """
+        pings, beams = angles_rad.shape
+        across = angles_rad[..., None] + self.across_rad
+        sines, cosines = np.sin(across), np.cos(across)
+        along = np.cos(self.along_rad)
+        forward = np.broadcast_to(np.sin(self.along_rad), sines.shape)
+        direction_mbes = np.stack([sines * along, forward, -cosines * along], axis=-1)
+        directions = direction_mbes.reshape(pings, -1, 3) @ R_target_from_mbes.transpose(0, 2, 1)
+        origins = np.repeat(origins_m, beams * self.rays, axis=0)
+        flat = directions.reshape(-1, 3)
+        ranges, surfaces = self.caster.cast(origins, flat)
+        wet = (surfaces >= 0) & (ranges <= self.max_range_m)
+        wet &= origins[:, 2] + np.where(wet, ranges, 0.0) * flat[:, 2] < self.water_level_m
+        paths = np.where(wet, ranges, 0.0)
+        if self.projector_m.any():
+            points_mbes = paths[:, None] * direction_mbes.reshape(-1, 3)
+            paths = (paths + np.linalg.norm(points_mbes - self.projector_m, axis=1)) / 2
+        shape = (pings, beams, self.rays)
+        detected = self._detect(paths.reshape(shape), wet.reshape(shape), surfaces.reshape(shape))
+        return detected, directions.reshape(*shape, 3)[:, :, self.axis]
+
+    def _detect(self, paths: Floats, wet: NDArray[np.bool_], surfaces: NDArray[np.int64]) -> Floats:
+        axis = slice(self.axis, self.axis + 1)
+        one_plane = np.all(wet & (surfaces == surfaces[..., axis]), axis=-1)
+        weights = self.weights * wet
+        total = weights.sum(axis=-1)
+        mean = np.divide((weights * paths).sum(axis=-1), total, out=np.full(total.shape, np.inf), where=total > 0)
+        return np.where(one_plane, paths[..., self.axis], np.where(total >= LEAST_WEIGHT, mean, np.inf))

@@ -1,0 +1,80 @@
+"""What the INS records: its true pose, Gauss-Markov drift through the whole session, and white noise."""
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.signal import lfilter
+
+from pipeline.config import Drift
+from pipeline.simulation.earth import Floats
+from pipeline.simulation.motion import Movement, Times
+from pipeline.simulation.noise import generator
+from pipeline.simulation.scenario import InsScenario
+from pipeline.times import NS
+
+Columns = dict[str, np.ndarray]
+NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
+
+
+def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Columns, list[int]]:
+    """The canonical raw columns, and the first row of each pass (and of the end)."""
+    times = [_epochs(scenario.rate_hz, *movement.ins_runs_ns(k)) for k in movement.passes]
+    t_ns = np.concatenate(times)
+    errors = drift(scenario.drift, t_ns, generator(seed, "ins_drift")) + white(scenario, len(t_ns), seed)
+    rows = np.concatenate([[0], np.cumsum([len(t) for t in times])])
+    columns: Columns = {"t_ns": t_ns} | {name: np.empty(len(t_ns)) for name in NAMES}
+    for k in movement.passes:
+        part = slice(rows[k], rows[k + 1])
+        pose = movement.pose(k, times[k])
+        east_north_up = errors[:3, part].T
+        shift_target = movement.site.R_level_from_target.inv().apply(east_north_up)
+        position = movement.site.geodetic_from_target(pose.position_target_m + shift_target)
+        for name, values in zip(NAMES[:3], position, strict=True):
+            columns[name][part] = values
+        columns["roll_rad"][part] = pose.roll_rad + errors[3, part]
+        columns["pitch_rad"][part] = pose.pitch_rad + errors[4, part]
+        columns["azimuth_rad"][part] = (pose.azimuth_rad + errors[5, part]) % (2 * np.pi)
+    return columns, [int(row) for row in rows]
+
+
+def _epochs(rate_hz: float, start_ns: int, end_ns: int) -> Times:
+    """Epochs at whole multiples of the record interval in GPS time, as receivers give them."""
+    interval_ns = round(NS / rate_hz)
+    return np.arange(-(-start_ns // interval_ns), end_ns // interval_ns + 1, dtype=np.int64) * interval_ns
+
+
+def sigmas(position_m: tuple[float, float, float], attitude_deg: tuple[float, float, float]) -> Floats:
+    """(6, 1): east, north, up in m; roll, pitch, azimuth in rad."""
+    return np.concatenate([position_m, np.radians(attitude_deg)])[:, None]
+
+
+def white(scenario: InsScenario, count: int, seed: int) -> Floats:
+    """(6, count) independent errors of each record."""
+    position, attitude = scenario.white.position_m, scenario.white.attitude_deg
+    noise = generator(seed, "ins_white").standard_normal((6, count))
+    return sigmas((position,) * 3, (attitude,) * 3) * noise
+
+
+def drift(scenario: Drift, t_ns: Times, random: np.random.Generator) -> Floats:
+    """(6, n) first-order Gauss-Markov errors; the process goes on through gaps.
+
+    x(t + dt) = f x(t) + sqrt(1 - f²) sigma w, f = exp(-dt / tau): stationary from the first record on.
+    """
+    scale = sigmas(
+        (scenario.horizontal_m, scenario.horizontal_m, scenario.vertical_m),
+        (scenario.roll_pitch_deg, scenario.roll_pitch_deg, scenario.heading_deg),
+    )
+    shocks = random.standard_normal((6, len(t_ns)))
+    steps = np.diff(t_ns)
+    usual = np.median(steps) if len(steps) else 1
+    breaks = [0, *(np.flatnonzero(np.abs(steps - usual) > 1) + 1), len(t_ns)]
+    result = np.empty_like(shocks)
+    last, before_ns = np.zeros(6), None
+    for begin, end in pairwise(breaks):
+        f = 0.0 if before_ns is None else np.exp(-(t_ns[begin] - before_ns) / NS / scenario.time_constant_s)
+        shocks[:, begin] = f * last + np.sqrt(1 - f**2) * shocks[:, begin]
+        f = np.exp(-usual / NS / scenario.time_constant_s)
+        shocks[:, begin + 1 : end] *= np.sqrt(1 - f**2)
+        result[:, begin:end] = lfilter([1.0], [1.0, -f], shocks[:, begin:end], axis=1)
+        last, before_ns = result[:, end - 1], t_ns[end - 1]
+    return scale * result

@@ -1,0 +1,34 @@
+"""LAS 1.4, point format 6 (and LAZ): points in the scanner's frame with GPS time."""
+
+from datetime import date
+from pathlib import Path
+
+import laspy
+import numpy as np
+from laspy.header import GpsTimeType
+
+from pipeline.simulation.ins import Columns
+from pipeline.simulation.scenario import LaserScenario
+from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS
+
+CHUNK = 1_000_000
+
+
+def write_las(path: Path, laser: Columns, scenario: LaserScenario, day: date) -> None:
+    """One file. The creation date is the session's day: the same session gives the same bytes."""
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = np.full(3, scenario.scale_m), np.zeros(3)
+    header.creation_date = day
+    header.system_identifier, header.generating_software = "simulated scanner", "poolcal simulate"
+    weekly = scenario.time == "week_seconds"
+    header.global_encoding.gps_time_type = GpsTimeType.WEEK_TIME if weekly else GpsTimeType.STANDARD
+    with laspy.open(path, mode="w", header=header, do_compress=scenario.format == "laz") as file:
+        for start in range(0, len(laser["t_ns"]), CHUNK):
+            part = {name: values[start : start + CHUNK] for name, values in laser.items()}
+            points = laspy.ScaleAwarePointRecord.zeros(len(part["t_ns"]), header=header)
+            points.x, points.y, points.z = part["x_m"], part["y_m"], part["z_m"]
+            t_ns = part["t_ns"] % WEEK_NS if weekly else part["t_ns"] - ADJUSTED_STANDARD_OFFSET_S * NS
+            points.gps_time = t_ns // NS + t_ns % NS / NS
+            points.return_number[:] = 1
+            points.number_of_returns[:] = 1
+            file.write_points(points)

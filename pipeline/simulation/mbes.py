@@ -1,0 +1,124 @@
+"""What the sonar records: two-way times and angles of beams of finite width, with the echoes nobody wants."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.simulation.beams import Beams, fan
+from pipeline.simulation.earth import Floats
+from pipeline.simulation.ins import Columns
+from pipeline.simulation.motion import Movement, Times
+from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
+from pipeline.simulation.noise import generator
+from pipeline.simulation.raycast import RayCaster
+from pipeline.simulation.scenario import MbesScenario
+from pipeline.times import NS
+
+RAYS_AT_ONCE = 400_000
+CLOCK_RATE_ERROR = 3.7e-5  # the sonar's own clock: pings never fall into step with the INS
+SHORTEST_M = 0.5
+UPWARD_RAD = np.radians(-30.0)  # beams above this may get the water surface's echo
+
+
+@dataclass(frozen=True)
+class Pool:
+    """What the sonar needs to know of the world."""
+
+    caster: RayCaster
+    water_level_m: float
+    corner_lines: Floats  # (n, 4): x, y, lowest z, highest z
+
+
+def record_mbes(
+    scenario: MbesScenario, movement: Movement, pool: Pool, seed: int
+) -> tuple[Columns, Columns]:
+    """Detections (canonical raw columns), and all pings (t_ns, ping, pass)."""
+    angles = fan(scenario).angles_rad
+    parts: list[Columns] = []
+    pings: list[Columns] = []
+    first = 1000
+    for k in movement.passes:
+        sonar = _Pass(scenario, movement, pool, angles, seed, k, first)
+        batch = max(1, RAYS_AT_ONCE // (len(angles) * sonar.beams.rays))
+        parts += [sonar.detections(slice(i, i + batch)) for i in range(0, max(len(sonar.t_ns), 1), batch)]
+        pings.append({"t_ns": sonar.recorded_ns, "ping": sonar.ping, "pass": np.full(len(sonar.ping), k)})
+        first += sonar.count
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return columns, {name: np.concatenate([part[name] for part in pings]) for name in pings[0]}
+
+
+class _Pass:
+    """One pass; batches of pings must be taken in order, as they share the generators."""
+
+    def __init__(
+        self, scenario: MbesScenario, movement: Movement, pool: Pool, angles_rad: Floats, seed: int, k: int, first: int
+    ) -> None:
+        self.scenario, self.movement, self.pool, self.k, self.angles_rad = scenario, movement, pool, k, angles_rad
+        start_ns, end_ns = movement.sensors_run_ns(k)
+        period_s = (1 + CLOCK_RATE_ERROR) / scenario.ping_rate_hz
+        phase = generator(seed, "mbes_clock", k).random()
+        self.count = round((end_ns - start_ns) / NS / period_s)
+        t_ns = start_ns + np.rint((np.arange(self.count) + phase) * period_s * NS).astype(np.int64)
+        kept = generator(seed, "mbes_drop", k).random(self.count) >= scenario.dropped_ping_share
+        self.t_ns: Times = t_ns[kept]
+        self.recorded_ns: Times = self.t_ns + round(scenario.latency_s * NS)
+        self.ping = first + np.flatnonzero(kept).astype(np.int64)
+        self.beams = Beams(scenario, pool.caster, pool.water_level_m)
+        self.R_body_from_mbes = R_body_from_sensor(scenario.mount).as_matrix()
+        names = ("range", "angle", "outlier", "surface", "corner")
+        self.random = {name: generator(seed, f"mbes_{name}", k) for name in names}
+
+    def detections(self, part: slice) -> Columns:
+        """The canonical raw columns of some pings; beams without echo are left out."""
+        s, t_ns = self.scenario, self.t_ns[part]
+        shape = (len(t_ns), len(self.angles_rad))
+        pose = self.movement.pose(self.k, t_ns)
+        origins = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(s.mount)
+        R_target_from_mbes = pose.R_target_from_body @ self.R_body_from_mbes
+        steered = self.angles_rad + np.radians(s.angle_sigma_deg) * self.random["angle"].standard_normal(shape)
+        # The arrays are flat: beams are steered with the recorded sound speed, sin(true) = k sin(recorded).
+        sines = s.sound_speed_true_m_s / s.sound_speed_recorded_m_s * np.sin(steered)
+        looks = np.abs(sines) < 1
+        physical = np.arcsin(np.where(looks, sines, 0.0))
+        paths, directions = self.beams.paths(origins, R_target_from_mbes, physical)
+        paths = self._corners(paths, origins, directions)
+        paths = paths + s.range_sigma_m * self.random["range"].standard_normal(shape)
+        paths = self._surface(paths, origins, directions)
+        dice = self.random["outlier"].random((*shape, 2))
+        anything = SHORTEST_M + dice[..., 1] * (s.max_range_m - SHORTEST_M)
+        paths = np.where(dice[..., 0] < s.outlier_share, anything, paths)
+        ping, beam = np.nonzero(np.isfinite(paths) & looks & (paths > 0.1) & (paths <= s.max_range_m))
+        return {
+            "t_ns": self.recorded_ns[part][ping],
+            "ping": self.ping[part][ping],
+            "beam": beam.astype(np.int16),
+            "two_way_time_s": 2 * paths[ping, beam] / s.sound_speed_true_m_s,
+            "angle_rad": self.angles_rad[beam],
+            "sound_speed_m_s": np.full(len(ping), float(np.float32(s.sound_speed_recorded_m_s))),
+        }
+
+    def _corners(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
+        """Near an inner corner the corner itself answers: the nearest point of its line within the beam."""
+        s = self.scenario
+        dice = self.random["corner"].random(paths.shape)
+        ping, beam = np.nonzero(np.isfinite(paths) & (dice < s.corner_share))
+        hits = origins[ping] + paths[ping, beam, None] * directions[ping, beam]
+        half = paths[ping, beam] * np.radians(s.beam_deg[0]) / 2
+        result = paths.copy()
+        for x, y, low, high in self.pool.corner_lines:
+            near = np.hypot(hits[:, 0] - x, hits[:, 1] - y) < s.corner_reach_m
+            near &= (hits[:, 2] > low) & (hits[:, 2] < high)
+            start = origins[ping[near]]
+            height = np.clip(start[:, 2], hits[near, 2] - half[near], hits[near, 2] + half[near])
+            points = np.column_stack([np.full(len(height), x), np.full(len(height), y), np.clip(height, low, high)])
+            result[ping[near], beam[near]] = np.linalg.norm(points - start, axis=1)
+        return result
+
+    def _surface(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
+        """Echoes of the water surface: along the beam if it rises enough to meet it, else from straight above."""
+        dice = self.random["surface"].random(paths.shape)
+        chosen = (dice < self.scenario.surface_share) & (directions[..., 2] > np.sin(UPWARD_RAD))
+        depth = np.broadcast_to((self.pool.water_level_m - origins[:, 2])[:, None], paths.shape)
+        rise = directions[..., 2]
+        along = np.divide(depth, rise, out=np.full(paths.shape, np.inf), where=rise > 1e-3)
+        return np.where(chosen, np.where(along <= self.scenario.max_range_m, along, depth), paths)

@@ -1,0 +1,120 @@
+"""Target and pool as planar polygons, built from the letters a, b, c, e; and their triangles.
+
+Origin: centre of the wall's front face; x into the wall, y along it ("north" is +y), z up. A block on side s = ±1 is
+the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pipeline.config import Target
+from pipeline.simulation.earth import Floats
+from pipeline.simulation.scenario import Surroundings
+
+SIDES = {"south": -1.0, "north": 1.0}
+BEHIND_M = 30.0  # the floor reaches this far toward the vessel
+
+
+@dataclass(frozen=True)
+class Polygon:
+    name: str
+    vertices_m: Floats  # (k, 3), seen from outside counter-clockwise
+
+
+def block_bases_m(target: Target, side: str) -> list[float]:
+    """Heights of the blocks' bases: the low side's first at first_base_m, the other side's stagger_m above it."""
+    first = -target.a / 2 if target.first_base_m is None else target.first_base_m
+    stagger = target.e if target.stagger_m is None else target.stagger_m
+    count = int(target.a / (2 * target.e) + 1e-9) if target.blocks_per_side is None else target.blocks_per_side
+    lowest = first if side == target.low_side else first + stagger
+    return [lowest + 2 * target.e * k for k in range(count)]
+
+
+def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = True) -> list[Polygon]:
+    """Side faces, top and bottom over a footprint (k, 2) that runs counter-clockwise seen from above."""
+    def at(height_m: float) -> Floats:
+        return np.column_stack([corners, np.full(len(corners), height_m)])
+
+    low, high = at(low_m), at(high_m)
+    after = np.roll(np.arange(len(corners)), -1)
+    faces = [Polygon(f"{name}_{k}", np.array([low[k], low[n], high[n], high[k]])) for k, n in enumerate(after)]
+    return faces + ([Polygon(f"{name}_top", high), Polygon(f"{name}_bottom", low[::-1])] if caps else [])
+
+
+def target_polygons(target: Target) -> list[Polygon]:
+    """The wall as a box back to the pool's wall, and the blocks."""
+    a, half, c, e = target.a, target.b / 2, target.c, target.e
+    polygons = prism("wall", np.array([[0, -half], [c, -half], [c, half], [0, half]]), -a / 2, a / 2)
+    for side, s in SIDES.items():
+        footprint = np.array([[0, s * half], [c, s * half], [c, s * (half + c)]])
+        footprint = footprint if s > 0 else footprint[::-1]
+        for k, base in enumerate(block_bases_m(target, side)):
+            polygons += prism(f"{side}_{k}", footprint, base, base + e)
+    return polygons
+
+
+def pool_polygons(target: Target, surroundings: Surroundings) -> list[Polygon]:
+    """Back wall (plane x = c) and floor."""
+    reach, c = surroundings.half_length_m, target.c
+    floor, top = -target.a / 2 - surroundings.floor_gap_m, target.a / 2 + surroundings.wall_above_m
+    wall = np.array([[c, -reach, floor], [c, -reach, top], [c, reach, top], [c, reach, floor]])
+    ground = np.array([[-BEHIND_M, -reach, floor], [c, -reach, floor], [c, reach, floor], [-BEHIND_M, reach, floor]])
+    return [Polygon("back_wall", wall), Polygon("floor", ground)]
+
+
+def corner_lines(target: Target) -> Floats:
+    """Inner corners with the back wall, (n, 4): x, y, lowest z, highest z.
+
+    Slanted faces meet it at y = ±(b/2 + c); in the gaps between blocks the wall's sides do at y = ±b/2.
+    """
+    lines = []
+    for side, s in SIDES.items():
+        bases = block_bases_m(target, side)
+        lines += [(target.c, s * (target.b / 2 + target.c), base, base + target.e) for base in bases]
+        lines += [(target.c, s * target.b / 2, base + target.e, base + 2 * target.e) for base in bases[:-1]]
+    return np.array(lines)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles, each with the plane it lies in: normal · x = distance."""
+
+    vertices_m: Floats  # (v, 3)
+    triangles: NDArray[np.uint32]  # (t, 3)
+    normals: Floats  # (t, 3), outward
+    distances_m: Floats  # (t,)
+    surfaces: NDArray[np.int64]  # (t,) number of the plane: coplanar faces share one
+    names: tuple[str, ...]  # (t,) polygon of each triangle
+
+
+def build_mesh(target: Target, surroundings: Surroundings) -> Mesh:
+    """Everything a ray may meet but the water."""
+    tilt = Rotation.from_euler("XY", surroundings.tilt_deg, degrees=True)
+    polygons = [Polygon(p.name, tilt.apply(p.vertices_m)) for p in target_polygons(target)]
+    polygons += pool_polygons(target, surroundings)
+    triangles: list[tuple[int, int, int]] = []
+    planes: list[Floats] = []
+    names: list[str] = []
+    first = 0
+    for polygon in polygons:
+        corners = polygon.vertices_m
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        normal /= np.linalg.norm(normal)
+        for k in range(1, len(corners) - 1):
+            triangles.append((first, first + k, first + k + 1))
+            planes.append(np.append(normal, normal @ corners[0]))
+            names.append(polygon.name)
+        first += len(corners)
+    table = np.array(planes)
+    _, surfaces = np.unique(np.round(table, 9) + 0.0, axis=0, return_inverse=True)
+    return Mesh(
+        vertices_m=np.concatenate([p.vertices_m for p in polygons]),
+        triangles=np.array(triangles, dtype=np.uint32),
+        normals=table[:, :3],
+        distances_m=table[:, 3],
+        surfaces=surfaces.astype(np.int64).ravel(),
+        names=tuple(names),
+    )

@@ -1,0 +1,34 @@
+"""Mount angles and lever arms: R_body_from_sensor = Rz(yaw) Rx(pitch) Ry(roll)."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pipeline.config import Mount
+from pipeline.simulation.earth import Floats
+from pipeline.simulation.noise import generator
+from pipeline.simulation.scenario import MbesScenario
+
+
+def R_body_from_sensor(mount: Mount) -> Rotation:
+    return Rotation.from_euler("ZXY", [mount.yaw_deg, mount.pitch_deg, mount.roll_deg], degrees=True)
+
+
+def lever_arm_m(mount: Mount) -> Floats:
+    """(3,) the sensor's origin in the body frame."""
+    return np.array([mount.x_m, mount.y_m, mount.z_m])
+
+
+def coarse_error(scenario: MbesScenario, seed: int) -> Mount:
+    """Coarse minus true: as given, or of the given sizes with random signs."""
+    if scenario.coarse_error is not None:
+        return scenario.coarse_error
+    signs = generator(seed, "coarse").choice([-1.0, 1.0], 6)
+    sizes = [scenario.coarse_angle_deg] * 3 + [scenario.coarse_lever_m] * 3
+    names = Mount.model_fields
+    return Mount(**{name: float(sign * size) for name, sign, size in zip(names, signs, sizes, strict=True)})
+
+
+def coarse_mount(scenario: MbesScenario, seed: int) -> Mount:
+    """What session.yaml says."""
+    true, error = scenario.mount.model_dump(), coarse_error(scenario, seed).model_dump()
+    return Mount(**{name: round(true[name] + error[name], 12) for name in true})

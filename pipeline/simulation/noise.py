@@ -1,0 +1,13 @@
+"""Random numbers: one generator for each purpose, so that switching one source off leaves all others as they were."""
+
+import numpy as np
+
+PURPOSES = (
+    "coarse", "motion", "ins_white", "ins_drift", "laser_range", "laser_angle", "laser_outlier", "laser_water",
+    "mbes_clock", "mbes_range", "mbes_angle", "mbes_outlier", "mbes_surface", "mbes_corner", "mbes_drop",
+)  # append only: the place in this list is part of the seed
+
+
+def generator(seed: int, purpose: str, index: int = 0) -> np.random.Generator:
+    """The generator of one purpose in one pass; draws come out the same however they are divided into batches."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PURPOSES.index(purpose), index)))

@@ -1,0 +1,187 @@
+"""A scenario: what a simulated pool session is like. The defaults of all keys are "the default scenario"."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from pipeline.config import (
+    Angle,
+    Drift,
+    Latency,
+    Length,
+    Lever,
+    Model,
+    Mount,
+    NotNegative,
+    Origin,
+    Positive,
+    Target,
+    White,
+    parse,
+    read_yaml,
+)
+
+Share = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=1, le=20)]
+SoundSpeed = Annotated[float, Field(ge=1300, le=1700)]
+
+
+def _moment(text: str) -> str:
+    moment = datetime.fromisoformat(text)
+    if moment.tzinfo is not None or not 2000 <= moment.year < 2070:
+        raise ValueError("must be a UTC moment without zone, such as 2026-05-12T08:00:00, from 2000 to 2069")
+    return text
+
+
+class Surroundings(Model):
+    """The pool round the target, and how far the pool's config is from the target as it stands."""
+
+    half_length_m: Annotated[float, Field(gt=0, le=200)] = 15.0  # back wall and floor reach this far along y
+    floor_gap_m: NotNegative = 0.3  # the floor lies this much below the target's foot
+    wall_above_m: NotNegative = 0.5  # the back wall ends this much above the target's top
+    tilt_deg: tuple[Angle, Angle] = (0.0, 0.0)  # the target as built, turned about its x and y axes
+    origin_error_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # configured minus true, target axes
+    azimuth_error_deg: Angle = 0.0  # configured minus true
+    give_azimuth: bool = True  # false: pool.yaml leaves azimuth_deg open
+
+
+class Wave(Model):
+    """One coordinate's unrest: 3/4 of the amplitude at the period, 1/4 at 0.37 of it; phases are random."""
+
+    amplitude: NotNegative
+    period_s: Positive
+
+
+class Motion(Model):
+    """How the vessel moves about its track (amplitudes in m and deg)."""
+
+    surge: Wave = Wave(amplitude=0.03, period_s=8.0)
+    sway: Wave = Wave(amplitude=0.06, period_s=9.0)
+    heave: Wave = Wave(amplitude=0.02, period_s=4.0)
+    roll: Wave = Wave(amplitude=1.0, period_s=4.5)
+    pitch: Wave = Wave(amplitude=0.6, period_s=3.8)
+    heading: Wave = Wave(amplitude=1.5, period_s=12.0)
+    roll_offset_deg: Angle = 0.0
+    pitch_offset_deg: Angle = 0.0
+    heading_offset_deg: Angle = 0.0  # heading minus the target's azimuth
+
+
+class Track(Model):
+    """Passes along the target, in the direction of its +y axis."""
+
+    distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # INS to wall
+    speed_m_s: Annotated[float, Field(gt=0.001, le=20)] = 0.4
+    half_length_m: Length | None = None  # from -y to +y of this; null: b/2 + c + 2
+    ins_height_m: Lever = 1.3  # INS above the water
+    margin_s: Annotated[float, Field(ge=0, le=3600)] = 3.0  # INS logged before and after each pass
+    gap_s: Annotated[float, Field(ge=0, le=86400)] = 60.0  # nothing logged between passes
+    log_between_passes: bool = False  # all instruments run on while the vessel turns and comes back
+
+
+class InsScenario(Model):
+    rate_hz: Annotated[float, Field(ge=1, le=1000)] = 200.0
+    white: White = White()
+    drift: Drift = Drift(horizontal_m=0.0, vertical_m=0.0, roll_pitch_deg=0.0, heading_deg=0.0)
+    format: Literal["inspvas", "inspva", "inspvasa", "inspvaa", "sbet"] = "inspvas"  # ...a: ASCII
+    files: Literal["session", "pass"] = "session"  # one file for the session, or one a pass
+    aligning_s: Annotated[float, Field(ge=0, le=3600)] = 5.0  # aligning before the first pass (novatel), 1 Hz
+
+
+class LaserScenario(Model):
+    mount: Mount = Mount(roll_deg=0.35, pitch_deg=-0.22, yaw_deg=0.41, x_m=0.21, y_m=0.48, z_m=1.10)
+    point_rate_hz: Annotated[float, Field(ge=1, le=1e6)] = 20000.0
+    line_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 50.0
+    field_deg: tuple[Angle, Angle] = (30.0, 130.0)  # from the scanner's zenith
+    max_range_m: Annotated[float, Field(ge=1, le=1000)] = 40.0
+    range_sigma_m: NotNegative = 0.005
+    angle_sigma_deg: NotNegative = 0.003
+    outlier_share: Share = 0.005  # a random range instead
+    water_return_share: Share = 0.02  # of the rays that meet the water: a point up to 0.3 m beyond its surface
+    latency_s: Latency = 0.0  # recorded time = true time + latency
+    latency_declared_s: Latency = 0.0
+    format: Literal["laz", "las"] = "laz"
+    scale_m: Annotated[float, Field(ge=1e-6, le=0.01)] = 1e-4
+    time: Literal["adjusted_standard", "week_seconds"] = "adjusted_standard"
+
+
+class MbesScenario(Model):
+    mount: Mount = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.30, y_m=0.20, z_m=-2.01)  # the truth
+    coarse_angle_deg: NotNegative = 0.8  # error of each coarse angle, its sign random
+    coarse_lever_m: NotNegative = 0.08  # the same of the coarse lever arm
+    coarse_error: Mount | None = None  # instead: the six errors, coarse minus true
+    ping_rate_hz: Annotated[float, Field(gt=0, le=100)] = 20.0
+    beams: Annotated[int, Field(ge=2, le=1024)] = 256
+    sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
+    spacing: Literal["equi_angle", "equidistant"] = "equi_angle"  # section A0 or A2
+    max_range_m: Annotated[float, Field(ge=1, le=500)] = 15.0
+    range_sigma_m: NotNegative = 0.008
+    angle_sigma_deg: NotNegative = 0.06
+    beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # across, along track
+    point_beams: bool = False  # true: beams without width
+    sub_rays: tuple[Count, Count] = (5, 3)  # of a beam, across and along; odd
+    corner_share: Share = 0.3  # of the beams within corner_reach_m of an inner corner: the corner's range
+    corner_reach_m: NotNegative = 0.1
+    outlier_share: Share = 0.02  # a random range instead
+    surface_share: Share = 0.04  # of the beams that look above 30 deg below the horizon: the water surface's range
+    dropped_ping_share: Share = 0.01
+    sound_speed_true_m_s: SoundSpeed = 1500.0
+    sound_speed_recorded_m_s: SoundSpeed = 1500.0
+    give_true_sound_speed: bool = False  # session.yaml carries the true one
+    projector_offset_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # transmitter in the mbes frame
+    give_projector_offset: bool = False
+    latency_s: Latency = 0.0
+    latency_declared_s: Latency = 0.0
+    format: Literal["xtf", "r2s"] = "xtf"  # r2s: packets one after another
+    intensity: bool = True  # section I1
+
+    @model_validator(mode="after")
+    def _odd(self) -> "MbesScenario":
+        if any(count % 2 == 0 for count in self.sub_rays):
+            raise ValueError(f"sub_rays = {list(self.sub_rays)} must be odd: the middle one is the beam's axis")
+        return self
+
+
+class Scenario(Model):
+    name: Annotated[str, Field(min_length=1, max_length=200)] = "default"
+    start_utc: Annotated[str, AfterValidator(_moment)] = "2026-05-12T08:00:00"
+    target: Target = Target(
+        a=8.0, b=3.0, c=1.0, e=0.5, azimuth_deg=0.0,
+        origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0),
+    )
+    surroundings: Surroundings = Surroundings()
+    track: Track = Track()
+    motion: Motion = Motion()
+    ins: InsScenario = InsScenario()
+    laser: LaserScenario = LaserScenario()
+    mbes: MbesScenario = MbesScenario()
+
+    @model_validator(mode="after")
+    def _can_be(self) -> "Scenario":
+        if self.target.azimuth_deg is None:
+            raise ValueError("target.azimuth_deg = null: a simulated target stands at some azimuth; give it")
+        height_m = self.track.ins_height_m
+        if height_m + self.mbes.mount.z_m > -0.2 or height_m + self.laser.mount.z_m < 0.2:
+            raise ValueError(
+                f"track.ins_height_m = {height_m} puts the sonar {height_m + self.mbes.mount.z_m:.2f} m and the laser "
+                f"{height_m + self.laser.mount.z_m:.2f} m above the water: it must be 0.2 m below, and 0.2 m above"
+            )
+        if 2 * self.half_length_m / self.track.speed_m_s < 1.0:
+            raise ValueError(f"track.speed_m_s = {self.track.speed_m_s}: a pass must last a second or more")
+        return self
+
+    @property
+    def half_length_m(self) -> float:
+        """A pass runs from -y to +y of this."""
+        return self.track.half_length_m or self.target.b / 2 + self.target.c + 2.0
+
+    @property
+    def azimuth_deg(self) -> float:
+        assert self.target.azimuth_deg is not None  # checked above
+        return self.target.azimuth_deg
+
+
+def load_scenario(path: Path | None) -> Scenario:
+    """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario."""
+    return Scenario() if path is None else parse(Scenario, read_yaml(path), str(path))

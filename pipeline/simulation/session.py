@@ -1,0 +1,146 @@
+"""A simulated pool session: in memory, and written as a session folder of instrument files."""
+
+import json
+import os
+import shutil
+import time
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from pipeline.errors import ConfigError
+from pipeline.simulation.beams import fan
+from pipeline.simulation.bth0 import packets, xtf_bytes
+from pipeline.simulation.ins import Columns, record_ins
+from pipeline.simulation.las import write_las
+from pipeline.simulation.laser import record_laser
+from pipeline.simulation.mbes import Pool, record_mbes
+from pipeline.simulation.mesh import build_mesh, corner_lines
+from pipeline.simulation.motion import Movement
+from pipeline.simulation.novatel import aligning_bodies, bodies, novatel_bytes
+from pipeline.simulation.raycast import RayCaster
+from pipeline.simulation.sbet import sbet_bytes
+from pipeline.simulation.scenario import Scenario, load_scenario
+from pipeline.simulation.texts import INS_SUFFIX, pool_text, session_text, truth_text
+
+
+@dataclass(frozen=True)
+class SimulatedSession:
+    """What the instruments recorded, as canonical raw columns, and the texts that go with it."""
+
+    ins: Columns  # t_ns, latitude_rad, longitude_rad, height_m, roll_rad, pitch_rad, azimuth_rad
+    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame
+    mbes: Columns  # t_ns, ping, beam, two_way_time_s, angle_rad, sound_speed_m_s; beams with a detection only
+    session: dict[str, Any]  # session.yaml
+    pool: dict[str, Any]  # pool.yaml
+    truth: dict[str, Any]  # OUT.truth.json
+    ins_rows: list[int]  # first row of each pass, and of the end
+    laser_rows: list[int]
+    pings: Columns  # every ping: t_ns, ping, pass
+
+
+def simulate(scenario: Scenario, seed: int) -> SimulatedSession:
+    """One session. The same scenario and seed give the same numbers; each noise source has its own generator."""
+    if seed < 0:
+        raise ConfigError(f"seed = {seed}: must not be negative; choose another seed")
+    movement = Movement(scenario, seed)
+    caster = RayCaster(build_mesh(scenario.target, scenario.surroundings))
+    water_level_m = scenario.target.water_level_m
+    ins, ins_rows = record_ins(scenario.ins, movement, seed)
+    laser, laser_rows = record_laser(scenario.laser, movement, caster, water_level_m, seed)
+    pool = Pool(caster, water_level_m, corner_lines(scenario.target))
+    mbes, pings = record_mbes(scenario.mbes, movement, pool, seed)
+    session, design = session_text(scenario, movement, seed), pool_text(scenario, movement)
+    truth = truth_text(scenario, movement, seed)
+    return SimulatedSession(ins, laser, mbes, session, design, truth, ins_rows, laser_rows, pings)
+
+
+def write_session(simulated: SimulatedSession, folder: Path, scenario: Scenario) -> None:
+    """Write the session folder, and the truth beside it. A folder under that name is complete or not there at all."""
+    _refuse_existing(folder)
+    partial = folder.with_name(f".{folder.name}.partial")
+    beside = folder.with_name(f".{folder.name}.truth.json.partial")
+    try:
+        shutil.rmtree(partial, ignore_errors=True)  # of a run that was killed
+        partial.mkdir(parents=True)
+        _write_files(simulated, partial, scenario)
+        beside.write_text(json.dumps(simulated.truth, indent=1) + "\n", encoding="utf-8")
+        beside.replace(truth_path(folder))
+        partial.replace(folder)
+    except OSError as error:
+        raise ConfigError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+        beside.unlink(missing_ok=True)
+
+
+def truth_path(folder: Path) -> Path:
+    """OUT.truth.json beside (never inside) the session folder OUT."""
+    return folder.with_name(folder.name + ".truth.json")
+
+
+def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> dict[str, Any]:
+    """Simulate and write a session; what was written, and the seconds it took."""
+    begin = time.perf_counter()
+    folder = Path(os.path.abspath(folder))
+    _refuse_existing(folder)  # before the work, not after it
+    scenario = load_scenario(scenario_path)
+    simulated = simulate(scenario, seed)
+    write_session(simulated, folder, scenario)
+    return {
+        "session": folder,
+        "pool": folder / "pool.yaml",
+        "truth": truth_path(folder),
+        "ins_records": len(simulated.ins["t_ns"]),
+        "laser_points": len(simulated.laser["t_ns"]),
+        "soundings": len(simulated.mbes["t_ns"]),
+        "seconds": time.perf_counter() - begin,
+    }
+
+
+def _refuse_existing(folder: Path) -> None:
+    try:
+        taken = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
+    except OSError as error:
+        raise ConfigError(f"{folder}: cannot be looked at ({error.strerror}); choose another folder") from error
+    if taken or not folder.name:
+        raise ConfigError(f"{folder}: exists already; choose another name, or remove it first")
+
+
+def _write_files(simulated: SimulatedSession, folder: Path, scenario: Scenario) -> None:
+    for name in ("ins", "laser", "mbes"):
+        (folder / name).mkdir()
+    _write_ins(simulated, folder / "ins", scenario)
+    day = datetime.fromisoformat(scenario.start_utc).date()
+    for k in range(len(scenario.track.distances_m)):
+        points = _rows(simulated.laser, simulated.laser_rows[k], simulated.laser_rows[k + 1])
+        write_las(folder / "laser" / f"pass_{k}.{scenario.laser.format}", points, scenario.laser, day)
+        pings = _rows(simulated.pings, *np.searchsorted(simulated.pings["pass"], [k, k + 1]))
+        first, last = (pings["ping"][[0, -1]] if len(pings["ping"]) else (0, -1))
+        mbes = _rows(simulated.mbes, *np.searchsorted(simulated.mbes["ping"], [first, last + 1]))
+        packet = packets(mbes, pings, fan(scenario.mbes), scenario.mbes)
+        path = folder / "mbes" / f"pass_{k}.{scenario.mbes.format}"
+        path.write_bytes(xtf_bytes(packet, path.name) if scenario.mbes.format == "xtf" else packet.tobytes())
+    for name, text in (("session.yaml", simulated.session), ("pool.yaml", simulated.pool)):
+        (folder / name).write_text(yaml.safe_dump(text, sort_keys=False), encoding="utf-8")
+
+
+def _write_ins(simulated: SimulatedSession, folder: Path, scenario: Scenario) -> None:
+    form, suffix = scenario.ins.format, INS_SUFFIX[scenario.ins.format]
+    rows = simulated.ins_rows if scenario.ins.files == "pass" else [0, simulated.ins_rows[-1]]
+    for k in range(len(rows) - 1):
+        ins = _rows(simulated.ins, rows[k], rows[k + 1])
+        path = folder / (f"pass_{k}.{suffix}" if scenario.ins.files == "pass" else f"ins.{suffix}")
+        if form == "sbet":
+            path.write_bytes(sbet_bytes(ins))
+            continue
+        before = aligning_bodies(int(ins["t_ns"][0]), scenario.ins.aligning_s if k == 0 else 0.0)
+        path.write_bytes(novatel_bytes(np.concatenate([before, bodies(ins)]), form))
+
+
+def _rows(columns: Columns, start: int, stop: int) -> Columns:
+    return {name: values[start:stop] for name, values in columns.items()}

@@ -1,0 +1,57 @@
+"""The patent's angle iteration, with the lever arm left at its coarse value."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+
+from pipeline import artefacts, config
+from pipeline.errors import DegenerateGeometryError
+from pipeline.fitted import angle_passes
+from pipeline.maths.angles import AngleResult, iterate_angles
+from pipeline.mounts import mount_of
+
+
+@dataclass(frozen=True)
+class Config:
+    fit_planes: config.FitPlanes
+    angle_iterate: config.AngleIterate
+    mbes: config.Mbes
+
+
+@dataclass(frozen=True)
+class Inputs:
+    faces: Annotated[pd.DataFrame, artefacts.FACES]
+    planes: Annotated[pd.DataFrame, artefacts.PLANES]
+    sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    iterations: Annotated[pd.DataFrame, artefacts.ITERATIONS]
+    pass_iterations: Annotated[pd.DataFrame, artefacts.PASS_ITERATIONS]
+    angles: Annotated[pd.DataFrame, artefacts.ANGLES]
+
+
+def run(inputs: Inputs, config: Config) -> Outputs:
+    settings = config.angle_iterate
+    try:
+        result = iterate_angles(
+            angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points),
+            mount_of(config.mbes.mount).lever_arm_body_m,
+            settings.max_iterations,
+            np.radians(settings.step_tolerance_deg),
+            np.radians(settings.angle_tolerance_deg),
+        )
+        reason = ""
+    except DegenerateGeometryError as error:
+        result, reason = AngleResult(np.full(3, np.nan), False, 0, [], []), str(error)
+    vector = np.degrees(result.rotation_vector_rad)
+    angles = {f"rotation_{axis}_deg": vector[k] for k, axis in enumerate("xyz")}
+    angles |= {"converged": result.converged, "iterations": result.iterations, "reason": reason}
+    return Outputs(
+        pd.DataFrame(result.rows, columns=[column.name for column in artefacts.ITERATIONS.columns]),
+        pd.DataFrame(result.pass_rows, columns=[column.name for column in artefacts.PASS_ITERATIONS.columns]),
+        pd.DataFrame([angles]),
+    )

@@ -1,0 +1,44 @@
+"""Simulated sessions through the stages in memory: for tests and ``make montecarlo``, without any file."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from pipeline.config import PoolConfig, SessionConfig
+from pipeline.evaluate import declared, run_in_memory
+from pipeline.artefacts import Artefact, Raw
+from pipeline.streams import MemoryPart, Stream
+from stages import load
+
+
+def calibrate_in_memory(
+    session: SessionConfig, pool: PoolConfig, raw: Mapping[str, Mapping[str, np.ndarray]], until: str = "adjust"
+) -> dict[str, Any]:
+    """Every artefact of the stages up to ``until``, by "owner/name"; ``raw``: canonical columns of ins, laser, mbes."""
+    found: dict[str, Any] = {}
+    for stage in load():
+        inputs = stage.Inputs(
+            **{
+                name: Stream((MemoryPart(marker.sensor, raw[marker.sensor]),))
+                if isinstance(marker, Raw)
+                else found[f"{marker.owner}/{marker.name}"]
+                for name, marker in declared(stage.Inputs).items()
+                if isinstance(marker, (Raw, Artefact))
+            }
+        )
+        outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
+        for name, marker in declared(stage.Outputs).items():
+            if isinstance(marker, Artefact):
+                found[f"{marker.owner}/{marker.name}"] = getattr(outputs, name)
+        if stage.__name__ == f"stages.{until}":
+            break
+    return found
+
+
+def config_of(stage: ModuleType, session: SessionConfig, pool: PoolConfig) -> Any:
+    """The stage's Config from the two models, field by field."""
+    names = [field.name for field in fields(stage.Config)]
+    return stage.Config(**{name: getattr(pool if hasattr(pool, name) else session, name) for name in names})

@@ -1,0 +1,190 @@
+"""The command line: thin. Imports what computes only inside the command that computes."""
+
+import os
+import sys
+import traceback
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import pipeline
+from pipeline.errors import ConfigError, PoolcalError
+from pipeline.progress import say
+from stages import ORDER, load
+
+app = typer.Typer(
+    name="poolcal",
+    help="Calibrates a boat's multibeam sonar against its laser scanner in a pool.",
+    epilog="Exit status: 0 done; 1 done, but the answer is no; 2 bad input or config; 3 a bug in poolcal.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")]
+Jobs = Annotated[int | None, typer.Option("--jobs", metavar="N", help="workers; default: one a core, at most 4")]
+Address = Annotated[
+    str | None, typer.Option("--executor", metavar="ADDRESS", help="dask scheduler; its workers must see these folders")
+]
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        say(f"poolcal {pipeline.__version__}", sys.stdout)
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and end")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of bad input as well")] = False,
+) -> None:
+    """Options of every command."""
+
+
+@app.command()
+def simulate(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="session folder to make; truth goes to OUT.truth.json")],
+    scenario: Annotated[
+        Path | None, typer.Option("--scenario", metavar="FILE", help="YAML file; default: the demo's pool")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", help="of all random numbers")] = 1,
+) -> None:
+    """Write a pool session with known truth as instrument files."""
+    from pipeline.files import writing
+    from pipeline.simulation.session import simulate_to_folder
+
+    if seed < 0:
+        raise ConfigError(f"--seed {seed}: must not be negative")
+    with writing(out):
+        written = simulate_to_folder(out, scenario, seed)
+    for name, value in written.items():
+        say(f"{name}: {value:.1f}" if isinstance(value, float) else f"{name}: {value}", sys.stdout)
+
+
+@app.command()
+def run(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", help="folder with session.yaml and the raw files")],
+    config: Annotated[Path, typer.Option("--config", metavar="CONFIG", help="the pool's YAML file")],
+    run_folder: Annotated[Path, typer.Option("--run", metavar="RUN", help="folder for the results")],
+    jobs: Jobs = None,
+    executor: Address = None,
+) -> int:
+    """Run all stages that are out of date, and say why each is."""
+    from pipeline import runner
+    from pipeline.executor import workers
+    from pipeline.progress import Progress
+
+    with workers(jobs, executor) as pool:
+        runner.run(load(), session, config, run_folder, pool, Progress())
+    return _answer(run_folder)
+
+
+@app.command()
+def stage(
+    name: Annotated[str, typer.Argument(metavar="NAME", help=f"one of {', '.join(ORDER)}")],
+    run_folder: RunFolder,
+    session: Annotated[Path | None, typer.Option("--session", help="default: as in RUN/run.yaml")] = None,
+    config: Annotated[Path | None, typer.Option("--config", help="default: as in RUN/run.yaml")] = None,
+    jobs: Jobs = None,
+    executor: Address = None,
+) -> int:
+    """Run one stage, if it is out of date; the stages before it must not be."""
+    from pipeline import folder, runner
+    from pipeline.executor import workers
+    from pipeline.progress import Progress
+
+    if name not in ORDER:
+        raise ConfigError(f"NAME {name!r}: is no stage; the stages are {', '.join(ORDER)}")
+    if (session is None) != (config is None):
+        raise ConfigError("--session and --config: give both, or neither to use those in RUN/run.yaml")
+    settings = folder.load_settings(session, config) if session is not None and config is not None else None
+    with workers(jobs, executor) as pool:
+        runner.run_stage(load(), name, run_folder, settings, pool, Progress())
+    return _answer(run_folder) if name == ORDER[-1] else 0
+
+
+@app.command()
+def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
+    """Hash again everything that a run read and wrote; list what is not as recorded."""
+    from pipeline.executor import workers
+    from pipeline.verify import verify as problems_of
+
+    with workers(jobs) as pool:
+        problems = problems_of(load(), run_folder, pool)
+    for problem in problems:
+        say(problem, sys.stdout)
+    say(f"{len(problems)} problems" if problems else f"{run_folder}: everything is as recorded", sys.stdout)
+    return 1 if problems else 0
+
+
+@app.command()
+def compare(
+    run_folder: RunFolder,
+    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="OUT.truth.json of poolcal simulate")],
+) -> int:
+    """Set a simulated session's result beside its truth; status 0 if every error is within four sigma."""
+    from stages.compare import compare as table_of
+
+    text, good = table_of(run_folder, truth)
+    say(text, sys.stdout)
+    return 0 if good else 1
+
+
+def _answer(run_folder: Path) -> int:
+    """Print the result; 1 if it was rejected."""
+    from pipeline.folder import calibration
+    from stages.report import summary
+
+    result = calibration(run_folder)
+    say(summary(result), sys.stdout)
+    return 0 if result["verdict"] == "accepted" else 1
+
+
+# --- from exceptions to exit status ----------------------------------------------------------------------------------
+def call(arguments: list[str]) -> int:
+    """The exit status of a command line; nothing is raised."""
+    debug = "--debug" in arguments  # accepted anywhere on the line
+    words = [word for word in arguments if word != "--debug"]
+    try:
+        return int(app(words or ["--help"], prog_name="poolcal", standalone_mode=False) or 0)
+    except PoolcalError as error:
+        if debug:
+            traceback.print_exc()
+        say(f"poolcal: {error}", sys.stderr)
+        return 2
+    except typer.TyperException as error:
+        usage = " ".join(error.format_message().split())
+        say(f"poolcal: {usage or 'nothing to do'}; see poolcal --help", sys.stderr)
+        return 2
+    except (KeyboardInterrupt, typer.Abort):
+        say("poolcal: interrupted; what was complete is kept", sys.stderr)
+        return 130
+    except BrokenPipeError:
+        return 141
+    except Exception:
+        say(traceback.format_exc().rstrip(), sys.stderr)
+        say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
+        return 3
+
+
+def main() -> None:
+    """The console script."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure: Any = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="backslashreplace")
+    status = call(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:  # nobody listens any more: leave without Python's own complaint
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(status)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""A simulated session's result beside its truth: the demo's last word.
+
+The rotation's error is the vector ε in R_true = Exp(ε) · R_body_from_mbes, about the body's axes, which is also what
+the covariance speaks of. The answer is yes when the calibration was accepted and each of the six errors of the result
+is within LIMIT sigmas; a method without sigmas is held to LIMIT times the verdict's largest allowed ones.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pipeline.config import Mount, Verdict
+from pipeline.errors import ConfigError
+from pipeline.folder import calibration, read_settings
+
+LIMIT = 4.0
+ROWS = (  # in the order of the six: rotation about body x, y, z, then the lever arm
+    ("pitch", "pitch_deg", "deg"),
+    ("roll", "roll_deg", "deg"),
+    ("yaw", "yaw_deg", "deg"),
+    ("x", "x_m", "m"),
+    ("y", "y_m", "m"),
+    ("z", "z_m", "m"),
+)
+Array = NDArray[np.float64]
+
+
+def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
+    """The table for people, and whether the result stands up to the truth."""
+    result, settings = calibration(run), read_settings(run)
+    R_true, lever_arm_true_m = read_truth(truth_path)
+    chosen = settings.pool.result
+    good = result["verdict"] == "accepted"
+    lines = [f"session {result['session']}: {result['verdict']}" + "".join(f"\n  {r}" for r in result["reasons"])]
+    for method, values in result["methods"].items():
+        error = errors_of(values, R_true, lever_arm_true_m)
+        sigma = _sigma_of(values)
+        mark = "  <- the result" if method == chosen else ""
+        lines += ["", f"{method}{mark}", *_table(settings.session.mbes.mount, values, R_true, lever_arm_true_m, sigma)]
+        if method == chosen:
+            limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
+            good = good and error is not None and bool(np.all(np.abs(error) <= limit))
+    what = "sigma" if _sigma_of(result["methods"][chosen]) is not None else "the largest sigma allowed"
+    how = "every error is" if good else "not accepted, or an error is not"
+    lines += ["", f"{chosen}: {how} within {LIMIT:g} {what}"]
+    return "\n".join(lines), good
+
+
+def read_truth(path: Path) -> tuple[Array, Array]:
+    """True rotation and lever arm of the sonar, from the simulator's file."""
+    try:
+        mbes = json.loads(path.read_text(encoding="utf-8"))["mbes"]
+        R_body_from_mbes = np.array(mbes["R_body_from_mbes"], dtype=np.float64).reshape(3, 3)
+        return R_body_from_mbes, np.array(mbes["lever_arm_m"], dtype=np.float64).reshape(3)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); name the OUT.truth.json meant") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise ConfigError(f"{path}: is no truth ({error!r}); name the OUT.truth.json meant") from error
+
+
+def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) -> Array | None:
+    """What is still wrong: rotation vector in degrees and lever arm in metres, true minus found; None: no result."""
+    if values["R_body_from_mbes"] is None or values["lever_arm_m"] is None:
+        return None
+    turn = Rotation.from_matrix(R_true @ np.array(values["R_body_from_mbes"]).T).as_rotvec()
+    return np.concatenate([np.degrees(turn), lever_arm_true_m - np.array(values["lever_arm_m"])])
+
+
+def _sigma_of(values: dict[str, Any]) -> Array | None:
+    sigma = values["sigma"]
+    if sigma is None or sigma["rotation_vector_deg"] is None or sigma["lever_arm_m"] is None:
+        return None
+    return np.array([*sigma["rotation_vector_deg"], *sigma["lever_arm_m"]], dtype=np.float64)
+
+
+def _largest(verdict: Verdict) -> Array:
+    return np.repeat([verdict.max_sigma_deg, verdict.max_sigma_m], 3)
+
+
+def _table(
+    coarse: Mount, values: dict[str, Any], R_true: Array, lever_arm_true_m: Array, sigma: Array | None
+) -> list[str]:
+    error = errors_of(values, R_true, lever_arm_true_m)
+    if error is None:
+        return ["  no result"]
+    yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
+    truth = (pitch, roll, yaw, *lever_arm_true_m)
+    lines = [f"  {'':6}{'coarse':>11}{'calibrated':>12}{'truth':>11}{'error':>11}{'sigma':>10}{'error/sigma':>13}"]
+    for k, (name, key, unit) in enumerate(ROWS):
+        spread = f"{'-':>10}{'-':>13}" if sigma is None else f"{sigma[k]:10.5f}{error[k] / sigma[k]:13.1f}"
+        numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[k]:11.5f}{error[k]:11.5f}"
+        lines.append(f"  {name:6}{numbers}{spread} {unit}")
+    return lines

@@ -1,0 +1,144 @@
+"""Points into the pool frame: attitude on the rotation group, through ECEF; what lies far from the target is dropped."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline import artefacts, config
+from pipeline.counting import counts_table
+from pipeline.errors import RawDataError
+from pipeline.maths import soundings
+from pipeline.maths.geodesy import PoolFrame
+from pipeline.maths.rotations import quaternion_from_rotation
+from pipeline.maths.trajectory import Trajectory, poses_in_pool
+from pipeline.mounts import mount_of, target_of
+from pipeline.passes import pass_of
+from pipeline.streams import EMPTY, Chunk, Piece, Stream
+from pipeline.times import NS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Config:
+    target: config.Target
+    georeference: config.Georeference
+    laser: config.Laser
+    mbes: config.Mbes
+
+
+@dataclass(frozen=True)
+class Inputs:
+    trajectory: Annotated[pd.DataFrame, artefacts.TRAJECTORY]
+    passes: Annotated[pd.DataFrame, artefacts.PASSES]
+    pool_frame: Annotated[pd.DataFrame, artefacts.POOL_FRAME]
+    laser_points: Annotated[Stream, artefacts.LASER_POINTS]
+    soundings: Annotated[Stream, artefacts.SOUNDINGS]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    poses: Annotated[pd.DataFrame, artefacts.POSES]
+    counts: Annotated[pd.DataFrame, artefacts.GEOREFERENCE_COUNTS]
+    laser_pool: Annotated[Stream, artefacts.LASER_POOL] = EMPTY
+    soundings_pool: Annotated[Stream, artefacts.SOUNDINGS_POOL] = EMPTY
+
+
+@dataclass(frozen=True)
+class Prepared:
+    frame: PoolFrame
+    trajectory: Trajectory
+    starts_ns: NDArray[np.int64]
+    ends_ns: NDArray[np.int64]
+    box_low_m: Array
+    box_high_m: Array
+
+
+def prepare(inputs: Inputs, config: Config) -> Prepared:
+    origin = inputs.pool_frame.iloc[0]
+    frame = PoolFrame.at(
+        np.radians(origin["latitude_deg"]),
+        np.radians(origin["longitude_deg"]),
+        float(origin["height_m"]),
+        np.radians(origin["azimuth_deg"]),
+    )
+    names = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
+    positions, R_pool_from_body = poses_in_pool(frame, *(inputs.trajectory[name].to_numpy() for name in names))
+    low, high = target_of(config.target).bounds()
+    margin = config.georeference.box_margin_m
+    return Prepared(
+        frame,
+        Trajectory.build(inputs.trajectory["t_ns"].to_numpy(), positions, R_pool_from_body),
+        inputs.passes["start_ns"].to_numpy(),
+        inputs.passes["end_ns"].to_numpy(),
+        low - margin,
+        high + margin,
+    )
+
+
+def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> Piece:
+    columns = chunk.columns
+    t_ns = columns["t_ns"]
+    number = pass_of(t_ns, prepared.starts_ns, prepared.ends_ns)
+    covered = prepared.trajectory.covers(t_ns, round(config.georeference.max_ins_interval_s * NS))
+    counts = {"outside every pass": int((number < 0).sum()), "hole in the INS": int(((number >= 0) & ~covered).sum())}
+    rows = np.flatnonzero((number >= 0) & covered)
+    t_ns, number = t_ns[rows], number[rows]
+    if source == "laser_points":
+        sensor, pool = _laser(t_ns, np.column_stack([columns[f"{axis}_m"][rows] for axis in "xyz"]), prepared, config)
+    else:
+        sensor, valid = soundings.points_in_mbes(
+            columns["two_way_time_s"][rows],
+            columns["angle_rad"][rows],
+            columns["sound_speed_m_s"][rows],
+            config.mbes.sound_speed_m_s,
+            None if config.mbes.projector_offset_m is None else np.array(config.mbes.projector_offset_m),
+        )
+        counts["angle impossible with the given sound speed"] = int((~valid).sum())
+        rows, t_ns, number, sensor = rows[valid], t_ns[valid], number[valid], sensor[valid]
+        mount = mount_of(config.mbes.mount)
+        pool = prepared.trajectory.place(t_ns, sensor @ mount.R_body_from_sensor.T + mount.lever_arm_body_m)
+    near = np.all((pool >= prepared.box_low_m) & (pool <= prepared.box_high_m), axis=1)
+    counts |= {"outside the box round the target": int((~near).sum()), "used": int(near.sum())}
+    kept: dict[str, NDArray[Any]] = {"t_ns": t_ns[near], "pass": number[near]}
+    if source == "soundings":
+        kept |= {name: columns[name][rows][near] for name in ("ping", "beam")}
+    word = "laser" if source == "laser_points" else "mbes"
+    for index, axis in enumerate("xyz"):
+        kept[f"{axis}_{word}_m"] = sensor[near, index]
+        kept[f"{axis}_pool_m"] = pool[near, index]
+    return Piece({"laser_pool" if source == "laser_points" else "soundings_pool": kept}, counts)
+
+
+def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: Config) -> tuple[Array, Array]:
+    """Points in the scanner's frame and in the pool frame, whichever of the two the files hold."""
+    mount = mount_of(config.laser.mount)
+    if config.laser.frame == "laser":
+        body = points @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
+        return points, prepared.trajectory.place(t_ns, body)
+    pool = prepared.frame.points_from_ecef(points)
+    positions, R_pool_from_body = prepared.trajectory.poses_at(t_ns)
+    body = np.einsum("nji,nj->ni", R_pool_from_body, pool - positions)
+    return (body - mount.lever_arm_body_m) @ mount.R_body_from_sensor, pool
+
+
+def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
+    counts = counts_table(partials)
+    for source, sensor in (("laser_points", "laser"), ("soundings", "mbes")):
+        of_source = counts[counts["source"] == source].set_index("reason")["count"]
+        if not of_source["used"]:
+            why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")
+            raise RawDataError(
+                f"{sensor}: no point within {config.georeference.box_margin_m:g} m of the target ({why}); "
+                f"check target.origin, target.azimuth_deg and {sensor}.mount"
+            )
+    quaternion = quaternion_from_rotation(prepared.trajectory.R_frame_from_body)
+    poses = pd.DataFrame({"t_ns": prepared.trajectory.t_ns})
+    for index, axis in enumerate("xyz"):
+        poses[f"{axis}_pool_m"] = prepared.trajectory.positions_m[:, index]
+    for index, axis in enumerate("wxyz"):
+        poses[f"q{axis}"] = quaternion[:, index]
+    return Outputs(poses=poses, counts=counts)

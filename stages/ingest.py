@@ -1,0 +1,257 @@
+"""Raw instrument files -> canonical streams and tables, with quality control."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline import artefacts, config
+from pipeline.errors import RawDataError
+from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
+from pipeline.passes import estimate_azimuth, find_passes, pass_of, split_at_gaps
+from pipeline.streams import EMPTY, Chunk, Piece, Stream
+from pipeline.times import NS, WEEK_NS
+
+Columns = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Config:
+    target: config.Target
+    ingest: config.Ingest
+    ins: config.Ins
+    laser: config.Laser
+    mbes: config.Mbes
+
+
+@dataclass(frozen=True)
+class Inputs:
+    ins: Annotated[Stream, artefacts.Raw("ins")]
+    laser: Annotated[Stream, artefacts.Raw("laser")]
+    mbes: Annotated[Stream, artefacts.Raw("mbes")]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    trajectory: Annotated[pd.DataFrame, artefacts.TRAJECTORY]
+    passes: Annotated[pd.DataFrame, artefacts.PASSES]
+    pool_frame: Annotated[pd.DataFrame, artefacts.POOL_FRAME]
+    files: Annotated[pd.DataFrame, artefacts.FILES]
+    gaps: Annotated[pd.DataFrame, artefacts.GAPS]
+    counts: Annotated[pd.DataFrame, artefacts.INGEST_COUNTS]
+    laser_points: Annotated[Stream, artefacts.LASER_POINTS] = EMPTY
+    soundings: Annotated[Stream, artefacts.SOUNDINGS] = EMPTY
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is kept of one chunk: counts, epochs (INS records or pings; of laser points the first and last)."""
+
+    count: int
+    dropped: dict[str, int]
+    epochs_ns: NDArray[np.int64]
+    trajectory: Columns
+
+
+def prepare(inputs: Inputs, config: Config) -> None:
+    return None
+
+
+def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Piece:
+    t_ns = np.asarray(chunk.columns["t_ns"], dtype=np.int64) if chunk.columns else np.empty(0, np.int64)
+    dropped = dict(chunk.dropped)
+    if source == "ins":
+        return Piece({}, Seen(len(t_ns), dropped, t_ns, dict(chunk.columns)))
+    if source == "laser":
+        span = np.array([t_ns.min(), t_ns.max()]) if len(t_ns) else t_ns
+        return Piece({"laser_points": chunk.columns}, Seen(len(t_ns), dropped, span, {}))
+    return Piece({"soundings": chunk.columns}, Seen(len(t_ns), dropped, np.unique(t_ns), {}))
+
+
+def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config: Config) -> Outputs:
+    _refuse_empty(partials)
+    trajectory, backwards = _trajectory([seen.trajectory for _, seen in partials["ins"] if seen.count])
+    ins_t = trajectory["t_ns"].to_numpy()
+    pings = np.unique(np.concatenate([seen.epochs_ns for _, seen in partials["mbes"]]))
+    laser = np.concatenate([seen.epochs_ns for _, seen in partials["laser"]])
+    _refuse_apart({"ins": (ins_t[0], ins_t[-1]), "laser": (laser.min(), laser.max()), "mbes": (pings[0], pings[-1])})
+    pool_frame, frame = _pool_frame(trajectory, config.target)
+    max_gap_ns = round(config.ingest.max_gap_s * NS)
+    counts = _counts(partials, {"ins": backwards})
+    return Outputs(
+        trajectory=trajectory,
+        passes=_passes(trajectory, frame, pings, max_gap_ns, config.ingest.reversal_m),
+        pool_frame=pool_frame,
+        files=_files(partials),
+        gaps=_gaps({"ins": ins_t, "mbes": pings}, max_gap_ns),
+        counts=counts,
+    )
+
+
+def _refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
+    for sensor, seen in partials.items():
+        if not sum(piece.count for _, piece in seen):
+            names = sorted({name.split("#")[0] for name, _ in seen})
+            reasons: dict[str, int] = {}
+            for _, piece in seen:
+                for reason, number in piece.dropped.items():
+                    reasons[reason] = reasons.get(reason, 0) + number
+            why = ", ".join(f"{number} x {reason}" for reason, number in sorted(reasons.items())) or "the files are empty"
+            advice = {
+                "ins": "log again after the INS has aligned, with INSPVA(S) on",
+                "laser": "export the scan again, with time stamps",
+                "mbes": "check that bathymetry was logged",
+            }[sensor]
+            raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {advice}")
+
+
+def _when(t_ns: int) -> str:
+    moment = datetime(1980, 1, 6, tzinfo=UTC) + timedelta(seconds=t_ns / NS)
+    return f"{moment:%Y-%m-%d %H:%M:%S} GPS"
+
+
+def _refuse_apart(spans: dict[str, tuple[int, int]]) -> None:
+    for sensor in ("laser", "mbes"):
+        (start, end), (first, last) = spans["ins"], spans[sensor]
+        if last < start or first > end:
+            apart = first - start
+            hint = (
+                f"they are {apart / WEEK_NS:.1f} weeks apart: check gps_week"
+                if abs(apart) > WEEK_NS / 2
+                else "check the instruments' clocks and latency_s"
+            )
+            raise RawDataError(
+                f"session.yaml: no time overlap: ins {_when(start)} to {_when(end)}, "
+                f"{sensor} {_when(first)} to {_when(last)}; {hint}"
+            )
+
+
+def _trajectory(chunks: list[Columns]) -> tuple[pd.DataFrame, int]:
+    """All INS records in order of time; of equal times the first; how many that left out."""
+    chunks = sorted(chunks, key=lambda columns: int(columns["t_ns"][0]))
+    table = pd.DataFrame(
+        {c.name: np.concatenate([columns[c.name] for columns in chunks]) for c in artefacts.TRAJECTORY.columns}
+    )
+    order = np.argsort(table["t_ns"].to_numpy(), kind="stable")
+    table = table.iloc[order]
+    keep = np.diff(table["t_ns"].to_numpy(), prepend=np.iinfo(np.int64).min // 2) > 0
+    return table[keep].reset_index(drop=True), int((~keep).sum())
+
+
+def _pool_frame(trajectory: pd.DataFrame, target: config.Target) -> tuple[pd.DataFrame, PoolFrame]:
+    origin = target.origin
+    place = (np.radians(origin.latitude_deg), np.radians(origin.longitude_deg), origin.height_m)
+    azimuth = target.azimuth_deg
+    if azimuth is None:
+        level = PoolFrame.at(*place, 0.0)
+        geodetic = (trajectory[name].to_numpy() for name in ("latitude_rad", "longitude_rad", "height_m"))
+        points = level.points_from_ecef(ecef_from_geodetic(*geodetic))
+        estimate = estimate_azimuth(points[:, 0], points[:, 1], trajectory["azimuth_rad"].to_numpy())
+        if estimate is None:
+            raise RawDataError(
+                "target.azimuth_deg is not given and the boat never had target.origin within 20 m to starboard; "
+                "give azimuth_deg, or check target.origin"
+            )
+        azimuth = float(np.degrees(estimate))
+    table = pd.DataFrame(
+        {
+            "latitude_deg": [origin.latitude_deg],
+            "longitude_deg": [origin.longitude_deg],
+            "height_m": [origin.height_m],
+            "azimuth_deg": [azimuth],
+            "azimuth_estimated": [target.azimuth_deg is None],
+        }
+    )
+    return table, PoolFrame.at(*place, float(np.radians(azimuth)))
+
+
+def _passes(
+    trajectory: pd.DataFrame, frame: PoolFrame, pings: NDArray[np.int64], max_gap_ns: int, reversal_m: float
+) -> pd.DataFrame:
+    t_ns = trajectory["t_ns"].to_numpy()
+    geodetic = (trajectory[name].to_numpy() for name in ("latitude_rad", "longitude_rad", "height_m"))
+    points = frame.points_from_ecef(ecef_from_geodetic(*geodetic))
+    passes = find_passes(t_ns, points[:, 1], pings, max_gap_ns, reversal_m)
+    if not passes:
+        raise RawDataError(
+            "session.yaml: ins and mbes never ran together for a second without a gap above "
+            f"{max_gap_ns / NS:g} s; check the logs, or raise ingest.max_gap_s"
+        )
+    starts, ends = (np.array(column, dtype=np.int64) for column in zip(*passes, strict=True))
+    number = pass_of(t_ns, starts, ends)
+    rows = []
+    for k, (start, end) in enumerate(passes):
+        inside = number == k
+        along, distance = points[inside, 1], np.hypot(points[inside, 0], points[inside, 1])
+        seconds = (end - start) / NS
+        heading = trajectory["azimuth_rad"].to_numpy()[inside]
+        mean = np.arctan2(np.sin(heading).mean(), np.cos(heading).mean()) if inside.any() else np.nan
+        swing = np.sqrt(np.mean(np.angle(np.exp(1j * (heading - mean))) ** 2)) if inside.any() else np.nan
+        rows.append(
+            {
+                "pass": k,
+                "start_ns": start,
+                "end_ns": end,
+                "duration_s": seconds,
+                "length_m": float(along[-1] - along[0]) if inside.any() else np.nan,
+                "speed_m_s": abs(float(along[-1] - along[0])) / seconds if inside.any() else np.nan,
+                "azimuth_deg": float(np.degrees(mean)),
+                "heading_swing_deg": float(np.degrees(swing)),
+                "distance_m": float(np.median(distance)) if inside.any() else np.nan,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _files(partials: dict[str, list[tuple[str, Seen]]]) -> pd.DataFrame:
+    rows = []
+    for sensor, pieces in partials.items():
+        by_file: dict[str, list[Seen]] = {}
+        for name, seen in pieces:
+            by_file.setdefault(name.split("#")[0], []).append(seen)
+        for name, seen_list in by_file.items():
+            epochs = np.concatenate([seen.epochs_ns for seen in seen_list])
+            records = sum(seen.count for seen in seen_list)
+            seconds = (epochs.max() - epochs.min()) / NS if len(epochs) else 0.0
+            if sensor == "laser":
+                rate = records / seconds if seconds > 0 else np.nan
+            else:
+                steps = np.diff(np.unique(epochs))
+                rate = NS / float(np.median(steps)) if len(steps) else np.nan
+            rows.append(
+                {
+                    "sensor": sensor,
+                    "file": name,
+                    "records": records,
+                    "dropped": sum(sum(seen.dropped.values()) for seen in seen_list),
+                    "first_ns": int(epochs.min()) if len(epochs) else -1,
+                    "last_ns": int(epochs.max()) if len(epochs) else -1,
+                    "rate_hz": rate,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _gaps(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.DataFrame:
+    rows: list[dict[str, Any]] = []
+    for sensor, t_ns in epochs_ns.items():
+        stretches = split_at_gaps(t_ns, max_gap_ns)
+        for (_, end), (start, _) in zip(stretches[:-1], stretches[1:], strict=True):
+            rows.append({"sensor": sensor, "start_ns": end, "end_ns": start, "duration_s": (start - end) / NS})
+    return pd.DataFrame(rows, columns=[column.name for column in artefacts.GAPS.columns])
+
+
+def _counts(partials: dict[str, list[tuple[str, Seen]]], repeated: dict[str, int]) -> pd.DataFrame:
+    rows = []
+    for source, pieces in partials.items():
+        total: dict[str, int] = {"used": 0, "repeated time": repeated.get(source, 0)}
+        for _, seen in pieces:
+            total["used"] += seen.count
+            for reason, number in seen.dropped.items():
+                total[reason] = total.get(reason, 0) + number
+        total["used"] -= total["repeated time"]
+        rows += [{"source": source, "reason": reason, "count": number} for reason, number in sorted(total.items())]
+    return pd.DataFrame(rows)

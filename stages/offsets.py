@@ -1,0 +1,83 @@
+"""The patent's offsets: once after the angles (as it prints them), and in turn with the angles until both stand still."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline import artefacts, config
+from pipeline.errors import DegenerateGeometryError
+from pipeline.fitted import angle_passes, horizontal_faces, offset_passes
+from pipeline.maths.offsets import alternate, offsets
+from pipeline.maths.rotations import exp_so3
+from pipeline.mounts import mount_of
+
+
+@dataclass(frozen=True)
+class Config:
+    fit_planes: config.FitPlanes
+    offsets: config.Offsets
+    mbes: config.Mbes
+
+
+@dataclass(frozen=True)
+class Inputs:
+    faces: Annotated[pd.DataFrame, artefacts.FACES]
+    planes: Annotated[pd.DataFrame, artefacts.PLANES]
+    sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
+    angles: Annotated[pd.DataFrame, artefacts.ANGLES]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    offset_pairs: Annotated[pd.DataFrame, artefacts.OFFSET_PAIRS]
+    alternation: Annotated[pd.DataFrame, artefacts.ALTERNATION]
+    corrections: Annotated[pd.DataFrame, artefacts.CORRECTIONS]
+
+
+def run(inputs: Inputs, config: Config) -> Outputs:
+    passes = angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
+    pool = offset_passes(passes, inputs.planes)
+    dry, wet = horizontal_faces(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
+    lever = mount_of(config.mbes.mount).lever_arm_body_m
+    settings = config.offsets
+    angles = inputs.angles.iloc[0]
+    corrections, pairs, alternation = [], [], []
+
+    vector = np.radians([float(angles[f"rotation_{axis}_deg"]) for axis in "xyz"])
+    method = "patent_sequential"
+    try:
+        if angles["reason"]:
+            raise DegenerateGeometryError(str(angles["reason"]))
+        once = offsets(pool, dry, wet, exp_so3(vector), lever, settings.apply_x_first)
+        pairs += [{"method": method} | pair for pair in once.pairs]
+        corrections.append(_row(method, vector, once.body_m, bool(angles["converged"]), int(angles["iterations"]), ""))
+    except DegenerateGeometryError as error:
+        corrections.append(_row(method, np.full(3, np.nan), np.full(3, np.nan), False, 0, str(error)))
+
+    method = "patent_alternating"
+    try:
+        tolerances = (np.radians(settings.step_tolerance_deg), settings.step_tolerance_m)
+        result = alternate(passes, pool, dry, wet, lever, settings.max_iterations, *tolerances)
+        rotation, shift = result.rotation_vector_rad, result.lever_arm_correction_m
+        last = offsets(pool, dry, wet, exp_so3(rotation), lever + shift, True)
+        pairs += [{"method": method} | pair for pair in last.pairs]
+        alternation = result.rows
+        corrections.append(_row(method, rotation, shift, result.converged, result.iterations, ""))
+    except DegenerateGeometryError as error:
+        corrections.append(_row(method, np.full(3, np.nan), np.full(3, np.nan), False, 0, str(error)))
+    return Outputs(
+        pd.DataFrame(pairs, columns=[column.name for column in artefacts.OFFSET_PAIRS.columns]),
+        pd.DataFrame(alternation, columns=[column.name for column in artefacts.ALTERNATION.columns]),
+        pd.DataFrame(corrections),
+    )
+
+
+def _row(
+    method: str, vector_rad: np.ndarray, lever_m: np.ndarray, converged: bool, iterations: int, reason: str
+) -> dict[str, Any]:
+    row: dict[str, Any] = {"method": method}
+    row |= {f"rotation_{axis}_deg": float(np.degrees(vector_rad[k])) for k, axis in enumerate("xyz")}
+    row |= {f"lever_arm_{axis}_m": float(lever_m[k]) for k, axis in enumerate("xyz")}
+    return row | {"converged": converged, "iterations": iterations, "reason": reason}

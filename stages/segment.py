@@ -1,0 +1,221 @@
+"""Where the target is, and which points lie on which of its faces."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline import artefacts, config
+from pipeline.beams import beams_in_target
+from pipeline.counting import counts_table
+from pipeline.errors import RawDataError
+from pipeline.finding import VOXEL_M, FoundMount, FoundTarget, SoundingSample, find_mount, find_target
+from pipeline.maths.labelling import Beams, label_points, near_planes
+from pipeline.maths.rotations import exp_so3
+from pipeline.maths.targets import TargetModel
+from pipeline.maths.trajectory import Trajectory
+from pipeline.mounts import mount_of, target_of
+from pipeline.poses import trajectory_in_pool
+from pipeline.sampling import every_nth, voxel_means, voxel_sums
+from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
+
+Array = NDArray[np.float64]
+SAMPLE = 20_000  # soundings to search with
+LASER_GATE_M = 0.05
+
+
+@dataclass(frozen=True)
+class Config:
+    target: config.Target
+    segment: config.Segment
+    laser: config.Laser
+    mbes: config.Mbes
+
+
+@dataclass(frozen=True)
+class Inputs:
+    pool_frame: Annotated[pd.DataFrame, artefacts.POOL_FRAME]
+    poses: Annotated[pd.DataFrame, artefacts.POSES]
+    counts: Annotated[pd.DataFrame, artefacts.GEOREFERENCE_COUNTS]
+    laser_pool: Annotated[Stream, artefacts.LASER_POOL]
+    soundings_pool: Annotated[Stream, artefacts.SOUNDINGS_POOL]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    faces: Annotated[pd.DataFrame, artefacts.FACES]
+    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
+    provisional_mount: Annotated[pd.DataFrame, artefacts.PROVISIONAL_MOUNT]
+    counts: Annotated[pd.DataFrame, artefacts.SEGMENT_COUNTS]
+    laser_labelled: Annotated[Stream, artefacts.LASER_LABELLED] = EMPTY
+    soundings_labelled: Annotated[Stream, artefacts.SOUNDINGS_LABELLED] = EMPTY
+
+
+@dataclass(frozen=True)
+class Prepared:
+    model: TargetModel
+    target: FoundTarget
+    mount: FoundMount
+    trajectory: Trajectory  # in the target frame
+
+
+def prepare(inputs: Inputs, config: Config) -> Prepared:
+    model = target_of(config.target)
+    other_side = "north" if config.target.low_side == "south" else "south"
+    lowest = config.target.water_level_m - model.period_m / 4
+    names = ("x_pool_m", "y_pool_m", "z_pool_m")
+    dry = voxel_means(inputs.laser_pool.fold(voxel_sums, names, VOXEL_M, lowest))
+    if len(dry) < 50:
+        raise RawDataError(
+            f"laser: {len(dry)} places seen above the water near the target, at least 50 are needed; "
+            "check target.origin, target.water_level_m and laser.mount"
+        )
+    known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
+    target = find_target(dry, model, target_of(config.target, other_side), config.segment, known)
+    trajectory = trajectory_in_pool(inputs.poses).moved(
+        target.R_target_from_pool, -target.R_target_from_pool @ target.origin_pool_m
+    )
+    sample = _sounding_sample(inputs, trajectory)
+    coarse = mount_of(config.mbes.mount)
+    mount = find_mount(
+        sample, model, coarse.R_body_from_sensor, coarse.lever_arm_body_m, _beam_rad(config), config.segment
+    )
+    return Prepared(model, target, mount, trajectory)
+
+
+def _beam_rad(config: Config) -> tuple[float, float]:
+    across, along = np.radians(config.mbes.beam_deg)
+    return float(across), float(along)
+
+
+def _sounding_sample(inputs: Inputs, trajectory: Trajectory) -> SoundingSample:
+    used = inputs.counts.query("source == 'soundings' and reason == 'used'")["count"].sum()
+    pieces = inputs.soundings_pool.fold(every_nth, max(1.0, used / SAMPLE))
+    t_ns = np.concatenate([piece["t_ns"] for piece in pieces])
+    points = np.column_stack([np.concatenate([piece[f"{axis}_mbes_m"] for piece in pieces]) for axis in "xyz"])
+    return SoundingSample(*trajectory.poses_at(t_ns), points)
+
+
+def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> Piece:
+    if source == "laser_pool":
+        return _label_laser(chunk.columns, prepared, config)
+    return _label_soundings(chunk.columns, prepared, config)
+
+
+def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
+    model, segment = prepared.model, config.segment
+    pool = np.column_stack([batch[f"{axis}_pool_m"] for axis in "xyz"])
+    points = (pool - prepared.target.origin_pool_m) @ prepared.target.R_target_from_pool.T
+    dry = points[:, 2] > model.water_level_m + segment.water_margin_m
+    near = dry & near_planes(model, points, LASER_GATE_M)
+    rows = np.flatnonzero(near)
+    sensor = np.column_stack([batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
+    lever = np.broadcast_to(mount_of(config.laser.mount).lever_arm_body_m, sensor.shape)
+    rays = points[rows] - prepared.trajectory.place(batch["t_ns"][rows], lever)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    grazing = np.radians(segment.min_grazing_deg)
+    labels = label_points(model, points[rows], Beams(rays), LASER_GATE_M, segment.margin_m, grazing)
+    on = labels.face >= 0
+    columns = {name: batch[name][rows[on]] for name in ("t_ns", "pass")} | {"face": labels.face[on]}
+    for index, axis in enumerate("xyz"):
+        columns[f"{axis}_laser_m"], columns[f"{axis}_target_m"] = sensor[on, index], points[rows[on], index]
+    columns["cos_incidence"] = labels.cos_incidence[on]
+    counts = {
+        "below or near the water line": int((~dry).sum()),
+        "off every face": int((dry & ~near).sum() + labels.off_surface.sum()),
+        "near an edge": int(labels.near_edge.sum()),
+        "ray too flat": int(labels.grazing.sum()),
+        "used": int(on.sum()),
+    }
+    return Piece({"laser_labelled": columns}, counts)
+
+
+def _label_soundings(batch: Batch, prepared: Prepared, config: Config) -> Piece:
+    model, segment, mount = prepared.model, config.segment, prepared.mount
+    coarse = mount_of(config.mbes.mount)
+    R_body_from_mbes = exp_so3(mount.rotation_vector_rad) @ coarse.R_body_from_sensor
+    lever = coarse.lever_arm_body_m + mount.lever_arm_correction_m
+    sensor = np.column_stack([batch[f"{axis}_mbes_m"] for axis in "xyz"])
+    points = prepared.trajectory.place(batch["t_ns"], sensor @ R_body_from_mbes.T + lever)
+    wet = points[:, 2] < model.water_level_m - segment.water_margin_m
+    near = wet & near_planes(model, points, mount.gate_m)
+    rows = np.flatnonzero(near)
+    _, R_target_from_body = prepared.trajectory.poses_at(batch["t_ns"][rows])
+    beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[rows], _beam_rad(config))
+    grazing = np.radians(segment.min_grazing_deg)
+    labels = label_points(model, points[rows], beams, mount.gate_m, segment.margin_m, grazing)
+    on = labels.face >= 0
+    columns = {name: batch[name][rows[on]] for name in ("t_ns", "pass", "ping", "beam")} | {"face": labels.face[on]}
+    for index, axis in enumerate("xyz"):
+        columns[f"{axis}_mbes_m"] = sensor[rows[on], index]
+    counts = {
+        "above or near the water line": int((~wet).sum()),
+        "off every face": int((wet & ~near).sum() + labels.off_surface.sum()),
+        "footprint near an edge": int(labels.near_edge.sum()),
+        "ray too flat": int(labels.grazing.sum()),
+        "used": int(on.sum()),
+    }
+    return Piece({"soundings_labelled": columns}, counts)
+
+
+def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
+    counts = counts_table(partials)
+    for source, sensor in (("laser_pool", "laser"), ("soundings_pool", "mbes")):
+        of_source = counts[counts["source"] == source].set_index("reason")["count"]
+        if not of_source["used"]:
+            why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")
+            raise RawDataError(
+                f"{sensor}: no point on the target's faces ({why}); the coarse mount may be wrong by more than "
+                f"{config.segment.search_mount_deg:g}° and {config.segment.search_mount_m:g} m, or target.a, b, c, e wrong"
+            )
+    return Outputs(_faces(prepared.model), _target_pose(prepared.target), _mount(prepared.mount), counts)
+
+
+def _faces(model: TargetModel) -> pd.DataFrame:
+    rows = []
+    for number, face in enumerate(model.faces):
+        row = {"face": number, "name": face.name, "family": face.family, "distance_m": face.distance_m}
+        row |= {f"normal_{axis}_target_1": face.normal[index] for index, axis in enumerate("xyz")}
+        rows.append(row | {"vertices_target_m": face.vertices_m.ravel().tolist()})
+    return pd.DataFrame(rows)
+
+
+def _target_pose(found: FoundTarget) -> pd.DataFrame:
+    sigma, tilt_sigma = np.sqrt(np.diag(found.pose.covariance)), np.sqrt(np.diag(found.tilt.covariance))
+    row = {
+        "R_target_from_pool": found.R_target_from_pool.ravel().tolist(),
+        "azimuth_correction_deg": np.degrees(found.azimuth_correction_rad),
+        # The correction turns the points onto the model: the target itself is tilted the other way.
+        "tilt_x_deg": -np.degrees(found.tilt.parameters[0]),
+        "tilt_y_deg": -np.degrees(found.tilt.parameters[1]),
+        "sigma_azimuth_deg": np.degrees(sigma[0]),
+        "sigma_tilt_x_deg": np.degrees(tilt_sigma[0]),
+        "sigma_tilt_y_deg": np.degrees(tilt_sigma[1]),
+        "rms_m": found.pose.rms_m,
+        "points": found.pose.count,
+        "score": found.score,
+        "rival_score": found.rival_score,
+        "rival": found.rival,
+        "ambiguous": found.ambiguous,
+    }
+    for index, axis in enumerate("xyz"):
+        row |= {f"origin_{axis}_pool_m": found.origin_pool_m[index], f"sigma_{axis}_m": sigma[1 + index]}
+    return pd.DataFrame([row])
+
+
+def _mount(found: FoundMount) -> pd.DataFrame:
+    row = {
+        "scale_m": found.scale_m,
+        "gate_m": found.gate_m,
+        "score": found.score,
+        "rival_score": found.rival_score,
+        "ambiguous": found.ambiguous,
+    }
+    for index, axis in enumerate("xyz"):
+        row |= {
+            f"rotation_{axis}_deg": np.degrees(found.rotation_vector_rad[index]),
+            f"lever_arm_{axis}_m": found.lever_arm_correction_m[index],
+        }
+    return pd.DataFrame([row])

@@ -1,0 +1,149 @@
+"""The forward model against trigonometry by hand, and against a georeferencing written out from the conventions."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pipeline.simulation.earth import R_ecef_from_level
+from pipeline.simulation.motion import R_level_from_body
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.session import SimulatedSession, simulate
+
+LEVEL = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": -2.0}
+STILL = {name: {"amplitude": 0.0, "period_s": 5.0} for name in ("surge", "sway", "heave", "roll", "pitch", "heading")}
+Change = Callable[..., Scenario]
+LEVEL_CURVES = 1e-5  # m: 5 m from the origin the local level is turned by 5 / 6.4e6 rad
+
+
+def one_pass(changed: Change, noise_free: Scenario, mount: dict[str, float], **motion: float) -> SimulatedSession:
+    """A pass at 5 m with everything level and still but what is given; the sonar 1 m under water."""
+    scenario = changed(
+        noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL | motion,
+        mbes={"mount": LEVEL | mount, "beams": 131, "sector_deg": 130.0},
+    )
+    return simulate(scenario, 1)
+
+
+def range_m(session: SimulatedSession, angle_deg: float, y_m: float) -> float:
+    """The range of the beam at an angle while the INS passes y."""
+    when = session.truth["passes"][0]["start_ns"] + round((y_m + 4.5) / 0.4 * 1e9)
+    ping = session.pings["ping"][np.argmin(np.abs(session.pings["t_ns"] - when))]
+    chosen = (session.mbes["ping"] == ping) & (np.abs(session.mbes["angle_rad"] - np.radians(angle_deg)) < 1e-6)
+    assert chosen.sum() == 1
+    return float(session.mbes["two_way_time_s"][chosen][0] * session.mbes["sound_speed_m_s"][0] / 2)
+
+
+def test_level_beams_meet_wall_and_floor(changed: Change, noise_free: Scenario) -> None:
+    session = one_pass(changed, noise_free, {})
+    assert range_m(session, 60.0, 0.0) == pytest.approx(5.0 / np.sin(np.radians(60)), abs=LEVEL_CURVES)
+    assert range_m(session, 0.0, 0.0) == pytest.approx(4.3 - 1.0, abs=LEVEL_CURVES)  # the floor, 0.3 m below the foot
+    assert range_m(session, -30.0, 0.0) == pytest.approx(3.3 / np.cos(np.radians(30)), abs=LEVEL_CURVES)
+
+
+def test_starboard_down_lowers_the_starboard_beam(changed: Change, noise_free: Scenario) -> None:
+    by_vessel = one_pass(changed, noise_free, {}, roll_offset_deg=10.0)
+    # the sonar hangs 2 m below the INS: with starboard down it swings to port by 2 sin 10°, and comes up
+    depth = 2 * np.cos(np.radians(10)) - 1
+    assert range_m(by_vessel, 0.0, 0.0) == pytest.approx((4.3 - depth) / np.cos(np.radians(10)), abs=LEVEL_CURVES)
+    assert range_m(by_vessel, 40.0, 0.0) == pytest.approx((4.3 - depth) / np.cos(np.radians(30)), abs=LEVEL_CURVES)
+    assert range_m(by_vessel, -40.0, 0.0) == pytest.approx((4.3 - depth) / np.cos(np.radians(50)), abs=LEVEL_CURVES)
+    by_mount = one_pass(changed, noise_free, {"roll_deg": -10.0})  # starboard up: the beam at 50° looks along 60°
+    assert range_m(by_mount, 50.0, 0.0) == pytest.approx(5.0 / np.sin(np.radians(60)), abs=LEVEL_CURVES)
+
+
+def test_bow_up_turns_the_fan_forward(changed: Change, noise_free: Scenario) -> None:
+    session = one_pass(changed, noise_free, {"pitch_deg": 10.0})
+    assert range_m(session, 0.0, 0.0) == pytest.approx(3.3 / np.cos(np.radians(10)), abs=LEVEL_CURVES)
+    # of the beam at 60° the component that looks down is tipped forward: y = +cos 60 sin 10 > 0
+    assert range_m(session, 60.0, -1.6) == pytest.approx(5.0 / np.sin(np.radians(60)), abs=LEVEL_CURVES)  # on the wall again
+    assert range_m(session, 60.0, 1.4) > 5.0 / np.sin(np.radians(60)) + 0.05  # beyond its edge
+
+
+def test_yaw_is_counter_clockwise_and_azimuth_clockwise(changed: Change, noise_free: Scenario) -> None:
+    mount = one_pass(changed, noise_free, {"yaw_deg": 10.0})  # the starboard beam looks ahead, to +y
+    expected = 5.0 / np.sin(np.radians(60)) / np.cos(np.radians(10))
+    assert range_m(mount, 60.0, -2.0) == pytest.approx(expected, abs=LEVEL_CURVES)  # hits y = -1.12, on the wall
+    assert range_m(mount, 60.0, 1.0) != pytest.approx(expected, abs=1e-2)  # hits y = 1.88, a block or the back wall
+    heading = one_pass(changed, noise_free, {}, heading_offset_deg=10.0)  # the starboard beam looks astern, to -y
+    assert range_m(heading, 60.0, 2.0) == pytest.approx(expected, abs=LEVEL_CURVES)
+    assert range_m(heading, 60.0, -1.0) != pytest.approx(expected, abs=1e-2)
+
+
+def test_ins_reports_the_track_clockwise_from_north(changed: Change, noise_free: Scenario) -> None:
+    target = noise_free.target.model_dump() | {"azimuth_deg": 90.0}
+    session = simulate(changed(noise_free, target=target, motion=STILL), 1)
+    ins = session.ins
+    assert np.degrees(ins["azimuth_rad"]) == pytest.approx(90.0, abs=1e-4)
+    first = ins["t_ns"] < session.truth["passes"][0]["end_ns"]
+    assert np.all(np.diff(ins["longitude_rad"][first]) > 0)  # +y is east
+    assert np.degrees(ins["latitude_rad"][first]) == pytest.approx(36.0 + 4.0 / 110_970, abs=1e-6)  # -x is north: 4 m
+
+
+def test_attitude_and_level_are_the_conventions_rotations() -> None:
+    roll, pitch, azimuth = np.random.default_rng(0).uniform(-3, 3, (3, 20))
+    expected = Rotation.from_euler("ZXY", np.stack([-azimuth, pitch, roll], axis=1)).as_matrix()
+    np.testing.assert_allclose(R_level_from_body(roll, pitch, azimuth), expected, atol=1e-14)
+    expected = Rotation.from_euler("ZX", np.stack([azimuth + np.pi / 2, np.pi / 2 - pitch], axis=1)).as_matrix()
+    np.testing.assert_allclose(R_ecef_from_level(pitch, azimuth), expected, atol=1e-14)
+
+
+def distance_to_model_m(points: np.ndarray, a: float, b: float, c: float, e: float) -> np.ndarray:
+    """Distance to the nearest of the planes that anything can hit: wall, slanted faces, sides, tops, back wall, floor."""
+    x, y, z = points.T
+    slanted = (np.abs(y) - b / 2 - x) / np.sqrt(2)
+    horizontal = (z + a / 2 + e / 2) % e - e / 2
+    planes = [x, slanted, np.abs(y) - b / 2, horizontal, x - c, z + a / 2 + 0.3]
+    return np.min(np.abs(planes), axis=0)
+
+
+@pytest.mark.parametrize("azimuth_deg", [0.0, -163.0, 71.0])
+@pytest.mark.parametrize("sensor", ["laser", "mbes"])
+def test_points_georeferenced_by_hand_lie_on_the_target(
+    changed: Change, noise_free: Scenario, place: Callable[..., np.ndarray], sensor: str, azimuth_deg: float
+) -> None:
+    target = noise_free.target.model_dump() | {"azimuth_deg": azimuth_deg}
+    session = simulate(changed(noise_free, target=target), 3)
+    mount = session.truth["mbes"]["mount"] if sensor == "mbes" else session.session["laser"]["mount"]
+    points = place(session, sensor, mount, every=11)
+    assert len(points) > 300
+    assert np.abs(distance_to_model_m(points, 8.0, 3.0, 1.0, 0.5)).max() < 5e-6
+    on_wall = (np.abs(points[:, 0]) < 1e-3) & (np.abs(points[:, 1]) < 1.4)
+    assert on_wall.sum() > 30
+    assert (points[:, 2] < 0).all() if sensor == "mbes" else (points[:, 2] > 0).all()
+    coarse = place(session, "mbes", session.session["mbes"]["mount"], every=11)
+    assert np.median(distance_to_model_m(coarse, 8.0, 3.0, 1.0, 0.5)) > 1e-3  # the test can fail
+
+
+def test_latency_is_added_to_recorded_times(changed: Change, noise_free: Scenario) -> None:
+    plain = simulate(noise_free, 1)
+    late = simulate(changed(noise_free, mbes={"latency_s": 0.25}, laser={"latency_s": -0.5}), 1)
+    np.testing.assert_array_equal(late.mbes["t_ns"], plain.mbes["t_ns"] + 250_000_000)
+    np.testing.assert_array_equal(late.laser["t_ns"], plain.laser["t_ns"] - 500_000_000)
+    np.testing.assert_array_equal(late.mbes["two_way_time_s"], plain.mbes["two_way_time_s"])
+    assert late.session["mbes"]["latency_s"] == 0.0
+    declared = simulate(changed(noise_free, mbes={"latency_s": 0.25, "latency_declared_s": 0.2}), 1)
+    assert declared.session["mbes"]["latency_s"] == 0.2
+
+
+def test_wrong_sound_speed_scales_ranges_and_sines(changed: Change, noise_free: Scenario) -> None:
+    wrong = {"sound_speed_true_m_s": 1500.0, "sound_speed_recorded_m_s": 1485.0}
+    scenario = changed(
+        noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL,
+        mbes=wrong | {"mount": LEVEL, "beams": 131, "sector_deg": 130.0},
+    )
+    session = simulate(scenario, 1)
+    true_angle = np.arcsin(1500 / 1485 * np.sin(np.radians(60.0)))
+    assert range_m(session, 60.0, 0.0) * 1500 / 1485 == pytest.approx(5.0 / np.sin(true_angle), abs=LEVEL_CURVES)
+    assert session.session["mbes"]["sound_speed_m_s"] is None
+    told = simulate(changed(scenario, mbes={"give_true_sound_speed": True}), 1)
+    assert told.session["mbes"]["sound_speed_m_s"] == 1500.0
+
+
+def test_separate_projector_lengthens_the_path(changed: Change, noise_free: Scenario) -> None:
+    mbes = {"mount": LEVEL, "beams": 131, "sector_deg": 130.0, "projector_offset_m": [0.0, 0.3, 0.119]}
+    scenario = changed(noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL, mbes=mbes)
+    down = np.array([0.0, 0.0, -3.3])
+    expected = (3.3 + np.linalg.norm(down - [0.0, 0.3, 0.119])) / 2
+    assert range_m(simulate(scenario, 1), 0.0, 0.0) == pytest.approx(expected, abs=LEVEL_CURVES)
