@@ -9,7 +9,7 @@ JOBS     =
 SEED     = 1
 
 POOLCAL := .venv/bin/poolcal
-PYTHON  := .venv/bin/python
+PY      := .venv/bin/python
 SETUP   := .venv/.setup
 STAGES  := ingest georeference segment fit_planes angle_iterate offsets adjust report
 DEMO    := runs/demo-session
@@ -71,13 +71,13 @@ format: $(SETUP) ## what ruff can mend by itself
 	.venv/bin/ruff check --fix-only .
 
 test: lint ## lint, then every test
-	$(PYTHON) -m pytest -n 2 -q
+	$(PY) -m pytest -n 2 -q
 
 bench: $(SETUP) ## time the parts that must be fast
-	$(PYTHON) -m pytest tests/bench --benchmark-only --benchmark-disable-gc -q
+	$(PY) -m pytest tests/bench --benchmark-only --benchmark-disable-gc -q
 
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
-	$(PYTHON) -m tools.montecarlo
+	$(PY) -m tools.montecarlo
 
 clean: ## remove the demo and the tools' caches; results of other runs stay
 	rm -rf runs/demo runs/demo-session runs/demo-session.truth.json

@@ -78,7 +78,8 @@ class Segment(Model):
     search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
-    ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = 0.02  # a rival pose that explains nearly as many points
+    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # of the wall that a pose half a period off must lose
+    ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = 0.02  # another mount that explains so nearly as many soundings
 
 
 class FitPlanes(Model):

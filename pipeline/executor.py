@@ -1,5 +1,8 @@
 """Where parts are worked on: in this thread, in threads side by side, or on a dask.distributed cluster.
 
+A cluster's workers must see the session and the run folder under the same paths, and run one BLAS thread each, which
+is what dask's own worker command sees to.
+
 Threads, not processes: numpy, pyarrow and laspy release the interpreter's lock, nothing is copied between workers, and
 nothing is left behind when the program is killed. Results come back in order, so they never depend on the workers.
 """
@@ -63,14 +66,19 @@ class Workers:
             self._abandon(waiting)
 
     def _abandon(self, waiting: deque[Future[T]]) -> None:
-        """Cancel what has not begun, tell what has begun to stop, and wait until it has."""
+        """Cancel what has not begun, tell what has begun to stop, and wait until it has.
+
+        A cluster cannot be told to stop: there all that was sent out (twice the workers, no more) is waited for, so
+        that nothing writes into a folder that is being removed or made anew.
+        """
         if not waiting:
             return
         self.stop.set()
         for future in waiting:
-            future.cancel()
+            if self.local:
+                future.cancel()
         for future in waiting:
-            if not future.cancelled() and self.local:
+            if not future.cancelled():
                 future.exception()
         self.stop.clear()
 

@@ -38,8 +38,8 @@ class FoundTarget:
     azimuth_correction_rad: float
     pose: Refined
     tilt: Refined
-    score: float
-    rival_score: float
+    agreement_m2: float
+    rival_agreement_m2: float
     rival: str
     ambiguous: bool
 
@@ -54,7 +54,8 @@ def find_target(
     """Pose of the target from dry laser points (n, 3) in the pool frame; rivals are the poses one block off.
 
     Shifting by one period, or by half of it with the sides swapped, changes nothing but the ends of the stacks and the
-    wall's top edge: if those do not decide by ``ambiguity_margin`` of the points, the registration is ambiguous.
+    wall's top edge. A rival half a period off loses the wall's width times half a period; if it loses less than
+    ``ambiguity_share`` of that, the ends were not seen well enough, and the registration is ambiguous.
     """
     azimuth = np.radians(settings.search_azimuth_deg if azimuth_known else max(10.0, settings.search_azimuth_deg))
     reach_xy, reach_z = settings.search_horizontal_m, settings.search_vertical_e * model.period_m / 2
@@ -85,14 +86,16 @@ def find_target(
     tilt = refine(tilted, np.zeros(6), label, normals, distances, rounds=2)
     name, rival = _rivals(placement, pose.parameters, model, swapped)
     R_target_from_pool = rotation_z(pose.parameters[0])
-    ambiguous = bool(rival > best * (1 - settings.ambiguity_margin))
+    wall = model.faces[model.family_faces("P2")[0]].vertices_m
+    expected = np.ptp(wall[:, 1]) * model.period_m / 2
+    ambiguous = bool(best - rival < settings.ambiguity_share * expected)
     return FoundTarget(
         R_target_from_pool, pose.parameters[1:], pose.parameters[0], pose, tilt, best, rival, name, ambiguous
     )
 
 
 def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, closest: ClosestSurface) -> float:
-    """Share of laser points explained by the model and of the model's dry upright faces covered by points, in [0, 1].
+    """Area of laser points explained by the model, plus area of its dry upright faces covered by points, in m².
 
     Both ways, because a model that reaches beyond the end of the stack explains every point as well.
     """
@@ -101,7 +104,7 @@ def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, clo
     grid = model.upright_grid(VOXEL_M, model.water_level_m + VOXEL_M)
     distance, _ = cKDTree(points).query(grid)
     covered = np.maximum(0.0, 1.0 - (distance / (2 * VOXEL_M)) ** 2).sum()
-    return float((explained + covered) / (len(points) + len(grid)))
+    return float((explained + covered) * VOXEL_M**2)
 
 
 def _rivals(placement: TargetPose, best: Array, model: TargetModel, swapped: TargetModel) -> tuple[str, float]:

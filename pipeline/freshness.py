@@ -7,7 +7,7 @@ from types import ModuleType
 
 from pipeline import manifest, readers
 from pipeline.artefacts import Artefact, Document, Provenance, Raw
-from pipeline.errors import ArtefactError
+from pipeline.errors import ArtefactError, RawDataError
 from pipeline.evaluate import declared, name_of
 from pipeline.executor import SERIAL, Workers
 from pipeline.files import Digests
@@ -65,7 +65,11 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
     """Digest by file of one sensor, relative to the session folder."""
     root = this.settings.session_folder
     paths = readers.raw_files(getattr(this.settings.session, sensor), root)
-    return dict(zip((path.relative_to(root).as_posix() for path in paths), this.digests.of(paths), strict=True))
+    names = [path.relative_to(root).as_posix() for path in paths]
+    for name in names:
+        if any("\udc80" <= letter <= "\udcff" for letter in name):  # Python's stand-ins for other bytes
+            raise RawDataError(f"{name!a}: the file's name is not UTF-8; rename it")
+    return dict(zip(names, this.digests.of(paths), strict=True))
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:

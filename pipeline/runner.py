@@ -64,6 +64,7 @@ def run_stage(
 
 
 def _open(path: Path, settings: Settings, workers: Workers, progress: Progress | None) -> Run:
+    path = path.absolute()  # workers elsewhere have another working directory
     digests = Digests(path / folder.DIGESTS, workers.here)
     return Run(path, settings, digests, workers, progress or Progress(quiet=True))
 

@@ -35,11 +35,16 @@ def to_arrow(columns: Mapping[str, Any] | pd.DataFrame, artefact: Artefact) -> p
 
 def _to_array(values: Any, field: "pa.Field[Any]", where: str) -> "pa.Array[Any]":
     values = values.to_numpy() if isinstance(values, pd.Series) else np.asarray(values)
-    if values.dtype == object or values.dtype.kind in "UT":
+    plain = pa.types.is_list(field.type) or pa.types.is_string(field.type)
+    if plain:
         values = list(values)
+    elif values.dtype == object:
+        values = np.array(list(values))
     try:
+        if not plain and len(values) and not np.can_cast(values.dtype, field.type.to_pandas_dtype(), "same_kind"):
+            raise TypeError(f"these are {values.dtype}")
         array: Any = pa.array(values, type=field.type, from_pandas=False)
-    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError) as error:
+    except (pa.ArrowException, TypeError, OverflowError) as error:
         raise TypeError(f"{where}: column {field.name} does not fit {field.type}: {error}") from error
     if isinstance(array, pa.ChunkedArray):
         array = array.combine_chunks()

@@ -7,31 +7,31 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.artefacts import Artefact, Document, Raw
 from pipeline.config import PoolConfig, SessionConfig
 from pipeline.evaluate import declared, run_in_memory
-from pipeline.artefacts import Artefact, Raw
 from pipeline.streams import MemoryPart, Stream
 from stages import load
 
 
 def calibrate_in_memory(
-    session: SessionConfig, pool: PoolConfig, raw: Mapping[str, Mapping[str, np.ndarray]], until: str = "adjust"
+    session: SessionConfig, pool: PoolConfig, raw: Mapping[str, Mapping[str, np.ndarray]], until: str = "report"
 ) -> dict[str, Any]:
     """Every artefact of the stages up to ``until``, by "owner/name"; ``raw``: canonical columns of ins, laser, mbes."""
     found: dict[str, Any] = {}
+
+    def given(marker: Any) -> Any:
+        if isinstance(marker, Raw):
+            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),))
+        if isinstance(marker, (Artefact, Document)):
+            return found[f"{marker.owner}/{marker.name}"]
+        return {"inputs": {}, "software": {}}
+
     for stage in load():
-        inputs = stage.Inputs(
-            **{
-                name: Stream((MemoryPart(marker.sensor, raw[marker.sensor]),))
-                if isinstance(marker, Raw)
-                else found[f"{marker.owner}/{marker.name}"]
-                for name, marker in declared(stage.Inputs).items()
-                if isinstance(marker, (Raw, Artefact))
-            }
-        )
+        inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
         outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
         for name, marker in declared(stage.Outputs).items():
-            if isinstance(marker, Artefact):
+            if isinstance(marker, (Artefact, Document)):
                 found[f"{marker.owner}/{marker.name}"] = getattr(outputs, name)
         if stage.__name__ == f"stages.{until}":
             break

@@ -13,6 +13,8 @@ from pipeline.errors import ConfigError, PoolcalError
 from pipeline.progress import say
 from stages import ORDER, load
 
+INTERRUPTED = 130  # what typer makes of Ctrl-C
+
 app = typer.Typer(
     name="poolcal",
     help="Calibrates a boat's multibeam sonar against its laser scanner in a pool.",
@@ -118,7 +120,8 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
         problems = problems_of(load(), run_folder, pool)
     for problem in problems:
         say(problem, sys.stdout)
-    say(f"{len(problems)} problems" if problems else f"{run_folder}: everything is as recorded", sys.stdout)
+    many = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
+    say(many if problems else f"{run_folder}: everything is as recorded", sys.stdout)
     return 1 if problems else 0
 
 
@@ -151,7 +154,10 @@ def call(arguments: list[str]) -> int:
     debug = "--debug" in arguments  # accepted anywhere on the line
     words = [word for word in arguments if word != "--debug"]
     try:
-        return int(app(words or ["--help"], prog_name="poolcal", standalone_mode=False) or 0)
+        status = int(app(words or ["--help"], prog_name="poolcal", standalone_mode=False) or 0)
+        if status == INTERRUPTED:
+            say("poolcal: interrupted; what was complete is kept", sys.stderr)
+        return status
     except PoolcalError as error:
         if debug:
             traceback.print_exc()
@@ -161,11 +167,6 @@ def call(arguments: list[str]) -> int:
         usage = " ".join(error.format_message().split())
         say(f"poolcal: {usage or 'nothing to do'}; see poolcal --help", sys.stderr)
         return 2
-    except (KeyboardInterrupt, typer.Abort):
-        say("poolcal: interrupted; what was complete is kept", sys.stderr)
-        return 130
-    except BrokenPipeError:
-        return 141
     except Exception:
         say(traceback.format_exc().rstrip(), sys.stderr)
         say("poolcal: this is a bug; please report it with the lines above", sys.stderr)

@@ -195,8 +195,8 @@ def _target_pose(found: FoundTarget) -> pd.DataFrame:
         "sigma_tilt_y_deg": np.degrees(tilt_sigma[1]),
         "rms_m": found.pose.rms_m,
         "points": found.pose.count,
-        "score": found.score,
-        "rival_score": found.rival_score,
+        "agreement_m2": found.agreement_m2,
+        "rival_agreement_m2": found.rival_agreement_m2,
         "rival": found.rival,
         "ambiguous": found.ambiguous,
     }

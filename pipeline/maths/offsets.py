@@ -167,7 +167,7 @@ def alternate(
         correction = correction + shift
         vector = np.degrees(log_so3(rotation))
         step_rad, step_m = float(np.linalg.norm(turn)), float(np.linalg.norm(shift))
-        row = {"iteration": float(iteration), "step_deg": float(np.degrees(step_rad)), "step_m": step_m}
+        row: dict[str, float] = {"iteration": iteration, "step_deg": float(np.degrees(step_rad)), "step_m": step_m}
         row |= {f"rotation_{axis}_deg": float(vector[k]) for k, axis in enumerate("xyz")}
         rows.append(row | {f"lever_arm_{axis}_m": float(correction[k]) for k, axis in enumerate("xyz")})
         converged = step_rad <= step_tolerance_rad and step_m <= step_tolerance_m

@@ -7,7 +7,11 @@ scenario    what a session is like (YAML, strict)
 earth       target frame <-> WGS 84, by pyproj
 motion      the vessel's true movement
 mesh        target and pool as triangles;  raycast: what a ray meets
-ins, laser, mbes      what each instrument records
-novatel, sbet, las, bth0, xtf     the bytes of its files
+noise       one random generator for each purpose
+mounts      sensors on the body, and the coarse mount's errors
+ins, laser, mbes      what each instrument records;  beams: of what a fan of beams consists
+georeferenced         laser points placed in ECEF, as other programs hand them on
+novatel, sbet, las, bth0 (and its XTF shell)      the bytes of its files
+texts       session.yaml, pool.yaml, truth
 session     everything together, in memory and as a folder
 """

@@ -65,7 +65,7 @@ class Beams:
         along = np.cos(self.along_rad)
         forward = np.broadcast_to(np.sin(self.along_rad), sines.shape)
         direction_mbes = np.stack([sines * along, forward, -cosines * along], axis=-1)
-        directions = direction_mbes.reshape(pings, -1, 3) @ R_target_from_mbes.transpose(0, 2, 1)
+        directions = direction_mbes.reshape(pings, beams * self.rays, 3) @ R_target_from_mbes.transpose(0, 2, 1)
         origins = np.repeat(origins_m, beams * self.rays, axis=0)
         flat = directions.reshape(-1, 3)
         ranges, surfaces = self.caster.cast(origins, flat)

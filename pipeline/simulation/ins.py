@@ -38,9 +38,9 @@ def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Co
 
 
 def _epochs(rate_hz: float, start_ns: int, end_ns: int) -> Times:
-    """Epochs at whole multiples of the record interval in GPS time, as receivers give them."""
+    """Epochs from start to before end at whole multiples of the record interval in GPS time, as receivers give them."""
     interval_ns = round(NS / rate_hz)
-    return np.arange(-(-start_ns // interval_ns), end_ns // interval_ns + 1, dtype=np.int64) * interval_ns
+    return np.arange(-(-start_ns // interval_ns), -(-end_ns // interval_ns), dtype=np.int64) * interval_ns
 
 
 def sigmas(position_m: tuple[float, float, float], attitude_deg: tuple[float, float, float]) -> Floats:

@@ -18,6 +18,8 @@ def write_las(path: Path, laser: Columns, scenario: LaserScenario, day: date) ->
     """One file. The creation date is the session's day: the same session gives the same bytes."""
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = np.full(3, scenario.scale_m), np.zeros(3)
+    if scenario.frame != "laser" and len(laser["t_ns"]):
+        header.offsets = np.array([np.rint(laser[name].mean()) for name in ("x_m", "y_m", "z_m")])
     header.creation_date = day
     header.system_identifier, header.generating_software = "simulated scanner", "poolcal simulate"
     weekly = scenario.time == "week_seconds"

@@ -71,7 +71,7 @@ class Motion(Model):
 class Track(Model):
     """Passes along the target, in the direction of its +y axis."""
 
-    distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # INS to wall
+    distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # from wall
     speed_m_s: Annotated[float, Field(gt=0.001, le=20)] = 0.4
     half_length_m: Length | None = None  # from -y to +y of this; null: b/2 + c + 2
     ins_height_m: Lever = 1.3  # INS above the water
@@ -101,6 +101,7 @@ class LaserScenario(Model):
     water_return_share: Share = 0.02  # of the rays that meet the water: a point up to 0.3 m beyond its surface
     latency_s: Latency = 0.0  # recorded time = true time + latency
     latency_declared_s: Latency = 0.0
+    frame: Literal["laser", "EPSG:4978"] = "laser"  # EPSG:4978: placed in ECEF with the recorded INS
     format: Literal["laz", "las"] = "laz"
     scale_m: Annotated[float, Field(ge=1e-6, le=0.01)] = 1e-4
     time: Literal["adjusted_standard", "week_seconds"] = "adjusted_standard"
@@ -146,6 +147,7 @@ class MbesScenario(Model):
 class Scenario(Model):
     name: Annotated[str, Field(min_length=1, max_length=200)] = "default"
     start_utc: Annotated[str, AfterValidator(_moment)] = "2026-05-12T08:00:00"
+    declare_sigmas: bool = True  # false: session.yaml says nothing of noise, drift and beam width
     target: Target = Target(
         a=8.0, b=3.0, c=1.0, e=0.5, azimuth_deg=0.0,
         origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0),

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -15,6 +16,7 @@ import yaml
 from pipeline.errors import ConfigError
 from pipeline.simulation.beams import fan
 from pipeline.simulation.bth0 import packets, xtf_bytes
+from pipeline.simulation.georeferenced import laser_in_ecef
 from pipeline.simulation.ins import Columns, record_ins
 from pipeline.simulation.las import write_las
 from pipeline.simulation.laser import record_laser
@@ -33,7 +35,7 @@ class SimulatedSession:
     """What the instruments recorded, as canonical raw columns, and the texts that go with it."""
 
     ins: Columns  # t_ns, latitude_rad, longitude_rad, height_m, roll_rad, pitch_rad, azimuth_rad
-    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame
+    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF if so asked
     mbes: Columns  # t_ns, ping, beam, two_way_time_s, angle_rad, sound_speed_m_s; beams with a detection only
     session: dict[str, Any]  # session.yaml
     pool: dict[str, Any]  # pool.yaml
@@ -52,6 +54,8 @@ def simulate(scenario: Scenario, seed: int) -> SimulatedSession:
     water_level_m = scenario.target.water_level_m
     ins, ins_rows = record_ins(scenario.ins, movement, seed)
     laser, laser_rows = record_laser(scenario.laser, movement, caster, water_level_m, seed)
+    if scenario.laser.frame != "laser":
+        laser = laser_in_ecef(laser, ins, scenario.laser)
     pool = Pool(caster, water_level_m, corner_lines(scenario.target))
     mbes, pings = record_mbes(scenario.mbes, movement, pool, seed)
     session, design = session_text(scenario, movement, seed), pool_text(scenario, movement)
@@ -75,7 +79,8 @@ def write_session(simulated: SimulatedSession, folder: Path, scenario: Scenario)
         raise ConfigError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
-        beside.unlink(missing_ok=True)
+        with suppress(OSError):
+            beside.unlink()
 
 
 def truth_path(folder: Path) -> Path:
@@ -87,8 +92,12 @@ def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> d
     """Simulate and write a session; what was written, and the seconds it took."""
     begin = time.perf_counter()
     folder = Path(os.path.abspath(folder))
-    _refuse_existing(folder)  # before the work, not after it
     scenario = load_scenario(scenario_path)
+    _refuse_existing(folder)  # before the work, not after it
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{folder.parent}: cannot be made ({error.strerror}); choose another folder") from error
     simulated = simulate(scenario, seed)
     write_session(simulated, folder, scenario)
     return {

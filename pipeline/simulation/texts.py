@@ -22,12 +22,13 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
     about_ins["format"] = "sbet" if ins.format == "sbet" else "novatel"
     if ins.format == "sbet":
         about_ins["gps_week"] = first_ns // WEEK_NS
-    about_ins |= {"drift": ins.drift.model_dump(), "white": ins.white.model_dump()}
+    if scenario.declare_sigmas:
+        about_ins |= {"drift": ins.drift.model_dump(), "white": ins.white.model_dump()}
     about_laser: Text = {"files": [f"laser/*.{laser.format}"], "format": "las"}
     if laser.time == "week_seconds":
         about_laser["gps_week"] = movement.starts_ns[0] // WEEK_NS
-    about_laser |= {"frame": "laser", "mount": laser.mount.model_dump()}
-    about_laser |= _sigmas(laser.range_sigma_m, laser.angle_sigma_deg) | {"latency_s": laser.latency_declared_s}
+    about_laser |= {"frame": laser.frame, "mount": laser.mount.model_dump()}
+    about_laser["latency_s"] = laser.latency_declared_s
     about_mbes: Text = {
         "files": [f"mbes/*.{mbes.format}"],
         "format": "r2sonic",
@@ -36,8 +37,10 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
     }
     if mbes.give_projector_offset:
         about_mbes["projector_offset_m"] = list(mbes.projector_offset_m)
-    about_mbes |= _sigmas(mbes.range_sigma_m, mbes.angle_sigma_deg)
-    about_mbes |= {"beam_deg": list(mbes.beam_deg), "latency_s": mbes.latency_declared_s}
+    about_mbes["latency_s"] = mbes.latency_declared_s
+    if scenario.declare_sigmas:
+        about_laser |= _sigmas(laser.range_sigma_m, laser.angle_sigma_deg)
+        about_mbes |= _sigmas(mbes.range_sigma_m, mbes.angle_sigma_deg) | {"beam_deg": list(mbes.beam_deg)}
     name = f"{scenario.start_utc[:10]}_{scenario.name}"
     return {"name": name, "ins": about_ins, "laser": about_laser, "mbes": about_mbes}
 

@@ -1,9 +1,11 @@
 """What is run again, and why; and that the result is the same however it is worked out."""
 
 import json
+import multiprocessing
 import os
 import shutil
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +13,8 @@ import pytest
 
 from pipeline import manifest, runner
 from pipeline.errors import ArtefactError, RawDataError
-from pipeline.executor import workers
-from pipeline.streams import Chunk
+from pipeline.executor import Workers, workers
+from tests.runner import toys
 from tests.runner.conftest import Pool
 
 Contents = Callable[[Path], dict[str, bytes]]
@@ -125,6 +127,19 @@ def test_one_job_or_two_give_the_same_bytes(pool: Pool, contents: Contents) -> N
     assert len(one) == 2 + 1 + 2 + 1 + 1
 
 
+def test_workers_that_share_no_memory_give_the_same_bytes(pool: Pool, contents: Contents) -> None:
+    """As on a cluster: what is sent out is pickled, what comes back are files under the same paths."""
+    pool.run()
+    one, pool.run_folder = contents(pool.run_folder), pool.run_folder.with_name("b")
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
+        pool.run(Workers(2, executor, local=False))
+        pool.margin(0.5)
+        pool.stages[1].run_batch = toys.refuse  # type: ignore[attr-defined]
+        with pytest.raises(RawDataError, match=r"cannot be used"):
+            pool.run(Workers(2, executor, local=False))
+    assert contents(pool.run_folder) == one
+
+
 def test_the_size_of_batches_does_not_show_in_the_bytes(
     pool: Pool, contents: Contents, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,20 +153,15 @@ def test_the_size_of_batches_does_not_show_in_the_bytes(
 
 
 def _parts(settings: object, folder: Path, step: int) -> tuple[object, ...]:
-    from tests.runner.toys import RawPart, raw_files
-
-    return tuple(RawPart(path, step) for path in raw_files(settings, folder))
+    return tuple(toys.RawPart(path, step) for path in toys.raw_files(settings, folder))
 
 
 def test_a_failed_rerun_keeps_the_complete_result(pool: Pool, contents: Contents) -> None:
     pool.run()
     before = contents(pool.run_folder)
 
-    def fail(source: str, chunk: Chunk, prepared: object, config: object) -> None:
-        raise RawDataError("laser/0.bin: cannot be")
-
     good = pool.stages[1].run_batch
-    pool.stages[1].run_batch = fail  # type: ignore[attr-defined]
+    pool.stages[1].run_batch = toys.refuse  # type: ignore[attr-defined]
     pool.margin(0.5)
     with workers(2) as two, pytest.raises(RawDataError):
         pool.run(two)
@@ -175,6 +185,13 @@ def test_raw_files_that_change_while_they_are_read_are_refused(pool: Pool) -> No
     with pytest.raises(RawDataError, match="changed while they were read"):
         pool.run()
     assert not (pool.run_folder / "take").exists()
+
+
+def test_a_file_name_that_is_no_text_is_refused(pool: Pool) -> None:
+    with open(bytes(pool.session / "laser") + b"/\xff.bin", "wb"):
+        pass
+    with pytest.raises(RawDataError, match="not UTF-8; rename it"):
+        pool.run()
 
 
 def test_the_manifest_tells_what_was_done(pool: Pool) -> None:

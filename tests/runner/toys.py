@@ -11,7 +11,8 @@ import pandas as pd
 
 from pipeline import artefacts, config
 from pipeline.artefacts import F64, I16, I64, TEXT, Artefact, Column, Document
-from pipeline.streams import EMPTY, Chunk, Piece, Stream
+from pipeline.errors import RawDataError
+from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
 
 POINTS = Artefact(
     "take", "points", "stream", "points", (Column("t_ns", I64, "ns", "time"), Column("x_m", F64, "m", "x"))
@@ -99,7 +100,11 @@ class SiftOutputs:
 
 
 def _sift_prepare(inputs: SiftInputs, config: SiftConfig) -> float:
-    return float(max(inputs.points.fold(lambda batch: float(np.max(batch["x_m"], initial=-np.inf))), default=0.0))
+    return max(inputs.points.fold(_largest), default=0.0)
+
+
+def _largest(batch: Batch) -> float:
+    return float(np.max(batch["x_m"]))
 
 
 def _sift_batch(source: str, chunk: Chunk, prepared: float, config: SiftConfig) -> Piece:
@@ -109,10 +114,15 @@ def _sift_batch(source: str, chunk: Chunk, prepared: float, config: SiftConfig) 
     return Piece({"near": near}, (float(x_m[keep].sum()), int(keep.sum())))
 
 
+def refuse(source: str, chunk: Chunk, prepared: float, config: SiftConfig) -> Piece:
+    raise RawDataError("laser/0.bin: cannot be used; take another")
+
+
 def _sift_combine(
     prepared: float, partials: dict[str, list[tuple[str, tuple[float, int]]]], config: SiftConfig
 ) -> SiftOutputs:
-    total, count = (sum(column) for column in zip(*(value for _, value in partials["points"]), strict=True))
+    total = sum(value for _, (value, _) in partials["points"])
+    count = sum(number for _, (_, number) in partials["points"])
     return SiftOutputs(pd.DataFrame({"face": [0], "mean_m": [round(total / max(count, 1), 3)]}))
 
 

@@ -1,5 +1,6 @@
 """Small scenarios, and a georeferencing of raw columns written out by hand from the conventions alone."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ def _changed(scenario: Scenario, **changes: dict[str, Any]) -> Scenario:
     content = scenario.model_dump(mode="json")
     for block, values in changes.items():
         content[block].update(values)
-    return Scenario.model_validate_json(__import__("json").dumps(content), strict=True)
+    return Scenario.model_validate_json(json.dumps(content), strict=True)
 
 
 @pytest.fixture(scope="session")

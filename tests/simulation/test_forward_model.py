@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from pyproj import Transformer
 from scipy.spatial.transform import Rotation
 
 from pipeline.simulation.earth import R_ecef_from_level
@@ -57,8 +58,9 @@ def test_bow_up_turns_the_fan_forward(changed: Change, noise_free: Scenario) -> 
     session = one_pass(changed, noise_free, {"pitch_deg": 10.0})
     assert range_m(session, 0.0, 0.0) == pytest.approx(3.3 / np.cos(np.radians(10)), abs=LEVEL_CURVES)
     # of the beam at 60° the component that looks down is tipped forward: y = +cos 60 sin 10 > 0
-    assert range_m(session, 60.0, -1.6) == pytest.approx(5.0 / np.sin(np.radians(60)), abs=LEVEL_CURVES)  # on the wall again
-    assert range_m(session, 60.0, 1.4) > 5.0 / np.sin(np.radians(60)) + 0.05  # beyond its edge
+    # so that it is on the wall already at y = -1.6, and off it again at y = 1.4
+    assert range_m(session, 60.0, -1.6) == pytest.approx(5.0 / np.sin(np.radians(60)), abs=LEVEL_CURVES)
+    assert range_m(session, 60.0, 1.4) > 5.0 / np.sin(np.radians(60)) + 0.05
 
 
 def test_yaw_is_counter_clockwise_and_azimuth_clockwise(changed: Change, noise_free: Scenario) -> None:
@@ -90,12 +92,13 @@ def test_attitude_and_level_are_the_conventions_rotations() -> None:
 
 
 def distance_to_model_m(points: np.ndarray, a: float, b: float, c: float, e: float) -> np.ndarray:
-    """Distance to the nearest of the planes that anything can hit: wall, slanted faces, sides, tops, back wall, floor."""
+    """Distance to the nearest plane: wall, slanted faces, sides, tops and bottoms, back wall, floor."""
     x, y, z = points.T
     slanted = (np.abs(y) - b / 2 - x) / np.sqrt(2)
     horizontal = (z + a / 2 + e / 2) % e - e / 2
     planes = [x, slanted, np.abs(y) - b / 2, horizontal, x - c, z + a / 2 + 0.3]
-    return np.min(np.abs(planes), axis=0)
+    nearest: np.ndarray = np.min(np.abs(planes), axis=0)
+    return nearest
 
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, -163.0, 71.0])
@@ -147,3 +150,39 @@ def test_separate_projector_lengthens_the_path(changed: Change, noise_free: Scen
     down = np.array([0.0, 0.0, -3.3])
     expected = (3.3 + np.linalg.norm(down - [0.0, 0.3, 0.119])) / 2
     assert range_m(simulate(scenario, 1), 0.0, 0.0) == pytest.approx(expected, abs=LEVEL_CURVES)
+
+
+def test_angle_noise_turns_the_beam_not_the_record(changed: Change, noise_free: Scenario) -> None:
+    session = simulate(
+        changed(
+            noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL,
+            mbes={"mount": LEVEL, "beams": 131, "sector_deg": 130.0, "angle_sigma_deg": 0.06, "ping_rate_hz": 10.0},
+        ), 1,
+    )
+    mbes = session.mbes
+    assert len(np.unique(mbes["angle_rad"])) == 131
+    middle = np.abs(mbes["t_ns"] - session.truth["passes"][0]["start_ns"] - 4.5 / 0.4 * 1e9) < 1.4 / 0.4 * 1e9
+    on_wall = middle & (mbes["angle_rad"] > np.radians(59.5)) & (mbes["angle_rad"] < np.radians(64))
+    true_angle = np.arcsin(5.0 / (750 * mbes["two_way_time_s"][on_wall]))
+    noise = np.degrees(true_angle - mbes["angle_rad"][on_wall])
+    assert noise.std() == pytest.approx(0.06, rel=0.15)
+    assert abs(noise.mean()) < 0.01
+
+
+def test_laser_points_placed_in_ecef_are_the_same_points(
+    changed: Change, noise_free: Scenario, place: Callable[..., np.ndarray]
+) -> None:
+    latency = {"latency_s": 0.3, "latency_declared_s": 0.3}
+    placed = simulate(changed(noise_free, laser=latency | {"frame": "EPSG:4978"}), 1)
+    raw = simulate(noise_free, 1)
+    origin = placed.truth["target"]["origin"]
+    centre = Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True).transform(
+        origin["longitude_deg"], origin["latitude_deg"], origin["height_m"]
+    )
+    ecef = np.stack([placed.laser[name] for name in ("x_m", "y_m", "z_m")], axis=1)[::50]
+    points = place(raw, "laser", raw.session["laser"]["mount"], every=50)
+    np.testing.assert_allclose(np.linalg.norm(ecef - centre, axis=1), np.linalg.norm(points, axis=1), atol=2e-6)
+    up = np.array([np.cos(0.2 * np.pi) * np.cos(np.radians(120.1)), np.cos(0.2 * np.pi) * np.sin(np.radians(120.1)), 0])
+    up[2] = np.sin(0.2 * np.pi)  # latitude 36°
+    np.testing.assert_allclose((ecef - centre) @ up, points[:, 2], atol=2e-6)
+    assert placed.session["laser"]["frame"] == "EPSG:4978"

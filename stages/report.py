@@ -1,0 +1,191 @@
+"""The answer: calibration.json for programs, calibration.yaml for people, a summary for the screen, and the verdict."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+import yaml
+from numpy.typing import NDArray
+
+from pipeline import artefacts, config
+from pipeline.maths.adjustment import COMMON, NAMES
+from pipeline.maths.rotations import exp_so3
+from pipeline.mounts import Mounted, mount_of
+from pipeline.verdict import Evidence, reasons
+
+Array = NDArray[np.float64]
+SCHEMA = 1
+AXES = ("roll", "pitch", "yaw", "x", "y", "z")
+VECTOR_OF_ANGLE = {"pitch": 0, "roll": 1, "yaw": 2}  # rotation vector's component about the same body axis
+
+
+@dataclass(frozen=True)
+class Config:
+    name: str
+    mbes: config.Mbes
+    verdict: config.Verdict
+    result: config.Method
+
+
+@dataclass(frozen=True)
+class Inputs:
+    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
+    provisional_mount: Annotated[pd.DataFrame, artefacts.PROVISIONAL_MOUNT]
+    corrections: Annotated[pd.DataFrame, artefacts.CORRECTIONS]
+    estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
+    covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
+    cells: Annotated[pd.DataFrame, artefacts.CELLS]
+    groups: Annotated[pd.DataFrame, artefacts.GROUPS]
+    summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
+    provenance: Annotated[dict[str, Any], artefacts.Provenance]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    calibration: Annotated[pd.DataFrame, artefacts.CALIBRATION]
+    calibration_json: Annotated[str, artefacts.CALIBRATION_JSON]
+    calibration_yaml: Annotated[str, artefacts.CALIBRATION_YAML]
+
+
+def run(inputs: Inputs, config: Config) -> Outputs:
+    coarse = mount_of(config.mbes.mount)
+    methods = _patent_methods(inputs.corrections, coarse)
+    methods["adjustment"] = _adjustment(inputs.estimate, inputs.covariance, coarse)
+    found = reasons(
+        Evidence(
+            inputs.target_pose, inputs.provisional_mount, inputs.corrections, inputs.summary, inputs.cells, inputs.groups
+        ),
+        methods["adjustment"]["sigma"],
+        config.verdict,
+        config.result,
+    )
+    summary = inputs.summary.iloc[0]
+    result = {
+        "schema": SCHEMA,
+        "session": config.name,
+        "verdict": "rejected" if found else "accepted",
+        "reasons": found,
+        "result": config.result,
+        "mbes": methods[config.result],
+        "methods": methods,
+        "coarse": {"mount": config.mbes.mount.model_dump()},
+        "geometry": {
+            "correlation": _matrix(inputs.covariance, "correlation"),
+            "weakest": str(summary["weakest"]),
+            "test": {name: _plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
+        },
+        "ranges": _range_note(config.mbes),
+        "inputs": inputs.provenance["inputs"],
+        "software": inputs.provenance["software"],
+    }
+    return Outputs(
+        _table(methods, coarse),
+        json.dumps(result, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+        yaml.safe_dump(result, sort_keys=False, allow_unicode=True, width=120),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """A number or truth value that JSON knows; None for what is not a number."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    number = float(value)
+    return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
+
+
+def _range_note(mbes: config.Mbes) -> str:
+    if mbes.projector_offset_m is None:
+        return "sonar ranges taken as recorded: half the two-way path"
+    return f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
+
+
+def _method(vector_rad: Array, lever_m: Array, coarse: Mounted, covariance: Array | None, why: str = "") -> dict[str, Any]:
+    """One method's block of the contract; nulls where there is no result."""
+    good = bool(np.all(np.isfinite(vector_rad)) and np.all(np.isfinite(lever_m)))
+    known = good and covariance is not None and bool(np.all(np.isfinite(covariance)))
+    sigma = np.sqrt(np.diag(covariance)) if known and covariance is not None else None
+    total = (
+        Mounted(exp_so3(vector_rad) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + lever_m) if good else None
+    )
+    block: dict[str, Any] = {
+        "R_body_from_mbes": total.R_body_from_sensor.tolist() if total else None,
+        "lever_arm_m": total.lever_arm_body_m.tolist() if total else None,
+        "mount": total.settings() if total else None,
+        "correction": {
+            "rotation_vector_deg": np.degrees(vector_rad).tolist() if good else None,
+            "lever_arm_m": lever_m.tolist() if good else None,
+        },
+        "sigma": None
+        if sigma is None
+        else {"rotation_vector_deg": np.degrees(sigma[:3]).tolist(), "lever_arm_m": sigma[3:].tolist()},
+        "covariance": covariance.tolist() if known and covariance is not None else None,
+    }
+    return block | ({"no_result": why} if why else {})
+
+
+def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dict[str, Any]]:
+    methods = {}
+    for row in corrections.to_dict("records"):
+        vector = np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"])
+        lever = np.array([row[f"lever_arm_{axis}_m"] for axis in "xyz"])
+        block = _method(vector, lever, coarse, None, row["reason"])
+        methods[row["method"]] = block | {"converged": bool(row["converged"]), "iterations": int(row["iterations"])}
+    return methods
+
+
+def _adjustment(estimate: pd.DataFrame, covariance: pd.DataFrame, coarse: Mounted) -> dict[str, Any]:
+    values = estimate.set_index("unknown").loc[list(NAMES), "value"].to_numpy()
+    table = covariance["covariance"].to_numpy().reshape(COMMON, COMMON)
+    return _method(values[:3], values[3:], coarse, table)
+
+
+def _matrix(table: pd.DataFrame, column: str) -> list[list[float]] | None:
+    values = table[column].to_numpy().reshape(COMMON, COMMON)
+    return values.tolist() if np.all(np.isfinite(values)) else None
+
+
+def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.DataFrame:
+    rows = []
+    for method, block in methods.items():
+        for parameter in AXES:
+            angle = parameter in VECTOR_OF_ANGLE
+            key = f"{parameter}_deg" if angle else f"{parameter}_m"
+            part = "rotation_vector_deg" if angle else "lever_arm_m"
+            index = VECTOR_OF_ANGLE[parameter] if angle else "xyz".index(parameter)
+            correction, sigma = block["correction"][part], block["sigma"]
+            rows.append(
+                {
+                    "method": method,
+                    "parameter": parameter,
+                    "unit": "deg" if angle else "m",
+                    "coarse": coarse.settings()[key],
+                    "total": block["mount"][key] if block["mount"] else np.nan,
+                    "correction": correction[index] if correction else np.nan,
+                    "sigma": sigma[part][index] if sigma else np.nan,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def summary(calibration: Mapping[str, Any]) -> str:
+    """The result on one screen, from calibration.json."""
+    lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]
+    lines += [f"  because {reason}" for reason in calibration["reasons"]]
+    lines += ["", f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'correction':>14}{'sigma':>12}   (result: {calibration['result']})"]  # fmt: skip
+    block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
+    for parameter in AXES:
+        angle = parameter in VECTOR_OF_ANGLE
+        key, unit = (f"{parameter}_deg", "°") if angle else (f"{parameter}_m", "m")
+        part = "rotation_vector_deg" if angle else "lever_arm_m"
+        index = VECTOR_OF_ANGLE[parameter] if angle else "xyz".index(parameter)
+        total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
+        correction = f"{block['correction'][part][index]:+.4f} {unit}" if block["mount"] else "-"
+        sigma = f"{block['sigma'][part][index]:.4f} {unit}" if block["sigma"] else "-"
+        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{correction:>14}{sigma:>12}")
+    lines += ["", "'calibrated' replaces the coarse value; 'correction' is what lies between (about the same body axis)."]
+    if calibration["geometry"]["weakest"]:
+        lines.append(f"Geometry: {calibration['geometry']['weakest']}.")
+    return "\n".join(lines)

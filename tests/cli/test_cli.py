@@ -1,0 +1,224 @@
+"""The command line as users and scripts meet it: exit status, what goes to which stream, and how fast it answers."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import pipeline
+from stages import ORDER
+from stages.cli import call
+from tests.runner.conftest import Pool
+
+TOY = [sys.executable, str(Path(__file__).with_name("toy_poolcal.py"))]
+
+
+def _toy(*words: object, **options: object) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run([*TOY, *map(str, words)], capture_output=True, text=True, timeout=60, **options)  # type: ignore[call-overload,no-any-return]
+
+
+def _words(pool: Pool) -> tuple[object, ...]:
+    return ("run", pool.session, "--config", pool.config, "--run", pool.run_folder)
+
+
+def _told(pool: Pool, code: int) -> None:
+    pool.margin(0.05)
+    pool.config.write_text(pool.config.read_text() + f"verdict: {{max_sigma_m: {code}}}\n")
+
+
+# --- answering -------------------------------------------------------------------------------------------------------
+def test_help_is_quick_and_imports_nothing_that_computes() -> None:
+    code = (
+        "import sys; from stages.cli import call; status = call(['--help']);"
+        "heavy = {'numpy', 'pandas', 'pyarrow', 'pydantic', 'scipy', 'open3d', 'rich'} & set(sys.modules);"
+        "sys.exit(f'imported {heavy}' if heavy else status)"
+    )
+    start = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert time.monotonic() - start < 1.0
+    for command in ("simulate", "run", "stage", "verify", "compare"):
+        assert command in done.stdout
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["--version"]) == 0
+    assert capsys.readouterr().out == f"poolcal {pipeline.__version__}\n"
+
+
+@pytest.mark.parametrize("command", ["simulate", "run", "stage", "verify", "compare"])
+def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call([command, "--help"]) == 0
+    assert "Usage: poolcal" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["runn"], "No such command 'runn'"),
+        (["run"], "Missing argument 'SESSION'"),
+        (["run", "x"], "Missing option '--config'"),
+        (["run", "x", "--config", "y", "--run", "z", "--jobs", "many"], "--jobs"),
+        (["run", "x", "--config", "y", "--run", "z", "--jobs", "0"], "--jobs 0: must be 1 or more"),
+        (["run", "x", "--config", "missing.yaml", "--run", "z"], "missing.yaml: cannot be read"),
+        (["stage", "wash", "z"], "NAME 'wash': is no stage; the stages are ingest"),
+        (["stage", "ingest", "z", "--session", "x"], "--session and --config: give both"),
+        (["simulate", "x", "--seed", "-1"], "--seed -1: must not be negative"),
+        (["verify", "z"], "z: holds no run.yaml"),
+        (["compare", "z", "truth.json"], "calibration.json: cannot be read"),
+        (["--wrong"], "No such option"),
+    ],
+)
+def test_bad_usage_is_one_line(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("stages.cli.load", lambda: ())
+    assert call(words) == 2
+    out, err = capsys.readouterr()
+    assert said in err
+    assert err.startswith("poolcal: ")
+    assert err.count("\n") == 1
+    assert out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_order_is_the_contracts() -> None:
+    assert " ".join(ORDER) == "ingest georeference segment fit_planes angle_iterate offsets adjust report"
+
+
+# --- running ---------------------------------------------------------------------------------------------------------
+def test_accepted_then_nothing_to_do_then_rejected(pool: Pool) -> None:
+    _told(pool, 1)
+    done = _toy(*_words(pool))
+    assert (done.returncode, done.stdout) == (0, "toy: accepted\n")
+    assert "take: has no result yet\ntake: done in" in done.stderr
+    done = _toy(*_words(pool))
+    assert done.returncode == 0
+    assert done.stderr == "take: up to date\nsift: up to date\nreport: up to date\n"
+    _told(pool, 2)
+    done = _toy(*_words(pool), "--jobs", 2)
+    assert (done.returncode, done.stdout) == (1, "toy: rejected\n")
+    assert "report: verdict.max_sigma_m 1.0 -> 2.0\n" in done.stderr
+    assert _toy("stage", "report", pool.run_folder).returncode == 1
+    assert _toy("stage", "sift", pool.run_folder).returncode == 0
+    assert _toy("verify", pool.run_folder).returncode == 0
+
+
+def test_the_report_learns_what_it_was_made_from(pool: Pool) -> None:
+    _told(pool, 1)
+    _toy(*_words(pool))
+    told = json.loads((pool.run_folder / "report" / "calibration.json").read_text())
+    assert set(told["inputs"]) == {"ins/0.bin", "laser/0.bin", "laser/1.bin", "mbes/0.bin"}
+    assert {"poolcal", "python", "numpy"} <= set(told["software"])
+    (pool.session / "ins" / "0.bin").write_bytes(b"")
+    assert "report: ins/0.bin changed" in _toy(*_words(pool)).stderr
+
+
+def test_verify_says_what_is_wrong(pool: Pool) -> None:
+    _told(pool, 1)
+    _toy(*_words(pool))
+    (pool.run_folder / "sift" / "means.parquet").write_bytes(b"")
+    done = _toy("verify", pool.run_folder)
+    assert done.returncode == 1
+    assert done.stdout == "sift: its result means.parquet was edited\n1 problem\n"
+
+
+def test_a_bug_keeps_its_traceback(pool: Pool) -> None:
+    _told(pool, 3)
+    done = _toy(*_words(pool))
+    assert done.returncode == 3
+    assert "Traceback" in done.stderr
+    assert "ZeroDivisionError: a toy bug" in done.stderr
+    assert sorted(p.name for p in pool.run_folder.glob("[a-z]*")) == ["digests.json", "run.yaml", "sift", "take"]
+
+
+def test_bad_input_is_one_line_and_debug_shows_more(pool: Pool) -> None:
+    pool.config.write_text("target: 3\n")
+    done = _toy(*_words(pool))
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "target = 3" in done.stderr
+    done = _toy(*_words(pool), "--debug")
+    assert done.returncode == 2
+    assert "Traceback" in done.stderr
+
+
+def test_interrupted(pool: Pool) -> None:
+    _told(pool, 4)
+    done = _toy(*_words(pool))
+    assert done.returncode == 130
+    assert done.stderr.splitlines()[-1] == "poolcal: interrupted; what was complete is kept"
+    assert "Traceback" not in done.stderr
+    assert not (pool.run_folder / "report.partial").exists()
+
+
+def test_killed_and_run_again(pool: Pool) -> None:
+    _told(pool, 5)
+    with subprocess.Popen([*TOY, *map(str, _words(pool))], stderr=subprocess.DEVNULL) as process:
+        deadline = time.monotonic() + 30
+        while not (pool.run_folder / "report.partial").exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+    _told(pool, 1)
+    done = _toy(*_words(pool))
+    assert done.returncode == 0
+    assert "sift: up to date" in done.stderr
+    assert not (pool.run_folder / "report.partial").exists()
+
+
+def test_names_cannot_command_the_terminal(pool: Pool) -> None:
+    _told(pool, 1)
+    text = (pool.session / "session.yaml").read_text()
+    (pool.session / "session.yaml").write_text(text.replace("name: toy", 'name: "a\\e[2Jb"'))
+    (pool.session / "laser" / "\x1b[31m.bin").write_bytes(b"")
+    assert _toy(*_words(pool)).stdout == "a\\x1b[2Jb: accepted\n"
+    (pool.session / "laser" / "\x1b[31m.bin").write_bytes(bytes(8))
+    assert "take: laser/\\x1b[31m.bin changed" in _toy(*_words(pool)).stderr
+
+
+def test_nobody_listens(pool: Pool) -> None:
+    _told(pool, 2)
+    read, write = os.pipe()
+    os.close(read)
+    command = [*TOY, *map(str, _words(pool))]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(write)
+    assert done.returncode == 1
+    assert "Broken" not in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_terminal_sees_a_bar(pool: Pool) -> None:
+    _told(pool, 1)
+    ours, theirs = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "120"}
+    with subprocess.Popen([*TOY, *map(str, _words(pool))], stderr=theirs, stdout=theirs, env=environment) as process:
+        os.close(theirs)
+        seen = b""
+        while True:
+            try:
+                piece = os.read(ours, 65536)
+            except OSError:
+                break
+            if not piece:
+                break
+            seen += piece
+    os.close(ours)
+    assert process.returncode == 0
+    assert b"rows/s" in seen
+    assert b"left" in seen
+    assert b"take: done in" in seen
+
+
+def test_plain_output_has_no_control_characters(pool: Pool) -> None:
+    _told(pool, 1)
+    done = _toy(*_words(pool), env={**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0
+    assert done.stderr.replace("\n", "").isprintable()

@@ -1,0 +1,94 @@
+"""An ordered map: lazy, bounded, and quick to give up."""
+
+import threading
+import time
+
+import pytest
+
+from pipeline.errors import ConfigError, RawDataError
+from pipeline.executor import SERIAL, Workers, default_jobs, workers
+from pipeline.streams import MemoryPart, Stream
+
+
+def test_results_come_in_order() -> None:
+    def late(k: int) -> int:
+        time.sleep(0.002 * (5 - k % 5))
+        return k * k
+
+    with workers(3) as three:
+        assert list(three.map(late, range(40))) == [k * k for k in range(40)]
+
+
+def test_several_arguments_as_in_map() -> None:
+    with workers(2) as two:
+        assert list(two.map(pow, [2, 3], [3, 2])) == list(SERIAL.map(pow, [2, 3], [3, 2])) == [8, 9]
+
+
+def test_it_does_not_run_ahead() -> None:
+    taken: list[int] = []
+
+    def items() -> "list[int]":
+        return [taken.append(k) or k for k in range(1000)]  # type: ignore[func-returns-value]
+
+    started: list[int] = []
+    with workers(2) as two:
+        results = iter(two.map(lambda k: started.append(k) or k, items()))  # type: ignore[func-returns-value]
+        assert next(results) == 0
+        time.sleep(0.05)
+        assert len(started) <= 6
+
+
+def test_an_error_comes_out_as_it_is_and_ends_the_rest() -> None:
+    started: list[int] = []
+    with workers(2) as two:
+
+        def work(k: int) -> int:
+            started.append(k)
+            if k == 3:
+                raise RawDataError("part 3")
+            while k > 3 and not two.stop.wait(0.01):
+                pass
+            return k
+
+        begin = time.monotonic()
+        with pytest.raises(RawDataError, match="part 3"):
+            list(two.map(work, range(1000)))
+        assert len(started) < 10
+        assert not two.stop.is_set()
+        assert time.monotonic() - begin < 5
+
+
+def test_a_map_inside_a_map_does_not_lock_up() -> None:
+    with workers(2) as two:
+        nested = two.map(lambda k: sum(two.map(lambda m: m * k, range(5))), range(20))
+        assert list(nested) == [10 * k for k in range(20)]
+
+
+def test_a_stream_folds_over_workers() -> None:
+    import numpy as np
+
+    parts = tuple(MemoryPart(str(k), {"x_m": np.full(10, float(k))}) for k in range(20))
+    with workers(2) as two:
+        assert Stream(parts, two.map).fold(lambda batch, factor: float(batch["x_m"].sum()) * factor, 2.0) == [
+            20.0 * k for k in range(20)
+        ]
+
+
+def test_one_job_works_in_this_thread() -> None:
+    with workers(1) as one:
+        assert list(one.map(lambda _: threading.current_thread().name, range(2))) == ["MainThread"] * 2
+
+
+def test_how_many() -> None:
+    assert 1 <= default_jobs() <= 4
+    with workers() as some:
+        assert isinstance(some, Workers)
+        assert some.jobs == default_jobs()
+    with pytest.raises(ConfigError, match="--jobs 0: must be 1 or more"), workers(0):
+        pass
+
+
+def test_a_cluster_without_its_library_or_scheduler_is_one_line() -> None:
+    with pytest.raises(ConfigError, match=r"dask.distributed is not installed|no scheduler answers"):  # noqa: SIM117
+        with workers(address="tcp://127.0.0.1:9"):
+            pass

@@ -1,0 +1,79 @@
+"""Rules of the house that no linter holds: who may import what, and what make promises."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def _imports(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_maths_is_pure() -> None:
+    for path in (ROOT / "pipeline" / "maths").glob("*.py"):
+        for name in _imports(path):
+            top = name.split(".")[0]
+            ours = name.startswith(("pipeline.errors.", "pipeline.maths."))
+            assert ours or top in ("numpy", "scipy") or (top in sys.stdlib_module_names and top != "os"), (path, name)
+
+
+def test_open3d_and_rerun_have_their_places() -> None:
+    allowed = {"open3d": ("pipeline/clouds.py", "pipeline/simulation/raycast.py"), "rerun": ("stages/views/",)}
+    for path in [*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "stages").rglob("*.py")]:
+        for name in _imports(path):
+            places = allowed.get(name.split(".")[0], ("",))
+            assert path.relative_to(ROOT).as_posix().startswith(places), (path, name)
+
+
+def test_modules_are_short() -> None:
+    for path in [*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "stages").rglob("*.py")]:
+        if path != ROOT / "pipeline" / "artefacts.py":  # one table of tables
+            assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
+
+
+def _make(*words: str) -> str:
+    command = ["make", "--no-print-directory", *words]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_make_explains_itself() -> None:
+    shown = _make()
+    for target in ("setup", "demo", "calibrate", "test", "lint", "bench", "montecarlo"):
+        assert f"make {target} " in shown
+
+
+def test_make_calibrate_takes_blanks() -> None:
+    shown = _make("-n", "calibrate", "SESSION=my pool", "CONFIG=a b.yaml", "RUN=runs/c d", "JOBS=2")
+    assert "run 'my pool' --config 'a b.yaml' --run 'runs/c d' --jobs 2" in shown
+
+
+def test_make_has_one_rule_a_stage_over_real_files(tmp_path: Path) -> None:
+    from stages import ORDER
+
+    (tmp_path / "laser").mkdir()
+    for name in ("session.yaml", "laser/0.las", "pool.yaml"):
+        (tmp_path / name).write_text("")
+    words = ("-o", ".venv/.setup", f"SESSION={tmp_path}", f"CONFIG={tmp_path}/pool.yaml", f"RUN={tmp_path}/run")
+    ran = [line.split()[2] for line in _make("-n", "stages", *words).splitlines() if "poolcal stage" in line]
+    assert ran == list(ORDER)
+    for stage in ORDER:
+        (tmp_path / "run" / stage).mkdir(parents=True)
+        (tmp_path / "run" / stage / "manifest.json").write_text("")
+    assert "poolcal stage" not in _make("-n", "stages", *words)
+
+
+def test_environment_does_not_steer_make(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RUN", "elsewhere")
+    assert "elsewhere" not in _make("-n", "calibrate")

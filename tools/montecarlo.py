@@ -1,0 +1,201 @@
+"""Many simulated sessions: are the results right, and the predicted sigmas true?
+
+``make montecarlo`` prints, campaign by campaign, the errors of the adjustment's six values, their mean normalised squared
+error (its expectation is 6 if the covariance is true) with the 99 % band, and how many sessions were accepted. Seeds are
+fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and the combination of signs
+goes through all 64. Results go to runs/montecarlo/ as CSV as well.
+
+    python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2]
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import yaml
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+Array = NDArray[np.float64]
+NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about / along body x, y, z
+COARSE_DEG, COARSE_M = 2.5, 0.25
+THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points to leave the sonar's noise in charge
+WHITE: dict[str, Any] = {
+    "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
+    "laser": {"outlier_share": 0.0, "water_return_share": 0.0},
+    "mbes": {"point_beams": True, "corner_share": 0.0, "outlier_share": 0.0, "surface_share": 0.0},
+}
+
+
+@dataclass(frozen=True)
+class Campaign:
+    name: str
+    sessions: int
+    first_seed: int
+    scenario: dict[str, Any] = field(default_factory=dict)
+    through_files: bool = False
+
+
+def _target(**letters: Any) -> dict[str, Any]:
+    origin = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}
+    return {"a": 8.0, "b": 3.0, "c": 1.0, "e": 0.5, "origin": origin} | letters
+
+
+CAMPAIGNS = (
+    Campaign("white noise", 200, 1000, WHITE),
+    Campaign("white noise, files and CLI", 10, 1900, WHITE, through_files=True),
+    Campaign("azimuth 47, low side north", 64, 2000, WHITE | {"target": _target(azimuth_deg=47.0, low_side="north")}),
+    Campaign("azimuth -163", 64, 3000, WHITE | {"target": _target(azimuth_deg=-163.0)}),
+    Campaign("target 6/2.4/0.8/0.4", 64, 4000, WHITE | {"target": _target(a=6.0, b=2.4, c=0.8, e=0.4)}),
+    Campaign(
+        "origin off by 0.3 m, azimuth by 1",
+        64,
+        5000,
+        WHITE | {"surroundings": {"origin_error_m": [0.3, -0.3, 0.15], "azimuth_error_deg": 1.0}},
+    ),
+    Campaign("finite beams, outliers, echoes", 64, 6000, {"ins": WHITE["ins"]}),
+    Campaign("the same and INS white noise", 64, 7000, {}),
+    Campaign(
+        "the same and INS drift",
+        64,
+        8000,
+        {
+            "ins": {
+                "drift": {
+                    "horizontal_m": 0.015,
+                    "vertical_m": 0.02,
+                    "roll_pitch_deg": 0.01,
+                    "heading_deg": 0.03,
+                    "time_constant_s": 200.0,
+                }
+            }
+        },
+    ),
+)
+
+
+def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
+    """The scenario of one session: the campaign's, thinned, with its combination of coarse errors."""
+    signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
+    keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
+    sizes = (COARSE_DEG,) * 3 + (COARSE_M,) * 3
+    coarse = {key: sign * size for key, sign, size in zip(keys, signs, sizes, strict=True)}
+    merged: dict[str, Any] = {"name": campaign.name}
+    for part in (campaign.scenario, THIN, {"mbes": {"coarse_error": coarse}}):
+        for key, value in part.items():
+            merged[key] = merged.get(key, {}) | value
+    return merged
+
+
+def errors_of(R_body_from_mbes: Array, lever_arm_m: Array, truth: Mapping[str, Any]) -> Array:
+    """(6,): ε of R_true = Exp(ε) R_body_from_mbes in rad, then the lever arm's error in m."""
+    R_true = np.array(truth["mbes"]["R_body_from_mbes"])
+    rotation = Rotation.from_matrix(R_true @ R_body_from_mbes.T).as_rotvec()
+    return np.concatenate([rotation, np.array(truth["mbes"]["lever_arm_m"]) - lever_arm_m])
+
+
+def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
+    from pipeline.config import PoolConfig, SessionConfig, parse
+    from pipeline.simulation.scenario import Scenario
+    from pipeline.simulation.session import simulate
+    from stages.campaign import calibrate_in_memory
+
+    scenario = parse(Scenario, scenario_of(campaign, number), campaign.name)
+    made = simulate(scenario, campaign.first_seed + number)
+    found = calibrate_in_memory(
+        parse(SessionConfig, made.session, "session"),
+        parse(PoolConfig, made.pool, "pool"),
+        {"ins": made.ins, "laser": made.laser, "mbes": made.mbes},
+    )
+    return _row(json.loads(found["report/calibration.json"]), made.truth)
+
+
+def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as folder:
+        scenario, session, run = Path(folder, "scenario.yaml"), Path(folder, "session"), Path(folder, "run")
+        scenario.write_text(yaml.safe_dump(scenario_of(campaign, number)))
+        poolcal = [sys.executable, "-m", "stages.cli"]
+        seed = str(campaign.first_seed + number)
+        for command in (
+            ["simulate", str(session), "--scenario", str(scenario), "--seed", seed],
+            ["run", str(session), "--config", str(session / "pool.yaml"), "--run", str(run), "--jobs", "1"],
+        ):
+            done = subprocess.run(poolcal + command, capture_output=True, text=True)
+            if done.returncode not in (0, 1):
+                raise RuntimeError(done.stderr)
+        calibration = json.loads((run / "report" / "calibration.json").read_text())
+        return _row(calibration, json.loads(Path(f"{session}.truth.json").read_text()))
+
+
+def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:
+    block = calibration["methods"]["adjustment"]
+    covariance = np.array(block["covariance"])
+    error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), truth)
+    row: dict[str, Any] = {"accepted": calibration["verdict"] == "accepted", "reasons": "; ".join(calibration["reasons"])}
+    row["nse"] = float(error @ np.linalg.solve(covariance, error))
+    sigma = np.sqrt(np.diag(covariance))
+    for k, name in enumerate(NAMES):
+        unit = np.degrees(1.0) if k < 3 else 1000.0  # degrees, millimetres
+        row |= {f"error_{name}": error[k] * unit, f"sigma_{name}": sigma[k] * unit}
+    return row
+
+
+def one(task: tuple[Campaign, int]) -> dict[str, Any]:
+    campaign, number = task
+    row = session_through_files(*task) if campaign.through_files else session_in_memory(*task)
+    return {"campaign": campaign.name, "seed": campaign.first_seed + number} | row
+
+
+def report(campaign: Campaign, table: pd.DataFrame) -> str:
+    """The campaign in five lines."""
+    n = len(table)
+    low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
+    mean = table["nse"].mean()
+    verdict = "inside" if low <= mean <= high else "OUTSIDE"
+    lines = [
+        f"{campaign.name}: {n} sessions, {int(table['accepted'].sum())} accepted; mean normalised squared error "
+        f"{mean:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}",
+        f"  {'':16}" + "".join(f"{name:>10}" for name in NAMES) + "     (degrees, millimetres)",
+    ]
+    for word, values in (
+        ("RMS error", [np.sqrt(np.mean(table[f"error_{name}"] ** 2)) for name in NAMES]),
+        ("largest error", [table[f"error_{name}"].abs().max() for name in NAMES]),
+        ("mean sigma", [np.sqrt(np.mean(table[f"sigma_{name}"] ** 2)) for name in NAMES]),
+    ):
+        lines.append(f"  {word:16}" + "".join(f"{value:10.4f}" if k < 3 else f"{value:10.3f}" for k, value in enumerate(values)))
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="*", help="names (or beginnings) of campaigns")
+    parser.add_argument("--share", type=float, default=1.0, help="share of the sessions, for a quick look")
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    folder = Path("runs/montecarlo")
+    folder.mkdir(parents=True, exist_ok=True)
+    for campaign in CAMPAIGNS:
+        if options.only and not any(campaign.name.startswith(name) for name in options.only):
+            continue
+        started = time.monotonic()
+        tasks = [(campaign, number) for number in range(max(2, round(campaign.sessions * options.share)))]
+        with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
+            table = pd.DataFrame(list(pool.map(one, tasks)))
+        table.to_csv(folder / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.csv", index=False)
+        print(report(campaign, table), f"\n  ({time.monotonic() - started:.0f} s)\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()
