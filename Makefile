@@ -74,7 +74,7 @@ test: lint ## lint, then every test
 	$(PY) -m pytest -n 2 -q
 
 bench: $(SETUP) ## time the parts that must be fast
-	$(PY) -m pytest tests/bench --benchmark-only --benchmark-disable-gc -q
+	$(PY) -m pytest -o addopts=--import-mode=importlib tests/bench --benchmark-only --benchmark-disable-gc -q
 
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.montecarlo

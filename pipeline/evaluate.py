@@ -149,8 +149,15 @@ class _MemoryPart:
 
 
 # --- the call --------------------------------------------------------------------------------------------------------
-def evaluate(stage: ModuleType, inputs: Any, config: Any, sink: Sink, mapper: Mapper = serial) -> Any:
-    """The stage's Outputs, checked against the artefacts they are annotated with."""
+def evaluate(
+    stage: ModuleType,
+    inputs: Any,
+    config: Any,
+    sink: Sink,
+    mapper: Mapper = serial,
+    begin: Callable[[], None] = lambda: None,
+) -> Any:
+    """The stage's Outputs, checked against the artefacts they are annotated with; ``begin`` is called before mapping."""
     if not hasattr(stage, "run_batch"):
         return _checked(stage, stage.run(inputs, config), {}, mapper)
     prepared = stage.prepare(inputs, config)
@@ -158,6 +165,7 @@ def evaluate(stage: ModuleType, inputs: Any, config: Any, sink: Sink, mapper: Ma
     partials: dict[str, list[tuple[str, object]]] = {}
     parts: dict[str, list[Part]] = {name: [] for name in outputs}
     owner: dict[str, str] = {}
+    begin()
     for source in sources(stage):
         stream: Stream = getattr(inputs, source)
         work = [

@@ -94,8 +94,9 @@ def _execute(this: Run, stage: ModuleType) -> None:
     remove(partial)
     try:
         streams = _make_folders(partial, stage)
-        this.progress.begin(_rows_to_map(this, stage))
-        outputs = evaluate(stage, inputs, config, FolderSink(partial, streams), this.workers.map)
+        total = _rows_to_map(this, stage)
+        sink = FolderSink(partial, streams)
+        outputs = evaluate(stage, inputs, config, sink, this.workers.map, lambda: this.progress.begin(total))
         rows = _write(partial, stage, outputs)
         if key_of(this, stage).raw != key.raw:
             raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")

@@ -50,7 +50,7 @@ class Campaign:
 
 def _target(**letters: Any) -> dict[str, Any]:
     origin = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}
-    return {"a": 8.0, "b": 3.0, "c": 1.0, "e": 0.5, "origin": origin} | letters
+    return {"a": 8.0, "b": 3.0, "c": 1.0, "e": 0.5, "azimuth_deg": 0.0, "origin": origin} | letters
 
 
 CAMPAIGNS = (

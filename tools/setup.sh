@@ -29,8 +29,9 @@ python=""
 for candidate in ${PYTHON:-python3.13 python3.12 python3.11 python3}; do
     command -v "$candidate" >/dev/null 2>&1 && new_enough "$candidate" || continue
     [ -n "$python" ] || python=$candidate
-    if "$candidate" -c 'import ensurepip, venv' 2>/dev/null; then python=$candidate; break; fi
+    if "$candidate" -c 'import ensurepip, venv; ensurepip.version()' 2>/dev/null; then python=$candidate; break; fi
 done
+[ -n "$python" ] || [ -z "${PYTHON:-}" ] || fail "PYTHON=$PYTHON is no Python 3.11 or newer; name another, or none"
 [ -n "$python" ] || fail "no Python 3.11 or newer (found: $(python3 --version 2>&1 || true)); install one, or name it: make setup PYTHON=/path/to/python3"
 
 # --- nothing to do? -----------------------------------------------------------------------------------------------------
@@ -47,10 +48,10 @@ name, version = platform.libc_ver()
 if name != "glibc" or tuple(int(n) for n in version.split(".")[:2]) < (2, 35):
     sys.exit(f"setup: open3d needs glibc 2.35 or newer, here is {name or 'no glibc'} {version}; use Debian 12, Ubuntu 22.04 or newer")
 PYTHON
-"$python" -c 'import ensurepip, venv' 2>/dev/null || {
+"$python" -c 'import ensurepip, venv; ensurepip.version()' 2>/dev/null || {
     version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
     apt_install "$python lacks venv" "python$version-venv"
-    "$python" -c 'import ensurepip, venv' 2>/dev/null || fail "$python still lacks venv; name another: make setup PYTHON=/path/to/python3"
+    "$python" -c 'import ensurepip, venv; ensurepip.version()' 2>/dev/null || fail "$python still lacks venv; name another: make setup PYTHON=/path/to/python3"
 }
 missing_libraries() {
     "$python" - <<'PYTHON'
@@ -79,7 +80,7 @@ if [ -d .venv ] && ! { [ -x .venv/bin/python ] && new_enough .venv/bin/python &&
     echo "setup: .venv does not work here any more: making it anew"
     rm -rf .venv
 fi
-[ -x .venv/bin/python ] || "$python" -m venv .venv || fail "$python could not make .venv"
+[ -x .venv/bin/python ] || "$python" -m venv .venv || { rm -rf .venv; fail "$python could not make .venv"; }
 echo "setup: installing packages into .venv (some minutes the first time)"
 pip() { .venv/bin/python -m pip --disable-pip-version-check "$@" </dev/null; }
 pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e '.[dev]' ||
