@@ -15,12 +15,13 @@ from typing import Any
 from pipeline import folder, manifest, readers, store
 from pipeline.artefacts import Artefact, Document, Provenance, Raw
 from pipeline.errors import ArtefactError, RawDataError
-from pipeline.evaluate import FolderSink, declared, evaluate, is_stream, name_of, sources
+from pipeline.evaluate import declared, evaluate, is_stream, name_of, sources
 from pipeline.executor import SERIAL, Stopped, Workers
 from pipeline.files import Digests, remove, write_text, writing
 from pipeline.folder import Settings
 from pipeline.freshness import SENSORS, Run, key_of, out_of_date, raw_digests
 from pipeline.progress import Progress
+from pipeline.sinks import FolderSink
 from pipeline.streams import Chunk, ParquetPart, Part, Stream
 
 

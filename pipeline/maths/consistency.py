@@ -9,7 +9,7 @@ which needs no model of what is common (White 1980; Arellano 1987 for clusters),
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,8 @@ class Scores:
 
 def scores_of(state: State, rows: Rows, sensor: str, number: Integers, moment: Integers) -> Scores:
     """One chunk's scores by moment and its cells; ``number``: pass, ``moment``: index of the time slot, (n,) each."""
-    robust, full = weights_of(state, rows)
+    _, full = weights_of(state, rows)
+    _, plain = weights_of(replace(state, robust=None), rows)  # a whole cell off must show, not be cut away
     pull = full * rows.residual_m
     found, inverse = np.unique(moment, return_inverse=True)
     scores = np.zeros((len(found), state.size))
@@ -49,9 +50,10 @@ def scores_of(state: State, rows: Rows, sensor: str, number: Integers, moment: I
         for column, values in zip(columns, design.T, strict=True):
             scores[:, column] += np.bincount(slot, weights=values * pull[inside], minlength=len(found))
         for one in np.unique(number[inside]).tolist():
-            use = inside & (number == one) & (robust > 0)
+            use = inside & (number == one)
             slots, where = np.unique(inverse[use], return_inverse=True)
-            parts = (full[use], pull[use], np.ones(int(use.sum())), rows.residual_m[use] ** 2)
+            residual = rows.residual_m[use]
+            parts = (plain[use], plain[use] * residual, np.ones(len(residual)), residual**2)
             sums = np.column_stack([np.bincount(where, weights=part, minlength=len(slots)) for part in parts])
             cells[(sensor, surface, one)] = dict(zip(found[slots].tolist(), sums, strict=True))
     return Scores(dict(zip(found.tolist(), scores, strict=True)), cells)
