@@ -10,8 +10,8 @@ Array = NDArray[np.float64]
 
 
 def beams_in_target(
-    R_target_from_body: Array,  # noqa: N803
-    R_body_from_mbes: Array,  # noqa: N803
+    R_target_from_body: Array,
+    R_body_from_mbes: Array,
     points_mbes_m: Array,
     beam_rad: tuple[float, float],
 ) -> Beams:

@@ -17,14 +17,13 @@ class ClosestSurface:
     """
 
     def __init__(self, model: TargetModel) -> None:
-        import open3d as o3d  # half a second: only where needed
+        import open3d  # half a second: only where needed
 
+        o3d: Any = open3d
         vertices, triangles = model.context()
-        self._tensor: Any = o3d.core.Tensor
+        self._tensor = o3d.core.Tensor
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(
-            self._tensor(vertices.astype(np.float32)), self._tensor(triangles.astype(np.uint32))
-        )
+        self._scene.add_triangles(self._tensor(vertices.astype(np.float32)), self._tensor(triangles.astype(np.uint32)))
         self._face_of_triangle = model.face_of_triangle()
 
     def __call__(self, points_m: Array) -> tuple[Array, NDArray[np.int64]]:

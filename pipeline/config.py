@@ -79,7 +79,9 @@ class Segment(Model):
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
     ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # of the wall that a pose half a period off must lose
-    ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = 0.02  # another mount that explains so nearly as many soundings
+    ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
+        0.02  # another mount that explains so nearly as many soundings
+    )
 
 
 class FitPlanes(Model):
@@ -254,7 +256,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
     try:
-        content = yaml.load(text, Loader=_StrictLoader)  # noqa: S506 (a SafeLoader, made stricter)
+        content = yaml.load(text, Loader=_StrictLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
     if not isinstance(content, dict):
@@ -282,6 +284,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
 
 def _to_json(content: dict[str, Any], where: str) -> str:
     """JSON between YAML and model: strict JSON mode reads lists as tuples and whole numbers as floats, nothing else."""
+
     def check(value: Any, key: str) -> None:
         if isinstance(value, dict):
             for name, item in value.items():

@@ -66,14 +66,20 @@ def find_target(
     turns = np.linspace(-azimuth, azimuth, 5 if azimuth_known else 13)
     steps = (-0.8, 0.0, 0.8)
     starts = [
-        np.array([turn, reach_xy * x, reach_xy * y, reach_z * z]) for turn in turns for x in steps for y in steps for z in steps
+        np.array([turn, reach_xy * x, reach_xy * y, reach_z * z])
+        for turn in turns
+        for x in steps
+        for y in steps
+        for z in steps
     ]
     quarter = model.period_m / 4
 
     def same(p: Array, q: Array) -> bool:
         return bool(np.max(np.abs(p[1:] - q[1:])) < quarter)
 
-    found = search(placement, starts, closest, normals, same, 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02]), SHARP_M)
+    found = search(
+        placement, starts, closest, normals, same, 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02]), SHARP_M
+    )
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
         dry = points[:, 2] > model.water_level_m + settings.water_margin_m
@@ -155,10 +161,11 @@ def find_mount(
     beam_rad: tuple[float, float],
     settings: config.Segment,
 ) -> FoundMount:
-    """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search limits.
+    """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search
+    limits.
 
-    First the wall: roll turns it about the track and x shifts it, nothing else moves it, so both follow from a vote over
-    the part of the wall that is the wall wherever the rest still stands. Then a search over yaw, y and z; blocks
+    First the wall: roll turns it about the track and x shifts it, nothing else moves it, so both follow from a vote
+    over the part of the wall that is the wall wherever the rest still stands. Then a search over yaw, y and z; blocks
     repeat every period, so z is sought within the lever arm's limits and a rival there is reported.
     """
     angle, arm = np.radians(settings.search_mount_deg), settings.search_mount_m
@@ -187,7 +194,9 @@ def find_mount(
         beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, beam_rad)
         wet = points[:, 2] < model.water_level_m - settings.water_margin_m
         grazing = np.radians(settings.min_grazing_deg)
-        return np.where(wet, label_points(model, points, beams, gate, settings.margin_m, grazing).face, -1).astype(np.int16)
+        return np.where(wet, label_points(model, points, beams, gate, settings.margin_m, grazing).face, -1).astype(
+            np.int16
+        )
 
     refined = refine(placement, found.parameters, label, normals, distances)
     gate = max(settings.gate_m, 5 * refined.scale_m) if np.isfinite(refined.scale_m) else settings.gate_m

@@ -89,7 +89,7 @@ def horizontal_faces(
         plane = laser.get((ALL_PASSES, row["name"]))
         if plane is not None and plane.count >= min_points:
             dry.append(DryFace(row["name"], float(plane.centroid_m[2]), design, plane.count))
-        lifted = total.get(int(row["face"]))
-        if lifted is not None and lifted[-1, -1] >= min_points:
-            wet.append(WetFace(row["name"], lifted, design))
+        seen = total.get(int(row["face"]))
+        if seen is not None and seen[-1, -1] >= min_points:
+            wet.append(WetFace(row["name"], seen, design))
     return dry, wet

@@ -1,5 +1,7 @@
 """Passes: maximal intervals without gap or along-track reversal, and the direction of the track."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,8 +26,8 @@ def split_at_gaps(t_ns: Times, max_gap_ns: int) -> list[Interval]:
 def reversals(t_ns: Times, along_m: Array, hysteresis_m: float) -> list[int]:
     """Moments of turning: extremes of the along-track coordinate that are left by more than ``hysteresis_m``.
 
-    >>> reversals(np.arange(7), np.array([0.0, 1, 2, 3, 2, 1, 0]), 1.5)
-    [3]
+    >>> reversals(np.arange(7) * 1_000_000_000, np.array([0.0, 1, 2, 3, 2, 1, 0]), 1.5)
+    [3000000000]
     """
     turns: list[int] = []
     if len(t_ns) == 0:
@@ -56,7 +58,12 @@ def reversals(t_ns: Times, along_m: Array, hysteresis_m: float) -> list[int]:
 
 
 def find_passes(
-    ins_t_ns: Times, along_m: Array, ping_t_ns: Times, max_gap_ns: int, reversal_m: float, shortest_ns: int = 1_000_000_000
+    ins_t_ns: Times,
+    along_m: Array,
+    ping_t_ns: Times,
+    max_gap_ns: int,
+    reversal_m: float,
+    shortest_ns: int = 1_000_000_000,
 ) -> list[Interval]:
     """Intervals in which INS and soundings run without a gap and the boat does not turn back; ascending, disjoint."""
     pings = split_at_gaps(ping_t_ns, max_gap_ns)
@@ -64,7 +71,7 @@ def find_passes(
     for start, end in split_at_gaps(ins_t_ns, max_gap_ns):
         rows = slice(int(np.searchsorted(ins_t_ns, start)), int(np.searchsorted(ins_t_ns, end, side="right")))
         cuts = [start, *reversals(ins_t_ns[rows], along_m[rows], reversal_m), end]
-        for leg_start, leg_end in zip(cuts[:-1], cuts[1:], strict=True):
+        for leg_start, leg_end in pairwise(cuts):
             for ping_start, ping_end in pings:
                 first, last = max(leg_start, ping_start), min(leg_end, ping_end)
                 if last - first >= shortest_ns:
@@ -82,7 +89,8 @@ def pass_of(t_ns: Times, starts_ns: Times, ends_ns: Times) -> NDArray[np.int16]:
 
 
 def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> float | None:
-    """Direction of the track past the origin, clockwise from north: mean heading while the origin is near, to starboard.
+    """Direction of the track past the origin, clockwise from north: mean heading while the origin is near, to
+    starboard.
 
     east, north (n,): the INS relative to the target's origin. None when the boat never had the target to starboard.
     """

@@ -210,5 +210,3 @@ def _entries(this: Run, partial: Path) -> dict[str, dict[str, Any]]:
         path.relative_to(partial).as_posix(): {"sha256": digest, "bytes": path.stat().st_size}
         for path, digest in zip(paths, Digests(None, this.digests.mapper).of(paths), strict=True)
     }
-
-

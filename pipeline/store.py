@@ -162,4 +162,3 @@ def write_empty_part(folder: Path, artefact: Artefact) -> Path:
 def rows_of(path: Path) -> int:
     """Rows of a Parquet file, from its footer."""
     return int(pq.read_metadata(path).num_rows)
-

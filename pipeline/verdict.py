@@ -37,8 +37,8 @@ def reasons(
         )
     if mount["ambiguous"]:
         found.append(
-            f"the soundings fit two ways (score {mount['rival_score']:.3f} against {mount['score']:.3f}): the coarse mount "
-            "may be a block off; measure the coarse lever arm again"
+            f"the soundings fit two ways (score {mount['rival_score']:.3f} against {mount['score']:.3f}): the coarse "
+            "mount may be a block off; measure the coarse lever arm again"
         )
     summary = evidence.summary.iloc[0]
     if summary["reason"]:
@@ -48,9 +48,12 @@ def reasons(
     if not summary["reason"] and not summary["test_passed"]:
         found.append(_inconsistency(summary, evidence.cells))
     if sigma is not None:
-        values = [(name, v, limits.max_sigma_deg, "°") for name, v in zip(ANGLES, sigma["rotation_vector_deg"], strict=True)]
+        values = [
+            (name, v, limits.max_sigma_deg, "°") for name, v in zip(ANGLES, sigma["rotation_vector_deg"], strict=True)
+        ]
         values += [
-            (f"lever arm {axis}", v, limits.max_sigma_m, " m") for axis, v in zip("xyz", sigma["lever_arm_m"], strict=True)
+            (f"lever arm {axis}", v, limits.max_sigma_m, " m")
+            for axis, v in zip("xyz", sigma["lever_arm_m"], strict=True)
         ]
         found += [
             f"sigma of {name} is {value:.4f}{unit}, above the limit of {limit:g}{unit}; {summary['weakest']}"
@@ -71,6 +74,6 @@ def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
     sensor = "the laser" if worst["sensor"] == "laser" else "the sonar"
     return (
         f"the passes do not agree: in pass {worst['pass']} {sensor} lies {1000 * worst['mean_m']:+.1f} mm off "
-        f"{worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely INS drift, "
-        "a clock, the sound speed, or a moved bracket"
+        f"{worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely INS "
+        "drift, a clock, the sound speed, or a moved bracket"
     )

@@ -31,9 +31,7 @@ def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
     except PoolcalError as error:
         yield str(error)
         return
-    recorded = dataclasses.replace(
-        now, config=old.key.config, source=old.key.source, versions=old.key.versions
-    )
+    recorded = dataclasses.replace(now, config=old.key.config, source=old.key.source, versions=old.key.versions)
     yield from manifest.reasons(old, recorded, present(this, this.folder(name_of(stage)), old))
     where = this.folder(name_of(stage))
     for path in sorted(where.rglob("*.parquet")):

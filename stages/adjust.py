@@ -41,8 +41,10 @@ from pipeline.streams import Batch, Stream
 from pipeline.times import NS
 
 Array = NDArray[np.float64]
-STEP_RAD, STEP_M = 1e-9, 1e-8  # a smaller step is none
-ROUGH_STEP = 1e-3  # weights become robust when the step is smaller
+STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
+STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
+ROUGH_STEP = 1e-3  # weights become robust when the step is smaller (rad, m)
+RESCALINGS = 2  # how often the groups' robust scales are then taken anew
 
 
 @dataclass(frozen=True)
@@ -117,10 +119,11 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     scene, state = _start(inputs, config)
     settings = config.adjust
     laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
-    state = replace(state, scales=state.scales | {"laser": scale_of(laser.histogram)})
+    laser_scale = scale_of(laser.histogram)
+    state = replace(state, scales={**state.scales, "laser": laser_scale})
     robust = replace(state, robust=(settings.robust_k0, settings.robust_k1))
     laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, robust))
-    converged, iterations = False, 0
+    converged, iterations, rescaled = False, 0, 0
     while True:
         sums = laser.sums(state) + _sum(inputs.soundings_labelled.fold(_sounding_sums, scene, state))
         solution = solve(sums)
@@ -128,19 +131,25 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             break
         factors = variance_factors(sums, solution.inverse, state.factors)
         settled = all(abs(factors[name] / state.factors[name] - 1) < 1e-3 for name in GROUPS)
-        step = solution.step
-        size = max(np.max(np.abs(step[:3])) / STEP_RAD, np.max(np.abs(step[3:COMMON])) / STEP_M)
-        converged = bool(state.robust is not None and size < 1 and settled)
-        state = state.moved(step)
+        converged = rescaled == RESCALINGS and settled and _negligible(solution)
+        state = replace(state.moved(solution.step), factors=factors if rescaled else state.factors)
         iterations += 1
-        if np.max(np.abs(step[:COMMON])) < ROUGH_STEP:
-            scales = {name: scale_of(histogram) for name, histogram in sums.histograms.items()}
-            state = replace(state, robust=robust.robust, factors=factors, scales=state.scales | scales)
+        if rescaled < RESCALINGS and np.max(np.abs(solution.step[:COMMON])) < ROUGH_STEP:
+            rescaled += 1  # then the scales stay: weights that follow them for ever need not come to rest
+            scales = {name: scale_of(group.histogram) for name, group in sums.groups.items()}
+            state = replace(state, robust=robust.robust, scales={**state.scales, **scales, "laser": laser_scale})
     scores = merge_scores(
         inputs.laser_labelled.fold(_scores, scene, state, "laser")
         + inputs.soundings_labelled.fold(_scores, scene, state, "mbes")
     )
     return _outputs(state, sums, solution, scores, converged, iterations, config)
+
+
+def _negligible(solution: Solution) -> bool:
+    """Whether the six's step is far below their sigmas, or below anything that matters."""
+    sigma = np.sqrt(np.diag(solution.inverse))[:COMMON]
+    floor = np.repeat([STEP_RAD, STEP_M], 3)
+    return bool(np.all(np.abs(solution.step[:COMMON]) <= np.maximum(STEP_SIGMAS * sigma, floor)))
 
 
 def _sum(pieces: list[Any]) -> Any:
@@ -207,16 +216,14 @@ def _outputs(
     cells = cells_of(scores, config.adjust.test_tolerance_m)
     statistic = float(sum(cell.normalised**2 for cell in cells.values()))
     limit = consistency_limit(len(cells), config.adjust.test_level)
-    observations = sum(sums.counts.values())
-    reason = (
-        f"the data leave {solution.deficiency} direction(s) of the unknowns open" if solution.deficiency else ""
-    )
+    observations = sum(group.count for group in sums.groups.values())
+    reason = f"the data leave {solution.deficiency} direction(s) of the unknowns open" if solution.deficiency else ""
     summary = {
         "converged": converged,
         "iterations": iterations,
         "observations": observations,
         "redundancy": sum(free.values()),
-        "sigma0": float(np.sqrt(sum(sums.squares.values()) / max(sum(free.values()), 1.0))),
+        "sigma0": float(np.sqrt(sum(group.squares for group in sums.groups.values()) / max(sum(free.values()), 1.0))),
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
         "weakest": "" if solution.deficiency else weakest_direction(covariance[:COMMON, :COMMON]),
@@ -230,7 +237,7 @@ def _outputs(
         estimate,
         _covariance_table(covariance[:COMMON, :COMMON]),
         _surfaces_table(state, cells),
-        _groups_table(state, sums, free),
+        _groups_table(sums, free),
         _cells_table(state, cells),
         pd.DataFrame([summary]),
     )
@@ -259,19 +266,18 @@ def _surfaces_table(state: State, cells: dict[Any, Any]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _groups_table(state: State, sums: Sums, free: dict[str, float]) -> pd.DataFrame:
+def _groups_table(sums: Sums, free: dict[str, float]) -> pd.DataFrame:
     rows = [
         {
             "group": name,
-            "count": sums.counts[name],
+            "count": group.count,
             "redundancy": free[name],
-            "variance_factor": sums.squares[name] / max(free[name], 1.0),
-            "rms_normalised": float(np.sqrt(sums.squares[name] / max(sums.weights[name], 1.0))),
-            "cut": sums.cut[name],
-            "reduced": sums.reduced[name],
+            "variance_factor": group.squares / max(free[name], 1.0),
+            "rms_normalised": float(np.sqrt(group.squares / max(group.weights, 1.0))),
+            "cut": group.cut,
+            "reduced": group.reduced,
         }
-        for name in GROUPS
-        if name in sums.counts
+        for name, group in sums.groups.items()
     ]
     return pd.DataFrame(rows)
 

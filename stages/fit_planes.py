@@ -1,4 +1,4 @@
-"""Total least squares planes of both sensors, by pass, face and family; and the moments from which any mount's follow."""
+"""Total least squares planes of both sensors, by pass, face and family; and moments from which any mount's follow."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ def laser_moments(batch: Batch) -> dict[Key, Moments]:
     return {key: Moments.of(points[rows]) for key, rows in _groups(batch)}
 
 
-def sounding_moments(batch: Batch, trajectory: Trajectory, R_body_from_mbes: Array) -> dict[Key, Array]:  # noqa: N803
+def sounding_moments(batch: Batch, trajectory: Trajectory, R_body_from_mbes: Array) -> dict[Key, Array]:
     """Lifted moments (40, 40) of a batch's soundings by pass and face."""
     points = np.column_stack([batch[f"{axis}_mbes_m"] for axis in "xyz"]) @ R_body_from_mbes.T
     positions, R_target_from_body = trajectory.poses_at(batch["t_ns"])
@@ -90,9 +90,7 @@ def _merge(partials: list[dict[Key, Any]]) -> dict[Key, Any]:
     return dict(sorted(total.items()))
 
 
-def _planes(
-    sensor: str, moments: dict[Key, Moments], faces: pd.DataFrame, min_points: int
-) -> Iterator[dict[str, Any]]:
+def _planes(sensor: str, moments: dict[Key, Moments], faces: pd.DataFrame, min_points: int) -> Iterator[dict[str, Any]]:
     components = faces[["normal_x_target_1", "normal_y_target_1", "normal_z_target_1"]].to_numpy()
     normals = dict(zip(faces["face"].tolist(), components, strict=True))
     family = dict(zip(faces["face"].tolist(), faces["family"].tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Points into the pool frame: attitude on the rotation group, through ECEF; what lies far from the target is dropped."""
+"""Points into the pool frame: attitude on the rotation group, through ECEF; what lies far off the target is dropped."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
@@ -99,7 +100,9 @@ def _refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
             for _, piece in seen:
                 for reason, number in piece.dropped.items():
                     reasons[reason] = reasons.get(reason, 0) + number
-            why = ", ".join(f"{number} x {reason}" for reason, number in sorted(reasons.items())) or "the files are empty"
+            why = (
+                ", ".join(f"{number} x {reason}" for reason, number in sorted(reasons.items())) or "the files are empty"
+            )
             advice = {
                 "ins": "log again after the INS has aligned, with INSPVA(S) on",
                 "laser": "export the scan again, with time stamps",
@@ -239,7 +242,7 @@ def _gaps(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.DataFr
     rows: list[dict[str, Any]] = []
     for sensor, t_ns in epochs_ns.items():
         stretches = split_at_gaps(t_ns, max_gap_ns)
-        for (_, end), (start, _) in zip(stretches[:-1], stretches[1:], strict=True):
+        for (_, end), (start, _) in pairwise(stretches):
             rows.append({"sensor": sensor, "start_ns": end, "end_ns": start, "duration_s": (start - end) / NS})
     return pd.DataFrame(rows, columns=[column.name for column in artefacts.GAPS.columns])
 

@@ -1,4 +1,4 @@
-"""The patent's offsets: once after the angles (as it prints them), and in turn with the angles until both stand still."""
+"""The patent's offsets: once after the angles (as it prints them), and in turn with them until both stand still."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -43,7 +43,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     lever = mount_of(config.mbes.mount).lever_arm_body_m
     settings = config.offsets
     angles = inputs.angles.iloc[0]
-    corrections, pairs, alternation = [], [], []
+    corrections: list[dict[str, Any]] = []
+    pairs: list[dict[str, Any]] = []
+    alternation: list[dict[str, float]] = []
 
     vector = np.radians([float(angles[f"rotation_{axis}_deg"]) for axis in "xyz"])
     method = "patent_sequential"
@@ -51,7 +53,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         if angles["reason"]:
             raise DegenerateGeometryError(str(angles["reason"]))
         once = offsets(pool, dry, wet, exp_so3(vector), lever, settings.apply_x_first)
-        pairs += [{"method": method} | pair for pair in once.pairs]
+        pairs += [{"method": method, **pair} for pair in once.pairs]
         corrections.append(_row(method, vector, once.body_m, bool(angles["converged"]), int(angles["iterations"]), ""))
     except DegenerateGeometryError as error:
         corrections.append(_row(method, np.full(3, np.nan), np.full(3, np.nan), False, 0, str(error)))
@@ -62,7 +64,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         result = alternate(passes, pool, dry, wet, lever, settings.max_iterations, *tolerances)
         rotation, shift = result.rotation_vector_rad, result.lever_arm_correction_m
         last = offsets(pool, dry, wet, exp_so3(rotation), lever + shift, True)
-        pairs += [{"method": method} | pair for pair in last.pairs]
+        pairs += [{"method": method, **pair} for pair in last.pairs]
         alternation = result.rows
         corrections.append(_row(method, rotation, shift, result.converged, result.iterations, ""))
     except DegenerateGeometryError as error:

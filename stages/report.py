@@ -56,7 +56,12 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     methods["adjustment"] = _adjustment(inputs.estimate, inputs.covariance, coarse)
     found = reasons(
         Evidence(
-            inputs.target_pose, inputs.provisional_mount, inputs.corrections, inputs.summary, inputs.cells, inputs.groups
+            inputs.target_pose,
+            inputs.provisional_mount,
+            inputs.corrections,
+            inputs.summary,
+            inputs.cells,
+            inputs.groups,
         ),
         methods["adjustment"]["sigma"],
         config.verdict,
@@ -102,7 +107,9 @@ def _range_note(mbes: config.Mbes) -> str:
     return f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
 
 
-def _method(vector_rad: Array, lever_m: Array, coarse: Mounted, covariance: Array | None, why: str = "") -> dict[str, Any]:
+def _method(
+    vector_rad: Array, lever_m: Array, coarse: Mounted, covariance: Array | None, why: str = ""
+) -> dict[str, Any]:
     """One method's block of the contract; nulls where there is no result."""
     good = bool(np.all(np.isfinite(vector_rad)) and np.all(np.isfinite(lever_m)))
     known = good and covariance is not None and bool(np.all(np.isfinite(covariance)))
@@ -174,7 +181,8 @@ def summary(calibration: Mapping[str, Any]) -> str:
     """The result on one screen, from calibration.json."""
     lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    lines += ["", f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'correction':>14}{'sigma':>12}   (result: {calibration['result']})"]  # fmt: skip
+    heads = f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'change':>14}{'sigma':>12}"
+    lines += ["", f"{heads}   (result: {calibration['result']})"]
     block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
     for parameter in AXES:
         angle = parameter in VECTOR_OF_ANGLE
@@ -182,10 +190,10 @@ def summary(calibration: Mapping[str, Any]) -> str:
         part = "rotation_vector_deg" if angle else "lever_arm_m"
         index = VECTOR_OF_ANGLE[parameter] if angle else "xyz".index(parameter)
         total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
-        correction = f"{block['correction'][part][index]:+.4f} {unit}" if block["mount"] else "-"
+        change = f"{block['mount'][key] - coarse[key]:+.4f} {unit}" if block["mount"] else "-"
         sigma = f"{block['sigma'][part][index]:.4f} {unit}" if block["sigma"] else "-"
-        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{correction:>14}{sigma:>12}")
-    lines += ["", "'calibrated' replaces the coarse value; 'correction' is what lies between (about the same body axis)."]
+        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
+    lines += ["", "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."]
     if calibration["geometry"]["weakest"]:
         lines.append(f"Geometry: {calibration['geometry']['weakest']}.")
     return "\n".join(lines)

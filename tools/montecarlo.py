@@ -1,9 +1,9 @@
 """Many simulated sessions: are the results right, and the predicted sigmas true?
 
-``make montecarlo`` prints, campaign by campaign, the errors of the adjustment's six values, their mean normalised squared
-error (its expectation is 6 if the covariance is true) with the 99 % band, and how many sessions were accepted. Seeds are
-fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and the combination of signs
-goes through all 64. Results go to runs/montecarlo/ as CSV as well.
+``make montecarlo`` prints, campaign by campaign, the errors of the adjustment's six values, their mean normalised
+squared error (its expectation is 6 if the covariance is true) with the 99 % band, and how many sessions were
+accepted. Seeds are fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and
+the combination of signs goes through all 64. Results go to runs/montecarlo/ as CSV as well.
 
     python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2]
 """
@@ -143,7 +143,10 @@ def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, 
     block = calibration["methods"]["adjustment"]
     covariance = np.array(block["covariance"])
     error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), truth)
-    row: dict[str, Any] = {"accepted": calibration["verdict"] == "accepted", "reasons": "; ".join(calibration["reasons"])}
+    row: dict[str, Any] = {
+        "accepted": calibration["verdict"] == "accepted",
+        "reasons": "; ".join(calibration["reasons"]),
+    }
     row["nse"] = float(error @ np.linalg.solve(covariance, error))
     sigma = np.sqrt(np.diag(covariance))
     for k, name in enumerate(NAMES):
@@ -174,7 +177,9 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
         ("largest error", [table[f"error_{name}"].abs().max() for name in NAMES]),
         ("mean sigma", [np.sqrt(np.mean(table[f"sigma_{name}"] ** 2)) for name in NAMES]),
     ):
-        lines.append(f"  {word:16}" + "".join(f"{value:10.4f}" if k < 3 else f"{value:10.3f}" for k, value in enumerate(values)))
+        lines.append(
+            f"  {word:16}" + "".join(f"{value:10.4f}" if k < 3 else f"{value:10.3f}" for k, value in enumerate(values))
+        )
     return "\n".join(lines)
 
 

@@ -21,7 +21,7 @@ the last three columns alone, and their normal equations follow from second mome
 Weights: 1 / (σ² f), σ from range, angle and incidence, f the variance factor of the observation's group, times IGG III.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -122,7 +122,7 @@ def laser_rows(
     range_sigma_m: float,
     angle_sigma_rad: float,
 ) -> Rows:
-    """Laser points in the target frame (reduced): σ² = cos² i σ_r² + sin² i (r σ_a)², i the incidence on the surface."""
+    """Laser points in the target frame (reduced): σ² = cos² i σ_r² + sin² i (r σ_a)², i the angle of incidence."""
     residual, local = _local(state, surface, points_m)
     across = np.sqrt(np.maximum(0.0, 1.0 - cos_incidence**2)) * ranges_m * angle_sigma_rad
     sigma = np.hypot(cos_incidence * range_sigma_m, across)
@@ -134,14 +134,15 @@ def sounding_rows(
     surface: Integers,
     points_mbes_m: Array,
     positions_m: Array,
-    R_target_from_body: Array,  # noqa: N803
+    R_target_from_body: Array,
     range_sigma_m: float,
     angle_sigma_rad: float,
 ) -> Rows:
-    """Soundings with their poses (positions reduced): σ² = (n · u)² σ_r² + (n · a)² (r σ_θ)², a the across-track unit vector at the beam.
+    """Soundings with their poses (positions reduced): σ² = (n · u)² σ_r² + (n · a)² (r σ_θ)², a the across-track unit
+    vector at the beam.
 
-    The footprint enters through the labels (no edge within it) and through the group's variance factor: on one plane the
-    phase detection takes the beam's axis.
+    The footprint enters through the labels (no edge within it) and through the group's variance factor: on one plane
+    the phase detection takes the beam's axis.
     """
     turned = points_mbes_m @ state.R_body_from_mbes.T
     points = positions_m + np.einsum("nij,nj->ni", R_target_from_body, turned + state.lever_arm_m)
@@ -159,28 +160,36 @@ def sounding_rows(
 
 
 @dataclass(frozen=True)
-class Sums:
-    """Normal equations and statistics; they add. ``normal`` (k, k) and ``right`` (k,) by group, for variance components."""
+class GroupSums:
+    """Normal equations and statistics of one group of observations; they add.
 
-    normal: Mapping[str, Array]
-    right: Mapping[str, Array]
-    squares: Mapping[str, float]  # Σ weight v² / σ², without the variance factor
-    weights: Mapping[str, float]
-    counts: Mapping[str, int]
-    cut: Mapping[str, int]
-    reduced: Mapping[str, int]
-    histograms: Mapping[str, Array]
+    normal (k, k), right (k,); squares: Σ w v² / σ² (without the variance factor); weights: Σ w, w the robust weight.
+    """
+
+    normal: Array
+    right: Array
+    squares: float
+    weights: float
+    count: int
+    cut: int
+    reduced: int
+    histogram: Array
+
+    def __add__(self, other: "GroupSums") -> "GroupSums":
+        return GroupSums(*(getattr(self, name) + getattr(other, name) for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class Sums:
+    """The groups' sums, by name of the group; they add."""
+
+    groups: Mapping[str, GroupSums]
 
     def __add__(self, other: "Sums") -> "Sums":
-        return Sums(*(_add(getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__))
-
-
-def _add(first: Mapping[str, object], second: Mapping[str, object]) -> dict[str, object]:
-    keys = [name for name in GROUPS if name in first or name in second]
-    return {
-        name: first[name] + second[name] if name in first and name in second else first.get(name, second.get(name))  # type: ignore[operator]
-        for name in keys
-    }
+        both = dict(self.groups)
+        for name, group in other.groups.items():
+            both[name] = both[name] + group if name in both else group
+        return Sums({name: both[name] for name in GROUPS if name in both})
 
 
 def weights_of(state: State, rows: Rows) -> tuple[Array, Array]:
@@ -199,40 +208,35 @@ def accumulate(state: State, rows: Rows) -> Sums:
     """One chunk's contribution to the normal equations, group by group and surface by surface."""
     robust, full = weights_of(state, rows)
     normalised = rows.residual_m / rows.sigma_m
-    normal: dict[str, Array] = {}
-    right: dict[str, Array] = {}
-    statistics: list[dict[str, object]] = [{} for _ in range(6)]
+    groups = {}
     for number in np.unique(rows.group).tolist():
-        name, inside = GROUPS[number], rows.group == number
-        normal[name], right[name] = np.zeros((state.size, state.size)), np.zeros(state.size)
+        inside = rows.group == number
+        normal, right = np.zeros((state.size, state.size)), np.zeros(state.size)
         for surface in np.unique(rows.surface[inside]).tolist():
             use = np.flatnonzero(inside & (rows.surface == surface))
             design, columns = rows.local[use], state.columns(surface)
             if rows.common is not None:
                 design, columns = np.hstack([rows.common[use], design]), [*range(COMMON), *columns]
             weighted = design * full[use, None]
-            normal[name][np.ix_(columns, columns)] += weighted.T @ design
-            right[name][columns] -= weighted.T @ rows.residual_m[use]
-        w = robust[inside]
-        values = (
-            float(np.sum(w * normalised[inside] ** 2)),
-            float(np.sum(w)),
-            int(inside.sum()),
-            int(np.sum(w == 0)),
-            int(np.sum((w < 1) & (w > 0))),
-            histogram(normalised[inside]),
-        )
-        for store, value in zip(statistics, values, strict=True):
-            store[name] = value
-    return Sums(normal, right, *statistics)  # type: ignore[arg-type]
+            normal[np.ix_(columns, columns)] += weighted.T @ design
+            right[columns] -= weighted.T @ rows.residual_m[use]
+        w, v = robust[inside], normalised[inside]
+        groups[GROUPS[number]] = GroupSums(normal, right, float(w @ v**2), *_weight_counts(w), histogram(v))
+    return Sums(groups)
+
+
+def _weight_counts(weights: Array) -> tuple[float, int, int, int]:
+    """Sum of the robust weights, how many there are, how many are zero, how many between zero and one."""
+    cut = int(np.sum(weights == 0))
+    return float(weights.sum()), len(weights), cut, int(np.sum(weights < 1)) - cut
 
 
 @dataclass(frozen=True)
 class LaserMoments:
-    """Σ w / σ² · y yᵀ, y = (X - c, 1), per surface (s, 4, 4); and the same statistics as :class:`Sums`.
+    """Σ w / σ² · y yᵀ, y = (X - c, 1), per surface (s, 4, 4); and the same statistics as :class:`GroupSums`.
 
-    The laser's share of the normal equations is a quadratic form of y, so after one pass over the points every iteration
-    takes it from here.
+    The laser's share of the normal equations is a quadratic form of y, so after one pass over the points every
+    iteration takes it from here.
     """
 
     moments: Array
@@ -258,11 +262,8 @@ class LaserMoments:
             normal[np.ix_(columns, columns)] = design @ self.moments[k] @ design.T / factor
             right[columns] = -design @ self.moments[k] @ v / factor
             squares += float(v @ self.moments[k] @ v)
-        one = "laser"
-        return Sums(
-            {one: normal}, {one: right}, {one: squares}, {one: self.weights},
-            {one: self.count}, {one: self.cut}, {one: self.reduced}, {one: self.histogram},
-        )  # fmt: skip
+        statistics = (squares, self.weights, self.count, self.cut, self.reduced, self.histogram)
+        return Sums({"laser": GroupSums(normal, right, *statistics)})
 
 
 def laser_moments(state: State, rows: Rows, points_m: Array) -> LaserMoments:
@@ -273,11 +274,4 @@ def laser_moments(state: State, rows: Rows, points_m: Array) -> LaserMoments:
         use = rows.surface == k
         y = np.column_stack([points_m[use] - surface.centre_m, np.ones(int(use.sum()))])
         moments[k] = (y * (robust[use] / rows.sigma_m[use] ** 2)[:, None]).T @ y
-    return LaserMoments(
-        moments,
-        float(robust.sum()),
-        len(robust),
-        int(np.sum(robust == 0)),
-        int(np.sum((robust < 1) & (robust > 0))),
-        histogram(rows.residual_m / rows.sigma_m),
-    )
+    return LaserMoments(moments, *_weight_counts(robust), histogram(rows.residual_m / rows.sigma_m))

@@ -62,7 +62,9 @@ def patent_cosines(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> dic
 
 def angles_between(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> dict[str, float]:
     """Full angle between the sensors' normals of each plane, rad (by the chord: exact for small angles)."""
-    return {name: float(2 * np.arcsin(np.linalg.norm(mbes[name] - laser[name]) / 2)) for name in ("P1", "P2", "P3", "P4")}
+    return {
+        name: float(2 * np.arcsin(np.linalg.norm(mbes[name] - laser[name]) / 2)) for name in ("P1", "P2", "P3", "P4")
+    }
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,8 @@ class Look:
 def look(passes: Sequence[PassPlanes], rotation: Array, lever_arm_m: Array) -> Look:
     """Deviations pass by pass with this mount (Exp(δ) = ``rotation``, lever arm), combined by weight.
 
-    Pass by pass, because one straight pass turns with a yaw error by a known sign (0 < gain <= 1), passes pooled need not.
+    Pass by pass, because one straight pass turns with a yaw error by a known sign (0 < gain <= 1), passes pooled need
+    not.
     """
     if not passes:
         raise DegenerateGeometryError("no pass has laser points and soundings on all of P1, P2 and P3")
@@ -149,8 +152,8 @@ def iterate_angles(
 ) -> AngleResult:
     """[0036]: correct, place again, compare again, until the step and the angles between the normals stand still.
 
-    A yaw error turns a straight pass's 45° faces by half only, so the iteration closes about half of it per step: no gain is
-    assumed, enough iterations are allowed. With noise the angles end at the noise, not at zero.
+    A yaw error turns a straight pass's 45° faces by half only, so the iteration closes about half of it per step: no
+    gain is assumed, enough iterations are allowed. With noise the angles end at the noise, not at zero.
     """
     rotation = np.eye(3)
     rows: list[dict[str, float]] = []

@@ -107,7 +107,9 @@ def cells_of(scores: Scores, tolerance_m: float) -> dict[CellKey, Cell]:
         mean = pull / p
         variance = float(np.sum((table[:, 1] - table[:, 0] * mean) ** 2)) / p**2
         normalised = mean / np.sqrt(variance + tolerance_m**2) if variance + tolerance_m > 0 else 0.0
-        found[key] = Cell(int(count), float(mean), float(np.sqrt(squares / count)), float(np.sqrt(variance)), normalised)
+        found[key] = Cell(
+            int(count), float(mean), float(np.sqrt(squares / count)), float(np.sqrt(variance)), normalised
+        )
     return found
 
 

@@ -23,7 +23,7 @@ FEATURES = 13
 SIZE = 3 * FEATURES + 1  # three axes, and the constant 1 for the sums
 
 
-def lift(R_target_from_body: Array, positions_m: Array, points_body_m: Array) -> Array:  # noqa: N803
+def lift(R_target_from_body: Array, positions_m: Array, points_body_m: Array) -> Array:
     """Features (n, 40) of soundings: poses (n, 3, 3), (n, 3) m; points m = R_body_from_mbes x_mbes, (n, 3) m."""
     n = len(positions_m)
     features = np.empty((n, SIZE))

@@ -67,8 +67,8 @@ def offsets(
 ) -> Offsets:
     """X, Y, Z with the mount Exp(δ) = ``rotation`` and this lever arm.
 
-    X [0126]: mean X of the laser's wall points minus that of the MBES's, pass by pass, weighted by n_L n_M / (n_L + n_M).
-    Z [0127]: (z_dry - z_wet) measured minus (z_dry - z_wet) by design, over every pair of horizontal faces.
+    X [0126]: mean X of the laser's wall points minus that of the MBES's, pass by pass, weighted by n_L n_M / (n_L +
+    n_M). Z [0127]: (z_dry - z_wet) measured minus (z_dry - z_wet) by design, over every pair of horizontal faces.
     Y [0128]: P1 planes projected onto the floor (their traces at their own mean height), cut with a line parallel to Y
     through the faces' centroid, laser minus MBES. An X displacement ΔX shifts the cut by -ΔX n_x / n_y: with
     ``apply_x_first`` it is taken out, so that Y is what remains after X has been applied.
@@ -154,8 +154,8 @@ def alternate(
 ) -> AlternationResult:
     """One step of the angles, then one of the offsets, until both stand still.
 
-    The sequential recipe stops at angles found with a wrong lever arm (method: 0.08° on noise-free data); the fixed point of
-    the alternation has neither a deviation nor a displacement left, which only the truth has.
+    The sequential recipe stops at angles found with a wrong lever arm (method: 0.08° on noise-free data); the fixed
+    point of the alternation has neither a deviation nor a displacement left, which only the truth has.
     """
     rotation, correction = np.eye(3), np.zeros(3)
     rows: list[dict[str, float]] = []

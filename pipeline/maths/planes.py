@@ -70,7 +70,9 @@ def fit_plane(moments: Moments, toward: Array) -> Plane:
     values, vectors = np.linalg.eigh((scatter + scatter.T) / 2)
     values = np.maximum(values, 0.0)
     if values[1] <= 1e-12 or values[1] < 2 * values[0]:
-        raise DegenerateGeometryError(f"{n} points do not span a plane (eigenvalues {values[0]:.3g}, {values[1]:.3g} m²)")
+        raise DegenerateGeometryError(
+            f"{n} points do not span a plane (eigenvalues {values[0]:.3g}, {values[1]:.3g} m²)"
+        )
     normal = vectors[:, 0] * (1.0 if vectors[:, 0] @ toward >= 0 else -1.0)
     tangents = _signed(vectors[:, [2, 1]].T)
     variance = values[0] * n / (n - 3)

@@ -20,7 +20,10 @@ Closest = Callable[[Array], tuple[Array, NDArray[np.int64]]]  # points -> neares
 class Placement(Protocol):
     """Points in the target frame as a function of k parameters, and their derivatives."""
 
-    prior_sigmas: Array
+    @property
+    def prior_sigmas(self) -> Array:
+        """(k,): how far from zero the parameters may be expected."""
+        ...
 
     def points(self, parameters: Array) -> Array:
         """(k,) -> (n, 3) m."""
@@ -68,7 +71,7 @@ class MountCorrection:
 
     def points(self, parameters: Array) -> Array:
         body = self.points_body_m @ exp_so3(parameters[:3]).T + self.lever_arm_m + parameters[3:]
-        return self.positions_m + np.einsum("nij,nj->ni", self.R_target_from_body, body)
+        return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_target_from_body, body))
 
     def rows(self, parameters: Array, directions: Array) -> Array:
         turned = self.points_body_m @ exp_so3(parameters[:3]).T
@@ -144,8 +147,8 @@ def search(
 ) -> Found:
     """Best pose from many starts: all are scored with a wide reach, the ``keep`` best settle and are scored sharply.
 
-    ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells whether two settled poses are
-    the same solution.
+    ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells whether two settled
+    poses are the same solution.
     """
     ranked = sorted(starts, key=lambda p: -score(placement, p, closest, 0.25))[:keep]
     settled = [settle(placement, start, closest, normals) for start in ranked]
@@ -195,8 +198,9 @@ def refine(
 ) -> Refined:
     """Point-to-plane least squares on labelled points only, relabelled each round: no bias from edges.
 
-    ``label(parameters, points)`` gives face numbers (-1: none). Residual r = n · x - d, Huber weights min(1, k s / |r|) with
-    k = 2 and s = 1.4826 · median |r|; covariance s² (Aᵀ W A + prior)⁻¹. With too few points the start comes back.
+    ``label(parameters, points)`` gives face numbers (-1: none). Residual r = n · x - d, Huber weights min(1, k s /
+    |r|) with k = 2 and s = 1.4826 · median |r|; covariance s² (Aᵀ W A + prior)⁻¹. With too few points the start comes
+    back.
     """
     parameters = start.copy()
     scale, rms, count = np.inf, np.nan, 0

@@ -1,7 +1,7 @@
 """Rotations: elementary, exponential map, mounts and attitudes.
 
-Convention everywhere: ``R_a_from_b`` turns coordinates in frame b into coordinates in frame a, ``v_a = R_a_from_b @ v_b``.
-Angles are radians; elementary rotations are right-handed. Stacks of rotations have shape (n, 3, 3).
+Convention everywhere: ``R_a_from_b`` turns coordinates in frame b into coordinates in frame a, ``v_a = R_a_from_b @
+v_b``. Angles are radians; elementary rotations are right-handed. Stacks of rotations have shape (n, 3, 3).
 """
 
 import numpy as np
@@ -60,7 +60,7 @@ def exp_so3(rotation_vector: Array) -> Array:
     return np.eye(3) + first[..., None, None] * k + second[..., None, None] * (k @ k)
 
 
-def log_so3(R: Array) -> Array:  # noqa: N803
+def log_so3(R: Array) -> Array:
     """Rotation vector (length in [0, pi]) of a rotation: inverse of :func:`exp_so3`; (..., 3, 3) -> (..., 3).
 
     Goes through the quaternion with the largest component first, so it is exact near 0 and near pi.
@@ -74,16 +74,18 @@ def log_so3(R: Array) -> Array:  # noqa: N803
     angle = 2 * np.arctan2(length, scalar)
     small = length < 1e-9
     factor = np.where(small, 2.0, angle / np.where(small, 1.0, length))
-    return vector * factor[..., None]
+    return np.asarray(vector * factor[..., None])
 
 
-def quaternion_from_rotation(R: Array) -> Array:  # noqa: N803
+def quaternion_from_rotation(R: Array) -> Array:
     """Unit quaternion (w, x, y, z), w >= 0, of (..., 3, 3) (Shepperd's method: the largest component is the root)."""
     m = np.asarray(R, dtype=np.float64)
     trace = np.trace(m, axis1=-2, axis2=-1)
     diagonal = np.diagonal(m, axis1=-2, axis2=-1)
     squares = np.concatenate([(1 + trace)[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)
-    w = np.stack([squares[..., 0], m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]], -1)
+    w = np.stack(
+        [squares[..., 0], m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]], -1
+    )
     sums = m + np.swapaxes(m, -1, -2)
     rows = [w]
     for i in range(3):
@@ -93,7 +95,7 @@ def quaternion_from_rotation(R: Array) -> Array:  # noqa: N803
     best = np.argmax(squares, axis=-1)
     chosen = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
     chosen = chosen / np.linalg.norm(chosen, axis=-1, keepdims=True)
-    return chosen * np.where(chosen[..., :1] < 0, -1.0, 1.0)
+    return np.asarray(chosen * np.where(chosen[..., :1] < 0, -1.0, 1.0))
 
 
 def rotation_from_quaternion(quaternion: Array) -> Array:
@@ -114,7 +116,7 @@ def rotation_from_mount(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Ar
     return rotation_z(yaw_rad) @ rotation_x(pitch_rad) @ rotation_y(roll_rad)
 
 
-def mount_from_rotation(R_body_from_sensor: Array) -> tuple[float, float, float]:  # noqa: N803
+def mount_from_rotation(R_body_from_sensor: Array) -> tuple[float, float, float]:
     """(roll, pitch, yaw) in radians: inverse of :func:`rotation_from_mount`, pitch in [-pi/2, pi/2].
 
     From the product Rz(y)·Rx(p)·Ry(r): third row (-cos p sin r, sin p, cos p cos r), second column

@@ -27,8 +27,8 @@ def solve(sums: Sums) -> Solution:
 
     Directions with an eigenvalue below rounding get no step; they are counted, not repaired.
     """
-    normal = np.sum(list(sums.normal.values()), axis=0)
-    right = np.sum(list(sums.right.values()), axis=0)
+    normal = np.sum([group.normal for group in sums.groups.values()], axis=0)
+    right = np.sum([group.right for group in sums.groups.values()], axis=0)
     diagonal = np.diag(normal)
     scale = np.where(diagonal > 0, 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)), 0.0)
     values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
@@ -42,14 +42,14 @@ def solve(sums: Sums) -> Solution:
 
 def redundancies(sums: Sums, inverse: Array) -> dict[str, float]:
     """Redundancy by group: Σ weights - tr(N⁻¹ N_g) (Förstner 1979)."""
-    return {name: sums.weights[name] - float(np.sum(inverse * n)) for name, n in sums.normal.items()}
+    return {name: group.weights - float(np.sum(inverse * group.normal)) for name, group in sums.groups.items()}
 
 
 def variance_factors(sums: Sums, inverse: Array, current: Mapping[str, float]) -> dict[str, float]:
-    """Estimated variance / expected variance by group: Σ w v² / σ² over the redundancy; unchanged where there is none."""
+    """Estimated / expected variance by group: Σ w v² / σ² over the redundancy; unchanged where there is none."""
     free = redundancies(sums, inverse)
     return {
-        name: max(sums.squares[name] / free[name], 1e-12) if name in free and free[name] > 1 else value
+        name: max(sums.groups[name].squares / free[name], 1e-12) if name in free and free[name] > 1 else value
         for name, value in current.items()
     }
 
@@ -66,12 +66,12 @@ def weakest_direction(covariance: Array) -> str:
     correlation = covariance / np.outer(sigma, sigma)
     values, vectors = np.linalg.eigh(correlation)
     vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
-    members = [k for k in np.argsort(-np.abs(vector), kind="stable").tolist() if abs(vector[k]) >= np.abs(vector).max() / 2]
+    members = [
+        k for k in np.argsort(-np.abs(vector), kind="stable").tolist() if abs(vector[k]) >= np.abs(vector).max() / 2
+    ]
     if values[-1] < 1.5 or len(members) < 2:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))
         return f"no two are hard to tell apart; least sure are {WORDS[worst[0]]} and {WORDS[worst[1]]}"
     pair = members[:2]
     rho = correlation[pair[0], pair[1]]
     return f"{' and '.join(WORDS[k] for k in members)} move together (correlation of the first two {rho:+.3f})"
-
-

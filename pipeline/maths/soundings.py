@@ -44,8 +44,8 @@ def points_in_mbes(
 def beam_half_widths(points_mbes_m: Array, across_rad: float, along_rad: float) -> tuple[Array, Array]:
     """Half axes of the beams at the points, (n, 3) m each in frame mbes: across track, and along track (y).
 
-    For u = (sin θ, 0, -cos θ) the across-track unit vector is du/dθ = (cos θ, 0, sin θ); length = range · tan(half width).
-    Arguments are full widths.
+    For u = (sin θ, 0, -cos θ) the across-track unit vector is du/dθ = (cos θ, 0, sin θ); length = range · tan(half
+    width). Arguments are full widths.
     """
     x, _, z = points_mbes_m.T
     zero = np.zeros_like(x)

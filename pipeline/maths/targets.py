@@ -88,9 +88,10 @@ class TargetModel:
 
     def context(self) -> tuple[Array, Array]:
         """Triangles (vertices (v, 3), corner numbers (t, 3)) of the faces, each fanned from its first corner."""
-        vertices, triangles = [], []
+        vertices: list[Array] = []
+        triangles: list[tuple[int, int, int]] = []
         for face in self.faces:
-            first = sum(len(v) for v in vertices)
+            first = sum(map(len, vertices))
             vertices.append(face.vertices_m)
             triangles += [(first, first + k, first + k + 1) for k in range(1, len(face.vertices_m) - 1)]
         return np.concatenate(vertices), np.array(triangles)
@@ -100,7 +101,9 @@ class TargetModel:
         return np.repeat(np.arange(len(self.faces)), [len(face.vertices_m) - 2 for face in self.faces])
 
 
-def _face(name: str, family: str, normal: tuple[float, float, float], vertices: list[tuple[float, float, float]]) -> Face:
+def _face(
+    name: str, family: str, normal: tuple[float, float, float], vertices: list[tuple[float, float, float]]
+) -> Face:
     n, v = np.array(normal), np.array(vertices)
     if np.dot(np.cross(v[1] - v[0], v[2] - v[1]), n) < 0:
         v = v[::-1].copy()

@@ -35,11 +35,11 @@ class Trajectory:
     steps_rad: Array
 
     @classmethod
-    def build(cls, t_ns: Times, positions_m: Array, R_frame_from_body: Array) -> "Trajectory":  # noqa: N803
+    def build(cls, t_ns: Times, positions_m: Array, R_frame_from_body: Array) -> "Trajectory":
         steps = log_so3(np.swapaxes(R_frame_from_body[:-1], -1, -2) @ R_frame_from_body[1:])
         return cls(t_ns, positions_m, R_frame_from_body, np.concatenate([steps, np.zeros((1, 3))]))
 
-    def moved(self, R_new_from_frame: Array, shift_m: Array) -> "Trajectory":  # noqa: N803
+    def moved(self, R_new_from_frame: Array, shift_m: Array) -> "Trajectory":
         """The same poses in another frame: x_new = R_new_from_frame · x + shift; steps are body vectors and stay."""
         return Trajectory(
             self.t_ns,
@@ -59,7 +59,7 @@ class Trajectory:
             return np.zeros(len(t_ns), dtype=bool)
         index, _ = self._locate(t_ns)
         inside = (t_ns >= self.t_ns[0]) & (t_ns <= self.t_ns[-1])
-        return inside & (self.t_ns[index + 1] - self.t_ns[index] <= max_interval_ns)
+        return np.asarray(inside & (self.t_ns[index + 1] - self.t_ns[index] <= max_interval_ns))
 
     def poses_at(self, t_ns: Times) -> tuple[Array, Array]:
         """Positions (n, 3) and rotations R_frame_from_body (n, 3, 3) at ``t_ns`` (n,)."""

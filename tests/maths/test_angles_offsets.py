@@ -14,7 +14,10 @@ from pipeline.maths.targets import build_target
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def normals_of(turn=np.eye(3)):
+UNTURNED = np.eye(3)
+
+
+def normals_of(turn=UNTURNED):
     root = np.sqrt(0.5)
     n = {"P1": [-root, -root, 0], "P2": [-1, 0, 0], "P3": [-root, root, 0]}
     found = {name: turn @ np.array(v) for name, v in n.items()}
@@ -48,8 +51,8 @@ def test_the_patents_pitch_cosine_takes_in_roll():
 def straight_pass(distance, number, mount_error, lever_error, swing_deg=0.0, azimuth=0.0, noise=0.0):
     """A pass along +y at x = -distance: soundings on the faces, generated from the truth; and the laser's planes.
 
-    The forward model is its own: for each moment the fan's plane is cut with the faces in the target frame, and the sonar
-    coordinates follow by inverting the *true* mount. The lifted features then use the wrong, coarse mount.
+    The forward model is its own: for each moment the fan's plane is cut with the faces in the target frame, and the
+    sonar coordinates follow by inverting the *true* mount. The lifted features then use the wrong, coarse mount.
     """
     rng = np.random.default_rng(number)
     model = build_target(8.0, 3.0, 1.0, 0.5)
@@ -82,7 +85,7 @@ def straight_pass(distance, number, mount_error, lever_error, swing_deg=0.0, azi
         lifted[key] = lifted.get(key, 0) + features.T @ features
         heights[face.name] = face.vertices_m[0, 2]
     for family in ("P1", "P2", "P3"):
-        dry = np.concatenate([model.faces[k].vertices_m + [0, 0, 4.0] for k in model.family_faces(family)])
+        dry = np.concatenate([model.faces[k].vertices_m + np.array([0, 0, 4.0]) for k in model.family_faces(family)])
         laser[family] = fit_plane(Moments.of(dry @ turn.T), turn @ model.faces[model.family_faces(family)[0]].normal)
     normals = {name: plane.normal for name, plane in laser.items()}
     normals["P4"] = fourth_normal(normals["P1"], normals["P2"])

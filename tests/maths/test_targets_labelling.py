@@ -112,7 +112,7 @@ def test_faces_are_seen_from_their_fronts_only_and_not_too_flat(target):
 
 
 def test_a_grazed_face_needs_its_margin_along_the_ray(target):
-    """0.5 degrees at 6 m and 27 degrees of grazing: the footprint is 11 cm long, so 4 cm from the far edge is too near."""
+    """0.5 degrees at 6 m, grazing at 27: the footprint is 11 cm long, so 4 cm from the far edge is too near."""
     origin = np.array([-5.0, -1.75, -0.5])
     points = np.array([[0.75, -1.75, -3.5], [0.96, -1.75, -3.5]])
     fine = label_points(target, points, beams_from(origin, points), 0.05, 0.03, 0.0)
