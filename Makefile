@@ -73,8 +73,8 @@ format: $(SETUP) ## what ruff can mend by itself
 test: lint ## lint, then every test
 	$(PY) -m pytest -n 2 -q
 
-bench: $(SETUP) ## time the parts that must be fast
-	$(PY) -m pytest -o addopts=--import-mode=importlib tests/bench --benchmark-only --benchmark-disable-gc -q
+bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare decoding
+	$(PY) -m tools.bench
 
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.montecarlo

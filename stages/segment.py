@@ -168,8 +168,8 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
             why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")
             raise RawDataError(
                 f"{sensor}: no point on the target's faces ({why}); the coarse mount may be wrong by more than "
-                f"{config.segment.search_mount_deg:g}° and {config.segment.search_mount_m:g} m, or target.a, b, c, e be "
-                "wrong"
+                f"{config.segment.search_mount_deg:g}° and {config.segment.search_mount_m:g} m, or target.a, b, c, e "
+                "be wrong"
             )
     return Outputs(_faces(prepared.model), _target_pose(prepared.target), _mount(prepared.mount), counts)
 

@@ -7,6 +7,7 @@ Array = NDArray[np.float64]
 
 BINS = np.linspace(0.0, 50.0, 2001)  # |residual| / sigma; what lies above counts into the last bin
 NORMAL_MEDIAN = 0.6744897501960817  # median of |standard normal|
+LEAST_SCALE = 0.01  # nobody's noise is a hundred times smaller than its stated sigma: what is, is rounding
 
 
 def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
@@ -35,4 +36,4 @@ def scale_of(counts: Array) -> float:
     if total == 0:
         return 1.0
     cumulative = np.concatenate([[0.0], np.cumsum(counts)])
-    return float(max(np.interp(total / 2, cumulative, BINS) / NORMAL_MEDIAN, 1e-6))
+    return float(max(np.interp(total / 2, cumulative, BINS) / NORMAL_MEDIAN, LEAST_SCALE))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment import Sums
+from pipeline.maths.robust import LEAST_SCALE
 
 Array = NDArray[np.float64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
@@ -49,7 +50,7 @@ def variance_factors(sums: Sums, inverse: Array, current: Mapping[str, float]) -
     """Estimated / expected variance by group: Σ w v² / σ² over the redundancy; unchanged where there is none."""
     free = redundancies(sums, inverse)
     return {
-        name: max(sums.groups[name].squares / free[name], 1e-12) if name in free and free[name] > 1 else value
+        name: max(sums.groups[name].squares / free[name], LEAST_SCALE**2) if name in free and free[name] > 1 else value
         for name, value in current.items()
     }
 

@@ -1,0 +1,87 @@
+"""Simulated sessions in memory, made once a worker."""
+
+import copy
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.config import PoolConfig, SessionConfig, parse
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.session import SimulatedSession, simulate
+from stages.campaign import calibrate_in_memory
+
+THIN: dict[str, Any] = {"laser": {"point_rate_hz": 4000.0}, "mbes": {"ping_rate_hz": 10.0}}
+QUIET: dict[str, Any] = {
+    "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
+    "laser": {"outlier_share": 0.0, "water_return_share": 0.0, "range_sigma_m": 0.0, "angle_sigma_deg": 0.0},
+    "mbes": {
+        "point_beams": True,
+        "corner_share": 0.0,
+        "outlier_share": 0.0,
+        "surface_share": 0.0,
+        "range_sigma_m": 0.0,
+        "angle_sigma_deg": 0.0,
+    },
+}
+
+
+def merged(*parts: Mapping[str, Any]) -> dict[str, Any]:
+    """Scenario dictionaries laid over each other, two levels deep."""
+    total: dict[str, Any] = {}
+    for part in parts:
+        for key, value in part.items():
+            total[key] = {**total.get(key, {}), **value} if isinstance(value, dict) else value
+    return total
+
+
+def made(*parts: Mapping[str, Any], seed: int = 1) -> SimulatedSession:
+    return simulate(parse(Scenario, merged({"name": "test"}, THIN, *parts), "test"), seed)
+
+
+def calibrated(
+    session: SimulatedSession,
+    until: str = "report",
+    pool: Mapping[str, Any] | None = None,
+    mount: Mapping[str, float] | None = None,
+    raw: Mapping[str, Mapping[str, np.ndarray]] | None = None,
+) -> dict[str, Any]:
+    """Every artefact; ``pool`` and ``mount`` change the pool's target and the coarse sonar mount."""
+    settings, design = copy.deepcopy(session.session), copy.deepcopy(session.pool)
+    settings["mbes"]["mount"].update(mount or {})
+    for key, value in (pool or {}).items():
+        design.setdefault(key, {}).update(value) if isinstance(value, dict) else design.update({key: value})
+    columns = {"ins": session.ins, "laser": session.laser, "mbes": session.mbes, **(raw or {})}
+    return calibrate_in_memory(
+        parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until
+    )
+
+
+@pytest.fixture(scope="session")
+def quiet() -> SimulatedSession:
+    """Without any noise, point beams."""
+    return made(QUIET)
+
+
+@pytest.fixture(scope="session")
+def noisy() -> SimulatedSession:
+    """The default scenario, thinned."""
+    return made()
+
+
+Errors = Callable[[Mapping[str, Any], Mapping[str, Any]], np.ndarray]
+
+
+@pytest.fixture(scope="session")
+def errors_of() -> Errors:
+    """(6,): a method's block of calibration.json against the truth: rotation in degrees, lever arm in mm."""
+    from scipy.spatial.transform import Rotation
+
+    def errors(block: Mapping[str, Any], truth: Mapping[str, Any]) -> np.ndarray:
+        R_true, R_found = np.array(truth["mbes"]["R_body_from_mbes"]), np.array(block["R_body_from_mbes"])
+        rotation = Rotation.from_matrix(R_true @ R_found.T).as_rotvec(degrees=True)
+        lever = 1000 * (np.array(truth["mbes"]["lever_arm_m"]) - np.array(block["lever_arm_m"]))
+        return np.concatenate([rotation, lever])
+
+    return errors

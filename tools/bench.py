@@ -1,0 +1,137 @@
+"""Time and memory of whole runs on simulated sessions of three sizes, a factor four apart.
+
+``make bench`` prints, for each size, in one run on this machine: seconds and peak memory of each stage, the whole run
+against bare decoding of the same files (laspy, the INS and BTH0 readers, one after another in one process),
+georeferencing in million points a second, and the seconds of a second run, which finds nothing to do. Figures are
+medians of ``--repeats``; machines differ and are busy: trust the ratios.
+
+    python -m tools.bench [--sizes small medium large] [--repeats 3] [--jobs 2]
+"""
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import yaml
+
+STAGES = ("ingest", "georeference", "segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")
+FOLDER = Path("runs/bench")
+POOLCAL = [sys.executable, "-m", "stages.cli"]
+
+# The largest has more than 20 million laser points and two million soundings; the others a quarter of it each time:
+# fewer and faster passes at the same rates of the instruments.
+SIZES = {
+    "small": {"distances_m": [4.0, 8.0], "speed_m_s": 0.68},
+    "medium": {"distances_m": [4.0, 8.0, 5.0, 7.0], "speed_m_s": 0.34},
+    "large": {"distances_m": [4.0, 8.0, 5.0, 7.0, 4.5, 6.0, 5.5, 7.5], "speed_m_s": 0.17},
+}
+INSTRUMENTS = {
+    "laser": {"point_rate_hz": 120_000.0, "line_rate_hz": 120.0},
+    "mbes": {"ping_rate_hz": 25.0},
+}
+DECODE = """
+import sys, time
+from pathlib import Path
+import laspy
+from pipeline.config import load_session
+from pipeline.readers import raw_parts
+folder = Path(sys.argv[1]); session = load_session(folder)
+start = time.perf_counter()
+points = 0
+for path in sorted((folder / "laser").iterdir()):
+    with laspy.open(path) as file:
+        for chunk in file.chunk_iterator(1_000_000):
+            x, y, z, t = chunk.x.scaled_array(), chunk.y.scaled_array(), chunk.z.scaled_array(), chunk.gps_time
+            points += len(x)
+for sensor, settings in (("ins", session.ins), ("mbes", session.mbes)):
+    for part in raw_parts(sensor, settings, folder):
+        for chunk in part.chunks():
+            pass
+print(time.perf_counter() - start, points)
+"""
+
+
+def measured(command: list[str]) -> tuple[float, float, str]:
+    """Seconds and peak MiB of a command, and what it printed."""
+    start = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    output = process.stdout.read() if process.stdout else ""
+    _, status, usage = os.wait4(process.pid, 0)
+    if os.waitstatus_to_exitcode(status) not in (0, 1):
+        raise RuntimeError(f"{' '.join(command)} ended with {os.waitstatus_to_exitcode(status)}")
+    return time.perf_counter() - start, usage.ru_maxrss / 1024, output
+
+
+def session_of(size: str) -> Path:
+    """The simulated session, made once."""
+    folder = FOLDER / f"session-{size}"
+    if not folder.exists():
+        FOLDER.mkdir(parents=True, exist_ok=True)
+        scenario = FOLDER / f"{size}.yaml"
+        scenario.write_text(yaml.safe_dump({"name": size, "track": SIZES[size], **INSTRUMENTS}))
+        subprocess.run([*POOLCAL, "simulate", str(folder), "--scenario", str(scenario)], check=True, capture_output=True)
+    return folder
+
+
+def bench(size: str, repeats: int, jobs: int) -> dict[str, float]:
+    """One size: medians over the repeats."""
+    session = session_of(size)
+    run = FOLDER / f"run-{size}"
+    rounds: list[dict[str, float]] = []
+    for _ in range(repeats):
+        shutil.rmtree(run, ignore_errors=True)
+        found: dict[str, float] = {}
+        _, _, text = measured([sys.executable, "-c", DECODE, str(session)])
+        found["decode_s"], found["points"] = (float(word) for word in text.split())
+        common = ["--jobs", str(jobs)]
+        where = ["--config", str(session / "pool.yaml")]
+        found["run_s"], found["run_mib"], _ = measured(
+            [*POOLCAL, "run", str(session), *where, "--run", str(run), *common]
+        )
+        found["again_s"], _, _ = measured([*POOLCAL, "run", str(session), *where, "--run", str(run), *common])
+        for stage in STAGES:
+            found[f"{stage}_s"] = json.loads((run / stage / "manifest.json").read_text())["wall_s"]
+            shutil.rmtree(run / stage)
+            _, found[f"{stage}_mib"], _ = measured([*POOLCAL, "stage", stage, str(run), *common])
+        rounds.append(found)
+    return {name: statistics.median(one[name] for one in rounds) for name in rounds[0]}
+
+
+def table(results: dict[str, dict[str, float]]) -> str:
+    """The figures as a Markdown table."""
+    lines = ["| | " + " | ".join(results) + " |", "|---|" + "---:|" * len(results)]
+
+    def row(name: str, cells: list[str]) -> None:
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+
+    values = list(results.values())
+    row("laser points, million", [f"{v['points'] / 1e6:.1f}" for v in values])
+    for stage in STAGES:
+        row(f"{stage}: s, peak MiB", [f"{v[f'{stage}_s']:.1f}, {v[f'{stage}_mib']:.0f}" for v in values])
+    row("whole run: s, peak MiB", [f"{v['run_s']:.1f}, {v['run_mib']:.0f}" for v in values])
+    row("bare decoding, s", [f"{v['decode_s']:.1f}" for v in values])
+    row("whole run ÷ bare decoding", [f"{v['run_s'] / v['decode_s']:.2f}" for v in values])
+    row("georeferencing, million points a second", [f"{v['points'] / v['georeference_s'] / 1e6:.1f}" for v in values])
+    row("second run, nothing to do, s", [f"{v['again_s']:.1f}" for v in values])
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", nargs="*", default=list(SIZES), choices=list(SIZES))
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    results = {size: bench(size, options.repeats, options.jobs) for size in options.sizes}
+    print(f"{options.jobs} workers, {os.cpu_count()} cores, medians of {options.repeats}\n")
+    print(table(results))
+
+
+if __name__ == "__main__":
+    main()
