@@ -115,19 +115,26 @@ def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, clo
 
 def _rivals(placement: TargetPose, best: Array, model: TargetModel, swapped: TargetModel) -> tuple[str, float]:
     """The best of the poses one block off, and how well it agrees."""
+    period = model.period_m
     rivals = []
-    for name, other, shifts in (
-        ("one block {}", model, (model.period_m, -model.period_m)),
-        ("low_side swapped, half a period {}", swapped, (model.period_m / 2, -model.period_m / 2)),
+    for other, shifts in (
+        (model, {"one block higher": period, "one block lower": -period}),
+        (
+            swapped,
+            {
+                "low_side swapped": 0.0,
+                "low_side swapped, half a period higher": period / 2,
+                "low_side swapped, half a period lower": -period / 2,
+            },
+        ),
     ):
         closest = ClosestSurface(other)
         # No prior here: the rival may settle where it fits best.
         free = TargetPose(placement.points_pool_m, np.full(4, 1e3))
-        for shift in shifts:
+        for name, shift in shifts.items():
             start = best + np.array([0.0, 0.0, 0.0, shift])
             settled = settle(free, start, closest, _planes(other)[0], NARROW)
-            agreement = _agreement(free, settled, other, closest)
-            rivals.append((name.format("higher" if shift > 0 else "lower"), agreement))
+            rivals.append((name, _agreement(free, settled, other, closest)))
     return max(rivals, key=lambda rival: rival[1])
 
 

@@ -1,0 +1,165 @@
+"""Single stages: what they drop and count, what they refuse, what makes a verdict."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.errors import RawDataError
+from tests.stages.conftest import QUIET, calibrated, made
+
+NS = 1_000_000_000
+
+
+def counts(found, stage):
+    table = found[f"{stage}/counts"]
+    return {(source, reason): int(number) for source, reason, number in table.itertuples(index=False)}
+
+
+def columns(stream, name):
+    return np.concatenate([part.columns[name] for part in stream.parts])
+
+
+def test_every_point_is_counted_from_stage_to_stage(noisy):
+    found = calibrated(noisy, "segment")
+    georeferenced, segmented = counts(found, "georeference"), counts(found, "segment")
+    for raw, source, nxt in (
+        ("laser", "laser_points", "laser_pool"),
+        ("mbes", "soundings", "soundings_pool"),
+    ):
+        total = len(getattr(noisy, raw)["t_ns"])
+        assert counts(found, "ingest")[(raw, "used")] == total
+        assert sum(n for (s, _), n in georeferenced.items() if s == source) == total
+        assert sum(n for (s, _), n in segmented.items() if s == nxt) == georeferenced[(source, "used")]
+    assert segmented[("laser_pool", "used")] == len(columns(found["segment/laser_labelled"], "face"))
+
+
+def test_points_in_holes_of_the_ins_are_not_interpolated_over(quiet):
+    t = quiet.ins["t_ns"]
+    middle = int(quiet.laser["t_ns"][len(quiet.laser["t_ns"]) // 8])
+    hole = (t > middle) & (t < middle + 2 * NS)
+    found = calibrated(quiet, "georeference", raw={"ins": {k: v[~hole] for k, v in quiet.ins.items()}})
+    lost = counts(found, "georeference")
+    assert lost[("laser_points", "hole in the INS")] > 1000
+    inside = columns(found["georeference/laser_pool"], "t_ns")
+    assert not np.any((inside > middle + 10_000_000) & (inside < middle + 2 * NS - 10_000_000))
+    assert len(found["ingest/passes"]) == 4  # two seconds end no pass
+
+
+def test_repeated_and_unordered_ins_records_are_sorted_out(quiet):
+    order = np.random.default_rng(0).permutation(len(quiet.ins["t_ns"]))
+    doubled = {k: np.concatenate([v[order], v[:100]]) for k, v in quiet.ins.items()}
+    found = calibrated(quiet, "ingest", raw={"ins": doubled})
+    np.testing.assert_array_equal(found["ingest/trajectory"]["t_ns"].to_numpy(), quiet.ins["t_ns"])
+    assert counts(found, "ingest")[("ins", "repeated time")] == 100
+
+
+def test_passes_and_quality_are_recorded(noisy):
+    found = calibrated(noisy, "ingest")
+    passes = found["ingest/passes"]
+    assert len(passes) == 4
+    np.testing.assert_allclose(passes["speed_m_s"], 0.4, atol=0.03)
+    np.testing.assert_allclose(passes["distance_m"], [4, 8, 5, 7], atol=1.0)
+    assert set(found["ingest/gaps"]["sensor"]) == {"ins", "mbes"}
+    assert len(found["ingest/gaps"]) == 6
+    rates = found["ingest/files"].set_index("sensor")["rate_hz"]
+    assert rates["ins"] == pytest.approx(200, rel=1e-3)
+    assert rates["mbes"] == pytest.approx(10, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "shift_s", "words"),
+    [
+        ("laser", 86_400, "no time overlap"),
+        ("mbes", -604_800, "weeks apart: check gps_week"),
+        ("mbes", 7_200, "clocks"),
+    ],
+)
+def test_clocks_that_do_not_meet_are_refused(quiet, sensor, shift_s, words):
+    moved = {**getattr(quiet, sensor), "t_ns": getattr(quiet, sensor)["t_ns"] + shift_s * NS}
+    with pytest.raises(RawDataError, match=words):
+        calibrated(quiet, "ingest", raw={sensor: moved})
+
+
+def test_nothing_near_the_target_is_refused_with_the_counts(quiet):
+    far = {"target": {"origin": {"latitude_deg": 36.01, "longitude_deg": 120.1, "height_m": 12.0}}}
+    with pytest.raises(RawDataError, match=r"laser: no point within 1\.5 m of the target \(.*outside the box"):
+        calibrated(quiet, "georeference", pool=far)
+
+
+def test_a_sonar_looking_away_is_refused(quiet):
+    with pytest.raises(RawDataError, match="mbes: no point"):
+        calibrated(quiet, "segment", mount={"roll_deg": 48.8})
+
+
+def test_an_unseen_top_makes_the_registration_ambiguous(quiet):
+    """Without the ends of the stacks and the wall's top, one block higher is as good: rejected, not guessed."""
+    found = calibrated(quiet, "georeference")
+    pool = found["georeference/laser_pool"]
+    low = set(columns(pool, "t_ns")[columns(pool, "z_pool_m") < 2.2].tolist())
+    keep = np.array([t in low for t in quiet.laser["t_ns"].tolist()])
+    result = calibrated(quiet, raw={"laser": {k: v[keep] for k, v in quiet.laser.items()}})
+    calibration = json.loads(result["report/calibration.json"])
+    assert result["segment/target_pose"]["ambiguous"].iloc[0]
+    assert calibration["verdict"] == "rejected"
+    assert any("ambiguous" in reason for reason in calibration["reasons"])
+
+
+def test_a_swapped_low_side_is_seen(quiet):
+    found = calibrated(quiet, "segment", pool={"target": {"low_side": "north"}})
+    pose = found["segment/target_pose"].iloc[0]
+    assert pose["ambiguous"]
+    assert "low_side swapped" in pose["rival"]
+
+
+def test_a_tilted_target_is_reported_and_does_no_harm(errors_of):
+    session = made(QUIET, {"surroundings": {"tilt_deg": [0.2, -0.3]}}, seed=4)
+    found = calibrated(session)
+    pose = found["segment/target_pose"].iloc[0]
+    assert pose["tilt_x_deg"] == pytest.approx(0.2, abs=0.01)
+    assert pose["tilt_y_deg"] == pytest.approx(-0.3, abs=0.01)
+    block = json.loads(found["report/calibration.json"])["methods"]["adjustment"]
+    error = np.abs(errors_of(block, session.truth))
+    assert error[:3].max() < 5e-4
+    assert error[3:].max() < 0.05
+
+
+def test_sigma_limits_reject_and_name_the_parameter(noisy):
+    found = calibrated(noisy, pool={"verdict": {"max_sigma_deg": 1e-4, "max_sigma_m": 1e-6}})
+    result = json.loads(found["report/calibration.json"])
+    assert result["verdict"] == "rejected"
+    assert sum("sigma of" in reason for reason in result["reasons"]) == 6
+    assert result["mbes"]["covariance"] is not None
+
+
+def test_wrong_sigmas_alone_reject_nothing(noisy, errors_of):
+    """Five times too small, five times too large: the variance factors say so, the result hardly moves."""
+    session = made(seed=11)
+    reference = json.loads(calibrated(session)["report/calibration.json"])
+    for factor in (0.2, 5.0):
+        session.session["laser"]["range_sigma_m"] = 0.005 * factor
+        session.session["mbes"] |= {"range_sigma_m": 0.008 / factor, "angle_sigma_deg": 0.06 / factor}
+        found = calibrated(session)
+        result = json.loads(found["report/calibration.json"])
+        assert result["verdict"] == "accepted", result["reasons"]
+        groups = found["adjust/groups"].set_index("group")["variance_factor"]
+        assert groups["mbes_vertical"] == pytest.approx(factor**2, rel=0.15)
+        moved = np.abs(errors_of(result["mbes"], session.truth) - errors_of(reference["mbes"], session.truth))
+        assert moved[:3].max() < 0.004
+        assert moved[3:].max() < 0.3
+
+
+def test_the_wall_alone_gives_nulls_and_a_reason(quiet):
+    """Rank-deficient: rejected with nulls, never an error."""
+    found = calibrated(quiet, "segment")
+    labelled = found["segment/soundings_labelled"]
+    t, beam, face = (columns(labelled, name) for name in ("t_ns", "beam", "face"))
+    wall = set(zip(t[face == 0].tolist(), beam[face == 0].tolist(), strict=True))
+    keep = np.array([key in wall for key in zip(*(quiet.mbes[n].tolist() for n in ("t_ns", "beam")), strict=True)])
+    result = calibrated(quiet, raw={"mbes": {k: v[keep] for k, v in quiet.mbes.items()}})
+    calibration = json.loads(result["report/calibration.json"])
+    assert calibration["verdict"] == "rejected"
+    assert calibration["mbes"]["R_body_from_mbes"] is None
+    assert calibration["mbes"]["sigma"] is None
+    assert any("no result" in reason for reason in calibration["reasons"])
+    assert calibration["methods"]["patent_alternating"]["mount"] is None
