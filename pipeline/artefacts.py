@@ -4,64 +4,29 @@ This is the only place that names a column. ``schema`` carries unit and meaning 
 a file explains itself. Kinds: a *table* fits in memory; a *stream* is a folder of parts (see :mod:`pipeline.streams`).
 """
 
-from dataclasses import dataclass
-from typing import Literal
-
+# fmt: off: the tables are laid out by hand
 import pyarrow as pa
+
+from pipeline.columns import Artefact as Artefact
+from pipeline.columns import Column as Column
+from pipeline.columns import Document as Document
+from pipeline.columns import Provenance as Provenance
+from pipeline.columns import Raw as Raw
 
 I16, I32, I64, F64, TEXT, BOOL = pa.int16(), pa.int32(), pa.int64(), pa.float64(), pa.string(), pa.bool_()
 FLOATS = pa.list_(pa.float64())
-
-
-@dataclass(frozen=True)
-class Column:
-    name: str
-    type: pa.DataType
-    unit: str
-    meaning: str
-
-
-@dataclass(frozen=True)
-class Artefact:
-    owner: str
-    name: str
-    kind: Literal["table", "stream"]
-    meaning: str
-    columns: tuple[Column, ...]
-
-    @property
-    def schema(self) -> pa.Schema:
-        """The Parquet schema, with unit and meaning in each field's metadata."""
-        return pa.schema(
-            [pa.field(c.name, c.type, metadata={"unit": c.unit, "meaning": c.meaning}) for c in self.columns],
-            metadata={"artefact": f"{self.owner}/{self.name}", "meaning": self.meaning},
-        )
-
-
-@dataclass(frozen=True)
-class Raw:
-    """A stage input that is not a table of an earlier stage: the raw files of one sensor."""
-
-    sensor: Literal["ins", "laser", "mbes"]
-
-
-@dataclass(frozen=True)
-class Document:
-    """A stage output that is not a table: a text file for other programs or people."""
-
-    owner: str
-    name: str
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """A stage input that says what the run is made from: digests of the raw files, and versions of the software."""
 
 
 def _xyz(frame: str, unit: str = "m", stem: str = "") -> tuple[Column, ...]:
     return tuple(Column(f"{stem}{axis}_{frame}_{unit}", F64, unit, f"{axis} in frame {frame}") for axis in "xyz")
 
 
+_ROTATION = tuple(
+    Column(f"rotation_{axis}_deg", F64, "deg", f"rotation vector from the coarse mount, body {axis}") for axis in "xyz"
+)
+_MOUNT_CORRECTION = (
+    *_ROTATION, *(Column(f"lever_arm_{axis}_m", F64, "m", f"lever arm correction, body {axis}") for axis in "xyz")
+)
 _T = Column("t_ns", I64, "ns", "GPS time: nanoseconds since 1980-01-06 00:00:00 GPS, latency removed")
 _PASS = Column("pass", I16, "1", "number of the pass, from 0; -1: none (or all of them together)")
 _COUNTS = (
@@ -72,10 +37,7 @@ _COUNTS = (
 
 # --- ingest ----------------------------------------------------------------------------------------------------------
 TRAJECTORY = Artefact(
-    "ingest",
-    "trajectory",
-    "table",
-    "INS solution, time ascending, unusable records left out",
+    "ingest", "trajectory", "table", "INS solution, time ascending, unusable records left out",
     (
         _T,
         Column("latitude_rad", F64, "rad", "geodetic latitude, WGS 84"),
@@ -87,17 +49,11 @@ TRAJECTORY = Artefact(
     ),
 )
 LASER_POINTS = Artefact(
-    "ingest",
-    "laser_points",
-    "stream",
-    "laser points as recorded: in the scanner's frame, or in ECEF if georeferenced",
+    "ingest", "laser_points", "stream", "laser points as recorded: in the scanner's frame, or in ECEF if georeferenced",
     (_T, *(Column(f"{axis}_m", F64, "m", f"{axis}, frame laser (or ecef)") for axis in "xyz")),
 )
 SOUNDINGS = Artefact(
-    "ingest",
-    "soundings",
-    "stream",
-    "soundings as recorded",
+    "ingest", "soundings", "stream", "soundings as recorded",
     (
         _T,
         Column("ping", I64, "1", "ping number as recorded"),
@@ -108,10 +64,7 @@ SOUNDINGS = Artefact(
     ),
 )
 PASSES = Artefact(
-    "ingest",
-    "passes",
-    "table",
-    "maximal intervals without gap or along-track reversal",
+    "ingest", "passes", "table", "maximal intervals without gap or along-track reversal",
     (
         _PASS,
         Column("start_ns", I64, "ns", "first moment, GPS"),
@@ -125,10 +78,7 @@ PASSES = Artefact(
     ),
 )
 FILES = Artefact(
-    "ingest",
-    "files",
-    "table",
-    "quality of each raw file",
+    "ingest", "files", "table", "quality of each raw file",
     (
         Column("sensor", TEXT, "", "ins, laser or mbes"),
         Column("file", TEXT, "", "path in the session folder"),
@@ -140,10 +90,7 @@ FILES = Artefact(
     ),
 )
 GAPS = Artefact(
-    "ingest",
-    "gaps",
-    "table",
-    "gaps in the INS and the soundings",
+    "ingest", "gaps", "table", "gaps in the INS and the soundings",
     (
         Column("sensor", TEXT, "", "ins or mbes"),
         Column("start_ns", I64, "ns", "last record before the gap"),
@@ -152,10 +99,7 @@ GAPS = Artefact(
     ),
 )
 POOL_FRAME = Artefact(
-    "ingest",
-    "pool_frame",
-    "table",
-    "the pool frame as used (azimuth as configured, or from the passes' headings)",
+    "ingest", "pool_frame", "table", "the pool frame as used (azimuth as configured, or from the passes' headings)",
     (
         Column("latitude_deg", F64, "deg", "origin"),
         Column("longitude_deg", F64, "deg", "origin"),
@@ -168,10 +112,7 @@ INGEST_COUNTS = Artefact("ingest", "counts", "table", "records used and left out
 
 # --- georeference ----------------------------------------------------------------------------------------------------
 POSES = Artefact(
-    "georeference",
-    "poses",
-    "table",
-    "the trajectory in the pool frame",
+    "georeference", "poses", "table", "the trajectory in the pool frame",
     (
         _T,
         *_xyz("pool"),
@@ -179,34 +120,23 @@ POSES = Artefact(
     ),
 )
 LASER_POOL = Artefact(
-    "georeference",
-    "laser_pool",
-    "stream",
-    "laser points near the target",
+    "georeference", "laser_pool", "stream", "laser points near the target",
     (_T, _PASS, *_xyz("laser"), *_xyz("pool")),
 )
 SOUNDINGS_POOL = Artefact(
-    "georeference",
-    "soundings_pool",
-    "stream",
-    "soundings near the target, placed with the coarse mount",
+    "georeference", "soundings_pool", "stream", "soundings near the target, placed with the coarse mount",
     (
-        _T,
-        _PASS,
+        _T, _PASS,
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number"),
-        *_xyz("mbes"),
-        *_xyz("pool"),
+        *_xyz("mbes"), *_xyz("pool"),
     ),
 )
 GEOREFERENCE_COUNTS = Artefact("georeference", "counts", "table", "points used and left out, by reason", _COUNTS)
 
 # --- segment ---------------------------------------------------------------------------------------------------------
 FACES = Artefact(
-    "segment",
-    "faces",
-    "table",
-    "the target's faces by design, in the target frame",
+    "segment", "faces", "table", "the target's faces by design, in the target frame",
     (
         Column("face", I16, "1", "number of the face"),
         Column("name", TEXT, "", "P2, P1-0 … (slanted), P1-0-top, P1-0-bottom …"),
@@ -217,18 +147,14 @@ FACES = Artefact(
     ),
 )
 TARGET_POSE = Artefact(
-    "segment",
-    "target_pose",
-    "table",
-    "the target as the laser sees it, relative to the pool frame (one row)",
+    "segment", "target_pose", "table", "the target as the laser sees it, relative to the pool frame (one row)",
     (
         Column("R_target_from_pool", FLOATS, "1", "rotation matrix, row by row"),
         *_xyz("pool", "m", "origin_"),
         Column("azimuth_correction_deg", F64, "deg", "true azimuth minus configured azimuth, clockwise +"),
         Column("tilt_x_deg", F64, "deg", "target tilted about its x axis (not applied: a check)"),
         Column("tilt_y_deg", F64, "deg", "target tilted about its y axis (not applied: a check)"),
-        Column("sigma_x_m", F64, "m", "standard deviation"),
-        Column("sigma_y_m", F64, "m", "standard deviation"),
+        Column("sigma_x_m", F64, "m", "standard deviation"), Column("sigma_y_m", F64, "m", "standard deviation"),
         Column("sigma_z_m", F64, "m", "standard deviation"),
         Column("sigma_azimuth_deg", F64, "deg", "standard deviation"),
         Column("sigma_tilt_x_deg", F64, "deg", "standard deviation"),
@@ -242,16 +168,9 @@ TARGET_POSE = Artefact(
     ),
 )
 PROVISIONAL_MOUNT = Artefact(
-    "segment",
-    "provisional_mount",
-    "table",
-    "mount found for labelling alone; nothing later starts from it (one row)",
+    "segment", "provisional_mount", "table", "mount found for labelling alone; nothing later starts from it (one row)",
     (
-        *(
-            Column(f"rotation_{axis}_deg", F64, "deg", f"rotation vector about body {axis}, from coarse")
-            for axis in "xyz"
-        ),
-        *(Column(f"lever_arm_{axis}_m", F64, "m", f"lever arm correction, body {axis}") for axis in "xyz"),
+        *_MOUNT_CORRECTION,
         Column("scale_m", F64, "m", "robust scale of the soundings' distances from their faces"),
         Column("gate_m", F64, "m", "largest distance from a face at which a sounding was labelled"),
         Column("score", F64, "1", "robust share of soundings explained by the model"),
@@ -260,27 +179,18 @@ PROVISIONAL_MOUNT = Artefact(
     ),
 )
 LASER_LABELLED = Artefact(
-    "segment",
-    "laser_labelled",
-    "stream",
-    "laser points on the target's dry faces",
+    "segment", "laser_labelled", "stream", "laser points on the target's dry faces",
     (
-        _T,
-        _PASS,
+        _T, _PASS,
         Column("face", I16, "1", "number of the face"),
-        *_xyz("laser"),
-        *_xyz("target"),
+        *_xyz("laser"), *_xyz("target"),
         Column("cos_incidence", F64, "1", "|cosine| of the angle between ray and the face's normal"),
     ),
 )
 SOUNDINGS_LABELLED = Artefact(
-    "segment",
-    "soundings_labelled",
-    "stream",
-    "soundings on the target's wet faces",
+    "segment", "soundings_labelled", "stream", "soundings on the target's wet faces",
     (
-        _T,
-        _PASS,
+        _T, _PASS,
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number"),
         Column("face", I16, "1", "number of the face"),
@@ -291,10 +201,7 @@ SEGMENT_COUNTS = Artefact("segment", "counts", "table", "points labelled and lef
 
 # --- fit_planes ------------------------------------------------------------------------------------------------------
 PLANES = Artefact(
-    "fit_planes",
-    "planes",
-    "table",
-    "total least squares planes (soundings: with the coarse mount)",
+    "fit_planes", "planes", "table", "total least squares planes (soundings: with the coarse mount)",
     (
         Column("sensor", TEXT, "", "laser or mbes"),
         _PASS,
@@ -305,20 +212,12 @@ PLANES = Artefact(
         Column("count", I64, "1", "points"),
         Column("rms_m", F64, "m", "RMS distance of the points from the plane"),
         Column("eigenvalues_m2", FLOATS, "m²", "of the centred scatter matrix / count, ascending"),
-        Column(
-            "tangents",
-            FLOATS,
-            "1",
-            "unit vectors t1, t2 in which the covariance's first two parameters turn the normal",
-        ),
+        Column("tangents", FLOATS, "1", "unit vectors t1, t2 along which the covariance turns the normal"),
         Column("covariance", FLOATS, "rad², rad m, m²", "3 x 3 of (turn along t1, along t2, distance at the centroid)"),
     ),
 )
 SOUNDING_MOMENTS = Artefact(
-    "fit_planes",
-    "sounding_moments",
-    "table",
-    "second moments from which any mount's planes follow (maths/moments.py)",
+    "fit_planes", "sounding_moments", "table", "second moments from which any mount's planes follow (maths/moments.py)",
     (
         _PASS,
         Column("face", I16, "1", "number of the face"),
@@ -342,33 +241,21 @@ _ITERATION = (
     *(Column(f"angle_P{k}_deg", F64, "deg", f"angle between the sensors' normals of P{k}") for k in (1, 2, 3, 4)),
 )
 ITERATIONS = Artefact(
-    "angle_iterate",
-    "iterations",
-    "table",
-    "the patent's angle iteration; deviations combined over the passes",
+    "angle_iterate", "iterations", "table", "the patent's angle iteration; deviations combined over the passes",
     (
         *_ITERATION,
         Column("step_deg", F64, "deg", "length of the rotation composed onto the correction after this row"),
-        *(
-            Column(f"rotation_{axis}_deg", F64, "deg", f"correction so far: rotation vector, body {axis}")
-            for axis in "xyz"
-        ),
+        *_ROTATION,
     ),
 )
 PASS_ITERATIONS = Artefact(
-    "angle_iterate",
-    "pass_iterations",
-    "table",
-    "the same, pass by pass",
+    "angle_iterate", "pass_iterations", "table", "the same, pass by pass",
     (_PASS, *_ITERATION, Column("weight", F64, "1", "share of the pass in the combination")),
 )
 ANGLES = Artefact(
-    "angle_iterate",
-    "angles",
-    "table",
-    "result of the angle iteration (one row)",
+    "angle_iterate", "angles", "table", "result of the angle iteration (one row)",
     (
-        *(Column(f"rotation_{axis}_deg", F64, "deg", f"rotation vector, body {axis}") for axis in "xyz"),
+        *_ROTATION,
         Column("converged", BOOL, "", "step and angles stood still within the iterations allowed"),
         Column("iterations", I32, "1", "steps taken"),
         Column("reason", TEXT, "", "why there is no result; empty when there is"),
@@ -377,14 +264,10 @@ ANGLES = Artefact(
 
 # --- offsets ---------------------------------------------------------------------------------------------------------
 OFFSET_PAIRS = Artefact(
-    "offsets",
-    "offset_pairs",
-    "table",
-    "each pair of a dry and a wet horizontal face [0127]",
+    "offsets", "offset_pairs", "table", "each pair of a dry and a wet horizontal face [0127]",
     (
         Column("method", TEXT, "", "patent_sequential or patent_alternating"),
-        Column("dry_face", TEXT, "", "face seen by the laser"),
-        Column("wet_face", TEXT, "", "face seen by the MBES"),
+        Column("dry_face", TEXT, "", "face seen by the laser"), Column("wet_face", TEXT, "", "face seen by the MBES"),
         Column("measured_m", F64, "m", "z_dry - z_wet as measured"),
         Column("design_m", F64, "m", "z_dry - z_wet by design"),
         Column("dz_m", F64, "m", "measured - design: the correction, target z"),
@@ -392,27 +275,19 @@ OFFSET_PAIRS = Artefact(
     ),
 )
 ALTERNATION = Artefact(
-    "offsets",
-    "alternation",
-    "table",
-    "angles and offsets in turn, until both stand still",
+    "offsets", "alternation", "table", "angles and offsets in turn, until both stand still",
     (
         Column("iteration", I32, "1", "turn"),
-        *(Column(f"rotation_{axis}_deg", F64, "deg", f"rotation vector, body {axis}") for axis in "xyz"),
-        *(Column(f"lever_arm_{axis}_m", F64, "m", f"lever arm correction, body {axis}") for axis in "xyz"),
+        *_MOUNT_CORRECTION,
         Column("step_deg", F64, "deg", "change of the rotation in this turn"),
         Column("step_m", F64, "m", "change of the lever arm in this turn"),
     ),
 )
 CORRECTIONS = Artefact(
-    "offsets",
-    "corrections",
-    "table",
-    "the patent's two forms: corrections to the coarse mount",
+    "offsets", "corrections", "table", "the patent's two forms: corrections to the coarse mount",
     (
         Column("method", TEXT, "", "patent_sequential or patent_alternating"),
-        *(Column(f"rotation_{axis}_deg", F64, "deg", f"rotation vector, body {axis}") for axis in "xyz"),
-        *(Column(f"lever_arm_{axis}_m", F64, "m", f"lever arm correction, body {axis}") for axis in "xyz"),
+        *_MOUNT_CORRECTION,
         Column("converged", BOOL, "", "stood still within the iterations allowed"),
         Column("iterations", I32, "1", "turns taken"),
         Column("reason", TEXT, "", "why there is no result; empty when there is"),
@@ -421,10 +296,7 @@ CORRECTIONS = Artefact(
 
 # --- adjust ----------------------------------------------------------------------------------------------------------
 ESTIMATE = Artefact(
-    "adjust",
-    "estimate",
-    "table",
-    "every unknown of the adjustment",
+    "adjust", "estimate", "table", "every unknown of the adjustment",
     (
         Column("unknown", TEXT, "", "rotation_x … lever_arm_z, then each surface's turn_1, turn_2, shift"),
         Column("value", F64, "rad or m", "estimate (rotation: vector from coarse; surfaces: from the laser's planes)"),
@@ -433,39 +305,26 @@ ESTIMATE = Artefact(
     ),
 )
 COVARIANCE = Artefact(
-    "adjust",
-    "covariance",
-    "table",
-    "covariance and correlation of the six",
+    "adjust", "covariance", "table", "covariance and correlation of the six",
     (
-        Column("row", TEXT, "", "unknown"),
-        Column("column", TEXT, "", "unknown"),
-        Column("covariance", F64, "rad², rad m, m²", "covariance"),
-        Column("correlation", F64, "1", "correlation"),
+        Column("row", TEXT, "", "unknown"), Column("column", TEXT, "", "unknown"),
+        Column("covariance", F64, "rad², rad m, m²", "covariance"), Column("correlation", F64, "1", "correlation"),
     ),
 )
 SURFACES = Artefact(
-    "adjust",
-    "surfaces",
-    "table",
-    "the adjusted surfaces, shared by both sensors",
+    "adjust", "surfaces", "table", "the adjusted surfaces, shared by both sensors",
     (
         Column("family", TEXT, "", "P1, P2, P3 or H"),
         *_xyz("target", "1", "normal_"),
         Column("distance_m", F64, "m", "normal · x = distance; H: shift against the design heights"),
-        Column("laser_points", I64, "1", "observations"),
-        Column("soundings", I64, "1", "observations"),
+        Column("laser_points", I64, "1", "observations"), Column("soundings", I64, "1", "observations"),
     ),
 )
 GROUPS = Artefact(
-    "adjust",
-    "groups",
-    "table",
-    "variance factors by group of observations",
+    "adjust", "groups", "table", "variance factors by group of observations",
     (
         Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal"),
-        Column("count", I64, "1", "observations"),
-        Column("redundancy", F64, "1", "their redundancy"),
+        Column("count", I64, "1", "observations"), Column("redundancy", F64, "1", "their redundancy"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
         Column("rms_normalised", F64, "1", "weighted RMS of residual / sigma"),
         Column("cut", I64, "1", "observations whose weight became zero"),
@@ -473,38 +332,26 @@ GROUPS = Artefact(
     ),
 )
 CELLS = Artefact(
-    "adjust",
-    "cells",
-    "table",
-    "mean residual of each sensor on each surface in each pass",
+    "adjust", "cells", "table", "mean residual of each sensor on each surface in each pass",
     (
-        Column("sensor", TEXT, "", "laser or mbes"),
-        Column("family", TEXT, "", "P1, P2, P3 or H"),
-        _PASS,
-        Column("count", I64, "1", "observations"),
-        Column("mean_m", F64, "m", "weighted mean residual"),
+        Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H"), _PASS,
+        Column("count", I64, "1", "observations"), Column("mean_m", F64, "m", "weighted mean residual"),
         Column("rms_m", F64, "m", "RMS residual"),
         Column("sigma_mean_m", F64, "m", "standard deviation of the mean from the scatter of its moments"),
         Column("normalised", F64, "1", "mean / root(sigma_mean² + tolerance²)"),
     ),
 )
 ADJUST_SUMMARY = Artefact(
-    "adjust",
-    "summary",
-    "table",
-    "the adjustment as a whole (one row)",
+    "adjust", "summary", "table", "the adjustment as a whole (one row)",
     (
-        Column("converged", BOOL, "", "the step became negligible"),
-        Column("iterations", I32, "1", "steps"),
-        Column("observations", I64, "1", "observations"),
-        Column("redundancy", F64, "1", "observations - unknowns"),
+        Column("converged", BOOL, "", "the step became negligible"), Column("iterations", I32, "1", "steps"),
+        Column("observations", I64, "1", "observations"), Column("redundancy", F64, "1", "observations - unknowns"),
         Column("sigma0", F64, "1", "root of the variance factor over all groups, session sigmas"),
         Column("condition", F64, "1", "condition number of the scaled normal matrix"),
         Column("rank_deficiency", I32, "1", "unknown directions that the data leave open"),
         Column("weakest", TEXT, "", "the weakest direction in words"),
         Column("test_statistic", F64, "1", "consistency of the cells: sum of their squared normalised means"),
-        Column("test_dof", I32, "1", "degrees of freedom"),
-        Column("test_limit", F64, "1", "limit at the test's level"),
+        Column("test_dof", I32, "1", "degrees of freedom"), Column("test_limit", F64, "1", "limit at the test's level"),
         Column("test_passed", BOOL, "", "statistic <= limit"),
         Column("reason", TEXT, "", "why there is no result; empty when there is"),
     ),
@@ -512,16 +359,12 @@ ADJUST_SUMMARY = Artefact(
 
 # --- report ----------------------------------------------------------------------------------------------------------
 CALIBRATION = Artefact(
-    "report",
-    "calibration",
-    "table",
-    "each method's six values: totals that replace the coarse mount, and corrections",
+    "report", "calibration", "table", "each method's six values: totals that replace the coarse mount, and corrections",
     (
         Column("method", TEXT, "", "patent_sequential, patent_alternating, adjustment"),
         Column("parameter", TEXT, "", "roll, pitch, yaw, x, y, z"),
         Column("unit", TEXT, "", "deg or m"),
-        Column("coarse", F64, "deg or m", "mount as configured"),
-        Column("total", F64, "deg or m", "calibrated mount"),
+        Column("coarse", F64, "deg or m", "mount as configured"), Column("total", F64, "deg or m", "calibrated mount"),
         Column("correction", F64, "deg or m", "rotation vector or lever arm correction about the same body axis"),
         Column("sigma", F64, "deg or m", "standard deviation of the correction"),
     ),
