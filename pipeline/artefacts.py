@@ -165,6 +165,7 @@ TARGET_POSE = Artefact(
         Column("rival_agreement_m2", F64, "m²", "the same for the best rival pose"),
         Column("rival", TEXT, "", "which rival pose that is"),
         Column("ambiguous", BOOL, "", "true: the rival explains the points nearly as well, or better"),
+        Column("gate_m", F64, "m", "largest distance from a face at which a laser point was labelled"),
     ),
 )
 PROVISIONAL_MOUNT = Artefact(

@@ -25,6 +25,8 @@ from pipeline.maths.targets import TargetModel
 
 Array = NDArray[np.float64]
 SHARP_M = 0.06  # reach of the final score
+WIDE_M = 0.08  # gate while the pose or the mount is still being refined
+GATE_SCALES = 5  # the final gate, in robust scales of what was labelled
 VOXEL_M = 0.1  # laser points are averaged over cubes of this size
 NARROW = (0.15, 0.1, 0.07, 0.05)
 
@@ -42,6 +44,7 @@ class FoundTarget:
     rival_agreement_m2: float
     rival: str
     ambiguous: bool
+    gate_m: float
 
 
 def _planes(model: TargetModel) -> tuple[Array, Array]:
@@ -83,7 +86,7 @@ def find_target(
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
         dry = points[:, 2] > model.water_level_m + settings.water_margin_m
-        labels = label_points(model, points, Beams.head_on(len(points)), 0.05, 0.05 + settings.margin_m, 0.0)
+        labels = label_points(model, points, Beams.head_on(len(points)), WIDE_M, VOXEL_M / 2 + settings.margin_m, 0.0)
         return np.where(dry, labels.face, -1).astype(np.int16)
 
     pose = refine(placement, found.parameters, label, normals, distances)
@@ -96,8 +99,22 @@ def find_target(
     expected = np.ptp(wall[:, 1]) * model.period_m / 2
     ambiguous = bool(best - rival < settings.ambiguity_share * expected)
     return FoundTarget(
-        R_target_from_pool, pose.parameters[1:], pose.parameters[0], pose, tilt, best, rival, name, ambiguous
+        R_target_from_pool,
+        pose.parameters[1:],
+        pose.parameters[0],
+        pose,
+        tilt,
+        best,
+        rival,
+        name,
+        ambiguous,
+        _gate(pose, settings),
     )
+
+
+def _gate(refined: Refined, settings: config.Segment) -> float:
+    """Distance from a face up to which points are labelled: wide enough that the noise is not cut into."""
+    return max(settings.gate_m, GATE_SCALES * refined.scale_m) if np.isfinite(refined.scale_m) else settings.gate_m
 
 
 def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, closest: ClosestSurface) -> float:
@@ -194,22 +211,25 @@ def find_mount(
         return bool(np.max(np.abs(p[3:] - q[3:])) < model.period_m / 4)
 
     found = search(placement, starts, closest, normals, same, 1.5 * sigmas, SHARP_M)
-    gate = 0.08
-
     def label(parameters: Array, points: Array) -> NDArray[np.int16]:
         R = exp_so3(parameters[:3]) @ R_body_from_mbes
         beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, beam_rad)
         wet = points[:, 2] < model.water_level_m - settings.water_margin_m
         grazing = np.radians(settings.min_grazing_deg)
-        return np.where(wet, label_points(model, points, beams, gate, settings.margin_m, grazing).face, -1).astype(
+        return np.where(wet, label_points(model, points, beams, WIDE_M, settings.margin_m, grazing).face, -1).astype(
             np.int16
         )
 
     refined = refine(placement, found.parameters, label, normals, distances)
-    gate = max(settings.gate_m, 5 * refined.scale_m) if np.isfinite(refined.scale_m) else settings.gate_m
     ambiguous = bool(found.rival_score > found.score * (1 - settings.ambiguity_margin))
     return FoundMount(
-        refined.parameters[:3], refined.parameters[3:], refined.scale_m, gate, found.score, found.rival_score, ambiguous
+        refined.parameters[:3],
+        refined.parameters[3:],
+        refined.scale_m,
+        _gate(refined, settings),
+        found.score,
+        found.rival_score,
+        ambiguous,
     )
 
 

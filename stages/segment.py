@@ -23,7 +23,6 @@ from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
 
 Array = NDArray[np.float64]
 SAMPLE = 20_000  # soundings to search with
-LASER_GATE_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -109,14 +108,14 @@ def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     pool = np.column_stack([batch[f"{axis}_pool_m"] for axis in "xyz"])
     points = (pool - prepared.target.origin_pool_m) @ prepared.target.R_target_from_pool.T
     dry = points[:, 2] > model.water_level_m + segment.water_margin_m
-    near = dry & near_planes(model, points, LASER_GATE_M)
+    near = dry & near_planes(model, points, prepared.target.gate_m)
     rows = np.flatnonzero(near)
     sensor = np.column_stack([batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
     lever = np.broadcast_to(mount_of(config.laser.mount).lever_arm_body_m, sensor.shape)
     rays = points[rows] - prepared.trajectory.place(batch["t_ns"][rows], lever)
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     grazing = np.radians(segment.min_grazing_deg)
-    labels = label_points(model, points[rows], Beams(rays), LASER_GATE_M, segment.margin_m, grazing)
+    labels = label_points(model, points[rows], Beams(rays), prepared.target.gate_m, segment.margin_m, grazing)
     on = labels.face >= 0
     columns = {name: batch[name][rows[on]] for name in ("t_ns", "pass")} | {"face": labels.face[on]}
     for index, axis in enumerate("xyz"):
@@ -200,6 +199,7 @@ def _target_pose(found: FoundTarget) -> pd.DataFrame:
         "rival_agreement_m2": found.rival_agreement_m2,
         "rival": found.rival,
         "ambiguous": found.ambiguous,
+        "gate_m": found.gate_m,
     }
     for index, axis in enumerate("xyz"):
         row |= {f"origin_{axis}_pool_m": found.origin_pool_m[index], f"sigma_{axis}_m": sigma[1 + index]}
