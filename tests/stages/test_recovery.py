@@ -63,7 +63,7 @@ def test_other_pools(azimuth_deg, low_side, letters, errors_of):
 
 @pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=6))[::9])
 def test_coarse_values_wrong_on_every_axis_at_once(noisy, signs):
-    """2.5 degrees and 0.25 m: 0.6 m at 8 m, blocks repeating every metre. Every ninth combination; the rest in campaigns."""
+    """2.5 degrees and 0.25 m: 0.6 m at 8 m, with blocks every metre. Every ninth combination; the rest in campaigns."""
     truth = noisy.truth["mbes"]["mount"]
     sizes = {"roll_deg": 2.5, "pitch_deg": 2.5, "yaw_deg": 2.5, "x_m": 0.25, "y_m": 0.25, "z_m": 0.25}
     mount = {key: truth[key] + sign * size for sign, (key, size) in zip(signs, sizes.items(), strict=True)}
