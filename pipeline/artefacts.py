@@ -366,7 +366,8 @@ CALIBRATION = Artefact(
         Column("parameter", TEXT, "", "roll, pitch, yaw, x, y, z"),
         Column("unit", TEXT, "", "deg or m"),
         Column("coarse", F64, "deg or m", "mount as configured"), Column("total", F64, "deg or m", "calibrated mount"),
-        Column("correction", F64, "deg or m", "rotation vector or lever arm correction about the same body axis"),
+        Column("change", F64, "deg or m", "total - coarse: the difference of the mount's settings"),
+        Column("correction", F64, "deg or m", "rotation vector (about the same body axis) or lever arm correction"),
         Column("sigma", F64, "deg or m", "standard deviation of the correction"),
     ),
 )

@@ -144,6 +144,8 @@ def _inside(pattern: str) -> str:
     path = PurePosixPath(pattern)
     if not pattern or path.is_absolute() or ".." in path.parts or "\\" in pattern or "\0" in pattern:
         raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
+    if any("**" in part and part != "**" for part in path.parts):
+        raise ValueError("must have ** only as a whole part between two /")
     return pattern
 
 
@@ -214,7 +216,7 @@ class Mbes(Model):
 class SessionConfig(Model):
     """SESSION/session.yaml"""
 
-    name: Annotated[str, Field(min_length=1, max_length=300)]
+    name: Annotated[str, Field(min_length=1, max_length=300)]  # left out: the session folder's name
     ins: Ins
     laser: Laser
     mbes: Mbes
@@ -323,4 +325,4 @@ def load_session(folder: Path) -> SessionConfig:
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
     path = folder / "session.yaml"
-    return parse(SessionConfig, read_yaml(path), str(path))
+    return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | read_yaml(path), str(path))

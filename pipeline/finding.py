@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from pipeline import config
 from pipeline.beams import beams_in_target
@@ -122,6 +121,8 @@ def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, clo
 
     Both ways, because a model that reaches beyond the end of the stack explains every point as well.
     """
+    from scipy.spatial import cKDTree  # half a second: only where needed
+
     points = placement.points(parameters)
     explained = score(placement, parameters, closest, SHARP_M) * len(points)
     grid = model.upright_grid(VOXEL_M, model.water_level_m + VOXEL_M)

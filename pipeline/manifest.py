@@ -21,7 +21,7 @@ from pipeline.files import sha256, write_text
 
 NAME = "manifest.json"
 SCHEMA = 1
-LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "pyxtf", "novatel-edie")
+LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "lazrs", "novatel-edie")
 ROOT = Path(pipeline.__file__).parent.parent
 NO_INFLUENCE = ("simulation/", "exports/", "progress.py", "executor.py")  # of pipeline/: cannot change a result
 

@@ -49,7 +49,7 @@ class Progress:
         for reason in reasons[:MAX_REASONS]:
             self.note(f"{stage}: {reason}")
         if len(reasons) > MAX_REASONS:
-            self.note(f"{stage}: and {len(reasons) - MAX_REASONS} more changes")
+            self.note(f"{stage}: and {len(reasons) - MAX_REASONS} more")
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[None]:

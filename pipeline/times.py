@@ -1,5 +1,7 @@
 """Time: everything inside is int64 nanoseconds since the GPS epoch (1980-01-06 00:00:00, no leap seconds)."""
 
+from datetime import UTC, datetime
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,6 +45,17 @@ def gps_ns_from_unix_utc(seconds: NDArray[np.int64], nanoseconds: NDArray[np.int
     seconds = np.asarray(seconds, dtype=np.int64)
     index = np.maximum(np.searchsorted(starts, seconds, side="right") - 1, 0)
     return (seconds - GPS_EPOCH_UNIX_S + leaps[index]) * NS + np.asarray(nanoseconds, dtype=np.int64)
+
+
+def utc_text(t_ns: int) -> str:
+    """GPS nanoseconds as UTC, to the second.
+
+    >>> utc_text(1_462_608_018 * NS)
+    '2026-05-12T08:00:00Z'
+    """
+    unix = t_ns // NS + GPS_EPOCH_UNIX_S
+    leap = max((leap for start, leap in LEAP_SECONDS if unix - leap >= start), default=0)
+    return f"{datetime.fromtimestamp(unix - leap, UTC):%Y-%m-%dT%H:%M:%SZ}"
 
 
 def gps_ns_from_week_seconds(week: int | NDArray[np.int64], seconds: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -1,14 +1,16 @@
 """Accepted or rejected, and why: each reason names its evidence."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from pipeline import config
 
-ANGLES = ("pitch", "roll", "yaw")  # rotation vector about body x, y, z
+SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
+NEAR_M = 1.5  # passes whose distances differ by less tell yaw from lever arm y badly
 
 
 @dataclass(frozen=True)
@@ -20,52 +22,45 @@ class Evidence:
     corrections: pd.DataFrame
     summary: pd.DataFrame
     cells: pd.DataFrame
-    groups: pd.DataFrame
 
 
 def reasons(
-    evidence: Evidence, sigma: Mapping[str, Any] | None, limits: config.Verdict, method: config.Method
+    evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], limits: config.Verdict, chosen: config.Method
 ) -> list[str]:
-    """Why the calibration is rejected; empty: accepted."""
+    """Why the calibration is rejected; empty: accepted. Where labels are in doubt, nothing else is judged."""
+    doubts = _ambiguities(evidence)
+    if doubts:
+        return doubts
+    found = []
+    summary = evidence.summary.iloc[0]
+    if summary["reason"]:
+        return [f"the adjustment has no result: {summary['reason']}; sail more passes, at different distances"]
+    if not summary["converged"]:
+        found.append(f"the adjustment did not converge in {summary['iterations']} steps")
+    if not summary["test_passed"]:
+        found.append(_inconsistency(summary, evidence.cells))
+    found += _wide_sigmas(methods["adjustment"]["sigma"], limits)
+    if chosen != "adjustment":
+        found += _patent(chosen, evidence.corrections.set_index("method").loc[chosen], methods, limits)
+    return found
+
+
+def _ambiguities(evidence: Evidence) -> list[str]:
     found = []
     pose, mount = evidence.target_pose.iloc[0], evidence.provisional_mount.iloc[0]
     if pose["ambiguous"]:
+        better = pose["rival_agreement_m2"] > pose["agreement_m2"]
+        how = "better" if better else "nearly as well"
+        remedy = "check target.low_side" if better else "let the laser see the wall's top edge; check target.low_side"
         found.append(
-            f"the target's pose is ambiguous: {pose['rival']} fits the laser points nearly as well "
-            f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); check low_side, "
-            "target.origin's height, and that the laser sees the wall's top"
+            f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {how} "
+            f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} and target.origin"
         )
     if mount["ambiguous"]:
         found.append(
             f"the soundings fit two ways (score {mount['rival_score']:.3f} against {mount['score']:.3f}): the coarse "
             "mount may be a block off; measure the coarse lever arm again"
         )
-    summary = evidence.summary.iloc[0]
-    if summary["reason"]:
-        found.append(f"the adjustment has no result: {summary['reason']}; sail more passes, at different distances")
-    elif not summary["converged"]:
-        found.append(f"the adjustment did not converge in {summary['iterations']} steps")
-    if not summary["reason"] and not summary["test_passed"]:
-        found.append(_inconsistency(summary, evidence.cells))
-    if sigma is not None:
-        values = [
-            (name, v, limits.max_sigma_deg, "°") for name, v in zip(ANGLES, sigma["rotation_vector_deg"], strict=True)
-        ]
-        values += [
-            (f"lever arm {axis}", v, limits.max_sigma_m, " m")
-            for axis, v in zip("xyz", sigma["lever_arm_m"], strict=True)
-        ]
-        found += [
-            f"sigma of {name} is {value:.4f}{unit}, above the limit of {limit:g}{unit}; {summary['weakest']}"
-            for name, value, limit, unit in values
-            if value > limit
-        ]
-    if method != "adjustment":
-        row = evidence.corrections.set_index("method").loc[method]
-        if row["reason"]:
-            found.append(f"{method} has no result: {row['reason']}")
-        elif not row["converged"]:
-            found.append(f"{method} did not converge in {row['iterations']} turns")
     return found
 
 
@@ -76,4 +71,43 @@ def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
         f"the passes do not agree: in pass {worst['pass']} {sensor} lies {1000 * worst['mean_m']:+.1f} mm off "
         f"{worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely INS "
         "drift, a clock, the sound speed, or a moved bracket"
+    )
+
+
+def _wide_sigmas(sigma: Mapping[str, Any] | None, limits: config.Verdict) -> list[str]:
+    if sigma is None:
+        return ["the adjustment has no covariance"]
+    values = [*sigma["rotation_vector_deg"], *sigma["lever_arm_m"]]
+    bounds = [(limits.max_sigma_deg, "°")] * 3 + [(limits.max_sigma_m, " m")] * 3
+    return [
+        f"sigma of {name} is {value:.4g}{unit}, above the limit of {limit:g}{unit}"
+        for name, value, (limit, unit) in zip(SIX, values, bounds, strict=True)
+        if value > limit
+    ]
+
+
+def _patent(chosen: str, row: Any, methods: Mapping[str, Mapping[str, Any]], limits: config.Verdict) -> list[str]:
+    """The patent's forms have no sigma: they must have converged and agree with the adjustment to the limits."""
+    if row["reason"]:
+        return [f"{chosen} has no result: {row['reason']}"]
+    if not row["converged"]:
+        return [f"{chosen} did not converge in {row['iterations']} turns"]
+    ours, theirs = methods[chosen]["correction"], methods["adjustment"]["correction"]
+    bounds = {"rotation_vector_deg": (limits.max_sigma_deg, "°", 0), "lever_arm_m": (limits.max_sigma_m, " m", 3)}
+    return [
+        f"{chosen} differs from the adjustment by {a - b:+.4f}{unit} in {SIX[first + k]}, more than {limit:g}{unit}"
+        for part, (limit, unit, first) in bounds.items()
+        for k, (a, b) in enumerate(zip(ours[part], theirs[part], strict=True))
+        if abs(a - b) > limit
+    ]
+
+
+def distance_advice(distances_m: Sequence[float]) -> str:
+    """What to sail when all passes lie at about one distance; empty otherwise."""
+    if not distances_m or np.ptp(distances_m) >= NEAR_M:
+        return ""
+    low, high = min(distances_m), max(distances_m)
+    return (
+        f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart: sail passes "
+        "at different distances, such as 4 m and 8 m"
     )

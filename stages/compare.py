@@ -18,13 +18,13 @@ from pipeline.errors import ConfigError
 from pipeline.folder import calibration, read_settings
 
 LIMIT = 4.0
-ROWS = (  # in the order of the six: rotation about body x, y, z, then the lever arm
-    ("pitch", "pitch_deg", "deg"),
-    ("roll", "roll_deg", "deg"),
-    ("yaw", "yaw_deg", "deg"),
-    ("x", "x_m", "m"),
-    ("y", "y_m", "m"),
-    ("z", "z_m", "m"),
+ROWS = (  # name, index among the six (rotation about body x, y, z, then the lever arm), setting, unit
+    ("roll", 1, "roll_deg", "deg"),
+    ("pitch", 0, "pitch_deg", "deg"),
+    ("yaw", 2, "yaw_deg", "deg"),
+    ("x", 3, "x_m", "m"),
+    ("y", 4, "y_m", "m"),
+    ("z", 5, "z_m", "m"),
 )
 Array = NDArray[np.float64]
 
@@ -45,8 +45,11 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
             limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
             good = good and error is not None and bool(np.all(np.abs(error) <= limit))
     what = "sigma" if _sigma_of(result["methods"][chosen]) is not None else "the largest sigma allowed"
-    how = "every error is" if good else "not accepted, or an error is not"
-    lines += ["", f"{chosen}: {how} within {LIMIT:g} {what}"]
+    lines += ["", "error: what is still wrong; of angles the rotation from found to true about the body's axes"]
+    if result["verdict"] != "accepted":
+        lines.append(f"{chosen}: the calibration was rejected")
+    else:
+        lines.append(f"{chosen}: {'every error is' if good else 'an error is not'} within {LIMIT:g} {what}")
     return "\n".join(lines), good
 
 
@@ -90,7 +93,7 @@ def _table(
     yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
     truth = (pitch, roll, yaw, *lever_arm_true_m)
     lines = [f"  {'':6}{'coarse':>11}{'calibrated':>12}{'truth':>11}{'error':>11}{'sigma':>10}{'error/sigma':>13}"]
-    for k, (name, key, unit) in enumerate(ROWS):
+    for name, k, key, unit in ROWS:
         spread = f"{'-':>10}{'-':>13}" if sigma is None else f"{sigma[k]:10.5f}{error[k] / sigma[k]:13.1f}"
         numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[k]:11.5f}{error[k]:11.5f}"
         lines.append(f"  {name:6}{numbers}{spread} {unit}")

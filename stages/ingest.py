@@ -1,7 +1,6 @@
 """Raw instrument files -> canonical streams and tables, with quality control."""
 
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -14,7 +13,7 @@ from pipeline.errors import RawDataError
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.passes import estimate_azimuth, find_passes, pass_of, split_at_gaps
 from pipeline.streams import EMPTY, Chunk, Piece, Stream
-from pipeline.times import NS, WEEK_NS
+from pipeline.times import NS, WEEK_NS, utc_text
 
 Columns = dict[str, NDArray[Any]]
 
@@ -111,24 +110,19 @@ def _refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
             raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {advice}")
 
 
-def _when(t_ns: int) -> str:
-    moment = datetime(1980, 1, 6, tzinfo=UTC) + timedelta(seconds=t_ns / NS)
-    return f"{moment:%Y-%m-%d %H:%M:%S} GPS"
-
-
 def _refuse_apart(spans: dict[str, tuple[int, int]]) -> None:
     for sensor in ("laser", "mbes"):
         (start, end), (first, last) = spans["ins"], spans[sensor]
         if last < start or first > end:
             apart = first - start
             hint = (
-                f"they are {apart / WEEK_NS:.1f} weeks apart: check gps_week"
+                f"they are {abs(apart) / WEEK_NS:.1f} weeks apart: check gps_week"
                 if abs(apart) > WEEK_NS / 2
                 else "check the instruments' clocks and latency_s"
             )
             raise RawDataError(
-                f"session.yaml: no time overlap: ins {_when(start)} to {_when(end)}, "
-                f"{sensor} {_when(first)} to {_when(last)}; {hint}"
+                f"session.yaml: no time overlap: ins {utc_text(start)} to {utc_text(end)}, "
+                f"{sensor} {utc_text(first)} to {utc_text(last)}; {hint}"
             )
 
 

@@ -14,7 +14,8 @@ from pipeline import artefacts, config
 from pipeline.maths.adjustment import COMMON, NAMES
 from pipeline.maths.rotations import exp_so3
 from pipeline.mounts import Mounted, mount_of
-from pipeline.verdict import Evidence, reasons
+from pipeline.times import utc_text
+from pipeline.verdict import Evidence, distance_advice, reasons
 
 Array = NDArray[np.float64]
 SCHEMA = 1
@@ -32,13 +33,13 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    passes: Annotated[pd.DataFrame, artefacts.PASSES]
     target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
     provisional_mount: Annotated[pd.DataFrame, artefacts.PROVISIONAL_MOUNT]
     corrections: Annotated[pd.DataFrame, artefacts.CORRECTIONS]
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
-    groups: Annotated[pd.DataFrame, artefacts.GROUPS]
     summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
     provenance: Annotated[dict[str, Any], artefacts.Provenance]
 
@@ -50,20 +51,21 @@ class Outputs:
     calibration_yaml: Annotated[str, artefacts.CALIBRATION_YAML]
 
 
+class _PlainDumper(yaml.SafeDumper):
+    """Writes what is repeated in full: anchors and aliases are not for people."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
 def run(inputs: Inputs, config: Config) -> Outputs:
     coarse = mount_of(config.mbes.mount)
     methods = _patent_methods(inputs.corrections, coarse)
     methods["adjustment"] = _adjustment(inputs.estimate, inputs.covariance, coarse)
+    passes = _passes(inputs.passes, inputs.cells)
     found = reasons(
-        Evidence(
-            inputs.target_pose,
-            inputs.provisional_mount,
-            inputs.corrections,
-            inputs.summary,
-            inputs.cells,
-            inputs.groups,
-        ),
-        methods["adjustment"]["sigma"],
+        Evidence(inputs.target_pose, inputs.provisional_mount, inputs.corrections, inputs.summary, inputs.cells),
+        methods,
         config.verdict,
         config.result,
     )
@@ -80,8 +82,10 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "geometry": {
             "correlation": _matrix(inputs.covariance, "correlation"),
             "weakest": str(summary["weakest"]),
+            "advice": distance_advice([one["distance_m"] for one in passes if one["soundings"]]),
             "test": {name: _plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
         },
+        "passes": passes,
         "ranges": _range_note(config.mbes),
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
@@ -89,7 +93,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     return Outputs(
         _table(methods, coarse),
         json.dumps(result, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
-        yaml.safe_dump(result, sort_keys=False, allow_unicode=True, width=120),
+        yaml.dump(result, Dumper=_PlainDumper, sort_keys=False, allow_unicode=True, width=120),
     )
 
 
@@ -99,6 +103,27 @@ def _plain(value: Any) -> Any:
         return bool(value)
     number = float(value)
     return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
+
+
+def _passes(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]:
+    """Each pass with what it gave: distance, time, observations on the target."""
+    rows = []
+    for row in passes.to_dict("records"):
+        of_pass = cells[cells["pass"] == row["pass"]]
+        on_target = {
+            sensor: int(of_pass.loc[of_pass["sensor"] == sensor, "count"].sum()) for sensor in ("laser", "mbes")
+        }
+        rows.append(
+            {
+                "pass": int(row["pass"]),
+                "start_utc": utc_text(int(row["start_ns"])),
+                "distance_m": _plain(round(row["distance_m"], 2)),
+                "duration_s": _plain(round(row["duration_s"], 1)),
+                "laser_points": on_target["laser"],
+                "soundings": on_target["mbes"],
+            }
+        )
+    return rows
 
 
 def _range_note(mbes: config.Mbes) -> str:
@@ -170,6 +195,7 @@ def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.Data
                     "unit": "deg" if angle else "m",
                     "coarse": coarse.settings()[key],
                     "total": block["mount"][key] if block["mount"] else np.nan,
+                    "change": block["mount"][key] - coarse.settings()[key] if block["mount"] else np.nan,
                     "correction": correction[index] if correction else np.nan,
                     "sigma": sigma[part][index] if sigma else np.nan,
                 }
@@ -194,6 +220,12 @@ def summary(calibration: Mapping[str, Any]) -> str:
         sigma = f"{block['sigma'][part][index]:.4f} {unit}" if block["sigma"] else "-"
         lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
     lines += ["", "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."]
-    if calibration["geometry"]["weakest"]:
-        lines.append(f"Geometry: {calibration['geometry']['weakest']}.")
+    if not block["sigma"]:
+        lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
+    lines.append("Passes with soundings on the target, distance and number:")
+    seen = [one for one in calibration["passes"] if one["soundings"]]
+    lines.append("  " + ", ".join(f"{p['pass']}: {p['distance_m']:.1f} m {p['soundings']}" for p in seen))
+    for key in ("weakest", "advice"):
+        if calibration["geometry"][key]:
+            lines.append(f"Geometry: {calibration['geometry'][key]}.")
     return "\n".join(lines)

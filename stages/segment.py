@@ -165,10 +165,13 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
         of_source = counts[counts["source"] == source].set_index("reason")["count"]
         if not of_source["used"]:
             why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")
+            mount = (
+                f", or the coarse mount by more than {config.segment.search_mount_deg:g}° and "
+                f"{config.segment.search_mount_m:g} m"
+            )
             raise RawDataError(
-                f"{sensor}: no point on the target's faces ({why}); the coarse mount may be wrong by more than "
-                f"{config.segment.search_mount_deg:g}° and {config.segment.search_mount_m:g} m, or target.a, b, c, e "
-                "be wrong"
+                f"{sensor}: no point on the target's faces ({why}); target.origin, target.azimuth_deg (of +y) "
+                f"or a, b, c, e may be wrong{mount if sensor == 'mbes' else ''}"
             )
     return Outputs(_faces(prepared.model), _target_pose(prepared.target), _mount(prepared.mount), counts)
 

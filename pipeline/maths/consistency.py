@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from pipeline.maths.adjustment import COMMON, Rows, State, weights_of
 
@@ -115,4 +115,4 @@ def cells_of(scores: Scores, tolerance_m: float) -> dict[CellKey, Cell]:
 
 def consistency_limit(cells: int, level: float) -> float:
     """Upper limit of Σ normalised² over so many cells: the chi-square quantile (conservative: nothing subtracted)."""
-    return float(chi2.ppf(1 - level, max(cells, 1)))
+    return float(chdtri(max(cells, 1), level))

@@ -1,0 +1,78 @@
+"""configs/: the file of defaults says what the models say, key by key; the scenarios load."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from pipeline.config import PoolConfig, load_pool, parse, read_yaml
+from pipeline.simulation.scenario import Scenario
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+DEFAULTS = CONFIGS / "defaults.yaml"
+
+
+def _leaves(model: type[BaseModel], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Each key's path and its field, blocks resolved into their keys."""
+    for name, field in model.model_fields.items():
+        inner = field.annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            yield from _leaves(inner, (*path, name))
+        else:
+            yield (*path, name), field
+
+
+LEAVES = list(_leaves(PoolConfig))
+
+
+def _at(content: Any, path: tuple[str, ...]) -> Any:
+    for name in path:
+        content = content[name]
+    return content
+
+
+def _names(content: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    if not isinstance(content, dict):
+        yield path
+        return
+    for name, value in content.items():
+        yield from _names(value, (*path, name))
+
+
+def test_defaults_load() -> None:
+    assert isinstance(load_pool(DEFAULTS), PoolConfig)
+
+
+def test_defaults_name_every_key_and_no_other() -> None:
+    assert sorted(_names(read_yaml(DEFAULTS))) == sorted(path for path, _ in LEAVES)
+
+
+def test_keys_come_in_the_models_order() -> None:
+    assert list(_names(read_yaml(DEFAULTS))) == [path for path, _ in LEAVES]
+
+
+@pytest.mark.parametrize(("path", "field"), LEAVES, ids=[".".join(path) for path, _ in LEAVES])
+def test_defaults_are_the_models(path: tuple[str, ...], field: Any) -> None:
+    value = _at(read_yaml(DEFAULTS), path)
+    if not field.is_required():
+        assert value == field.get_default(call_default_factory=True)
+        assert type(value) is type(field.default)
+
+
+def test_required_keys_are_those_of_the_contract() -> None:
+    required = {".".join(path) for path, field in LEAVES if field.is_required()}
+    letters = {f"target.{letter}" for letter in "abce"}
+    assert required == letters | {f"target.origin.{key}" for key in ("latitude_deg", "longitude_deg", "height_m")}
+
+
+def test_nothing_but_the_required_keys_is_needed() -> None:
+    content = read_yaml(DEFAULTS)
+    target = {name: content["target"][name] for name in ("a", "b", "c", "e", "origin")}
+    assert parse(PoolConfig, {"target": target}, "short") == load_pool(DEFAULTS)
+
+
+@pytest.mark.parametrize("path", sorted((CONFIGS / "scenarios").glob("*.yaml")), ids=lambda path: path.stem)
+def test_scenarios_load(path: Path) -> None:
+    assert parse(Scenario, read_yaml(path), path.name).name == path.stem

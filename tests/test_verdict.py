@@ -1,0 +1,107 @@
+"""Each reason to reject, and nothing else."""
+
+import pandas as pd
+import pytest
+
+from pipeline.config import Verdict
+from pipeline.verdict import Evidence, distance_advice, reasons
+
+SIGMA = {"rotation_vector_deg": [0.005, 0.002, 0.006], "lever_arm_m": [1e-4, 6e-4, 3e-4]}
+ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
+
+
+def methods(**patent):
+    adjustment = {"sigma": SIGMA, "correction": ZERO}
+    return {"adjustment": adjustment, "patent_alternating": {"sigma": None, "correction": ZERO | patent}}
+
+
+def evidence(pose=None, mount=None, summary=None, alternating=None):
+    pose_row = {"ambiguous": False, "rival": "one block higher", "rival_agreement_m2": 9.0, "agreement_m2": 10.0}
+    mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4}
+    summary_row = {
+        "reason": "",
+        "converged": True,
+        "iterations": 6,
+        "test_passed": True,
+        "test_statistic": 1.0,
+        "test_limit": 60.0,
+    }
+    row = {"method": "patent_alternating", "reason": "", "converged": True, "iterations": 9}
+    cells = pd.DataFrame(
+        {
+            "sensor": ["laser", "mbes"],
+            "family": ["P1", "P2"],
+            "pass": [0, 3],
+            "mean_m": [0.001, -0.012],
+            "normalised": [0.3, -4.0],
+        }
+    )
+    return Evidence(
+        pd.DataFrame([pose_row | (pose or {})]),
+        pd.DataFrame([mount_row | (mount or {})]),
+        pd.DataFrame([row | (alternating or {})]),
+        pd.DataFrame([summary_row | (summary or {})]),
+        cells,
+    )
+
+
+def test_a_good_session_has_no_reason():
+    assert reasons(evidence(), methods(), Verdict(), "adjustment") == []
+    assert reasons(evidence(), methods(), Verdict(), "patent_alternating") == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            {"pose": {"ambiguous": True}},
+            "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m²)",
+        ),
+        (
+            {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0}},
+            "better (11.00 against 10.00 m²); check target.low_side",
+        ),
+        ({"mount": {"ambiguous": True}}, "the soundings fit two ways"),
+        ({"summary": {"reason": "the data leave 2 directions open"}}, "no result: the data leave 2 directions open"),
+        ({"summary": {"converged": False}}, "did not converge in 6 steps"),
+        ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),
+    ],
+)
+def test_each_evidence_is_one_reason(change, words):
+    found = reasons(evidence(**change), methods(), Verdict(), "adjustment")
+    assert len(found) == 1
+    assert words in found[0]
+
+
+def test_where_labels_are_in_doubt_nothing_else_is_judged():
+    doubtful = evidence(pose={"ambiguous": True}, summary={"converged": False, "test_passed": False})
+    assert len(reasons(doubtful, methods(), Verdict(max_sigma_deg=1e-6), "adjustment")) == 1
+
+
+def test_sigmas_are_held_to_both_limits():
+    assert reasons(evidence(), methods(), Verdict(max_sigma_deg=0.006, max_sigma_m=6e-4), "adjustment") == []
+    found = reasons(evidence(), methods(), Verdict(max_sigma_deg=0.0059, max_sigma_m=5.9e-4), "adjustment")
+    assert [reason.split(" is ")[0] for reason in found] == ["sigma of yaw", "sigma of lever arm y"]
+
+
+@pytest.mark.parametrize(
+    ("alternating", "patent", "words"),
+    [
+        ({"reason": "the sonar sees no horizontal face"}, {}, "patent_alternating has no result: the sonar sees"),
+        ({"converged": False}, {}, "did not converge in 9 turns"),
+        ({}, {"rotation_vector_deg": [0.8, -0.8, 0.86]}, "differs from the adjustment by +0.0600° in yaw"),
+        ({}, {"lever_arm_m": [0.1, 0.094, 0.1]}, "differs from the adjustment by -0.0060 m in lever arm y"),
+    ],
+)
+def test_a_patent_form_as_the_result_is_held_to_the_adjustment(alternating, patent, words):
+    one = evidence(alternating=alternating)
+    assert reasons(one, methods(**patent), Verdict(), "adjustment") == []
+    found = reasons(one, methods(**patent), Verdict(), "patent_alternating")
+    assert len(found) == 1
+    assert words in found[0]
+
+
+def test_advice_on_distances():
+    assert "all passes lie at 5.9 to 6.1 m" in distance_advice([5.9, 6.1, 6.0])
+    assert distance_advice([4.0, 8.0]) == ""
+    assert distance_advice([]) == ""
