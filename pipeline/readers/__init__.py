@@ -1,61 +1,159 @@
-"""Raw instrument files -> canonical columns. The only place that knows byte layouts, NED and UTC.
+"""Readers: raw instrument files -> canonical columns. The only place that knows byte layouts, NED and UTC.
 
-One module a format. A file's kind is found by its content and must agree with session.yaml's ``format``.
+``raw_parts`` finds a sensor's files, recognises each by its content, and returns parts whose ``chunks()`` stream
+canonical columns (names and units as the tables of stage ingest in ``pipeline.artefacts``; INS angles are NovAtel's:
+roll starboard down +, pitch bow up +, azimuth clockwise from north) together with counts of what was left out and why.
+Damaged files give RawDataError or fewer rows, never another exception.
 """
 
 from pathlib import Path
 from typing import Literal
 
 from pipeline.config import Ins, Laser, Mbes
-from pipeline.errors import RawDataError
+from pipeline.errors import ConfigError, RawDataError
+from pipeline.readers import crs, detect
 from pipeline.streams import Part
+from pipeline.times import NS, WEEK_NS
 
 Sensor = Literal["ins", "laser", "mbes"]
-KINDS = {"novatel": ("novatel",), "sbet": ("sbet",), "las": ("las",), "r2sonic": ("xtf", "r2sonic"), "table": ("csv", "parquet")}
+Settings = Ins | Laser | Mbes
 
 
-def raw_files(settings: Ins | Laser | Mbes, folder: Path) -> list[Path]:
-    """The files that ``files`` names, in order of name, each once; all inside the session folder."""
-    root = folder.resolve()
-    found: set[Path] = set()
+def raw_files(settings: Settings, folder: Path) -> list[Path]:
+    """The files that session.yaml's patterns name, each once, in order of their paths in the session folder.
+
+    Raises
+    ------
+    RawDataError
+        A pattern matches no file, or a file that lies outside the session folder (by way of a symbolic link).
+    """
+    sensor = type(settings).__name__.lower()
+    found: dict[Path, Path] = {}
     for pattern in settings.files:
-        matches = [path for path in folder.glob(pattern) if path.is_file()]
+        matches = _matches(folder, pattern, sensor)
         if not matches:
-            raise RawDataError(f"{folder / 'session.yaml'}: files: {pattern!r} matches no file in the session folder; mend the pattern")
-        for path in matches:
-            if not path.resolve().is_relative_to(root):
-                raise RawDataError(f"{path}: leads out of the session folder; copy the file into it")
-        found |= set(matches)
-    return sorted(found)
+            raise RawDataError(f"session.yaml: {sensor}.files: {pattern!r} matches no file in {folder}; mend it")
+        for path, real in matches:
+            found[real] = min(path, found.get(real, path))
+    return sorted(found.values(), key=lambda path: path.relative_to(folder).as_posix())
 
 
-def raw_parts(sensor: Sensor, settings: Ins | Laser | Mbes, folder: Path) -> tuple[Part, ...]:
-    """Parts of all files of one sensor."""
+def _matches(folder: Path, pattern: str, sensor: str) -> list[tuple[Path, Path]]:
+    """Regular files that match, with their resolved paths."""
+    files = []
+    try:
+        root = folder.resolve()
+        for path in folder.glob(pattern):
+            if not path.is_file():
+                continue
+            real = path.resolve()
+            if not real.is_relative_to(root):
+                raise RawDataError(f"{path}: leads out of the session folder, to {real}; copy the file into it")
+            files.append((path, real))
+    except (ValueError, NotImplementedError) as error:
+        raise ConfigError(f"session.yaml: {sensor}.files: {pattern} is no pattern ({error}); mend it") from error
+    except (OSError, RuntimeError) as error:
+        raise RawDataError(f"{folder}: {pattern} cannot be searched ({error}); check the folder") from error
+    return files
+
+
+def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, ...]:
+    """The parts of one sensor's files, in order.
+
+    Raises
+    ------
+    RawDataError
+        A file cannot be read, or is not what session.yaml says it is.
+    ConfigError
+        Something is missing or wrong in session.yaml: ``gps_week``, ``laser.frame``.
+    """
+    if isinstance(settings, Laser):
+        crs.to_ecef(settings.frame)
+    files = [(path, path.relative_to(folder).as_posix()) for path in raw_files(settings, folder)]
+    for path, name in files:
+        _check_kind(path, name, sensor, settings)
+    if settings.format == "table":
+        return _tables(files, sensor, settings)
+    if isinstance(settings, Laser):
+        return _las(files, settings)
+    if isinstance(settings, Mbes):
+        return _r2sonic(files, settings)
+    return _sbet(files, settings) if settings.format == "sbet" else _novatel(files, settings)
+
+
+Files = list[tuple[Path, str]]
+
+
+def _check_kind(path: Path, name: str, sensor: Sensor, settings: Settings) -> None:
+    kind = detect.kind_of(path, name)
+    if kind.format == settings.format and sensor in kind.sensors:
+        return
+    if kind.format is None:
+        raise RawDataError(f"{name}: is {kind.title}, not {settings.format}; {kind.advice}")
+    if sensor in kind.sensors:
+        raise RawDataError(
+            f"{name}: is {kind.title}, but session.yaml has {sensor}.format: {settings.format}; "
+            f"write {sensor}.format: {kind.format}, and keep files of one format in {sensor}.files"
+        )
+    raise RawDataError(
+        f"{name}: is {kind.title}, not a file of {sensor} in format {settings.format}; "
+        f"list it under {kind.sensors[0]}.files"
+    )
+
+
+def _novatel(files: Files, settings: Ins) -> tuple[Part, ...]:
+    from pipeline.readers.novatel import NovatelPart
+
+    return tuple(NovatelPart(path, name, settings.latency_s) for path, name in files)
+
+
+def _sbet(files: Files, settings: Ins) -> tuple[Part, ...]:
+    from pipeline.readers import sbet
+
+    for path, name in files:
+        sbet.check_size(path, name)
+    weeks = _weeks([sbet.first_seconds(path, name) for path, name in files], settings.gps_week, "ins", files[0][1])
+    return tuple(
+        sbet.SbetPart(path, name, week, settings.latency_s) for (path, name), week in zip(files, weeks, strict=True)
+    )
+
+
+def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
+    from pipeline.readers import las
+
+    headers = [las.read_header(path, name) for path, name in files]
+    weekly = [(name, header) for (_, name), header in zip(files, headers, strict=True) if not header.adjusted_time]
+    firsts = [header.first_s for _, header in weekly]
+    weeks = iter(_weeks(firsts, settings.gps_week, "laser", weekly[0][0]) if weekly else [])
     parts: list[Part] = []
-    for path in raw_files(settings, folder):
-        parts += _parts_of(path, path.relative_to(folder).as_posix(), sensor, settings)
+    for (path, name), header in zip(files, headers, strict=True):
+        week = None if header.adjusted_time else next(weeks)
+        parts += las.parts(path, name, header, week, settings.frame, settings.latency_s)
     return tuple(parts)
 
 
-def _parts_of(path: Path, name: str, sensor: Sensor, settings: Ins | Laser | Mbes) -> list[Part]:
-    from pipeline.readers.detect import kind_of, refuse
-    from pipeline.readers.las import las_parts
-    from pipeline.readers.novatel import NovatelPart
-    from pipeline.readers.r2sonic import R2SonicPart
-    from pipeline.readers.sbet import SbetPart
+def _weeks(first_seconds: list[float], gps_week: int | None, sensor: str, name: str) -> list[int]:
+    """The GPS week of each file's start: ``gps_week`` is that of the first file; the others lie nearest to it."""
+    if gps_week is None:
+        raise ConfigError(
+            f"session.yaml: {sensor}.gps_week is missing: {name} has seconds of week alone; "
+            f"give {sensor}.gps_week, the GPS week in which the file begins"
+        )
+    week_s = WEEK_NS / NS
+    steps = [(first_seconds[0] - first) / week_s for first in first_seconds]
+    return [gps_week + (round(step) if abs(step) <= 1 else 0) for step in steps]
+
+
+def _r2sonic(files: Files, settings: Mbes) -> tuple[Part, ...]:
+    from pipeline.readers.r2sonic import R2sonicPart
+
+    return tuple(
+        R2sonicPart(path, name, detect.kind_of(path, name) is detect.XTF, settings.latency_s) for path, name in files
+    )
+
+
+def _tables(files: Files, sensor: Sensor, settings: Settings) -> tuple[Part, ...]:
     from pipeline.readers.table import TablePart
 
-    kind = kind_of(path)
-    if kind not in KINDS[settings.format]:
-        raise refuse(path, kind, settings.format)
-    if kind == "novatel":
-        return [NovatelPart(path, name, settings.latency_s)]
-    if kind == "sbet":
-        return [SbetPart(path, name, settings.gps_week if isinstance(settings, Ins) else None, settings.latency_s)]
-    if kind in ("xtf", "r2sonic"):
-        return [R2SonicPart(path, name, kind, settings.latency_s)]
-    frame = settings.frame if isinstance(settings, Laser) else "laser"
-    if kind == "las":
-        week = settings.gps_week if isinstance(settings, Laser) else None
-        return list(las_parts(path, name, week, settings.latency_s, frame))
-    return [TablePart(path, name, sensor, kind, settings.latency_s, frame)]
+    frame = settings.frame if isinstance(settings, Laser) else crs.LASER
+    return tuple(TablePart(path, name, sensor, frame, settings.latency_s) for path, name in files)

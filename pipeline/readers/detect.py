@@ -1,106 +1,169 @@
-"""What a file is, by its content; advice for those that cannot be read."""
+"""What a file is, by its content: never by its name."""
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.errors import RawDataError
+from pipeline.readers.files import opened, size_of
+from pipeline.readers.packets import BTH0, OTHERS, packet_size
+from pipeline.readers.sieve import through_float32
 
 HEAD = 65_536
-SBET_RECORD, ACCURACY_RECORD = 136, 80  # bytes
-
-ADVICE = {
-    "RIEGL RXP": "is a RIEGL .rxp, which only RIEGL's own library reads; export it to LAS or LAZ with GPS time stamps",
-    "RIEGL RDBX": "is a RIEGL .rdbx, which only RIEGL's own library reads; export it to LAS or LAZ with GPS time stamps",
-    "E57": "is an E57 file; export it to LAS or LAZ with GPS time stamps",
-    "PCD": "is a PCD file; export it to LAS or LAZ with GPS time stamps",
-    "GSF": "is a GSF file; give the sonar's own R2Sonic packets (in XTF or .r2s), or a table",
-    "KMALL": "is a Kongsberg .kmall; give R2Sonic packets (in XTF or .r2s), or a table",
-    "SBET accuracy": "holds the accuracies (SMRMSG) of an SBET, not the trajectory; give the SBET itself",
-    "empty": "is empty; copy it again from the instrument",
-    "text": "is text of an unknown layout; see README.md for the tables that are read",
-    "unknown": "is of no kind that is read; see README.md for the formats",
-}
 
 
-def kind_of(path: Path) -> str:
-    """novatel, sbet, xtf, r2sonic, las, parquet, csv, or one of the kinds in :data:`ADVICE`."""
-    try:
-        if not path.is_file():
-            raise RawDataError(f"{path}: is not a file; check the files of session.yaml")
-        size = path.stat().st_size
-        with path.open("rb") as file:
-            head = file.read(HEAD)
-    except OSError as error:
-        raise RawDataError(f"{path}: cannot be read ({error.strerror}); check its permissions") from error
-    if not head:
-        return "empty"
-    for test, kind in (
-        (head[:4] == b"LASF", "las"),
-        (head[:4] == b"PAR1", "parquet"),
-        (head[:8] == b"ASTM-E57", "E57"),
-        (b"RieglLMS" in head[:256], "RIEGL RXP"),
-        (b"RDB" in head[:64] and b"RIEGL" in head[:256].upper(), "RIEGL RDBX"),
-        (re.match(rb"(# \.PCD|VERSION )", head) is not None and b"\nFIELDS " in head[:1024], "PCD"),
-        (b"GSF-v" in head[:64], "GSF"),
-        (re.match(rb"....#[A-Z]{3}", head, re.DOTALL) is not None, "KMALL"),
-        (re.match(rb"(.{4})?BTH0.{8}[A-Z][0-9]", head, re.DOTALL) is not None, "r2sonic"),
-    ):
-        if test:
+@dataclass(frozen=True)
+class Kind:
+    """``format``: session.yaml's word where this program reads it, for these ``sensors``; ``advice`` where not."""
+
+    title: str
+    format: str | None = None
+    sensors: tuple[str, ...] = ()
+    advice: str = ""
+
+
+_EXPORT = "export it to LAS or LAZ with GPS time stamps"
+_BATHYMETRY = "log the R2Sonic's bathymetry packets (BTH0), or convert the soundings to a table"
+
+LAS = Kind("LAS or LAZ", "las", ("laser",))
+NOVATEL = Kind("a NovAtel log", "novatel", ("ins",))
+SBET = Kind("SBET", "sbet", ("ins",))
+XTF = Kind("XTF", "r2sonic", ("mbes",))
+PACKETS = Kind("R2Sonic packets", "r2sonic", ("mbes",))
+PARQUET = Kind("a Parquet table", "table", ("ins", "laser", "mbes"))
+CSV = Kind("a CSV table", "table", ("ins", "laser", "mbes"))
+EMPTY = Kind("empty", advice="copy it again, or take it out of the list")
+ACCURACY = Kind(
+    "an accuracy file (SMRMSG)", advice="give the SBET that belongs to it, and take this one out of the list"
+)
+FLOAT32_TEXT = Kind(
+    "a text whose numbers went through float32: times and positions have lost their digits",
+    advice="export it again in double precision, as LAS or as a table with the columns that README.md names",
+)
+TEXT = Kind(
+    "a text without the columns of a table",
+    advice="name the columns in its first line as README.md has them, or export it in a format of the instrument",
+)
+UNKNOWN = Kind("of no kind that is read", advice="copy it again, or see README.md for the formats")
+
+MAGICS: tuple[tuple[int, bytes, Kind], ...] = (
+    (0, b"LASF", LAS),
+    (0, b"PAR1", PARQUET),
+    (8, b"RieglLMS", Kind("a RIEGL .rxp file", advice=f"{_EXPORT} (RiSCAN PRO, RiPROCESS, or RiVLib)")),
+    (0, b"ASTM-E57", Kind("an E57 file", advice=_EXPORT)),
+    (8, b"GSF-v", Kind("a GSF file", advice=_BATHYMETRY)),
+    (0, b"PK\x03\x04", Kind("a ZIP archive", advice="unpack it")),
+    (0, b"\x1f\x8b", Kind("a gzip archive", advice="unpack it")),
+    (0, b"ply\n", Kind("a PLY file", advice=_EXPORT)),
+    (0, b"# .PCD", Kind("a PCD file", advice=_EXPORT)),
+    (0, b"VERSION 0.7\nFIELDS", Kind("a PCD file", advice=_EXPORT)),
+    (0, b"VERSION .7\nFIELDS", Kind("a PCD file", advice=_EXPORT)),
+    (0, b"\xd4\xc3\xb2\xa1", Kind("a network capture", advice="extract the packets of the sonar's bathymetry port")),
+    (0, b"\x0a\x0d\x0d\x0a", Kind("a network capture", advice="extract the packets of the sonar's bathymetry port")),
+)
+RDBX = Kind("a RIEGL .rdbx file", advice=f"{_EXPORT} (RiSCAN PRO or RiPROCESS)")
+KMALL = Kind("a Kongsberg .kmall file", advice=_BATHYMETRY)
+NOVATEL_SYNCS = (b"\xaa\x44\x12\x1c", b"\xaa\x44\x13")
+_NOVATEL_TEXT = re.compile(rb"(?:^|[\r\n\]])[#%][A-Z][A-Z0-9_]+A,[^\r\n;]*;")
+
+
+def kind_of(path: Path, name: str) -> Kind:
+    """What the file is, from its size and its first 64 kB."""
+    with opened(path, name) as file:
+        size = size_of(file)
+        return kind_of_bytes(file.read(HEAD), size)
+
+
+@np.errstate(all="ignore")  # whatever the bytes are as numbers
+def kind_of_bytes(head: bytes, size: int) -> Kind:
+    if not size:
+        return EMPTY
+    for offset, magic, kind in MAGICS:
+        if head[offset : offset + len(magic)] == magic:
             return kind
-    return _by_structure(head, size)
+    if head[:1] == b"\x7b" and _is_xtf(head):
+        return XTF
+    if re.match(rb"#[A-Z]{3}\x00?", head[4:9]) and int.from_bytes(head[:4], "little") <= max(size, 1 << 20):
+        return KMALL
+    if head.startswith(NOVATEL_SYNCS):
+        return NOVATEL
+    if head[:4] in (BTH0, *OTHERS) or _has_packet(head[:16]):
+        return PACKETS
+    if b"riegl" in head[:4096].lower() and b"rdb" in head[:4096].lower():
+        return RDBX
+    text = _is_text(head)
+    if not text and (doubles := _kind_of_doubles(head, size)) is not None:
+        return doubles
+    if any(sync in head for sync in NOVATEL_SYNCS) or _NOVATEL_TEXT.search(head):
+        return NOVATEL
+    if _has_packet(head):
+        return PACKETS
+    return _kind_of_text(head) if text else UNKNOWN
 
 
-def _by_structure(head: bytes, size: int) -> str:
-    if head[0] == 0x7B and b"\xce\xfa" in head[:2048]:
-        return "xtf"
-    if re.search(rb"\xaa\x44[\x12\x13]", head[:8192]) or re.search(
-        rb"(^|\n)[#%](INSPVA|INSPVAS|INSPVAX|[A-Z0-9]{4,14})A?,", head[:8192]
-    ):
-        return "novatel"
-    if _is_trajectory(head):
-        return "SBET accuracy" if _times_fit(head, ACCURACY_RECORD) and not _times_fit(head, SBET_RECORD) else "sbet"
-    if re.search(rb"BTH0.{8}[A-Z][0-9]", head, re.DOTALL):
-        return "r2sonic"
+def _is_xtf(head: bytes) -> bool:
+    """Format byte 0x7B, and a record's mark behind the file header of 1024 bytes or a multiple; or cut off before."""
+    marks = (head[start : start + 2] for start in range(1024, len(head), 1024))
+    return b"\xce\xfa" in marks or (len(head) <= 1024 and not _is_text(head))
+
+
+def _has_packet(head: bytes) -> bool:
+    start = head.find(BTH0)
+    while start >= 0:
+        if packet_size(head[start : start + 8]) is not None:
+            return True
+        start = head.find(BTH0, start + 4)
+    return False
+
+
+def _kind_of_doubles(head: bytes, size: int) -> Kind | None:
+    """Files of doubles without header: records of 17 (SBET) or 10 (accuracy) whose values make sense."""
+    if size >= 80 and size % 80 < 8:
+        rows = np.frombuffer(head, "<f8", len(head) // 80 * 10).reshape(-1, 10)[:20]
+        if _rising(rows[:, 0]) and np.all(np.isfinite(rows)) and np.all((rows[:, 1:] >= 0) & (rows[:, 1:] < 1e4)):
+            return ACCURACY
+    if size < 136 or len(head) < 136:
+        return None
+    rows = np.frombuffer(head, "<f8", len(head) // 136 * 17).reshape(-1, 17)[:20]
+    limits = [1.3e6, np.pi / 2, 2 * np.pi, 2e4, 1e3, 1e3, 1e3, np.pi, np.pi / 2, 13, 13, 1e3, 1e3, 1e3, 1e2, 1e2, 1e2]
+    first = rows[0]
+    possible = np.all(np.isfinite(first)) and np.all(np.abs(first) <= limits)
+    normal = possible and not np.any((first != 0) & (np.abs(first) < 1e-290))  # integers read as doubles are tiny
+    return SBET if normal and first[0] >= 0 and np.any(first[1:3] != 0) else None
+
+
+def _rising(seconds: np.ndarray) -> bool:
+    steps = np.diff(seconds)
+    return bool(np.all((seconds >= 0) & (seconds < 1.3e6)) and np.all((steps > 0) & (steps < 1000)))
+
+
+def _is_text(head: bytes) -> bool:
+    text = head.removesuffix(head[-3:]) if len(head) == HEAD else head  # a letter may be cut in two
     try:
-        text = head.decode("utf-8", errors="strict" if size <= HEAD else "ignore")
+        letters = text.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return "unknown"
-    if "\0" in text:
-        return "unknown"
-    first = text.lstrip("\ufeff").splitlines()[0] if text.strip() else ""
-    return "csv" if "," in first and re.match(r"\s*[A-Za-z_]", first) else "text"
-
-
-def _is_trajectory(head: bytes) -> bool:
-    """A first record whose time of week, latitude, longitude and height are possible (accuracies pass as well)."""
-    if len(head) < ACCURACY_RECORD:
         return False
-    time, latitude, longitude, height = np.frombuffer(head[:32], "<f8").tolist()
-    numbers = np.frombuffer(head[:ACCURACY_RECORD], "<f8")
-    return bool(
-        np.all(np.isfinite(numbers))
-        and np.all(np.abs(numbers) < 1e7)
-        and 1e-3 < time < 700_000
-        and 1e-9 < abs(latitude) <= np.pi / 2 + 10
-        and abs(longitude) <= 2 * np.pi + 10
-        and abs(height) < 20_000
-    )
+    return all(letter.isprintable() or letter in "\r\n\t\f" for letter in letters)
 
 
-def _times_fit(head: bytes, record: int) -> bool:
-    """Whether records of this length begin with times that ascend by less than a minute each."""
-    numbers = min(len(head) // record, 50)
-    times = np.array([np.frombuffer(head, "<f8", 1, k * record)[0] for k in range(numbers)])
-    steps = np.diff(times)
-    return numbers > 1 and bool(np.all(np.isfinite(steps)) and np.all(steps > 0) and np.all(steps < 60))
+def _kind_of_text(head: bytes) -> Kind:
+    from pipeline.readers.tabular import column_names
+
+    lines = [line for line in head.decode("utf-8-sig", "replace").splitlines() if line.strip()]
+    rows = [line for line in lines if not line.startswith(("#", "//"))]
+    if rows and column_names(rows[0]) is not None:
+        return CSV
+    numbers = [_floats(row) for row in rows[:-1][:200]]
+    width = max((len(row) for row in numbers), default=0)
+    whole = np.array([row for row in numbers if width >= 3 and len(row) == width]).reshape(-1, max(width, 1))
+    if len(whole) and any(through_float32(column) for column in whole.T):
+        return FLOAT32_TEXT
+    return TEXT
 
 
-def refuse(path: Path, kind: str, wanted: str) -> RawDataError:
-    """The error for a file that is not what ``format`` says."""
-    known = {"novatel": "NovAtel log", "sbet": "SBET", "xtf": "XTF", "r2sonic": "R2Sonic packets", "las": "LAS/LAZ"}
-    if kind in ADVICE:
-        return RawDataError(f"{path}: {ADVICE[kind]}")
-    what = {"csv": "a table (CSV)", "parquet": "a table (Parquet)"}.get(kind, f"a file of format {known.get(kind, kind)}")
-    return RawDataError(f"{path}: is {what}, but session.yaml says format: {wanted}; mend format, or the files' list")
+def _floats(row: str) -> list[float]:
+    try:
+        return [float(word) for word in re.split(r"[\s,;]+", row.strip()) if word]
+    except ValueError:
+        return []

@@ -1,146 +1,200 @@
-"""LAS and LAZ by laspy: points in the scanner's frame (or a CRS), GPS time as seconds of week or adjusted standard time."""
+"""LAS 1.0 to 1.5 and LAZ, by laspy and lazrs (ASPRS, "LAS Specification 1.4 R15").
 
+The header is checked here before laspy sees it: a damaged one may claim billions of points or of variable-length
+records, which must cost neither memory nor time. A file is read in *stretches* of at most 4,000,000 points, so that
+workers can share it. Header (little-endian): 6 u16 global encoding (bit 0: adjusted standard GPS time, else seconds of
+week), 24 u8 x 2 version, 94 u16 header size, 96 u32 offset to points, 100 u32 number of VLRs, 104 u8 point format
+(bit 7: LAZ), 105 u16 record length, 107 u32 points, 131 f64 x 3 scales, 155 f64 x 3 offsets, 247 u64 points (1.4).
+
+Seconds of week need ``laser.gps_week``, the week of the first point; points more than half a week before that belong
+to the next one. Adjusted standard time is GPS seconds since the epoch - 1e9.
+"""
+
+import logging
+import struct
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.errors import ConfigError, RawDataError
-from pipeline.readers.records import count, keep, latency
-from pipeline.streams import Chunk
-from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, NS, gps_ns_from_week_seconds
+from pipeline.errors import RawDataError
+from pipeline.readers.crs import to_ecef
+from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.laz import Points, points_at_most, unpack
+from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, through_float32
+from pipeline.streams import BATCH_ROWS, Chunk
+from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS, gps_ns_from_week_seconds
 
-STRETCH = 4_000_000  # points of one part: two workers can share one file
-CHUNK = 500_000
-FIRST_YEAR_NS, LAST_YEAR_NS = 20 * 31_557_600 * NS, 120 * 31_557_600 * NS  # 2000 to 2100
-FLOAT32_STEP_S = 2.0**-7
+STRETCH = 4_000_000
+MAX_OFFSET = 1 << 26
+TIMED_FORMATS = frozenset({1, 3, 4, 5, 6, 7, 8, 9, 10})
+LENGTHS = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # least record length by point format
+WEEK_S = WEEK_NS / NS
+EARLIEST_S, LATEST_S = 630_720_000, 3_786_912_000  # GPS seconds: years 2000 and 2100
+logging.getLogger("laspy").addHandler(logging.NullHandler())  # what laspy logs, the exceptions say as well
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a LAS header says, checked against the file's size."""
+
+    adjusted_time: bool
+    compressed: bool
+    claimed: int
+    present: int
+    first_s: float  # GPS time of the first point
 
 
 @dataclass(frozen=True)
 class LasPart:
-    """Points ``start`` to ``start + points`` of one file."""
+    """Points ``start`` to ``stop`` of one file; ``missing`` are points the header claims and the file has not."""
 
     path: Path
     name: str
+    compressed: bool
     start: int
-    points: int
-    gps_week: int | None
-    latency_s: float
+    stop: int
+    missing: int
     frame: str
+    latency_s: float
+    gps_week: int | None  # None: adjusted standard time
+    first_s: float
 
     def chunks(self) -> Iterator[Chunk]:
-        import laspy
+        dropped: Counter[str] = Counter({"truncated": self.missing})
+        done = self.start
+        with opened(self.path, self.name) as file:
+            for points in self._points(file):
+                first = done == self.start
+                done += len(points[0])
+                yield self._chunk(points, dropped, first)
+        dropped["truncated"] += self.stop - done
+        if dropped["truncated"]:
+            yield no_rows(LASER_COLUMNS, dropped)
 
-        read = 0
-        try:
-            with laspy.open(self.path) as file:
-                standard = file.header.global_encoding.gps_time_type == laspy.header.GpsTimeType.STANDARD
-                if self.start:
-                    file.seek(self.start)
-                while read < self.points:
-                    points = file.read_points(min(CHUNK, self.points - read))
-                    if len(points) == 0:
-                        break
-                    read += len(points)
-                    yield self._chunk(points, standard)
-        except (RawDataError, ConfigError):
-            raise
-        except Exception as error:  # laspy and lazrs raise many kinds for a cut or damaged file
-            if read == 0 and self.start == 0:
-                raise RawDataError(
-                    f"{self.path}: cannot be decoded ({type(error).__name__}: {error}); export it again"
-                ) from error
-        if read < self.points:
-            yield Chunk({}, {"missing: the file is cut": self.points - read})
+    def _points(self, file: BinaryIO) -> Iterator[Points]:
+        if self.stop <= self.start:
+            return iter(())
+        if self.compressed:
+            return unpack(self.path, self.name, self.start, self.stop, BATCH_ROWS)
+        return _las_points(file, self.name, self.start, self.stop)
 
-    def _chunk(self, points: Any, standard: bool) -> Chunk:
-        gps_time = np.asarray(points["gps_time"], dtype=np.float64)
-        xyz = {axis: np.asarray(points[axis], dtype=np.float64) for axis in "xyz"}
-        dropped: dict[str, int] = {}
-        good = np.isfinite(gps_time) & np.isfinite(xyz["x"]) & np.isfinite(xyz["y"]) & np.isfinite(xyz["z"])
-        count(dropped, "not a number", int((~good).sum()))
-        good &= (xyz["x"] != 0) | (xyz["y"] != 0) | (xyz["z"] != 0)
-        seconds = np.where(good, gps_time, 1.0)
-        t_ns = self._times(seconds, standard)
-        if len(seconds) > 100 and np.ptp(seconds) > 1 and np.all(np.mod(seconds, FLOAT32_STEP_S) == 0):
-            raise RawDataError(
-                f"{self.path}: times are whole steps of {FLOAT32_STEP_S:g} s: they went through single precision and cannot be "
-                "georeferenced; export again with double precision"
-            )
-        columns: dict[str, NDArray[np.generic]] = {"t_ns": latency(t_ns, self.latency_s)}
-        columns |= {f"{axis}_m": values for axis, values in _in_frame(xyz, self.frame).items()}
-        count(dropped, "at the scanner's origin", int(len(good) - good.sum() - dropped.get("not a number", 0)))
-        return Chunk(keep(columns, good) if not good.all() else columns, dropped)
+    @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+    def _chunk(self, points: Points, dropped: Counter[str], first: bool) -> Chunk:
+        seconds, x_m, y_m, z_m = points
+        if first:
+            _refuse_useless_times(seconds, self.name, adjusted=self.gps_week is None)
+        sieve = Sieve({"seconds": seconds, "x_m": x_m, "y_m": y_m, "z_m": z_m}, dropped)
+        sieve.keep_finite()
+        sieve.keep(sieve["seconds"] != 0, "no time")
+        transform = to_ecef(self.frame)
+        if transform is not None:
+            moved = transform(sieve["x_m"], sieve["y_m"], sieve["z_m"])
+            sieve.columns |= dict(zip(("x_m", "y_m", "z_m"), moved, strict=True))
+            sieve.keep_finite()
+        sieve.columns["t_ns"] = self._gps_ns(sieve) - latency_ns(self.latency_s)
+        return chunk(sieve.columns, LASER_COLUMNS, dropped)
 
-    def _times(self, seconds: NDArray[np.float64], standard: bool) -> NDArray[np.int64]:
-        if standard:
-            whole = np.floor(seconds)
-            t_ns = (whole.astype(np.int64) + ADJUSTED_STANDARD_OFFSET_S) * NS + np.rint((seconds - whole) * NS).astype(np.int64)
-            if len(t_ns) and not FIRST_YEAR_NS < int(np.median(t_ns)) < LAST_YEAR_NS:
-                raise RawDataError(
-                    f"{self.path}: GPS time {seconds[0]:.3f} is impossible as adjusted standard time, which its header claims; "
-                    "it may be seconds of week: export again"
-                )
-            return t_ns
+    def _gps_ns(self, sieve: Sieve) -> NDArray[np.int64]:
         if self.gps_week is None:
-            raise ConfigError(
-                f"session.yaml: laser.gps_week: is missing; {self.path.name} holds seconds of week alone: give the GPS week"
-            )
-        if len(seconds) and not (0 <= float(np.median(seconds)) < 2 * 604_800):
+            since = sieve["seconds"] + ADJUSTED_STANDARD_OFFSET_S
+            sieve.keep((since > EARLIEST_S) & (since < LATEST_S), "impossible time")
+            return gps_ns_from_week_seconds(0, sieve["seconds"]) + ADJUSTED_STANDARD_OFFSET_S * NS
+        sieve.keep((sieve["seconds"] >= 0) & (sieve["seconds"] < 2 * WEEK_S), "impossible time")
+        week = self.gps_week + (sieve["seconds"] < self.first_s - WEEK_S / 2)
+        return gps_ns_from_week_seconds(week, sieve["seconds"])
+
+
+def read_header(path: Path, name: str) -> Header:
+    """The header, checked.
+
+    Raises
+    ------
+    RawDataError
+        It contradicts itself or the file, or its point format has no time.
+    """
+    with opened(path, name) as file:
+        size = size_of(file)
+        head = file.read(375).ljust(375, b"\0")
+        encoding, major, minor = struct.unpack_from("<H16x2B", head, 6)
+        header_size, offset, records, form, length, claimed = struct.unpack_from("<HIIBHI", head, 94)
+        scales = struct.unpack_from("<3d", head, 131)
+        if minor >= 4:
+            (claimed,) = struct.unpack_from("<Q", head, 247)
+        compressed, form = bool(form & 0x80), form & 0x3F
+        sound = major == 1 and minor <= 5 and 227 <= header_size <= offset <= min(size, MAX_OFFSET)
+        sound = sound and form < len(LENGTHS) and length >= LENGTHS[form] and 54 * records <= offset - header_size
+        if not sound or not all(np.isfinite(scale) and scale > 0 for scale in scales):
+            raise RawDataError(f"{name}: its LAS header is damaged, or cut off; copy or export it again")
+        if form not in TIMED_FORMATS:
             raise RawDataError(
-                f"{self.path}: GPS time {seconds[0]:.3f} is impossible as seconds of week, which its header claims; export again"
+                f"{name}: its point format {form} has no GPS time; export it again in point format 1, 3 or 6 to 10"
             )
-        return gps_ns_from_week_seconds(self.gps_week, seconds)
+        present = (size - offset) // length
+        first = offset
+        if compressed:
+            present = points_at_most(file, name, records, header_size, offset, size)
+            first = offset + 8
+        time_at = first + (22 if form >= 6 else 20)
+        (first_s,) = struct.unpack("<d", read_at(file, time_at, 8).ljust(8, b"\0"))
+        here = min(claimed, present)
+        return Header(bool(encoding & 1), compressed, claimed, here, first_s if here else 0.0)
 
 
-def _in_frame(xyz: dict[str, NDArray[np.float64]], frame: str) -> dict[str, NDArray[np.float64]]:
-    """As they are in the scanner's frame; in ECEF from any three-dimensional CRS."""
-    if frame == "laser":
-        return xyz
-    from pyproj import Transformer
-
-    transformer = Transformer.from_crs(crs_of(frame), "EPSG:4978", always_xy=True)
-    return dict(zip("xyz", map(np.asarray, transformer.transform(xyz["x"], xyz["y"], xyz["z"])), strict=True))
-
-
-def crs_of(frame: str) -> Any:
-    """The CRS of session.yaml's laser.frame; refused when unknown or without heights."""
-    from pyproj import CRS
-    from pyproj.exceptions import CRSError
-
-    try:
-        crs = CRS.from_user_input(frame)
-    except CRSError as error:
-        raise ConfigError(
-            f"session.yaml: laser.frame = {frame!r}: is neither 'laser' nor a CRS; write e.g. EPSG:4978"
-        ) from error
-    if len(crs.axis_info) < 3:
-        raise ConfigError(
-            f"session.yaml: laser.frame = {frame!r}: has no heights above the ellipsoid; use a three-dimensional CRS"
-        )
-    return crs
+def parts(
+    path: Path, name: str, header: Header, gps_week: int | None, frame: str, latency_s: float
+) -> tuple[LasPart, ...]:
+    """A file's stretches. ``gps_week`` is None for adjusted standard time."""
+    starts = range(0, header.present, STRETCH) or range(1)
+    made = []
+    for k, start in enumerate(starts):
+        stop = min(start + STRETCH, header.present)
+        missing = header.claimed - header.present if k == len(starts) - 1 else 0
+        label = name if len(starts) == 1 else f"{name}#{k}"
+        common = (frame, latency_s, gps_week, header.first_s)
+        made.append(LasPart(path, label, header.compressed, start, stop, missing, *common))
+    return tuple(made)
 
 
-def las_parts(path: Path, name: str, gps_week: int | None, latency_s: float, frame: str) -> list[LasPart]:
-    """Stretches of one file; its header is checked here."""
+def _las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[Points]:
+    """GPS time, x, y, z of points ``start`` to ``stop``, batch by batch."""
     import laspy
 
-    if frame != "laser":
-        crs_of(frame)
     try:
-        with laspy.open(path) as file:
-            points, names = file.header.point_count, set(file.header.point_format.dimension_names)
-    except Exception as error:  # laspy raises many kinds for a damaged header
-        raise RawDataError(f"{path}: its header cannot be read ({type(error).__name__}: {error}); export it again") from error
-    if "gps_time" not in names:
-        raise RawDataError(f"{path}: has no time stamps; export again with GPS time (point format 1, 3 or 6 and above)")
-    limit = path.stat().st_size * 64  # no compression packs a point into less than a bit or so per field
-    points = min(points, limit)
-    starts = range(0, max(points, 1), STRETCH)
-    return [
-        LasPart(path, f"{name}#{k}" if points > STRETCH else name, s, min(STRETCH, points - s), gps_week, latency_s, frame)
-        for k, s in enumerate(starts)
-    ]
+        reader = laspy.LasReader(file, closefd=False, read_evlrs=False)
+        if start:
+            reader.seek(start)
+        while start < stop:
+            points = reader.read_points(min(BATCH_ROWS, stop - start))
+            if not len(points):
+                return
+            yield tuple(np.asarray(values, np.float64) for values in (points.gps_time, points.x, points.y, points.z))
+            start += len(points)
+    except (laspy.LaspyException, ValueError, LookupError, OverflowError, struct.error) as error:
+        raise RawDataError(f"{name}: is damaged ({error}); copy or export it again") from error
+
+
+def _refuse_useless_times(seconds: NDArray[np.float64], name: str, adjusted: bool) -> None:
+    if len(seconds) and not np.any(seconds):
+        raise RawDataError(f"{name}: all its GPS times are 0; export it again with GPS time stamps")
+    given = seconds[np.isfinite(seconds) & (seconds != 0)]
+    weekly = (given >= 0) & (given < 2 * WEEK_S)
+    since = given + ADJUSTED_STANDARD_OFFSET_S
+    if adjusted and len(given) and (np.all(weekly) or not np.any((since > EARLIEST_S) & (since < LATEST_S))):
+        raise RawDataError(
+            f"{name}: its header promises adjusted standard GPS time, but {given[0]:.6f} is none (before 2000, after "
+            "2100, or in its first week, September 2011): likely seconds of week; export it again with the right flag"
+        )
+    if not adjusted and len(given) and not np.any(weekly):
+        raise RawDataError(
+            f"{name}: its header promises seconds of GPS week, but {given[0]:.6f} is none: likely adjusted "
+            "standard time without its flag (global encoding, bit 0); export it again with the right flag"
+        )
+    if through_float32(seconds):
+        raise RawDataError(
+            f"{name}: its GPS times went through float32 (first: {seconds[0]}); export it again in double precision"
+        )

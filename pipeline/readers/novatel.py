@@ -1,28 +1,65 @@
-"""NovAtel OEM/SPAN logs, binary and ASCII, short and long headers, by NovAtel's own decoder.
+"""NovAtel OEM/SPAN logs, binary and ASCII: INSPVA, INSPVAS and INSPVAX records.
 
-INSPVA, INSPVAS and INSPVAX are read. INSPVA(S) heights are ellipsoidal; INSPVAX heights are above sea level, the
-undulation is added. Roll is right-handed about forward (starboard down +), pitch bow up +, azimuth clockwise from
-north: the frames of this program already (NovAtel APN-037).
+Framing and ASCII are left to NovAtel's own decoder (novatel_edie), which turns every record into its binary form;
+the layouts below are those of the OEM7 Commands and Logs Reference Manual (INSPVA 507, INSPVAS 508, INSPVAX 1465;
+binary header 28 bytes after sync 0xAA4412, short header 12 bytes after 0xAA4413, CRC 4 bytes behind the body).
+
+Where a file holds several of the three, one is used: that with the most usable records, but INSPVA or INSPVAS, whose
+heights are ellipsoidal, unless INSPVAX has more than twice as many. INSPVAX heights are above sea level: its own
+undulation is added. Usable: status INS_SOLUTION_GOOD, INS_ALIGNMENT_COMPLETE or INS_SOLUTION_FREE.
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
-from pipeline.errors import RawDataError
-from pipeline.readers.records import ins_columns, rows_or_none
+from pipeline.readers.files import opened
+from pipeline.readers.sieve import (
+    INS_COLUMNS,
+    Order,
+    Sieve,
+    chunk,
+    keep_possible_poses,
+    latency_ns,
+    no_rows,
+    possible_week_time,
+)
 from pipeline.streams import Chunk
 from pipeline.times import gps_ns_from_week_seconds
 
-ELLIPSOIDAL = ("INSPVA", "INSPVAS")
-TYPES = (*ELLIPSOIDAL, "INSPVAX")
-USABLE = {3, 6, 7}  # INS_SOLUTION_GOOD, INS_SOLUTION_FREE, INS_ALIGNMENT_COMPLETE
-READ_BYTES = 1 << 15
-ROWS = 100_000
+NAMES = {507: "INSPVA", 508: "INSPVAS", 1465: "INSPVAX"}
+GOOD, FREE, COMPLETE = 3, 6, 7
+USABLE = (GOOD, FREE, COMPLETE)
+STATUS = {
+    0: "INS_INACTIVE", 1: "INS_ALIGNING", 2: "INS_HIGH_VARIANCE", 3: "INS_SOLUTION_GOOD", 6: "INS_SOLUTION_FREE",
+    7: "INS_ALIGNMENT_COMPLETE", 8: "DETERMINING_ORIENTATION", 9: "WAITING_INITIALPOS", 10: "WAITING_AZIMUTH",
+    11: "INITIALIZING_BIASES", 12: "MOTION_DETECT", 14: "WAITING_ALIGNMENTORIENTATION",
+}
+_POSE = [("roll", "<f8"), ("pitch", "<f8"), ("azimuth", "<f8")]
+_PLACE = [("latitude", "<f8"), ("longitude", "<f8"), ("height", "<f8")]
+PVA = [("week", "<u4"), ("seconds", "<f8"), *_PLACE, ("velocity", "<f8", 3), *_POSE, ("status", "<u4")]
+PVAX = [
+    ("status", "<u4"), ("type", "<u4"), *_PLACE, ("undulation", "<f4"), ("velocity", "<f8", 3), *_POSE,
+    ("sigmas", "<f4", 9), ("extended", "<u4"), ("since_update", "<u2"),
+]
+_LONG = [("sync", "V14"), ("header_week", "<u2"), ("header_ms", "<u4"), ("rest", "V8")]
+_SHORT = [("sync", "V6"), ("header_week", "<u2"), ("header_ms", "<u4")]
+RECORDS = {
+    dtype.itemsize: dtype
+    for dtype in (np.dtype([*head, *body, ("crc", "<u4")]) for head in (_LONG, _SHORT) for body in (PVA, PVAX))
+}
+ANGLES = ("latitude", "longitude", "roll", "pitch", "azimuth")
+BLOCK = 32_768  # the decoder's buffer is 262,144 bytes
+RECORDS_PER_CHUNK = 65_536
+MAX_RESUMES = 100  # looks behind false starts at the end of a file; each costs a pass over at most the decoder's buffer
+_START = re.compile(rb"\xaa\x44[\x12\x13]|[#%][A-Z]")
+_PROMPT = re.compile(rb"[\s\[\]A-Z0-9]{0,24}")  # what a receiver's port says between records, such as [COM1]
 
 
 @dataclass(frozen=True)
@@ -34,75 +71,133 @@ class NovatelPart:
     latency_s: float
 
     def chunks(self) -> Iterator[Chunk]:
-        wanted, dropped = self._choose()
-        rows: list[tuple[float, ...]] = []
-        for message in _messages(self.path):
-            if _type_of(message) != wanted:
-                continue
-            status = message.ins_solution_status if hasattr(message, "ins_solution_status") else message.ins_status
-            if int(status) not in USABLE:
-                dropped[f"INS status {getattr(status, 'name', int(status))}"] += 1
-                continue
-            height = message.height + (message.undulation if wanted == "INSPVAX" else 0.0)
-            week, seconds = (
-                (message.week, message.seconds)
-                if wanted != "INSPVAX"
-                else (message.header.week, message.header.milliseconds / 1000)
-            )
-            rows.append(
-                (week, seconds, message.latitude, message.longitude, height, message.roll, message.pitch, message.azimuth)
-            )
-            if len(rows) == ROWS:
-                yield self._chunk(rows, dropped)
-                rows, dropped = [], Counter()
-        yield self._chunk(rows, dropped)
-
-    def _chunk(self, rows: list[tuple[float, ...]], dropped: Counter[str]) -> Chunk:
-        table = rows_or_none(rows, 8)
-        t_ns = gps_ns_from_week_seconds(table[:, 0].astype(np.int64), table[:, 1])
-        return ins_columns(t_ns, self.latency_s, *table[:, 2:5].T, *table[:, 5:].T, dropped=dict(dropped))
-
-    def _choose(self) -> tuple[str, Counter[str]]:
-        """The message type to use: ellipsoidal heights first, of these the more frequent. Counts what is unreadable."""
-        found: Counter[str] = Counter()
         dropped: Counter[str] = Counter()
-        for message in _messages(self.path):
-            kind = _type_of(message)
-            if kind == "UnknownBytes":
-                dropped["undecodable bytes"] += 1
-            elif kind in TYPES:
-                found[kind] += 1
-        if not found:
-            raise RawDataError(f"{self.path}: holds no INSPVA, INSPVAS or INSPVAX; log one of them, at 50 Hz or more")
-        best = max((kind for kind in ELLIPSOIDAL if found[kind]), key=lambda kind: found[kind], default="INSPVAX")
-        return best, dropped
+        with opened(self.path, self.name) as file:
+            number = _survey(file, dropped)
+            order = Order(self.name)
+            if number is not None:
+                for records in _records(file, number):
+                    yield _chunk(records, order, self.latency_s, dropped)
+            if dropped:
+                yield no_rows(INS_COLUMNS, dropped)
+            order.check()
 
 
-def _type_of(message: Any) -> str:
-    return type(message).__name__.split("_")[0]
+def _blocks(file: BinaryIO) -> Iterator[bytes]:
+    """The file in blocks the decoder can take; in ASCII logs lines end as it wants them, by CR LF."""
+    first = file.read(BLOCK)
+    if not first.isascii() or b"\0" in first:
+        yield first
+        while block := file.read(BLOCK):
+            yield block
+        return
+    block, held = first, b""
+    while block:
+        block = held + block
+        held = block[-1:] if block.endswith(b"\r") else b""
+        yield block[: len(block) - len(held)].replace(b"\r\n", b"\n").replace(b"\n", b"\r\n")
+        block = file.read(BLOCK)
+    yield held + b"\r\n"
 
 
-def _messages(path: Path) -> Iterator[Any]:
-    """All messages; ASCII with bare line feeds is given carriage returns (the decoder yields nothing without)."""
+def _fed(parser: Any, file: BinaryIO, dropped: Counter[str]) -> Iterator[None]:
+    """Feeds the file to a decoder, and yields whenever it may have something to give.
+
+    At the end it may hold bytes back for a message of which only the start came. There may be whole ones behind that.
+    """
+    for block in _blocks(file):
+        parser.write(block)
+        yield
+    rest = bytes(parser.flush(True))
+    dropped["truncated message"] += bool(rest.strip())
+    for _ in range(MAX_RESUMES):
+        starts = [found.start() for found in islice(_START.finditer(rest), 2)]
+        if len(starts) < 2:
+            return
+        parser.write(rest[starts[1] :])
+        yield
+        rest = bytes(parser.flush(True))
+
+
+def _survey(file: BinaryIO, dropped: Counter[str]) -> int | None:
+    """Which record to use, by its number; the others, and what is no record at all, are counted."""
     from novatel_edie.oem import Parser
 
-    parser = Parser()
-    parser.return_unknown_bytes = True
-    try:
-        with path.open("rb") as file:
-            text = not _is_binary(file.read(8192))
-            file.seek(0)
-            while block := file.read(READ_BYTES):
-                if text:
-                    block = block.replace(b"\r", b"").replace(b"\n", b"\r\n")
-                view = memoryview(block)
-                while view:
-                    view = view[parser.write(bytes(view)) :]
-                    yield from parser
-            yield from parser
-    except OSError as error:
-        raise RawDataError(f"{path}: cannot be read ({error.strerror}); copy it again") from error
+    parser, total = Parser(), Counter[str]()
+    names: dict[type, str] = {}
+    for _ in _fed(parser, file, dropped):
+        for message in parser:
+            kind = type(message)
+            if kind not in names:
+                names[kind] = kind.__name__.partition("_")[0]
+            total[names[kind]] += 1
+            if names[kind] == "UnknownBytes" and _PROMPT.fullmatch(message.data) is None:
+                dropped["undecodable bytes"] += 1
+    there = [number for number, name in NAMES.items() if total[name]]
+    if not there:
+        dropped["message other than INSPVA, INSPVAS, INSPVAX"] += total.total() - total["UnknownBytes"]
+        return None
+    chosen = there[0] if len(there) == 1 else _best(file, there)
+    for number in there:
+        if number != chosen:
+            dropped[f"{NAMES[number]} beside {NAMES[chosen]}"] += total[NAMES[number]]
+    return chosen
 
 
-def _is_binary(head: bytes) -> bool:
-    return b"\xaaD\x12" in head or b"\xaaD\x13" in head
+def _best(file: BinaryIO, numbers: list[int]) -> int:
+    """The kind with the most usable records; INSPVAX must have more than twice as many. Equal: the first."""
+    usable = {
+        number: sum(int(np.isin(records["status"], USABLE).sum()) for records in _records(file, number))
+        for number in numbers
+    }
+    return max(numbers, key=lambda number: usable[number] * (1 if NAMES[number] == "INSPVAX" else 2))
+
+
+def _records(file: BinaryIO, number: int) -> Iterator[np.ndarray[Any, Any]]:
+    """Records of one kind as arrays, in the order of the file."""
+    from novatel_edie import ENCODE_FORMAT
+    from novatel_edie.oem import Filter, Parser
+
+    file.seek(0)
+    parser, wanted = Parser(), Filter()
+    wanted.add_message_id(number)
+    parser.filter = wanted
+    waiting: list[bytes] = []
+    for _ in _fed(parser, file, Counter()):
+        waiting += [record.message for record in parser.iter_convert(ENCODE_FORMAT.BINARY)]
+        if len(waiting) >= RECORDS_PER_CHUNK:
+            yield from _arrays(waiting)
+            waiting = []
+    yield from _arrays(waiting)
+
+
+def _arrays(records: list[bytes]) -> Iterator[np.ndarray[Any, Any]]:
+    for size, alike in groupby(records, key=len):
+        if size in RECORDS:
+            yield np.frombuffer(b"".join(alike), RECORDS[size])
+
+
+@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+def _chunk(records: np.ndarray[Any, Any], order: Order, latency_s: float, dropped: Counter[str]) -> Chunk:
+    bad = ~np.isin(records["status"], USABLE)
+    for status, count in zip(*np.unique(records["status"][bad], return_counts=True), strict=True):
+        dropped[f"ins status {STATUS.get(int(status), int(status))}"] += int(count)
+    records = records[~bad]
+    names = records.dtype.names or ()
+    own_time = "week" in names
+    undulation = records["undulation"] if "undulation" in names else 0.0
+    sieve = Sieve(
+        {
+            "week": records["week" if own_time else "header_week"].astype(np.int64),
+            "seconds": records["seconds"].astype(float) if own_time else records["header_ms"] / 1000.0,
+            "height_m": records["height"] + undulation,
+            **{f"{name}_rad": np.radians(records[name]) for name in ANGLES},
+        },
+        dropped,
+    )
+    keep_possible_poses(sieve)
+    sieve.keep(possible_week_time(sieve["week"], sieve["seconds"]), "impossible time")
+    t_ns = gps_ns_from_week_seconds(sieve["week"], sieve["seconds"])
+    sieve.columns["t_ns"] = t_ns - latency_ns(latency_s)
+    order.keep(sieve)
+    return chunk(sieve.columns, INS_COLUMNS, dropped)

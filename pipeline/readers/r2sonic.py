@@ -1,176 +1,146 @@
-"""R2Sonic BTH0 packets (Bathy Data Format 0): in XTF records, or one after another.
+"""R2Sonic bathymetry packets (BTH0), each by itself, into soundings.
 
-Layout: R2Sonic Sonic 2026/2024/2022 Operation Manual, appendix "Uplink Data Formats". All numbers big-endian. A packet
-is {"BTH0", u32 size, u32 stream} and sections {2 letters, u16 size}; H0: time, ping, sound speed; R0: two-way times;
-A0 (equi-angle: first and last) or A2 (equidistant: first and steps): angles from the array's normal, starboard +.
+Layout: R2Sonic Sonic 2026/2024/2022 Operation Manual, appendix "Uplink Data Formats", Bathy Data Format 0 (V5.0 and
+V6.3 agree). All big-endian. Header of 12 bytes: 'BTH0', u32 packet size, u32 stream. Then sections, each u16 name (two
+letters), u16 size (all of it), padded to 4 bytes; unknown ones are skipped by their size. At offsets in the section:
+
+    H0   28 u32 Unix seconds (UTC), 32 u32 nanoseconds, 36 u32 ping number, 44 f32 sound speed [m/s], 114 u16 points N
+    R0   4 f32 scale, 8 u16 range[N]                     two-way time [s] = range * scale; 0: no detection
+    A0   4 f32 first, 8 f32 last                         angles evenly from first (port) to last (starboard) inclusive
+    A2   4 f32 first, 8 f32 scale, 36 u16 step[N]        angle[n] = first + (step[0] + ... + step[n]) * scale
+
+Angles [rad] are from the array's normal, starboard +, not roll corrected. How packets lie in files: ``packets.py``.
 """
 
 import struct
-import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.errors import RawDataError
-from pipeline.readers.records import sounding_columns
+from pipeline.readers.files import opened
+from pipeline.readers.packets import Sections, bare_packets, xtf_packets
+from pipeline.readers.sieve import (
+    MBES_COLUMNS,
+    Sieve,
+    chunk,
+    keep_possible_soundings,
+    latency_ns,
+    no_rows,
+    possible_ns,
+)
 from pipeline.streams import Chunk
-from pipeline.times import gps_ns_from_unix_utc
+from pipeline.times import NS, gps_ns_from_unix_utc
 
-MAGIC = b"BTH0"
-MAX_PACKET = 1 << 20
-READ_BYTES = 1 << 20
-CHUNK_PINGS = 512
+SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
+PINGS = 8_192
+MAX_POINTS = np.iinfo(np.int16).max
+HEAD = struct.Struct(">28xIII4xf66xH")
+TWO_FLOATS = struct.Struct(">4xff")
+SCALE = struct.Struct(">4xf")
+STEPS = 36
 
 
-@dataclass(frozen=True)
-class Ping:
-    """One packet: UTC time, ping number, sound speed, two-way times (n,), angles (n,)."""
+class Ping(NamedTuple):
+    """One packet's contents; ``steps`` is None where angles are evenly spaced from ``first_rad`` to ``second``."""
 
     seconds: int
     nanoseconds: int
     number: int
     sound_speed_m_s: float
-    two_way_time_s: NDArray[np.float64]
-    angle_rad: NDArray[np.float64]
-
-
-def parse_packet(packet: bytes) -> Ping | None:
-    """A packet's ping; None if it is damaged or lacks H0, R0 or an angle section."""
-    sections: dict[bytes, bytes] = {}
-    at = 12
-    while at + 4 <= len(packet):
-        size = int.from_bytes(packet[at + 2 : at + 4], "big")
-        if size < 4 or at + size > len(packet):
-            return None
-        sections[packet[at : at + 2]] = packet[at : at + size]
-        at += size
-    head, ranges = sections.get(b"H0", b""), sections.get(b"R0", b"")
-    if len(head) < 116:
-        return None
-    seconds, nanoseconds, number, _, speed = struct.unpack_from(">IIIff", head, 28)
-    points = int.from_bytes(head[114:116], "big")
-    if points == 0 or nanoseconds >= 1_000_000_000 or len(ranges) < 8 + 2 * points:
-        return None
-    scale = struct.unpack_from(">f", ranges, 4)[0]
-    times = np.frombuffer(ranges, ">u2", points, 8).astype(np.float64) * scale
-    angles = _angles(sections, points)
-    return None if angles is None else Ping(seconds, nanoseconds, number, speed, times, angles)
-
-
-def _angles(sections: dict[bytes, bytes], points: int) -> NDArray[np.float64] | None:
-    even, steps = sections.get(b"A0", b""), sections.get(b"A2", b"")
-    if len(even) >= 12:
-        first, last = struct.unpack_from(">ff", even, 4)
-        return np.linspace(first, last, points) if points > 1 else np.array([float(first)])
-    if len(steps) >= 36 + 2 * points:
-        first, scale = struct.unpack_from(">ff", steps, 4)
-        total = np.cumsum(np.frombuffer(steps, ">u2", points, 36), dtype=np.uint32)
-        return first + total.astype(np.float64) * scale
-    return None
+    range_scale_s: float
+    ranges: NDArray[np.uint16]
+    first_rad: float
+    second: float
+    steps: NDArray[np.uint16] | None
 
 
 @dataclass(frozen=True)
-class R2SonicPart:
-    """One file of packets, ``container``: "xtf" or "r2sonic" (bare, or each preceded by its length as HYPACK does)."""
+class R2sonicPart:
+    """One file: XTF, bare packets, or HYPACK .R2S."""
 
     path: Path
     name: str
-    container: str
+    xtf: bool
     latency_s: float
 
     def chunks(self) -> Iterator[Chunk]:
         dropped: Counter[str] = Counter()
         pings: list[Ping] = []
-        packets = _xtf_packets(self.path, dropped) if self.container == "xtf" else _bare_packets(self.path, dropped)
-        for packet in packets:
-            ping = parse_packet(packet)
-            if ping is None:
-                dropped["damaged packet"] += 1
-                continue
-            pings.append(ping)
-            if len(pings) == CHUNK_PINGS:
-                yield self._chunk(pings, dropped)
-                pings = []
-                dropped.clear()  # the generator of packets counts into this very one
-        yield self._chunk(pings, dropped)
-
-    def _chunk(self, pings: list[Ping], dropped: Counter[str]) -> Chunk:
-        counts = np.array([len(ping.two_way_time_s) for ping in pings], dtype=np.int64)
-        t_ns = gps_ns_from_unix_utc(
-            np.array([ping.seconds for ping in pings], dtype=np.int64),
-            np.array([ping.nanoseconds for ping in pings], dtype=np.int64),
-        )
-        none = np.empty(0)
-        return sounding_columns(
-            np.repeat(t_ns, counts),
-            self.latency_s,
-            np.repeat(np.array([ping.number for ping in pings], dtype=np.int64), counts),
-            np.concatenate([np.arange(n, dtype=np.int16) for n in counts] or [none]),
-            np.concatenate([ping.two_way_time_s for ping in pings] or [none]),
-            np.concatenate([ping.angle_rad for ping in pings] or [none]),
-            np.repeat(np.array([ping.sound_speed_m_s for ping in pings], dtype=np.float64), counts),
-            dict(dropped),
-        )
+        waiting = 0
+        with opened(self.path, self.name) as file:
+            packets = xtf_packets(file, dropped) if self.xtf else bare_packets(file, dropped)
+            for sections in packets:
+                ping = decode(sections)
+                if ping is None:
+                    dropped["damaged packet"] += 1
+                    continue
+                pings.append(ping)
+                waiting += len(ping.ranges)
+                if waiting >= SOUNDINGS or len(pings) >= PINGS:
+                    yield _chunk(pings, self.latency_s, dropped)
+                    pings, waiting = [], 0
+            if waiting:
+                yield _chunk(pings, self.latency_s, dropped)
+            if dropped:
+                yield no_rows(MBES_COLUMNS, dropped)
 
 
-def _packet_at(data: bytes, at: int) -> bytes | None:
-    size = int.from_bytes(data[at + 4 : at + 8], "big")
-    return data[at : at + size] if 12 <= size <= min(MAX_PACKET, len(data) - at) else None
+def decode(sections: Sections) -> Ping | None:
+    """The contents of one packet; None where they contradict themselves."""
+    head, ranges, a0, a2 = (sections.get(name, b"") for name in (b"H0", b"R0", b"A0", b"A2"))
+    if len(head) < HEAD.size or len(ranges) < SCALE.size:
+        return None
+    seconds, nanoseconds, number, speed, points = HEAD.unpack_from(head)
+    if points > MAX_POINTS or nanoseconds >= NS or len(ranges) < SCALE.size + 2 * points:
+        return None
+    steps = None
+    if len(a2) >= STEPS + 2 * points:
+        steps = np.frombuffer(a2, ">u2", points, STEPS)
+    elif a2 or len(a0) < TWO_FLOATS.size:
+        return None
+    first, second = TWO_FLOATS.unpack_from(a2 or a0)
+    (scale,) = SCALE.unpack_from(ranges)
+    ticks = np.frombuffer(ranges, ">u2", points, SCALE.size)
+    return Ping(seconds, nanoseconds, number, speed, scale, ticks, first, second, steps)
 
 
-def _xtf_packets(path: Path, dropped: Counter[str]) -> Iterator[bytes]:
-    """Packets in the records that pyxtf does not know; found by their magic, not by an offset."""
-    import pyxtf
-
-    # For good: "catch_warnings" is not safe where two files are read side by side.
-    warnings.filterwarnings("ignore", category=UserWarning, module=r"pyxtf\..*")
-    try:
-        for record in pyxtf.xtf_read_gen(str(path)):
-            data = bytes(getattr(record, "data", b"") or b"") if type(record).__name__ == "XTFUnknownPacket" else b""
-            at = data.find(MAGIC)
-            if at < 0:
-                continue
-            packet = _packet_at(data, at)
-            if packet is None:
-                dropped["damaged packet"] += 1
-            else:
-                yield packet
-    except (RuntimeError, ValueError, EOFError, struct.error, IndexError, KeyError, TypeError, AttributeError):
-        dropped["truncated or damaged XTF record"] += 1
-    except OSError as error:
-        raise RawDataError(f"{path}: cannot be read ({error.strerror}); copy it again") from error
+def _angles(ping: Ping) -> NDArray[np.float64]:
+    if ping.steps is None:
+        return np.linspace(ping.first_rad, ping.second, len(ping.ranges), dtype=np.float64)
+    sums: NDArray[np.int64] = np.cumsum(ping.steps, dtype=np.int64)
+    return np.asarray(ping.first_rad + sums * ping.second, dtype=np.float64)
 
 
-def _bare_packets(path: Path, dropped: Counter[str]) -> Iterator[bytes]:
-    """Packets one after another; what lies between them (HYPACK's four bytes of length apart) is counted."""
-    data = b""
-    try:
-        with path.open("rb") as file:
-            while True:
-                block = file.read(READ_BYTES)
-                data += block
-                at = data.find(MAGIC)
-                used = 0
-                while at >= 0:
-                    size = int.from_bytes(data[at + 4 : at + 8], "big") if at + 8 <= len(data) else 0
-                    if at + 8 > len(data) or (12 <= size <= MAX_PACKET and at + size > len(data) and block):
-                        break  # the rest comes with the next block
-                    if at - used not in (0, 4):
-                        dropped["stray bytes between packets"] += 1
-                    packet = _packet_at(data, at)
-                    if packet is None:
-                        dropped["truncated packet" if 12 <= size <= MAX_PACKET else "damaged packet"] += 1
-                        used = at + 4
-                    else:
-                        yield packet
-                        used = at + size
-                    at = data.find(MAGIC, used)
-                data = data[max(used, len(data) - MAX_PACKET - 8 if at < 0 else at) :]
-                if not block:
-                    return
-    except OSError as error:
-        raise RawDataError(f"{path}: cannot be read ({error.strerror}); copy it again") from error
+@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+def _chunk(pings: list[Ping], latency_s: float, dropped: Counter[str]) -> Chunk:
+    counts = np.array([len(ping.ranges) for ping in pings])
+    seconds = np.array([ping.seconds for ping in pings], dtype=np.int64)
+    nanoseconds = np.array([ping.nanoseconds for ping in pings], dtype=np.int64)
+    t_ns = gps_ns_from_unix_utc(seconds, nanoseconds)
+
+    def spread(values: Any, dtype: Any) -> NDArray[Any]:
+        return np.repeat(np.asarray(values, dtype=dtype), counts)
+
+    scale_s = spread([ping.range_scale_s for ping in pings], np.float64)
+    two_way_time_s = np.concatenate([ping.ranges for ping in pings]).astype(np.float64) * scale_s
+    angle_rad = np.concatenate([_angles(ping) for ping in pings])
+    sieve = Sieve(
+        {
+            "t_ns": spread(t_ns, np.int64),
+            "ping": spread([ping.number for ping in pings], np.int64),
+            "beam": np.concatenate([np.arange(count, dtype=np.int16) for count in counts]),
+            "two_way_time_s": two_way_time_s,
+            "angle_rad": angle_rad,
+            "sound_speed_m_s": spread([ping.sound_speed_m_s for ping in pings], np.float64),
+        },
+        dropped,
+    )
+    sieve.keep(possible_ns(sieve["t_ns"]), "impossible time (clock not set)")
+    keep_possible_soundings(sieve)
+    sieve.columns["t_ns"] = sieve["t_ns"] - latency_ns(latency_s)
+    return chunk(sieve.columns, MBES_COLUMNS, dropped)

@@ -1,103 +1,151 @@
-"""Plain tables, CSV or Parquet, for any sensor; times as gps_ns, or gps_week and seconds_of_week.
+"""Tables, CSV or Parquet, for instruments whose own format is not read.
 
-* ins: latitude_deg, longitude_deg, height_m (ellipsoidal), roll_deg (starboard down +), pitch_deg (bow up +), heading_deg
-  (clockwise from true north)
-* laser: x_m, y_m, z_m (frame as in session.yaml)
-* mbes: ping, beam, angle_deg (starboard +), sound_speed_m_s, and two_way_time_s or range_m (one way)
+Columns by name (others are ignored; in CSV the first line that does not begin with # or // names them; separated by
+comma, semicolon or tab; numbers with a decimal point):
+
+    every sensor  gps_ns                            nanoseconds since 1980-01-06 00:00:00 GPS, whole number; or
+                  gps_week, seconds_of_week         GPS week (not modulo 1024) and seconds of week
+    ins           latitude_deg, longitude_deg, height_m (ellipsoidal), roll_deg (starboard down +),
+                  pitch_deg (bow up +), heading_deg (clockwise from true north)
+    laser         x_m, y_m, z_m                     in the frame that session.yaml names
+    mbes          ping, beam, angle_deg (starboard +), sound_speed_m_s, and two_way_time_s or range_m (one way)
+
+A CSV row of the wrong number of columns, and a last line without line end (it may be cut off), are left out and
+counted. A word where a number should be is refused, as are times and positions that have been stored as float32.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv as pa_csv
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.readers.las import _in_frame
-from pipeline.readers.records import count, ins_columns, keep, latency, sounding_columns
+from pipeline.readers.crs import to_ecef
+from pipeline.readers.files import opened
+from pipeline.readers.sieve import (
+    INS_COLUMNS,
+    LASER_COLUMNS,
+    MBES_COLUMNS,
+    Order,
+    Sieve,
+    chunk,
+    keep_possible_poses,
+    keep_possible_soundings,
+    latency_ns,
+    no_rows,
+    possible_ns,
+    possible_week_time,
+    through_float32,
+)
+from pipeline.readers.tabular import WHOLE, Sensor, batches
 from pipeline.streams import Chunk
 from pipeline.times import gps_ns_from_week_seconds
 
-NEEDED = {
-    "ins": ("latitude_deg", "longitude_deg", "height_m", "roll_deg", "pitch_deg", "heading_deg"),
-    "laser": ("x_m", "y_m", "z_m"),
-    "mbes": ("ping", "beam", "angle_deg", "sound_speed_m_s"),
-}
-ROWS = 262_144
+CANONICAL = {"ins": INS_COLUMNS, "laser": LASER_COLUMNS, "mbes": MBES_COLUMNS}
 
 
 @dataclass(frozen=True)
 class TablePart:
-    """One table of one sensor."""
+    """One table."""
 
     path: Path
     name: str
-    sensor: str
-    kind: str  # csv or parquet
+    sensor: Sensor
+    frame: str
     latency_s: float
-    frame: str = "laser"
 
     def chunks(self) -> Iterator[Chunk]:
-        try:
-            for batch in self._batches():
-                yield self._chunk(batch)
-        except (pa.ArrowInvalid, pa.ArrowTypeError, OSError) as error:
-            raise RawDataError(f"{self.path}: cannot be read as a table: {error}; export it again") from error
+        dropped: Counter[str] = Counter()
+        order = Order(self.name)
+        canonical = CANONICAL[self.sensor]
+        first = True
+        with opened(self.path, self.name) as file:
+            for batch in batches(file, self.name, self.sensor, dropped):
+                columns = _numpy(batch, dropped)
+                if first:
+                    _refuse_float32(columns, self.name)
+                    first = False
+                yield self._chunk(columns, order, dropped)
+            if dropped:
+                yield no_rows(canonical, dropped)
+        order.check()
 
-    def _batches(self) -> Iterator[pa.RecordBatch]:
-        if self.kind == "parquet":
-            with pq.ParquetFile(self.path) as file:
-                self._check(file.schema_arrow.names)
-                yield from file.iter_batches(ROWS)
-            return
-        options = pa_csv.ConvertOptions(column_types={"gps_ns": pa.int64(), "gps_week": pa.int64()})
-        with pa_csv.open_csv(self.path, convert_options=options) as reader:
-            self._check(reader.schema.names)
-            yield from reader
-
-    def _check(self, names: list[str]) -> None:
-        missing = [name for name in NEEDED[self.sensor] if name not in names]
-        if "gps_ns" not in names and not {"gps_week", "seconds_of_week"} <= set(names):
-            missing.append("gps_ns (or gps_week and seconds_of_week)")
-        if self.sensor == "mbes" and not {"two_way_time_s", "range_m"} & set(names):
-            missing.append("two_way_time_s (or range_m)")
-        if missing:
-            raise RawDataError(f"{self.path}: lacks column {', '.join(missing)}; README.md lists the columns of tables")
-
-    def _chunk(self, batch: pa.RecordBatch) -> Chunk:
-        def column(name: str) -> NDArray[np.float64]:
-            return np.asarray(batch[name].cast(pa.float64()).to_numpy(zero_copy_only=False), dtype=np.float64)
-
-        names = set(batch.schema.names)
-        dropped: dict[str, int] = {}
-        if "gps_ns" in names:
-            if not pa.types.is_integer(batch["gps_ns"].type):
-                raise RawDataError(f"{self.path}: gps_ns must be whole numbers: a double holds no nanoseconds of GPS time")
-            t_ns = np.asarray(batch["gps_ns"].fill_null(-1).to_numpy(zero_copy_only=False)).astype(np.int64)
-        else:
-            week, seconds = column("gps_week"), column("seconds_of_week")
-            bad = ~(np.isfinite(week) & np.isfinite(seconds))
-            t_ns = gps_ns_from_week_seconds(np.where(bad, 0, week).astype(np.int64), np.where(bad, 0.0, seconds))
-            t_ns[bad] = -1
-        values = [column(name) for name in NEEDED[self.sensor]]
+    @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+    def _chunk(self, columns: dict[str, NDArray[Any]], order: Order, dropped: Counter[str]) -> Chunk:
+        sieve = Sieve(columns, dropped)
+        _keep_timed(sieve, self.latency_s)
         if self.sensor == "ins":
-            return ins_columns(t_ns, self.latency_s, *values, dropped=dropped)
-        if self.sensor == "laser":
-            good = np.all(np.isfinite(np.array(values)), axis=0) & (t_ns > 0)
-            count(dropped, "not a number", int((~good).sum()))
-            xyz = _in_frame(dict(zip("xyz", values, strict=True)), self.frame)
-            columns: dict[str, NDArray[np.generic]] = {"t_ns": latency(t_ns, self.latency_s)}
-            return Chunk(keep(columns | {f"{axis}_m": v for axis, v in xyz.items()}, good), dropped)
-        ping, beam, angle, speed = values
-        time = column("two_way_time_s") if "two_way_time_s" in names else 2 * column("range_m") / speed
-        good = np.isfinite(ping) & np.isfinite(beam) & (np.abs(beam) < 32_768)
-        count(dropped, "not a number", int((~good).sum()))
-        whole = [np.where(good, v, 0.0) for v in (ping, beam)]
-        time = np.where(good, time, np.nan)
-        return sounding_columns(
-            t_ns, self.latency_s, whole[0].astype(np.int64), whole[1].astype(np.int16), time, np.radians(angle), speed, dropped
-        )
+            _to_poses(sieve)
+            order.keep(sieve)
+        elif self.sensor == "laser":
+            _to_points(sieve, self.frame)
+        else:
+            _to_soundings(sieve)
+        return chunk(sieve.columns, CANONICAL[self.sensor], dropped)
+
+
+def _numpy(batch: pa.RecordBatch, dropped: Counter[str]) -> dict[str, NDArray[Any]]:
+    whole = batch.drop_null()
+    if whole.num_rows < batch.num_rows:
+        dropped["missing value"] += batch.num_rows - whole.num_rows
+    columns = {}
+    for column in whole.schema.names:
+        values = whole[column].to_numpy(zero_copy_only=False)
+        columns[column] = values if column in WHOLE else values.astype(np.float64)
+    return columns
+
+
+@np.errstate(all="ignore")
+def _refuse_float32(columns: dict[str, NDArray[Any]], name: str) -> None:
+    seconds = columns.get("seconds_of_week")
+    degraded = seconds is not None and through_float32(seconds)
+    for column in ("latitude_deg", "longitude_deg"):
+        values = columns.get(column)
+        if values is not None and len(values) >= 20 and len(np.unique(values)) > 1:
+            degraded = degraded or bool(np.all(np.abs(values - values.astype(np.float32)) < 1e-11))
+    if degraded:
+        raise RawDataError(f"{name}: its times or positions went through float32; export it again in double precision")
+
+
+def _keep_timed(sieve: Sieve, latency_s: float) -> None:
+    """Column t_ns, latency taken off, in place of the table's own time."""
+    for column in WHOLE:
+        if column in sieve.columns and sieve[column].dtype.kind == "f":
+            sieve.keep(np.isfinite(sieve[column]) & (np.abs(sieve[column]) < 1e15), "not a whole number")
+            sieve.keep(sieve[column] == np.rint(sieve[column]), "not a whole number")
+    if "gps_ns" in sieve.columns:
+        sieve.keep(possible_ns(sieve["gps_ns"]), "impossible time")
+        t_ns = sieve["gps_ns"].astype(np.int64)
+    else:
+        sieve.keep(possible_week_time(sieve["gps_week"], sieve["seconds_of_week"]), "impossible time")
+        t_ns = gps_ns_from_week_seconds(sieve["gps_week"].astype(np.int64), sieve["seconds_of_week"])
+    sieve.columns["t_ns"] = t_ns - latency_ns(latency_s)
+
+
+def _to_poses(sieve: Sieve) -> None:
+    for name in ("latitude", "longitude", "roll", "pitch", "heading"):
+        sieve.columns[f"{name}_rad"] = np.radians(sieve[f"{name}_deg"])
+    sieve.columns["azimuth_rad"] = sieve["heading_rad"]
+    keep_possible_poses(sieve)
+
+
+def _to_points(sieve: Sieve, frame: str) -> None:
+    sieve.keep_finite()
+    transform = to_ecef(frame)
+    if transform is not None:
+        moved = transform(sieve["x_m"], sieve["y_m"], sieve["z_m"])
+        sieve.columns |= dict(zip(("x_m", "y_m", "z_m"), moved, strict=True))
+        sieve.keep_finite()
+
+
+def _to_soundings(sieve: Sieve) -> None:
+    sieve.keep((sieve["beam"] >= 0) & (sieve["beam"] <= np.iinfo(np.int16).max), "impossible beam")
+    sieve.columns["angle_rad"] = np.radians(sieve["angle_deg"])
+    if "two_way_time_s" not in sieve.columns:
+        sieve.columns["two_way_time_s"] = 2 * sieve["range_m"] / sieve["sound_speed_m_s"]
+    keep_possible_soundings(sieve)

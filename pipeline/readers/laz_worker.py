@@ -1,0 +1,48 @@
+"""Unpacks points of a LAZ file in a process of its own: ``python -P laz_worker.py FILE START STOP BATCH``.
+
+lazrs 0.8 can die of a damaged file (segmentation fault, failed allocation, panic) instead of raising. Here only this
+process dies, and :mod:`pipeline.readers.laz` says which file it was. It imports nothing of the project.
+
+Standard output, native byte order: per batch an int64 count, then that many float64 GPS times, x, y and z; at the end a
+count of 0. An error: -1, an int64 length, and so many bytes of UTF-8.
+"""
+
+import sys
+
+import numpy as np
+
+MEMORY_BYTES = 1 << 30  # written to; a batch and its chunks need a twentieth
+
+
+def main(path: str, start: int, stop: int, batch: int) -> None:
+    import resource
+
+    import laspy
+
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    wanted = laspy.DecompressionSelection
+    selection = wanted.base() | wanted.XY_RETURNS_CHANNEL | wanted.Z | wanted.GPS_TIME
+    out = sys.stdout.buffer
+    with laspy.open(path, read_evlrs=False, decompression_selection=selection) as reader:
+        if start:
+            reader.seek(start)
+        while start < stop:
+            points = reader.read_points(min(batch, stop - start))
+            if not len(points):
+                break
+            out.write(np.int64(len(points)).tobytes())
+            for values in (points.gps_time, points.x, points.y, points.z):
+                out.write(np.ascontiguousarray(values, dtype=np.float64).tobytes())
+            start += len(points)
+    out.write(np.int64(0).tobytes())
+    out.flush()
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1], *(int(word) for word in sys.argv[2:]))
+    except Exception as error:  # the parent makes one RawDataError of it
+        told = f"{type(error).__name__}: {error}".encode()
+        sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(told)).tobytes() + told)
+        sys.stdout.buffer.flush()

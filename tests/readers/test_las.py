@@ -1,0 +1,253 @@
+"""LAS and LAZ, byte by byte."""
+
+import io
+import struct
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pytest
+
+from pipeline.errors import ConfigError, PoolcalError, RawDataError
+from pipeline.readers import las as reader
+from pipeline.readers import raw_parts
+from tests.readers import build
+from tests.readers.build import WEEK, las, read, rows
+
+NS = 1_000_000_000
+WEEK_NS = 604_800 * NS
+ADJUSTED = 400_000_000.0  # 2024-05
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "a.las"
+
+
+def some(count: int, first_s: float = ADJUSTED + 0.001, step_s: float = 0.001) -> list[tuple[int, int, int, float]]:
+    return [(k, -2 * k, 1000 + k, first_s + k * step_s) for k in range(count)]
+
+
+def laz_of(content: bytes) -> bytes:
+    points = laspy.read(io.BytesIO(content))
+    out = io.BytesIO()
+    points.write(out, do_compress=True)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
+def test_adjusted_standard_time(compress, file: Path) -> None:  # type: ignore[no-untyped-def]
+    file.write_bytes(compress(las([(1, -2, 3, ADJUSTED + 0.25), (2**31 - 1, -(2**31), 0, ADJUSTED + 0.5)])))
+    columns, dropped = read("laser", file, "las")
+    assert not dropped
+    assert columns["t_ns"].tolist() == [1_400_000_000 * NS + NS // 4, 1_400_000_000 * NS + NS // 2]
+    assert columns["x_m"] == pytest.approx([0.001, 2_147_483.647], rel=1e-15)
+    assert columns["y_m"] == pytest.approx([-0.002, -2_147_483.648], rel=1e-15)
+    assert columns["z_m"] == pytest.approx([0.003, 0.0], rel=1e-15)
+
+
+def test_adjusted_time_needs_no_week(file: Path) -> None:
+    file.write_bytes(las(some(3)))
+    columns, _ = read("laser", file, "las", gps_week=1234)
+    assert columns["t_ns"][0] // NS == 1_400_000_000
+
+
+@pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
+def test_week_seconds(compress, file: Path) -> None:  # type: ignore[no-untyped-def]
+    file.write_bytes(compress(las([(0, 0, 1, 1000.25), (0, 0, 2, 1000.375)], adjusted=False)))
+    columns, dropped = read("laser", file, "las", gps_week=WEEK)
+    assert not dropped
+    assert (columns["t_ns"] - WEEK * WEEK_NS).tolist() == [1000 * NS + NS // 4, 1000 * NS + 3 * NS // 8]
+
+
+def test_week_seconds_without_week(file: Path) -> None:
+    file.write_bytes(las(some(3, 1000.001), adjusted=False))
+    with pytest.raises(ConfigError, match=r"laser\.gps_week.*a\.las.*GPS week"):
+        read("laser", file, "las")
+
+
+def test_week_seconds_over_the_end_of_the_week(file: Path) -> None:
+    times = [604_799.25, 604_799.5, 0.125, 0.375]
+    file.write_bytes(las([(0, 0, 1, time) for time in times], adjusted=False))
+    columns, _ = read("laser", file, "las", gps_week=WEEK)
+    assert np.diff(columns["t_ns"]).tolist() == [NS // 4, NS * 5 // 8, NS // 4]
+
+
+def test_files_on_both_sides_of_the_end_of_the_week(tmp_path: Path) -> None:
+    """gps_week is the first file's; the second begins in the next."""
+    (tmp_path / "a.las").write_bytes(las(some(3, 604_790.0), adjusted=False))
+    (tmp_path / "b.las").write_bytes(las(some(3, 5.0), adjusted=False))
+    settings = build.settings("laser", ["*.las"], "las", gps_week=WEEK)
+    starts = [next(part.chunks()).columns["t_ns"][0] for part in raw_parts("laser", settings, tmp_path)]
+    assert [int(start) - WEEK * WEEK_NS for start in starts] == [604_790 * NS, 604_805 * NS]
+
+
+@pytest.mark.parametrize("latency_s", [0.02, -0.1])
+def test_latency_is_taken_off(latency_s: float, file: Path) -> None:
+    file.write_bytes(las([(0, 0, 1, ADJUSTED + 1.0)]))
+    columns, _ = read("laser", file, "las", latency_s=latency_s)
+    assert columns["t_ns"][0] == 1_400_000_001 * NS - round(latency_s * NS)
+
+
+def test_flag_that_contradicts_the_times(file: Path) -> None:
+    file.write_bytes(las(some(3), adjusted=False))
+    with pytest.raises(RawDataError, match=r"a\.las.*seconds of GPS week.*export"):
+        read("laser", file, "las", gps_week=WEEK)
+    file.write_bytes(las(some(3, 345_600.001), adjusted=True))
+    with pytest.raises(RawDataError, match=r"a\.las.*adjusted standard.*export"):
+        read("laser", file, "las")
+
+
+def test_without_times(file: Path) -> None:
+    file.write_bytes(las(some(3), point_format=0))
+    with pytest.raises(RawDataError, match=r"a\.las.*no GPS time.*export"):
+        read("laser", file, "las")
+    file.write_bytes(las([(1, 2, 3, 0.0)] * 5))
+    with pytest.raises(RawDataError, match=r"a\.las.*GPS times are 0.*export"):
+        read("laser", file, "las")
+
+
+def test_times_of_single_precision(file: Path) -> None:
+    times = np.float32(345_600) + np.arange(1000, dtype=np.float32) / np.float32(32)
+    file.write_bytes(las([(0, 0, 1, float(time)) for time in times], adjusted=False))
+    with pytest.raises(RawDataError, match=r"a\.las.*float32.*export"):
+        read("laser", file, "las", gps_week=WEEK)
+
+
+@pytest.mark.parametrize("time", [NAN, INF, -INF, 0.0, -1e15, 1e300])
+def test_impossible_times(time: float, file: Path) -> None:
+    file.write_bytes(las([(0, 0, 1, ADJUSTED + 0.001), (0, 0, 2, time), (0, 0, 3, ADJUSTED + 0.003)]))
+    columns, dropped = read("laser", file, "las")
+    assert columns["z_m"].tolist() == pytest.approx([0.001, 0.003])
+    assert sum(dropped.values()) == 1
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.001, NAN, INF])
+def test_impossible_scale(scale: float, file: Path) -> None:
+    file.write_bytes(las(some(3), scale=scale))
+    with pytest.raises(RawDataError, match=r"a\.las.*header"):
+        read("laser", file, "las")
+
+
+def test_no_points(file: Path) -> None:
+    file.write_bytes(las([]))
+    columns, dropped = read("laser", file, "las")
+    assert rows(columns) == 0
+    assert not dropped
+
+
+@pytest.mark.parametrize("claimed", [4, 1000, 2**32 + 5, 2**63])
+def test_header_that_claims_more_than_there_is(claimed: int, file: Path) -> None:
+    file.write_bytes(las(some(3), claimed=claimed))
+    columns, dropped = read("laser", file, "las")
+    assert rows(columns) == 3
+    assert dropped == {"truncated": claimed - 3}
+
+
+@pytest.mark.parametrize("claimed", [1000, 4_000_000_000])
+def test_laz_header_that_claims_more_than_there_is(claimed: int, file: Path) -> None:
+    content = bytearray(laz_of(las(some(50))))
+    content[247:255] = struct.pack("<Q", claimed)
+    file.write_bytes(content)
+    try:
+        columns, dropped = read("laser", file, "las")
+    except RawDataError as error:
+        assert "a.las" in str(error)  # noqa: PT017
+    else:
+        assert rows(columns) <= 50
+        assert rows(columns) + sum(dropped.values()) == claimed
+
+
+@pytest.mark.parametrize(("offset", "value"), [(94, 60_000), (96, 2**32 - 1), (100, 2**32 - 1), (105, 0), (104, 0x3F)])
+def test_damaged_header(offset: int, value: int, file: Path) -> None:
+    content = bytearray(las(some(3)))
+    size = {94: 2, 96: 4, 100: 4, 105: 2, 104: 1}[offset]
+    content[offset : offset + size] = value.to_bytes(size, "little")
+    file.write_bytes(content)
+    with pytest.raises(RawDataError, match=r"a\.las.*copy or export it again"):
+        read("laser", file, "las")
+
+
+@pytest.mark.parametrize("tenth", range(1, 10))
+@pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
+def test_cut_at_each_tenth(compress, tenth: int, file: Path) -> None:  # type: ignore[no-untyped-def]
+    whole = compress(las(some(60)))
+    cut = len(whole) * tenth // 10 + 1
+    file.write_bytes(whole[:cut])
+    try:
+        columns, dropped = read("laser", file, "las")
+    except PoolcalError as error:
+        assert "\n" not in str(error)  # noqa: PT017
+        assert compress is laz_of or cut < 375
+    else:
+        before = max(0, (cut - 375) // 30)
+        assert columns["z_m"].tolist() == pytest.approx([1.0 + k / 1000 for k in range(before)])
+        assert dropped == {"truncated": 60 - before}
+
+
+@pytest.mark.parametrize(
+    ("compress", "stretch"), [(bytes, 1), (bytes, 7), (bytes, 99), (bytes, 100), (bytes, 101), (laz_of, 40)]
+)
+def test_stretches_are_the_whole(compress, stretch: int, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
+    file.write_bytes(compress(las(some(100))))
+    whole, _ = read("laser", file, "las")
+    monkeypatch.setattr(reader, "STRETCH", stretch)
+    parts = raw_parts("laser", build.settings("laser", [file.name], "las"), file.parent)
+    assert len(parts) == -(-100 // stretch)
+    assert len({part.name for part in parts}) == len(parts)
+    pieces = [chunk for part in parts for chunk in part.chunks()]
+    for name, values in whole.items():
+        assert np.array_equal(np.concatenate([piece.columns[name] for piece in pieces]), values)
+    assert not any(piece.dropped for piece in pieces)
+
+
+def test_stretches_of_a_cut_file_count_its_loss_once(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reader, "STRETCH", 20)
+    file.write_bytes(las(some(50), claimed=90))
+    columns, dropped = read("laser", file, "las")
+    assert rows(columns) == 50
+    assert dropped == {"truncated": 40}
+
+
+# --- frames ----------------------------------------------------------------------------------------------------------
+def _one(file: Path, x: float, y: float, z: float) -> None:
+    file.write_bytes(las([(round(x * 1e6), round(y * 1e6), round(z * 1e6), ADJUSTED + 0.001)], scale=1e-6))
+
+
+def test_geographic_frame_becomes_ecef(file: Path) -> None:
+    """EPSG:4979, x = longitude, y = latitude; on the equator ECEF is known without a program."""
+    _one(file, 90.0, 0.0, 10.0)
+    columns, _ = read("laser", file, "las", frame="EPSG:4979")
+    assert [columns[name][0] for name in ("x_m", "y_m", "z_m")] == pytest.approx([0.0, 6_378_147.0, 0.0], abs=1e-6)
+
+
+def test_ecef_frame_stays(file: Path) -> None:
+    _one(file, 1.5, 2.5, -3.5)
+    columns, _ = read("laser", file, "las", frame="EPSG:4978")
+    assert [columns[name][0] for name in ("x_m", "y_m", "z_m")] == pytest.approx([1.5, 2.5, -3.5])
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"),
+    [
+        ("EPSG:0", "EPSG:4978"),
+        ("lasers", "EPSG:4978"),
+        ("EPSG:32651", "height"),
+        ("EPSG:4326", "height"),
+        ("\0", "laser"),
+    ],
+)
+def test_frame_that_cannot_be_used(frame: str, words: str, file: Path) -> None:
+    _one(file, 1.0, 2.0, 3.0)
+    with pytest.raises(ConfigError, match=rf"laser\.frame.*{words}") as error:
+        read("laser", file, "las", frame=frame)
+    assert "\n" not in str(error.value)
+
+
+def test_points_that_the_frame_cannot_hold(file: Path) -> None:
+    points = [(0, 0, 1, ADJUSTED + 0.001), (0, 900_000_000, 1, ADJUSTED + 0.002)]  # latitude 900 degrees
+    file.write_bytes(las(points, scale=1e-6))
+    columns, dropped = read("laser", file, "las", frame="EPSG:4979")
+    assert rows(columns) == 1
+    assert sum(dropped.values()) == 1

@@ -1,0 +1,60 @@
+"""Files from real instruments. They are not part of the program: POOLCAL_DATA names the folder that holds them."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.config import Ins, Laser, Mbes, Mount
+from pipeline.readers import Sensor, raw_parts
+
+DEFAULT = Path(__file__).parents[3] / "shared" / "data"
+MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
+Columns = dict[str, np.ndarray]
+Read = Callable[..., tuple[Columns, dict[str, int]]]
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of real files."""
+    folder = Path(os.environ.get("POOLCAL_DATA") or DEFAULT)
+    if not folder.is_dir():
+        pytest.skip(f"no real files: {folder} is no folder; set POOLCAL_DATA to the one that holds them")
+    return folder
+
+
+def settings_of(sensor: Sensor, name: str, kind: str, **more: Any) -> Ins | Laser | Mbes:
+    if sensor == "ins":
+        return Ins(files=[name], format=kind, **more)  # type: ignore[arg-type]
+    if sensor == "laser":
+        return Laser(files=[name], format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
+    return Mbes(files=[name], format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def read(data: Path, tmp_path: Path) -> Read:
+    """Reads a file as a session would: all its rows, and what was left out by reason."""
+
+    def read_(sensor: Sensor, kind: str, name: str, content: bytes | None = None, **more: Any) -> Any:
+        path = tmp_path / Path(name).name
+        if content is None:
+            shutil.copy(data / name, path)
+        else:
+            path.write_bytes(content)
+        chunks = [
+            chunk for part in raw_parts(sensor, settings_of(sensor, path.name, kind, **more), tmp_path)
+            for chunk in part.chunks()
+        ]
+        dropped: dict[str, int] = {}
+        for chunk in chunks:
+            for reason, number in chunk.dropped.items():
+                dropped[reason] = dropped.get(reason, 0) + number
+        full = [chunk.columns for chunk in chunks if chunk.columns]
+        names = full[0] if full else {}
+        return {name: np.concatenate([columns[name] for columns in full]) for name in names}, dropped
+
+    return read_
