@@ -75,7 +75,8 @@ def session_of(size: str) -> Path:
         FOLDER.mkdir(parents=True, exist_ok=True)
         scenario = FOLDER / f"{size}.yaml"
         scenario.write_text(yaml.safe_dump({"name": size, "track": SIZES[size], **INSTRUMENTS}))
-        subprocess.run([*POOLCAL, "simulate", str(folder), "--scenario", str(scenario)], check=True, capture_output=True)
+        command = [*POOLCAL, "simulate", str(folder), "--scenario", str(scenario)]
+        subprocess.run(command, check=True, capture_output=True)
     return folder
 
 
