@@ -34,23 +34,26 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
     result, settings = calibration(run), read_settings(run)
     R_true, lever_arm_true_m = read_truth(truth_path)
     chosen = settings.pool.result
-    good = result["verdict"] == "accepted"
-    lines = [f"session {result['session']}: {result['verdict']}" + "".join(f"\n  {r}" for r in result["reasons"])]
-    for method, values in result["methods"].items():
-        error = errors_of(values, R_true, lever_arm_true_m)
-        sigma = _sigma_of(values)
-        mark = "  <- the result" if method == chosen else ""
-        lines += ["", f"{method}{mark}", *_table(settings.session.mbes.mount, values, R_true, lever_arm_true_m, sigma)]
-        if method == chosen:
-            limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
-            good = good and error is not None and bool(np.all(np.abs(error) <= limit))
-    what = "sigma" if _sigma_of(result["methods"][chosen]) is not None else "the largest sigma allowed"
+    values = result["methods"][chosen]
+    error, sigma = errors_of(values, R_true, lever_arm_true_m), _sigma_of(values)
+    lines = [f"session {result['session']}: {result['verdict']}", *(f"  {reason}" for reason in result["reasons"])]
+    lines += ["", f"{chosen} (the result)"]
+    lines += _table(settings.session.mbes.mount, values, R_true, lever_arm_true_m, sigma)
+    lines += ["", f"errors of all:       {''.join(f'{name:>10}' for name, *_ in ROWS)}   (deg, m)"]
+    for method, other in result["methods"].items():
+        lines.append(f"  {method:19}{_error_row(errors_of(other, R_true, lever_arm_true_m))}")
+    limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
+    within = error is not None and bool(np.all(np.abs(error) <= limit))
+    accepted = result["verdict"] == "accepted"
+    what = "sigma" if sigma is not None else "the largest sigma allowed"
     lines += ["", "error: what is still wrong; of angles the rotation from found to true about the body's axes"]
-    if result["verdict"] != "accepted":
-        lines.append(f"{chosen}: the calibration was rejected")
-    else:
-        lines.append(f"{chosen}: {'every error is' if good else 'an error is not'} within {LIMIT:g} {what}")
-    return "\n".join(lines), good
+    how = f"{'every error is' if within else 'an error is not'} within {LIMIT:g} {what}"
+    lines.append(f"{chosen}: {how if accepted else 'the calibration was rejected'}")
+    return "\n".join(lines), accepted and within
+
+
+def _error_row(error: Array | None) -> str:
+    return "  no result" if error is None else "".join(f"{error[index]:10.5f}" for _, index, *_ in ROWS)
 
 
 def read_truth(path: Path) -> tuple[Array, Array]:
