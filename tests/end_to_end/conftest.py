@@ -1,0 +1,43 @@
+"""One small session, simulated and calibrated once a worker process; copies of it to spoil."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.end_to_end.places import Place, Told, digests, poolcal, simulate
+
+
+@pytest.fixture(scope="session")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The session folder; its truth is beside it. Nobody changes it."""
+    return simulate(tmp_path_factory.mktemp("small") / "session")
+
+
+@pytest.fixture(scope="session")
+def truth(small: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(small.with_name("session.truth.json").read_text(encoding="utf-8"))
+    return content
+
+
+@pytest.fixture(scope="session")
+def undisturbed(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Told]:
+    """The run folder of the small session, calibrated once with one job and left alone, and what was said."""
+    run = tmp_path_factory.mktemp("undisturbed") / "run"
+    told = poolcal("run", small, "--config", small / "pool.yaml", "--run", run, "--jobs", 1)
+    assert told.status == 0, told.err
+    return run, told
+
+
+@pytest.fixture(scope="session")
+def right(undisturbed: tuple[Path, Told]) -> dict[str, str]:
+    """Digests of every Parquet file of the undisturbed run."""
+    return digests(undisturbed[0])
+
+
+@pytest.fixture
+def place(small: Path, tmp_path: Path) -> Place:
+    made = Place(small, tmp_path)
+    made.mend()
+    return made

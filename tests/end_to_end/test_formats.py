@@ -1,0 +1,76 @@
+"""One session in every format gives one calibration."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.simulation.scenario import load_scenario
+from pipeline.simulation.session import simulate as simulate_in_memory
+from tests.end_to_end.places import Place, errors, poolcal, result_of, sigmas, simulate
+from tests.end_to_end.tables import write_tables
+
+# Every format of each sensor; files of one sensor do not meet those of another before ingest has read them.
+FILES: dict[str, dict[str, Any]] = {
+    "inspva, las in week seconds, r2s": {
+        "ins": {"format": "inspva"}, "laser": {"time": "week_seconds"}, "mbes": {"format": "r2s"},
+    },
+    "inspvaa, laz, xtf without intensity": {
+        "ins": {"format": "inspvaa"}, "laser": {"format": "laz"}, "mbes": {"intensity": False},
+    },
+    "inspvasa, laz in week seconds": {
+        "ins": {"format": "inspvasa"}, "laser": {"format": "laz", "time": "week_seconds"},
+    },
+    "sbet, one a pass, las in ECEF": {
+        "ins": {"format": "sbet", "files": "pass"}, "laser": {"frame": "EPSG:4978"},
+    },
+}
+EQUIDISTANT: dict[str, dict[str, Any]] = {  # other beams than equi-angle ones, so a calibration of its own
+    "A2 in xtf": {"mbes": {"spacing": "equidistant"}},
+    "A2 bare": {"mbes": {"spacing": "equidistant", "format": "r2s"}},
+}
+
+
+def values(block: dict[str, Any]) -> np.ndarray:
+    return np.array([*block["correction"]["rotation_vector_deg"], *block["correction"]["lever_arm_m"]])
+
+
+def run(session: Path) -> dict[str, Any]:
+    folder = session.with_name(session.name + ".run")
+    told = poolcal("run", session, "--config", session / "pool.yaml", "--run", folder, "--jobs", 1)
+    assert told.status == 0, told.err + told.out
+    return result_of(folder)
+
+
+def same(one: dict[str, Any], other: dict[str, Any], of_sigma: float) -> None:
+    """Methods with sigmas to a share of them, the patent's to the same lengths and angles."""
+    allowed = of_sigma * sigmas(one["mbes"])
+    for method in one["methods"]:
+        if one["methods"][method]["mount"] is None:
+            assert other["methods"][method]["mount"] is None
+            continue
+        difference = np.abs(values(one["methods"][method]) - values(other["methods"][method]))
+        assert np.all(difference <= allowed * (1 if method == "adjustment" else 10)), (method, difference / allowed)
+
+
+@pytest.mark.parametrize("what", FILES)
+def test_files(what: str, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None:
+    """Rounding differs (ASCII to 1e-9 deg, ECEF to 0.1 mm): a hundredth of a sigma."""
+    session = simulate(tmp_path / "session", **FILES[what])
+    same(result_of(undisturbed[0]), run(session), 0.05 if "ECEF" in what else 0.01)
+
+
+def test_equidistant_beams(tmp_path: Path, truth: dict[str, Any]) -> None:
+    bare, in_xtf = (run(simulate(tmp_path / f"session_{k}", **EQUIDISTANT[k])) for k in EQUIDISTANT)
+    same(bare, in_xtf, 1e-6)
+    assert np.all(np.abs(errors(bare["mbes"], truth)) < 4 * sigmas(bare["mbes"]))
+
+
+@pytest.mark.parametrize(("kind", "weeks"), [("parquet", False), ("csv", True)])
+def test_tables(kind: str, weeks: bool, small: Path, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None:
+    """The raw numbers themselves: what they were before they were rounded into instrument files."""
+    scenario = load_scenario(small.with_name("session.scenario.yaml"))
+    place = Place(small, tmp_path)
+    write_tables(simulate_in_memory(scenario, 1), place.session, kind, weeks=weeks)
+    same(result_of(undisturbed[0]), run(place.session), 0.05)

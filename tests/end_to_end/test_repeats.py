@@ -1,0 +1,153 @@
+"""The same input gives the same bytes, and only what changed is run again, with the reason said."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from stages import ORDER
+from tests.end_to_end.places import ROOT, Place, Told, digests, poolcal_process
+
+
+# --- the same bytes --------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("jobs", "threads"), [(1, "1"), (2, "2")])
+def test_jobs_processes_and_threads(place: Place, right: dict[str, str], jobs: int, threads: str) -> None:
+    """Another process, another folder, other numbers of workers and of BLAS threads: every table byte for byte."""
+    limits = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), threads)
+    told = poolcal_process(*place.words(), "--jobs", jobs, **limits)
+    assert told.status == 0, told.err
+    assert digests(place.run) == right
+    assert {name.split("/")[0] for name in right} == set(ORDER)
+
+
+def test_the_digests_tell_two_results_apart(place: Place, right: dict[str, str]) -> None:
+    place.raw("mbes").write_bytes(place.raw("mbes").read_bytes()[:-20_000])
+    assert place.calibrate().status == 0
+    different = {name for name, digest in digests(place.run).items() if right.get(name) != digest}
+    assert {name.split("/")[0] for name in different} == set(ORDER)
+
+
+# --- what is run again -----------------------------------------------------------------------------------------------
+@pytest.fixture
+def done(place: Place, undisturbed: tuple[Path, Told]) -> Place:
+    """A place whose run is complete."""
+    shutil.copytree(undisturbed[0], place.run)
+    return place
+
+
+def after(stage: str) -> list[str]:
+    return list(ORDER[ORDER.index(stage) :])
+
+
+def test_twice_does_nothing(done: Place, right: dict[str, str]) -> None:
+    told = done.calibrate()
+    assert told.err == "".join(f"{name}: up to date\n" for name in ORDER)
+    assert told.status == 0
+    assert digests(done.run) == right
+
+
+@pytest.mark.parametrize(
+    ("block", "key", "value", "stage", "reason"),
+    [
+        ("segment", "margin_m", 0.04, "segment", "segment: segment.margin_m 0.03 -> 0.04"),
+        ("verdict", "max_sigma_deg", 0.06, "report", "report: verdict.max_sigma_deg 0.05 -> 0.06"),
+        ("adjust", "robust_k0", 2.5, "adjust", "adjust: adjust.robust_k0 3.0 -> 2.5"),
+        ("", "result", "patent_alternating", "report", "report: result adjustment -> patent_alternating"),
+    ],
+)
+def test_a_changed_setting(
+    done: Place, right: dict[str, str], block: str, key: str, value: object, stage: str, reason: str
+) -> None:
+    done.edit_config(block, **{key: value})
+    told = done.calibrate()
+    assert told.status == 0, told.err
+    assert told.ran == after(stage)
+    assert f"{reason}\n" in told.err
+    for name in ORDER[: ORDER.index(stage)]:
+        assert f"{name}: up to date\n" in told.err
+    before = {name: digest for name, digest in right.items() if name.split("/")[0] not in told.ran}
+    assert before.items() <= digests(done.run).items()
+
+
+def test_a_change_that_makes_no_difference_goes_no_further(done: Place, right: dict[str, str]) -> None:
+    """A wider box holds more points, none of them on the target: once the labels are the same, nothing else is run."""
+    done.edit_config("georeference", box_margin_m=1.6)
+    told = done.calibrate()
+    assert "georeference: georeference.box_margin_m 1.5 -> 1.6\n" in told.err
+    assert told.ran[:2] == ["georeference", "segment"]
+    assert "ingest: up to date\n" in told.err
+    for name in set(ORDER) - set(told.ran):
+        assert f"{name}: up to date\n" in told.err
+
+
+def test_a_changed_coarse_mount(done: Place, right: dict[str, str]) -> None:
+    """Whatever is looked at again, the canonical tables stay: nothing of the mount is in them."""
+    done.edit_session("mbes", mount={"x_m": 0.37})
+    told = done.calibrate()
+    assert "georeference: mbes.mount.x_m 0.38 -> 0.37\n" in told.err
+    assert told.ran[-1] == "report"
+    ingested = {name: digest for name, digest in right.items() if name.startswith("ingest/")}
+    assert ingested.items() <= digests(done.run).items()
+
+
+def test_touching_is_no_change(done: Place) -> None:
+    for path in done.session.rglob("*"):
+        os.utime(path)
+    os.utime(done.config)
+    assert done.calibrate().ran == []
+
+
+def test_comments_and_order_are_no_change(done: Place) -> None:
+    done.config.write_text("# as surveyed in May\n" + done.config.read_text(encoding="utf-8"), encoding="utf-8")
+    assert done.calibrate().ran == []
+
+
+def test_one_byte_is_a_change(done: Place) -> None:
+    """A bit of one point's coordinates; size and time of the file stay."""
+    path = done.raw("laser")
+    status, content = path.stat(), bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    told = done.calibrate()
+    assert told.ran[0] == "ingest"
+    assert "ingest: laser/pass_0.las changed\n" in told.err
+
+
+def test_a_lost_or_edited_result_is_made_again(done: Place, right: dict[str, str]) -> None:
+    (done.run / "adjust" / "estimate.parquet").write_bytes(b"PAR1")
+    (done.run / "fit_planes" / "manifest.json").unlink()
+    told = done.calibrate()
+    assert "fit_planes: has no result yet\n" in told.err
+    assert "adjust: its result estimate.parquet was edited\n" in told.err
+    assert not {"ingest", "georeference", "segment"} & set(told.ran)
+    assert digests(done.run) == right
+
+
+# --- make ------------------------------------------------------------------------------------------------------------
+def make(place: Place, target: str) -> str:
+    command = ["make", "--no-print-directory", "-o", ".venv/.setup", target]
+    words = [f"SESSION={place.session}", f"CONFIG={place.config}", f"RUN={place.run}", "JOBS=1"]
+    done = subprocess.run([*command, *words], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_make_calibrate_twice(place: Place, right: dict[str, str]) -> None:
+    first = make(place, "calibrate")
+    assert "ACCEPTED" in first
+    assert all(f"{name}: done in" in first for name in ORDER)
+    second = make(place, "calibrate")
+    assert "ACCEPTED" in second
+    assert all(f"{name}: up to date" in second for name in ORDER)
+    assert "done in" not in second
+    assert digests(place.run) == right
+
+
+def test_make_stages_twice(place: Place, right: dict[str, str]) -> None:
+    first = make(place, "stages")
+    assert all(f"poolcal stage {name} " in first for name in ORDER)
+    assert digests(place.run) == right
+    assert "poolcal" not in make(place, "stages")
