@@ -58,6 +58,13 @@ class Target(Model):
         return self
 
 
+class TargetPlace(Model):
+    """Of the target, what reading the files needs: changing a letter must not read them again."""
+
+    origin: Origin
+    azimuth_deg: float | None
+
+
 class Ingest(Model):
     max_gap_s: Positive = 5.0  # a longer gap in INS or soundings ends a pass
     reversal_m: Positive = 1.0  # going back along the track by more than this ends a pass
@@ -138,6 +145,10 @@ class PoolConfig(Model):
     verdict: Verdict = Verdict()
     result: Method = "adjustment"
 
+    @property
+    def target_place(self) -> TargetPlace:
+        return TargetPlace(origin=self.target.origin, azimuth_deg=self.target.azimuth_deg)
+
 
 # --- the session -----------------------------------------------------------------------------------------------------
 def _inside(pattern: str) -> str:
@@ -213,6 +224,22 @@ class Mbes(Model):
     latency_s: Latency = 0.0
 
 
+class Recording(Model):
+    """Of a sensor, what its readers need: trying another mount or sigma must not read the files again."""
+
+    files: tuple[str, ...]
+    format: str
+    gps_week: Week = None
+    latency_s: float
+    frame: str = "laser"
+
+
+class Recordings(Model):
+    ins: Recording
+    laser: Recording
+    mbes: Recording
+
+
 class SessionConfig(Model):
     """SESSION/session.yaml"""
 
@@ -220,6 +247,19 @@ class SessionConfig(Model):
     ins: Ins
     laser: Laser
     mbes: Mbes
+
+    @property
+    def recordings(self) -> Recordings:
+        def of(sensor: Ins | Laser | Mbes) -> Recording:
+            return Recording(
+                files=tuple(sensor.files),
+                format=sensor.format,
+                gps_week=getattr(sensor, "gps_week", None),
+                latency_s=sensor.latency_s,
+                frame=getattr(sensor, "frame", "laser"),
+            )
+
+        return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=of(self.mbes))
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------

@@ -31,7 +31,8 @@ class Settings:
     def resolved(self) -> dict[str, Any]:
         """Every setting by the name under which a stage's Config asks for it."""
         blocks = (self.pool, self.session)
-        return {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
+        found = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
+        return found | {"target_place": self.pool.target_place, "recordings": self.session.recordings}
 
     def as_json(self) -> dict[str, Any]:
         """The same as plain values, defaults filled in."""

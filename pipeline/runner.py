@@ -81,7 +81,17 @@ def _bring_up_to_date(this: Run, stage: ModuleType) -> bool:
     this.progress.reasons(name, reasons)
     with this.progress.stage(name):
         _execute(this, stage)
+    for line in _losses(manifest.read(this.folder(name))):
+        this.progress.note(f"{name}: {line}")
     return True
+
+
+def _losses(done: manifest.Manifest | None) -> list[str]:
+    """Records of raw files that could not be used, for the screen: a cut file must not pass in silence."""
+    if done is None or done.stage != "ingest":
+        return []
+    lost = [row for row in done.counts if row["count"] and row["reason"] not in ("used", "no detection")]
+    return [f"{row['source']}: left out {row['count']:,} x {row['reason']}" for row in lost]
 
 
 def _execute(this: Run, stage: ModuleType) -> None:

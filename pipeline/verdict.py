@@ -10,6 +10,7 @@ import pandas as pd
 from pipeline import config
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
+FAR_M = 0.05  # a mean residual beyond this is no drift: the model is another
 NEAR_M = 1.5  # passes whose distances differ by less tell yaw from lever arm y badly
 
 
@@ -67,10 +68,13 @@ def _ambiguities(evidence: Evidence) -> list[str]:
 def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
     worst = cells.iloc[int(cells["normalised"].abs().argmax())]
     sensor = "the laser" if worst["sensor"] == "laser" else "the sonar"
+    cause = "INS drift, a clock, the sound speed, or a moved bracket"
+    if abs(worst["mean_m"]) > FAR_M:
+        cause = "a wrong target.a, b, c or e, or a coarse mount farther off than segment searches"
     return (
         f"the passes do not agree: in pass {worst['pass']} {sensor} lies {1000 * worst['mean_m']:+.1f} mm off "
-        f"{worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely INS "
-        "drift, a clock, the sound speed, or a moved bracket"
+        f"{worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely "
+        f"{cause}"
     )
 
 

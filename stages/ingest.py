@@ -20,11 +20,9 @@ Columns = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Config:
-    target: config.Target
+    target_place: config.TargetPlace
     ingest: config.Ingest
-    ins: config.Ins
-    laser: config.Laser
-    mbes: config.Mbes
+    recordings: config.Recordings
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config:
     pings = np.unique(np.concatenate([seen.epochs_ns for _, seen in partials["mbes"]]))
     laser = np.concatenate([seen.epochs_ns for _, seen in partials["laser"]])
     _refuse_apart({"ins": (ins_t[0], ins_t[-1]), "laser": (laser.min(), laser.max()), "mbes": (pings[0], pings[-1])})
-    pool_frame, frame = _pool_frame(trajectory, config.target)
+    pool_frame, frame = _pool_frame(trajectory, config.target_place)
     max_gap_ns = round(config.ingest.max_gap_s * NS)
     counts = _counts(partials, {"ins": backwards})
     return Outputs(
@@ -138,7 +136,7 @@ def _trajectory(chunks: list[Columns]) -> tuple[pd.DataFrame, int]:
     return table[keep].reset_index(drop=True), int((~keep).sum())
 
 
-def _pool_frame(trajectory: pd.DataFrame, target: config.Target) -> tuple[pd.DataFrame, PoolFrame]:
+def _pool_frame(trajectory: pd.DataFrame, target: config.TargetPlace) -> tuple[pd.DataFrame, PoolFrame]:
     origin = target.origin
     place = (np.radians(origin.latitude_deg), np.radians(origin.longitude_deg), origin.height_m)
     azimuth = target.azimuth_deg

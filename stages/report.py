@@ -61,7 +61,9 @@ class _PlainDumper(yaml.SafeDumper):
 def run(inputs: Inputs, config: Config) -> Outputs:
     coarse = mount_of(config.mbes.mount)
     methods = _patent_methods(inputs.corrections, coarse)
-    methods["adjustment"] = _adjustment(inputs.estimate, inputs.covariance, coarse)
+    methods["adjustment"] = _adjustment(
+        inputs.estimate, inputs.covariance, inputs.summary.to_dict("records")[0], coarse
+    )
     passes = _passes(inputs.passes, inputs.cells)
     found = reasons(
         Evidence(inputs.target_pose, inputs.provisional_mount, inputs.corrections, inputs.summary, inputs.cells),
@@ -133,9 +135,9 @@ def _range_note(mbes: config.Mbes) -> str:
 
 
 def _method(
-    vector_rad: Array, lever_m: Array, coarse: Mounted, covariance: Array | None, why: str = ""
+    vector_rad: Array, lever_m: Array, coarse: Mounted, covariance: Array | None, outcome: Mapping[Any, Any]
 ) -> dict[str, Any]:
-    """One method's block of the contract; nulls where there is no result."""
+    """One method's block of the contract, nulls where there is no result; ``outcome``: converged, iterations, reason."""
     good = bool(np.all(np.isfinite(vector_rad)) and np.all(np.isfinite(lever_m)))
     known = good and covariance is not None and bool(np.all(np.isfinite(covariance)))
     sigma = np.sqrt(np.diag(covariance)) if known and covariance is not None else None
@@ -155,7 +157,11 @@ def _method(
         else {"rotation_vector_deg": np.degrees(sigma[:3]).tolist(), "lever_arm_m": sigma[3:].tolist()},
         "covariance": covariance.tolist() if known and covariance is not None else None,
     }
-    return block | ({"no_result": why} if why else {})
+    return block | {
+        "converged": bool(outcome["converged"]),
+        "iterations": int(outcome["iterations"]),
+        "no_result": str(outcome["reason"]),
+    }
 
 
 def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dict[str, Any]]:
@@ -163,15 +169,16 @@ def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dic
     for row in corrections.to_dict("records"):
         vector = np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"])
         lever = np.array([row[f"lever_arm_{axis}_m"] for axis in "xyz"])
-        block = _method(vector, lever, coarse, None, row["reason"])
-        methods[row["method"]] = block | {"converged": bool(row["converged"]), "iterations": int(row["iterations"])}
+        methods[str(row["method"])] = _method(vector, lever, coarse, None, row)
     return methods
 
 
-def _adjustment(estimate: pd.DataFrame, covariance: pd.DataFrame, coarse: Mounted) -> dict[str, Any]:
+def _adjustment(
+    estimate: pd.DataFrame, covariance: pd.DataFrame, summary: Mapping[Any, Any], coarse: Mounted
+) -> dict[str, Any]:
     values = estimate.set_index("unknown").loc[list(NAMES), "value"].to_numpy()
     table = covariance["covariance"].to_numpy().reshape(COMMON, COMMON)
-    return _method(values[:3], values[3:], coarse, table)
+    return _method(values[:3], values[3:], coarse, table, summary)
 
 
 def _matrix(table: pd.DataFrame, column: str) -> list[list[float]] | None:

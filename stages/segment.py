@@ -22,7 +22,7 @@ from pipeline.sampling import every_nth, voxel_means, voxel_sums
 from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
 
 Array = NDArray[np.float64]
-SAMPLE = 20_000  # soundings to search with
+SAMPLE = 8_000  # soundings to search with
 
 
 @dataclass(frozen=True)

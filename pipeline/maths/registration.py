@@ -143,7 +143,7 @@ def search(
     same: Callable[[Array, Array], bool],
     limits: Array,
     reach_m: float = 0.06,
-    keep: int = 6,
+    keep: int = 4,
 ) -> Found:
     """Best pose from many starts: all are scored with a wide reach, the ``keep`` best settle and are scored sharply.
 

@@ -51,7 +51,6 @@ def test_keys(result: dict[str, Any]) -> None:
     assert {"poolcal", "python", "numpy", "pyarrow"} <= result["software"].keys()
 
 
-@pytest.mark.xfail(reason="stages/report.py: converged and iterations are in the patent's blocks alone", strict=True)
 def test_every_method_has_the_same_keys(result: dict[str, Any]) -> None:
     for block in blocks(result):
         assert block.keys() >= BLOCK
