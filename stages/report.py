@@ -137,7 +137,7 @@ def _range_note(mbes: config.Mbes) -> str:
 def _method(
     vector_rad: Array, lever_m: Array, coarse: Mounted, covariance: Array | None, outcome: Mapping[Any, Any]
 ) -> dict[str, Any]:
-    """One method's block of the contract, nulls where there is no result; ``outcome``: converged, iterations, reason."""
+    """One method's block of the contract, null where there is no result; ``outcome``: converged, iterations, reason."""
     good = bool(np.all(np.isfinite(vector_rad)) and np.all(np.isfinite(lever_m)))
     known = good and covariance is not None and bool(np.all(np.isfinite(covariance)))
     sigma = np.sqrt(np.diag(covariance)) if known and covariance is not None else None

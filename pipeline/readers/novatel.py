@@ -10,6 +10,7 @@ undulation is added. Usable: status INS_SOLUTION_GOOD, INS_ALIGNMENT_COMPLETE or
 """
 
 import re
+import threading
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -58,6 +59,9 @@ ANGLES = ("latitude", "longitude", "roll", "pitch", "azimuth")
 BLOCK = 32_768  # the decoder's buffer is 262,144 bytes
 RECORDS_PER_CHUNK = 65_536
 MAX_RESUMES = 100  # looks behind false starts at the end of a file; each costs a pass over at most the decoder's buffer
+# Two decoders at work in two threads lose a record now and then. A whole file is taken at once (its records become a
+# table in memory anyway), so that nobody can hold the lock while waiting for something else.
+_DECODER = threading.Lock()
 _START = re.compile(rb"\xaa\x44[\x12\x13]|[#%][A-Z]")
 _PROMPT = re.compile(rb"[\s\[\]A-Z0-9]{0,24}")  # what a receiver's port says between records, such as [COM1]
 
@@ -71,6 +75,11 @@ class NovatelPart:
     latency_s: float
 
     def chunks(self) -> Iterator[Chunk]:
+        with _DECODER:
+            found = list(self._decode())
+        yield from found
+
+    def _decode(self) -> Iterator[Chunk]:
         dropped: Counter[str] = Counter()
         with opened(self.path, self.name) as file:
             number = _survey(file, dropped)
