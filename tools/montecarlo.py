@@ -66,10 +66,10 @@ CAMPAIGNS = (
         WHITE | {"surroundings": {"origin_error_m": [0.3, -0.3, 0.15], "azimuth_error_deg": 1.0}},
     ),
     Campaign("finite beams, outliers, echoes", 64, 6000, {"ins": WHITE["ins"]}),
-    Campaign("the same and INS white noise", 64, 7000, {}),
+    Campaign("the same and INS white noise", 32, 7000, {}),
     Campaign(
         "the same and INS drift",
-        64,
+        32,
         8000,
         {
             "ins": {
