@@ -102,14 +102,12 @@ class Rows:
 
 def _local(state: State, surface: Integers, points_m: Array) -> tuple[Array, Array]:
     """Residuals v and columns (t1 · (X - c), t2 · (X - c), -1)."""
-    normals = np.array([s.normal for s in state.surfaces])[surface]
-    tangents = np.array([s.tangents for s in state.surfaces])[surface]
-    away = points_m - np.array([s.centre_m for s in state.surfaces])[surface]
-    shifts = np.array([s.shift_m for s in state.surfaces])[surface]
-    residual = np.einsum("nj,nj->n", normals, away) - shifts
-    local = np.empty((len(away), 3))
-    local[:, :2] = np.einsum("nkj,nj->nk", tangents, away)
-    local[:, 2] = -1.0
+    residual, local = np.empty(len(points_m)), np.full((len(points_m), 3), -1.0)
+    for k, one in enumerate(state.surfaces):
+        rows = np.flatnonzero(surface == k)
+        away = points_m[rows] - one.centre_m
+        residual[rows] = away @ one.normal - one.shift_m
+        local[rows, :2] = away @ one.tangents.T
     return residual, local
 
 

@@ -1,5 +1,6 @@
 """Which face a point lies on: by polygon, with a margin of the footprint's half extent along its own direction."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,11 +53,43 @@ class Beams:
         return tuple(h - self.directions * ((h @ normal) / slant)[:, None] for h in self.half_widths_m)
 
 
+@dataclass(frozen=True)
+class _Plane:
+    """Faces in one plane, and the points near it: rows (m,) and their signed distances along ``axis`` (m,)."""
+
+    faces: list[int]
+    axis: Array
+    rows: NDArray[np.int64]
+    distance_m: Array
+
+
+def _planes(model: TargetModel, points_m: Array, reach_m: float) -> Iterator[_Plane]:
+    """Each plane of the model with the points within ``reach_m``, parallel planes together.
+
+    Of parallel planes a point goes to the nearest: one projection and one search for all tops and bottoms, not forty.
+    """
+    parallel: dict[tuple[float, ...], dict[float, list[int]]] = {}
+    for number, face in enumerate(model.faces):
+        sign = np.sign(face.normal[np.flatnonzero(np.abs(face.normal) > 1e-9)[0]])
+        axis = tuple((sign * face.normal + 0.0).tolist())
+        # Tops of one side and bottoms of the other lie at one height, computed by different sums: one plane.
+        parallel.setdefault(axis, {}).setdefault(round(float(sign * face.distance_m), 9), []).append(number)
+    for axis, planes in parallel.items():
+        direction, offsets = np.array(axis), np.array(sorted(planes))
+        along = points_m @ direction
+        nearest = np.searchsorted((offsets[1:] + offsets[:-1]) / 2, along)
+        distance = along - offsets[nearest]
+        rows = np.flatnonzero(np.abs(distance) <= reach_m)
+        for k in np.unique(nearest[rows]).tolist():
+            here = rows[nearest[rows] == k]
+            yield _Plane(planes[float(offsets[k])], direction, here, distance[here])
+
+
 def near_planes(model: TargetModel, points_m: Array, reach_m: float) -> Flags:
     """Points (n,) within ``reach_m`` of the plane of some face: a quick way to leave out the rest."""
     near = np.zeros(len(points_m), dtype=bool)
-    for normal, distance in sorted({(tuple(face.normal.tolist()), face.distance_m) for face in model.faces}):
-        near |= np.abs(points_m @ np.array(normal) - distance) <= reach_m
+    for plane in _planes(model, points_m, reach_m):
+        near[plane.rows] = True
     return near
 
 
@@ -74,31 +107,30 @@ def label_points(
     cosine_of = np.zeros(n)
     best = np.full(n, np.inf)
     near_plane, seen_flat = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    z = points_m[:, 2]
     sine = np.sin(min_grazing_rad) if beams.directions.any() else 0.0
-    planes: dict[tuple[float, ...], tuple[Array, NDArray[np.int64]]] = {}
-    for number, face in enumerate(model.faces):
-        key = (*face.normal, face.distance_m)
-        if key not in planes:
-            distance = points_m @ face.normal - face.distance_m
-            planes[key] = (distance, np.flatnonzero(np.abs(distance) <= gate_m))
-        distance, index = planes[key]
-        low, high = face.vertices_m[:, 2].min() - gate_m, face.vertices_m[:, 2].max() + gate_m
-        index = index[(z[index] >= low) & (z[index] <= high)]
-        if len(index) == 0:
-            continue
-        on_plane = points_m[index] - distance[index, None] * face.normal
-        inside = face.clearance(on_plane) >= 0
-        near_plane[index[inside]] = True
-        index, on_plane = index[inside], on_plane[inside]
-        cosine = -(beams.directions[index] @ face.normal)
-        steep = cosine >= sine
-        seen_flat[index[~steep]] = True
-        index, on_plane, cosine = index[steep], on_plane[steep], cosine[steep]
-        clear = face.clearance(on_plane, *beams.rows(index).spreads(face.normal)) >= margin_m
-        better = clear & (np.abs(distance[index]) < best[index])
-        index = index[better]
-        face_of[index], cosine_of[index], best[index] = number, cosine[better], np.abs(distance[index])
+    for plane in _planes(model, points_m, gate_m):
+        z = points_m[plane.rows, 2]
+        for number in plane.faces:
+            face = model.faces[number]
+            low, high = face.vertices_m[:, 2].min() - gate_m, face.vertices_m[:, 2].max() + gate_m
+            level = np.flatnonzero((z >= low) & (z <= high))
+            rows, away = plane.rows[level], plane.distance_m[level]
+            on_plane = points_m[rows] - away[:, None] * plane.axis
+            clearance = face.clearance(on_plane)
+            inside = clearance >= 0
+            near_plane[rows[inside]] = True
+            rows, away, on_plane, clearance = rows[inside], away[inside], on_plane[inside], clearance[inside]
+            cosine = -(beams.directions[rows] @ face.normal)
+            steep = cosine >= sine
+            seen_flat[rows[~steep]] = True
+            if beams.half_widths_m:
+                rows, away, on_plane, cosine = rows[steep], away[steep], on_plane[steep], cosine[steep]
+                clear = face.clearance(on_plane, *beams.rows(rows).spreads(face.normal)) >= margin_m
+            else:
+                clear = steep & (clearance >= margin_m)
+            better = clear & (np.abs(away) < best[rows])
+            rows = rows[better]
+            face_of[rows], cosine_of[rows], best[rows] = number, cosine[better], np.abs(away[better])
     free = face_of == NO_FACE
     grazing = free & seen_flat
     near_edge = free & near_plane & ~seen_flat

@@ -50,10 +50,13 @@ class Face:
         point ± spread_1 ± spread_2, so the margin lies along the direction in which the footprint spreads.
         """
         inward, offsets = self.inward_edges()
-        distances = points_m @ inward.T - offsets
-        for spread in spreads_m:
-            distances -= np.abs(spread @ inward.T)
-        return np.asarray(distances.min(axis=1))
+        smallest = np.full(len(points_m), np.inf)
+        for normal, offset in zip(inward, offsets, strict=True):
+            distance = points_m @ normal - offset
+            for spread in spreads_m:
+                distance -= np.abs(spread @ normal)
+            np.minimum(smallest, distance, out=smallest)
+        return smallest
 
 
 @dataclass(frozen=True)

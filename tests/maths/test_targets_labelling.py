@@ -119,3 +119,13 @@ def test_a_grazed_face_needs_its_margin_along_the_ray(target):
     wide = label_points(target, points, beams_from(origin, points, np.radians(0.25)), 0.05, 0.03, 0.0)
     assert (fine.face >= 0).tolist() == [True, True]
     assert (wide.face >= 0).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("e", [0.5, 0.4, 0.3])
+def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
+    """-a/2 + e and -a/2 + 2e - e differ in the last bit for e = 0.4: neither side's faces may be lost by that."""
+    model = build_target(a=12 * e, b=3.0, c=1.0, e=e)
+    for number, face in enumerate(model.faces):
+        middle = face.vertices_m.mean(axis=0)[None, :]
+        ahead = Beams(-face.normal[None, :])  # a ray from straight in front
+        assert label_points(model, middle, ahead, 0.05, 0.01, 0.1).face[0] == number, face.name
