@@ -166,6 +166,7 @@ TARGET_POSE = Artefact(
         Column("rival", TEXT, "", "which rival pose that is"),
         Column("ambiguous", BOOL, "", "true: the rival explains the points nearly as well, or better"),
         Column("gate_m", F64, "m", "largest distance from a face at which a laser point was labelled"),
+        Column("within", BOOL, "", "false: no pose within the search limits was found"),
     ),
 )
 PROVISIONAL_MOUNT = Artefact(
@@ -177,6 +178,7 @@ PROVISIONAL_MOUNT = Artefact(
         Column("score", F64, "1", "robust share of soundings explained by the model"),
         Column("rival_score", F64, "1", "the same for the best other solution (another block)"),
         Column("ambiguous", BOOL, "", "true: another solution explains the soundings nearly as well"),
+        Column("within", BOOL, "", "false: no mount within the search limits was found"),
     ),
 )
 LASER_LABELLED = Artefact(

@@ -44,6 +44,7 @@ class FoundTarget:
     rival: str
     ambiguous: bool
     gate_m: float
+    within: bool
 
 
 def _planes(model: TargetModel) -> tuple[Array, Array]:
@@ -68,10 +69,7 @@ def find_target(
     turns = np.linspace(-azimuth, azimuth, 5 if azimuth_known else 13)
     steps = (-0.8, 0.0, 0.8)
     starts = [
-        np.array([turn, reach_xy * x, reach_xy * y, reach_z * z])
-        for turn in turns
-        for x in steps
-        for y in steps
+        [np.array([turn, reach_xy * x, reach_xy * y, reach_z * z]) for turn in turns for x in steps for y in steps]
         for z in steps
     ]
     quarter = model.period_m / 4
@@ -80,7 +78,7 @@ def find_target(
         return bool(np.max(np.abs(p[1:] - q[1:])) < quarter)
 
     found = search(
-        placement, starts, closest, normals, same, 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02]), SHARP_M
+        placement, starts, closest, normals, same, 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02]), SHARP_M, each=2
     )
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
@@ -108,6 +106,7 @@ def find_target(
         name,
         ambiguous,
         _gate(pose, settings),
+        found.within,
     )
 
 
@@ -176,6 +175,7 @@ class FoundMount:
     score: float
     rival_score: float
     ambiguous: bool
+    within: bool
 
 
 def find_mount(
@@ -202,9 +202,11 @@ def find_mount(
     roll, shift_x = _wall_vote(placement, model, settings)
     base = np.array([0.0, roll, 0.0, shift_x, 0.0, 0.0])
     starts = [
-        base + np.array([0.0, 0.0, yaw, 0.0, y, z])
-        for yaw in np.linspace(-angle, angle, 5)
-        for y in np.linspace(-arm, arm, 3)
+        [
+            base + np.array([0.0, 0.0, yaw, 0.0, y, z])
+            for yaw in np.linspace(-angle, angle, 5)
+            for y in np.linspace(-arm, arm, 3)
+        ]
         for z in np.linspace(-arm, arm, 7)
     ]
 
@@ -212,6 +214,7 @@ def find_mount(
         return bool(np.max(np.abs(p[3:] - q[3:])) < model.period_m / 4)
 
     found = search(placement, starts, closest, normals, same, 1.5 * sigmas, SHARP_M)
+
     def label(parameters: Array, points: Array) -> NDArray[np.int16]:
         R = exp_so3(parameters[:3]) @ R_body_from_mbes
         beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, beam_rad)
@@ -231,6 +234,7 @@ def find_mount(
         found.score,
         found.rival_score,
         ambiguous,
+        found.within,
     )
 
 

@@ -57,6 +57,16 @@ def _ambiguities(evidence: Evidence) -> list[str]:
             f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {how} "
             f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} and target.origin"
         )
+    if not pose["within"]:
+        found.append(
+            "no pose of the target within the search limits fits the laser points: target.origin or target.azimuth_deg "
+            "is farther off than segment.search_... allow"
+        )
+    if not mount["within"]:
+        found.append(
+            "no mount within the search limits brings the soundings onto the target: the coarse mbes.mount is farther "
+            "off than segment.search_mount_deg and search_mount_m, or target.a, b, c, e are wrong"
+        )
     if mount["ambiguous"]:
         found.append(
             f"the soundings fit two ways (score {mount['rival_score']:.3f} against {mount['score']:.3f}): the coarse "

@@ -203,6 +203,7 @@ def _target_pose(found: FoundTarget) -> pd.DataFrame:
         "rival": found.rival,
         "ambiguous": found.ambiguous,
         "gate_m": found.gate_m,
+        "within": found.within,
     }
     for index, axis in enumerate("xyz"):
         row |= {f"origin_{axis}_pool_m": found.origin_pool_m[index], f"sigma_{axis}_m": sigma[1 + index]}
@@ -216,6 +217,7 @@ def _mount(found: FoundMount) -> pd.DataFrame:
         "score": found.score,
         "rival_score": found.rival_score,
         "ambiguous": found.ambiguous,
+        "within": found.within,
     }
     for index, axis in enumerate("xyz"):
         row |= {

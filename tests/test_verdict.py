@@ -16,8 +16,14 @@ def methods(**patent):
 
 
 def evidence(pose=None, mount=None, summary=None, alternating=None):
-    pose_row = {"ambiguous": False, "rival": "one block higher", "rival_agreement_m2": 9.0, "agreement_m2": 10.0}
-    mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4}
+    pose_row = {
+        "ambiguous": False,
+        "rival": "one block higher",
+        "rival_agreement_m2": 9.0,
+        "agreement_m2": 10.0,
+        "within": True,
+    }
+    mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4, "within": True}
     summary_row = {
         "reason": "",
         "converged": True,
@@ -62,6 +68,8 @@ def test_a_good_session_has_no_reason():
             "better (11.00 against 10.00 m²); check target.low_side",
         ),
         ({"mount": {"ambiguous": True}}, "the soundings fit two ways"),
+        ({"mount": {"within": False}}, "the coarse mbes.mount is farther"),
+        ({"pose": {"within": False}}, "target.origin or target.azimuth_deg is farther off"),
         ({"summary": {"reason": "the data leave 2 directions open"}}, "no result: the data leave 2 directions open"),
         ({"summary": {"converged": False}}, "did not converge in 6 steps"),
         ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),

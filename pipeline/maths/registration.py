@@ -127,37 +127,42 @@ def settle(
 
 @dataclass(frozen=True)
 class Found:
-    """A pose and what it explains, with the best rival that is another pose (not the same one found again)."""
+    """A pose and what it explains, with the best rival that is another pose (not the same one found again).
+
+    ``within``: it lies within the limits; otherwise no start led to a pose that does.
+    """
 
     parameters: Array
     score: float
     rival_score: float
-    rival_parameters: Array
+    within: bool
 
 
 def search(
     placement: Placement,
-    starts: Sequence[Array],
+    starts: Sequence[Sequence[Array]],
     closest: Closest,
     normals: Array,
     same: Callable[[Array, Array], bool],
     limits: Array,
     reach_m: float = 0.06,
-    keep: int = 4,
+    each: int = 1,
 ) -> Found:
-    """Best pose from many starts: all are scored with a wide reach, the ``keep`` best settle and are scored sharply.
+    """Best pose from many starts: all are scored with a wide reach, the best settle and are scored sharply.
 
-    ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells whether two settled
-    poses are the same solution.
+    ``starts`` come in groups, of each of which the ``each`` best settle: where blocks repeat, the best of all may lie
+    round one wrong height. ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells
+    whether two settled poses are the same solution.
     """
-    ranked = sorted(starts, key=lambda p: -score(placement, p, closest, 0.25))[:keep]
-    settled = [settle(placement, start, closest, normals) for start in ranked]
-    allowed = [p for p in settled if np.all(np.abs(p) <= limits)] or [np.clip(settled[0], -limits, limits)]
-    scored = sorted(((score(placement, p, closest, reach_m), tuple(p)) for p in allowed), reverse=True)
-    best_score, best = scored[0][0], np.array(scored[0][1])
-    others = [(s, np.array(p)) for s, p in scored[1:] if not same(best, np.array(p))]
-    rival_score, rival = others[0] if others else (0.0, best)
-    return Found(best, best_score, rival_score, rival)
+    chosen = [
+        start for group in starts for start in sorted(group, key=lambda p: -score(placement, p, closest, 0.25))[:each]
+    ]
+    settled = [settle(placement, start, closest, normals) for start in chosen]
+    allowed = [p for p in settled if np.all(np.abs(p) <= limits)]
+    scored = [(score(placement, p, closest, reach_m), p) for p in allowed or settled]
+    best_score, best = max(scored, key=lambda one: one[0])
+    rivals = [s for s, p in scored if not same(best, p)]
+    return Found(best, best_score, max(rivals, default=0.0), bool(allowed))
 
 
 @dataclass(frozen=True)
