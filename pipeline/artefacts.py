@@ -13,12 +13,19 @@ from pipeline.columns import Document as Document
 from pipeline.columns import Provenance as Provenance
 from pipeline.columns import Raw as Raw
 
-I16, I32, I64, F64, TEXT, BOOL = pa.int16(), pa.int32(), pa.int64(), pa.float64(), pa.string(), pa.bool_()
+I16, I32, I64, F32, F64, TEXT, BOOL = (
+    pa.int16(), pa.int32(), pa.int64(), pa.float32(), pa.float64(), pa.string(), pa.bool_()
+)
 FLOATS = pa.list_(pa.float64())
 
 
-def _xyz(frame: str, unit: str = "m", stem: str = "") -> tuple[Column, ...]:
-    return tuple(Column(f"{stem}{axis}_{frame}_{unit}", F64, unit, f"{axis} in frame {frame}") for axis in "xyz")
+def _xyz(frame: str, unit: str = "m", stem: str = "", type_: pa.DataType = F64) -> tuple[Column, ...]:
+    return tuple(Column(f"{stem}{axis}_{frame}_{unit}", type_, unit, f"{axis} in frame {frame}") for axis in "xyz")
+
+
+def _near(frame: str) -> tuple[Column, ...]:
+    """Coordinates near target or sensor, in single precision: within 16 m that is within half a micrometre."""
+    return _xyz(frame, type_=F32)
 
 
 _ROTATION = tuple(
@@ -121,7 +128,7 @@ POSES = Artefact(
 )
 LASER_POOL = Artefact(
     "georeference", "laser_pool", "stream", "laser points near the target",
-    (_T, _PASS, *_xyz("laser"), *_xyz("pool")),
+    (_T, _PASS, *_near("laser"), *_near("pool")),
 )
 SOUNDINGS_POOL = Artefact(
     "georeference", "soundings_pool", "stream", "soundings near the target, placed with the coarse mount",
@@ -129,7 +136,7 @@ SOUNDINGS_POOL = Artefact(
         _T, _PASS,
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number"),
-        *_xyz("mbes"), *_xyz("pool"),
+        *_near("mbes"), *_near("pool"),
     ),
 )
 GEOREFERENCE_COUNTS = Artefact("georeference", "counts", "table", "points used and left out, by reason", _COUNTS)
@@ -186,8 +193,8 @@ LASER_LABELLED = Artefact(
     (
         _T, _PASS,
         Column("face", I16, "1", "number of the face"),
-        *_xyz("laser"), *_xyz("target"),
-        Column("cos_incidence", F64, "1", "|cosine| of the angle between ray and the face's normal"),
+        *_near("laser"), *_near("target"),
+        Column("cos_incidence", F32, "1", "|cosine| of the angle between ray and the face's normal"),
     ),
 )
 SOUNDINGS_LABELLED = Artefact(
@@ -197,7 +204,7 @@ SOUNDINGS_LABELLED = Artefact(
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number"),
         Column("face", I16, "1", "number of the face"),
-        *_xyz("mbes"),
+        *_near("mbes"),
     ),
 )
 SEGMENT_COUNTS = Artefact("segment", "counts", "table", "points labelled and left out, by reason", _COUNTS)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.artefacts import Artefact
 from pipeline.store import PartWriter, to_arrow, write_empty_part
-from pipeline.streams import Batch, MemoryPart, ParquetPart, Part
+from pipeline.streams import Batch, MemoryPart, ParquetPart, Part, columns_of
 
 Written = Mapping[str, tuple[Part, ...]]
 
@@ -90,8 +90,7 @@ class _MemoryPart:
     def add(self, stream: str, batch: Batch) -> None:
         table = to_arrow(batch, self.sink.streams[stream])
         if table.num_rows:
-            columns = {name: table[name].to_numpy() for name in table.column_names}
-            self.batches.setdefault(stream, []).append(columns)
+            self.batches.setdefault(stream, []).append(columns_of(table))
 
     def written(self) -> Written:
         parts: dict[str, tuple[Part, ...]] = {}

@@ -21,6 +21,12 @@ BATCH_ROWS = 262_144
 T = TypeVar("T")
 
 
+def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
+    """A table's columns as arrays; what is stored in single precision is computed with in double."""
+    arrays = {name: table[name].to_numpy() for name in table.column_names}
+    return {name: a.astype(np.float64) if a.dtype == np.float32 else a for name, a in arrays.items()}
+
+
 @dataclass(frozen=True)
 class Chunk:
     """What a part yields: good rows as columns, and how many records were left out, by reason."""
@@ -52,7 +58,7 @@ class ParquetPart:
         for table in self._groups():
             for start in range(0, table.num_rows, BATCH_ROWS):
                 piece = table.slice(start, BATCH_ROWS)
-                yield Chunk({name: piece[name].to_numpy() for name in piece.column_names})
+                yield Chunk(columns_of(piece))
 
     def _groups(self) -> Iterator[pa.Table]:
         try:
