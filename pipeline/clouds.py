@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipeline.maths.targets import TargetModel
 
 Array = NDArray[np.float64]
+THREADS = 2  # each point is looked up by itself: the answer does not depend on it
 
 
 class ClosestSurface:
@@ -27,6 +28,6 @@ class ClosestSurface:
         self._face_of_triangle = model.face_of_triangle()
 
     def __call__(self, points_m: Array) -> tuple[Array, NDArray[np.int64]]:
-        answer = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=1)
+        answer = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=THREADS)
         triangles = answer["primitive_ids"].numpy().astype(np.int64)
         return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]

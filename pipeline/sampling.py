@@ -1,11 +1,11 @@
 """Small, reproducible samples of streams for searching: never for a result."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.streams import Batch
+from pipeline.streams import Batch, xyz
 
 Array = NDArray[np.float64]
 KEY_BITS = 20
@@ -14,9 +14,9 @@ KEY_BITS = 20
 Voxels = tuple[NDArray[np.int64], Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
 
 
-def voxel_sums(batch: Batch, names: tuple[str, str, str], voxel_m: float, lowest_m: float) -> Voxels:
-    """A batch's points above ``lowest_m``, summed by voxel."""
-    points = np.column_stack([batch[name] for name in names])
+def voxel_sums(batch: Batch, suffix: str, voxel_m: float, lowest_m: float, one_in: float) -> Voxels:
+    """About one in ``one_in`` of a batch's points above ``lowest_m``, summed by voxel."""
+    points = xyz(every_nth(batch, one_in), suffix)
     points = points[points[:, 2] >= lowest_m]
     cells = np.floor(points / voxel_m).astype(np.int64) + (1 << (KEY_BITS - 1))
     keys, inverse = np.unique(
@@ -25,12 +25,14 @@ def voxel_sums(batch: Batch, names: tuple[str, str, str], voxel_m: float, lowest
     return keys, _sums(inverse, len(keys), np.column_stack([np.ones(len(points)), points]))
 
 
-def voxel_means(partials: Sequence[Voxels]) -> Array:
+def voxel_means(partials: Iterable[Voxels]) -> Array:
     """Mean points (n, 3) of the voxels that hold a fair share of points: lone outliers fall away."""
-    keys, inverse = np.unique(np.concatenate([keys for keys, _ in partials]), return_inverse=True)
+    keys, sums = np.empty(0, np.int64), np.empty((0, 4))
+    for more_keys, more_sums in partials:
+        keys, inverse = np.unique(np.concatenate([keys, more_keys]), return_inverse=True)
+        sums = _sums(inverse, len(keys), np.concatenate([sums, more_sums]))
     if len(keys) == 0:
         return np.empty((0, 3))
-    sums = _sums(inverse, len(keys), np.concatenate([sums for _, sums in partials]))
     counts = np.sort(sums[:, 0])
     typical = counts[np.searchsorted(np.cumsum(counts), counts.sum() / 2)]  # half of all points lie in fuller voxels
     fair = sums[:, 0] >= max(2.0, 0.02 * typical)
@@ -41,9 +43,13 @@ def _sums(group: NDArray[np.int64], groups: int, rows: Array) -> Array:
     return np.column_stack([np.bincount(group, weights=column, minlength=groups) for column in rows.T])
 
 
-def every_nth(batch: Batch, one_in: float) -> dict[str, Array]:
+def every_nth(batch: Batch, one_in: float) -> Batch:
     """About one in ``one_in`` rows, chosen by a hash of time and beam: the same rows whatever the batches are."""
-    mixed = batch["t_ns"].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + batch["beam"].astype(np.uint64)
+    if one_in <= 1:
+        return batch
+    mixed = batch["t_ns"].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    if "beam" in batch:
+        mixed += batch["beam"].astype(np.uint64)
     mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
-    chosen = (mixed >> np.uint64(40)).astype(np.float64) < (1 << 24) / one_in
+    chosen = np.flatnonzero((mixed >> np.uint64(40)) < np.uint64((1 << 24) / one_in))
     return {name: values[chosen] for name, values in batch.items()}

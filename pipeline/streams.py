@@ -8,7 +8,7 @@ ordered tuple of parts that can be iterated any number of times.
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from pipeline.errors import ArtefactError
 
 Batch = Mapping[str, np.ndarray]
-BATCH_ROWS = 262_144
+BATCH_ROWS = 131_072
 T = TypeVar("T")
 
 
@@ -25,6 +25,11 @@ def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
     """A table's columns as arrays; what is stored in single precision is computed with in double."""
     arrays = {name: table[name].to_numpy() for name in table.column_names}
     return {name: a.astype(np.float64) if a.dtype == np.float32 else a for name, a in arrays.items()}
+
+
+def xyz(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarray:
+    """Points (n, 3) from the columns ``x_<suffix>``, ``y_…`` and ``z_…``; each axis lies together in memory."""
+    return np.array([batch[f"{axis}_{suffix}"][rows] for axis in "xyz"]).T
 
 
 @dataclass(frozen=True)
@@ -106,10 +111,14 @@ class Stream:
             for chunk in part.chunks():
                 yield chunk.columns
 
-    def fold(self, function: Callable[..., T], *arguments: object) -> list[T]:
-        """``function(batch, *arguments)`` of every batch, in order; parts run side by side."""
+    def fold(self, function: Callable[..., T], *arguments: object) -> Iterator[T]:
+        """``function(batch, *arguments)`` of every batch, in order; parts run side by side.
+
+        Take the results one by one: together they may be many.
+        """
         work = [(part, function, arguments) for part in self.parts]
-        return [result for results in self.mapper(_fold_part, work) for result in results]
+        for results in self.mapper(_fold_part, work):
+            yield from results
 
 
 EMPTY = Stream(())

@@ -1,6 +1,10 @@
 """The rigorous solution: both sensors observe shared surfaces; six unknowns and the surfaces, with their covariance."""
 
+import functools
+import operator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Annotated, Any
 
 import numpy as np
@@ -31,19 +35,21 @@ from pipeline.maths.consistency import (
     merge_scores,
     scores_of,
 )
-from pipeline.maths.robust import scale_of
+from pipeline.maths.robust import histogram, scale_of
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.solution import Solution, redundancies, solve, variance_factors, weakest_direction
 from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of
 from pipeline.poses import trajectory_in_target
-from pipeline.streams import Batch, Stream
+from pipeline.sampling import every_nth
+from pipeline.streams import Batch, Stream, xyz
 from pipeline.times import NS
 
 Array = NDArray[np.float64]
 STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
 STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
 ROUGH_STEP = 1e-3  # weights become robust when the step is smaller (rad, m)
+SCALE_ONE_IN = 8  # the laser's robust scale is taken from one in so many of its points
 RESCALINGS = 2  # how often the groups' robust scales are then taken anew
 
 
@@ -85,7 +91,7 @@ class Scene:
 
     def laser(self, batch: Batch, state: State) -> tuple[Rows, Array]:
         face, laser = batch["face"], self.config.laser
-        points = np.column_stack([batch[f"{axis}_target_m"] for axis in "xyz"])
+        points = xyz(batch, "target_m")
         points[:, 2] -= self.height_of_face[face]
         ranges = np.sqrt(batch["x_laser_m"] ** 2 + batch["y_laser_m"] ** 2 + batch["z_laser_m"] ** 2)
         sigmas = (laser.range_sigma_m, np.radians(laser.angle_sigma_deg))
@@ -95,9 +101,14 @@ class Scene:
         face, mbes = batch["face"], self.config.mbes
         positions, R_target_from_body = self.trajectory.poses_at(batch["t_ns"])
         positions[:, 2] -= self.height_of_face[face]
-        points = np.column_stack([batch[f"{axis}_mbes_m"] for axis in "xyz"])
+        points = xyz(batch, "mbes_m")
         sigmas = (mbes.range_sigma_m, np.radians(mbes.angle_sigma_deg))
         return sounding_rows(state, self.surface_of_face[face], points, positions, R_target_from_body, *sigmas)
+
+
+def _laser_histogram(batch: Batch, scene: Scene, state: State) -> Array:
+    rows, _ = scene.laser(every_nth(batch, SCALE_ONE_IN), state)
+    return histogram(rows.residual_m / rows.sigma_m)
 
 
 def _laser_moments(batch: Batch, scene: Scene, state: State) -> LaserMoments:
@@ -118,8 +129,7 @@ def _scores(batch: Batch, scene: Scene, state: State, sensor: str) -> Scores:
 def run(inputs: Inputs, config: Config) -> Outputs:
     scene, state = _start(inputs, config)
     settings = config.adjust
-    laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
-    laser_scale = scale_of(laser.histogram)
+    laser_scale = scale_of(_sum(inputs.laser_labelled.fold(_laser_histogram, scene, state)))
     state = replace(state, scales={**state.scales, "laser": laser_scale})
     robust = replace(state, robust=(settings.robust_k0, settings.robust_k1))
     laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, robust))
@@ -139,8 +149,10 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             scales = {name: scale_of(group.histogram) for name, group in sums.groups.items()}
             state = replace(state, robust=robust.robust, scales={**state.scales, **scales, "laser": laser_scale})
     scores = merge_scores(
-        inputs.laser_labelled.fold(_scores, scene, state, "laser")
-        + inputs.soundings_labelled.fold(_scores, scene, state, "mbes")
+        chain(
+            inputs.laser_labelled.fold(_scores, scene, state, "laser"),
+            inputs.soundings_labelled.fold(_scores, scene, state, "mbes"),
+        )
     )
     return _outputs(state, sums, solution, scores, converged, iterations, config)
 
@@ -152,11 +164,8 @@ def _negligible(solution: Solution) -> bool:
     return bool(np.all(np.abs(solution.step[:COMMON]) <= np.maximum(STEP_SIGMAS * sigma, floor)))
 
 
-def _sum(pieces: list[Any]) -> Any:
-    total = pieces[0]
-    for piece in pieces[1:]:
-        total = total + piece
-    return total
+def _sum(pieces: Iterator[Any]) -> Any:
+    return functools.reduce(operator.add, pieces)
 
 
 def _start(inputs: Inputs, config: Config) -> tuple[Scene, State]:

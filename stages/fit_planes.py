@@ -16,7 +16,7 @@ from pipeline.maths.planes import Moments, Plane, fit_plane
 from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of
 from pipeline.poses import trajectory_in_target
-from pipeline.streams import Batch, Stream
+from pipeline.streams import Batch, Stream, xyz
 
 Array = NDArray[np.float64]
 Key = tuple[int, int]  # pass, face
@@ -70,19 +70,19 @@ def _groups(batch: Batch) -> Iterator[tuple[Key, NDArray[np.int64]]]:
 
 def laser_moments(batch: Batch) -> dict[Key, Moments]:
     """Moments of a batch's laser points by pass and face."""
-    points = np.column_stack([batch[f"{axis}_target_m"] for axis in "xyz"])
+    points = xyz(batch, "target_m")
     return {key: Moments.of(points[rows]) for key, rows in _groups(batch)}
 
 
 def sounding_moments(batch: Batch, trajectory: Trajectory, R_body_from_mbes: Array) -> dict[Key, Array]:
     """Lifted moments (40, 40) of a batch's soundings by pass and face."""
-    points = np.column_stack([batch[f"{axis}_mbes_m"] for axis in "xyz"]) @ R_body_from_mbes.T
+    points = xyz(batch, "mbes_m") @ R_body_from_mbes.T
     positions, R_target_from_body = trajectory.poses_at(batch["t_ns"])
     features = lift(R_target_from_body, positions, points)
     return {key: features[rows].T @ features[rows] for key, rows in _groups(batch)}
 
 
-def _merge(partials: list[dict[Key, Any]]) -> dict[Key, Any]:
+def _merge(partials: Iterator[dict[Key, Any]]) -> dict[Key, Any]:
     total: dict[Key, Any] = {}
     for partial in partials:
         for key, moments in partial.items():

@@ -16,7 +16,7 @@ from pipeline.maths.rotations import quaternion_from_rotation
 from pipeline.maths.trajectory import Trajectory, poses_in_pool
 from pipeline.mounts import mount_of, target_of
 from pipeline.passes import pass_of
-from pipeline.streams import EMPTY, Chunk, Piece, Stream
+from pipeline.streams import EMPTY, Chunk, Piece, Stream, xyz
 from pipeline.times import NS
 
 Array = NDArray[np.float64]
@@ -86,26 +86,31 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
     covered = prepared.trajectory.covers(t_ns, round(config.georeference.max_ins_interval_s * NS))
     counts = {"outside every pass": int((number < 0).sum()), "hole in the INS": int(((number >= 0) & ~covered).sum())}
     rows = np.flatnonzero((number >= 0) & covered)
-    t_ns, number = t_ns[rows], number[rows]
+    if len(rows) < len(t_ns):
+        columns = {name: values[rows] for name, values in columns.items()}
+        t_ns, number = columns["t_ns"], number[rows]
     if source == "laser_points":
-        sensor, pool = _laser(t_ns, np.column_stack([columns[f"{axis}_m"][rows] for axis in "xyz"]), prepared, config)
+        sensor, pool = _laser(t_ns, xyz(columns, "m"), prepared, config)
+        valid = np.ones(len(t_ns), dtype=bool)
     else:
         sensor, valid = soundings.points_in_mbes(
-            columns["two_way_time_s"][rows],
-            columns["angle_rad"][rows],
-            columns["sound_speed_m_s"][rows],
+            columns["two_way_time_s"],
+            columns["angle_rad"],
+            columns["sound_speed_m_s"],
             config.mbes.sound_speed_m_s,
             None if config.mbes.projector_offset_m is None else np.array(config.mbes.projector_offset_m),
         )
-        counts["angle impossible with the given sound speed"] = int((~valid).sum())
-        rows, t_ns, number, sensor = rows[valid], t_ns[valid], number[valid], sensor[valid]
         mount = mount_of(config.mbes.mount)
         pool = prepared.trajectory.place(t_ns, sensor @ mount.R_body_from_sensor.T + mount.lever_arm_body_m)
-    near = np.all((pool >= prepared.box_low_m) & (pool <= prepared.box_high_m), axis=1)
-    counts |= {"outside the box round the target": int((~near).sum()), "used": int(near.sum())}
+        counts["angle impossible with the given sound speed"] = int((~valid).sum())
+    inside = valid.copy()
+    for values, low, high in zip(pool.T, prepared.box_low_m, prepared.box_high_m, strict=True):
+        inside &= (values >= low) & (values <= high)
+    near = np.flatnonzero(inside)
+    counts |= {"outside the box round the target": int(valid.sum()) - len(near), "used": len(near)}
     kept: dict[str, NDArray[Any]] = {"t_ns": t_ns[near], "pass": number[near]}
     if source == "soundings":
-        kept |= {name: columns[name][rows][near] for name in ("ping", "beam")}
+        kept |= {name: columns[name][near] for name in ("ping", "beam")}
     word = "laser" if source == "laser_points" else "mbes"
     for index, axis in enumerate("xyz"):
         kept[f"{axis}_{word}_m"] = sensor[near, index]
@@ -117,7 +122,7 @@ def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: C
     """Points in the scanner's frame and in the pool frame, whichever of the two the files hold."""
     mount = mount_of(config.laser.mount)
     if config.laser.frame == "laser":
-        body = points @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
+        body = (mount.R_body_from_sensor @ points.T).T + mount.lever_arm_body_m
         return points, prepared.trajectory.place(t_ns, body)
     pool = prepared.frame.points_from_ecef(points)
     positions, R_pool_from_body = prepared.trajectory.poses_at(t_ns)

@@ -12,17 +12,18 @@ from pipeline.beams import beams_in_target
 from pipeline.counting import counts_table
 from pipeline.errors import RawDataError
 from pipeline.finding import VOXEL_M, FoundMount, FoundTarget, SoundingSample, find_mount, find_target
-from pipeline.maths.labelling import Beams, label_points, near_planes
+from pipeline.maths.labelling import Beams, Labels, label_points, near_planes
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of, target_of
 from pipeline.poses import trajectory_in_pool
 from pipeline.sampling import every_nth, voxel_means, voxel_sums
-from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
+from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
 
 Array = NDArray[np.float64]
-SAMPLE = 8_000  # soundings to search with
+SOUNDING_SAMPLE = 8_000  # soundings to search with
+LASER_SAMPLE = 2_000_000  # laser points, of which voxels are then made
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,8 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     model = target_of(config.target)
     other_side = "north" if config.target.low_side == "south" else "south"
     lowest = config.target.water_level_m - model.period_m / 4
-    names = ("x_pool_m", "y_pool_m", "z_pool_m")
-    dry = voxel_means(inputs.laser_pool.fold(voxel_sums, names, VOXEL_M, lowest))
+    one_in = _used(inputs, "laser_points") / LASER_SAMPLE
+    dry = voxel_means(inputs.laser_pool.fold(voxel_sums, "pool_m", VOXEL_M, lowest, one_in))
     if len(dry) < 50:
         raise RawDataError(
             f"laser: {len(dry)} places seen above the water near the target, at least 50 are needed; "
@@ -89,9 +90,13 @@ def _beam_rad(config: Config) -> tuple[float, float]:
     return float(across), float(along)
 
 
+def _used(inputs: Inputs, source: str) -> float:
+    counts = inputs.counts
+    return float(counts[(counts["source"] == source) & (counts["reason"] == "used")]["count"].sum())
+
+
 def _sounding_sample(inputs: Inputs, trajectory: Trajectory) -> SoundingSample:
-    used = inputs.counts.query("source == 'soundings' and reason == 'used'")["count"].sum()
-    pieces = inputs.soundings_pool.fold(every_nth, max(1.0, used / SAMPLE))
+    pieces = list(inputs.soundings_pool.fold(every_nth, _used(inputs, "soundings") / SOUNDING_SAMPLE))
     t_ns = np.concatenate([piece["t_ns"] for piece in pieces])
     points = np.column_stack([np.concatenate([piece[f"{axis}_mbes_m"] for piece in pieces]) for axis in "xyz"])
     return SoundingSample(*trajectory.poses_at(t_ns), points)
@@ -105,29 +110,22 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
 
 def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     model, segment = prepared.model, config.segment
-    pool = np.column_stack([batch[f"{axis}_pool_m"] for axis in "xyz"])
-    points = (pool - prepared.target.origin_pool_m) @ prepared.target.R_target_from_pool.T
+    gate, grazing = prepared.target.gate_m, np.radians(segment.min_grazing_deg)
+    pool = xyz(batch, "pool_m")
+    points = (prepared.target.R_target_from_pool @ (pool - prepared.target.origin_pool_m).T).T
     dry = points[:, 2] > model.water_level_m + segment.water_margin_m
-    near = dry & near_planes(model, points, prepared.target.gate_m)
-    rows = np.flatnonzero(near)
-    sensor = np.column_stack([batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
-    lever = np.broadcast_to(mount_of(config.laser.mount).lever_arm_body_m, sensor.shape)
-    rays = points[rows] - prepared.trajectory.place(batch["t_ns"][rows], lever)
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    grazing = np.radians(segment.min_grazing_deg)
-    labels = label_points(model, points[rows], Beams(rays), prepared.target.gate_m, segment.margin_m, grazing)
-    on = labels.face >= 0
-    columns = {name: batch[name][rows[on]] for name in ("t_ns", "pass")} | {"face": labels.face[on]}
+    near, planes = near_planes(model, points, gate, dry)
+    points, t_ns = points[near], batch["t_ns"][near]
+    rays = points - prepared.trajectory.carried(t_ns, mount_of(config.laser.mount).lever_arm_body_m)
+    rays /= np.sqrt(np.sum(rays**2, axis=1, keepdims=True))
+    labels = label_points(model, points, Beams(rays), gate, segment.margin_m, grazing, planes)
+    on = np.flatnonzero(labels.face >= 0)
+    rows = near[on]
+    columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}
     for index, axis in enumerate("xyz"):
-        columns[f"{axis}_laser_m"], columns[f"{axis}_target_m"] = sensor[on, index], points[rows[on], index]
+        columns[f"{axis}_laser_m"], columns[f"{axis}_target_m"] = batch[f"{axis}_laser_m"][rows], points[on, index]
     columns["cos_incidence"] = labels.cos_incidence[on]
-    counts = {
-        "below or near the water line": int((~dry).sum()),
-        "off every face": int((dry & ~near).sum() + labels.off_surface.sum()),
-        "near an edge": int(labels.near_edge.sum()),
-        "ray too flat": int(labels.grazing.sum()),
-        "used": int(on.sum()),
-    }
+    counts = _counts("below or near the water line", dry, "near an edge", near, labels)
     return Piece({"laser_labelled": columns}, counts)
 
 
@@ -136,27 +134,33 @@ def _label_soundings(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     coarse = mount_of(config.mbes.mount)
     R_body_from_mbes = exp_so3(mount.rotation_vector_rad) @ coarse.R_body_from_sensor
     lever = coarse.lever_arm_body_m + mount.lever_arm_correction_m
-    sensor = np.column_stack([batch[f"{axis}_mbes_m"] for axis in "xyz"])
+    sensor = xyz(batch, "mbes_m")
     points = prepared.trajectory.place(batch["t_ns"], sensor @ R_body_from_mbes.T + lever)
     wet = points[:, 2] < model.water_level_m - segment.water_margin_m
-    near = wet & near_planes(model, points, mount.gate_m)
-    rows = np.flatnonzero(near)
-    _, R_target_from_body = prepared.trajectory.poses_at(batch["t_ns"][rows])
-    beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[rows], _beam_rad(config))
+    near, planes = near_planes(model, points, mount.gate_m, wet)
+    _, R_target_from_body = prepared.trajectory.poses_at(batch["t_ns"][near])
+    beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[near], _beam_rad(config))
     grazing = np.radians(segment.min_grazing_deg)
-    labels = label_points(model, points[rows], beams, mount.gate_m, segment.margin_m, grazing)
-    on = labels.face >= 0
-    columns = {name: batch[name][rows[on]] for name in ("t_ns", "pass", "ping", "beam")} | {"face": labels.face[on]}
-    for index, axis in enumerate("xyz"):
-        columns[f"{axis}_mbes_m"] = sensor[rows[on], index]
-    counts = {
-        "above or near the water line": int((~wet).sum()),
-        "off every face": int((wet & ~near).sum() + labels.off_surface.sum()),
-        "footprint near an edge": int(labels.near_edge.sum()),
-        "ray too flat": int(labels.grazing.sum()),
-        "used": int(on.sum()),
-    }
+    labels = label_points(model, points[near], beams, mount.gate_m, segment.margin_m, grazing, planes)
+    on = np.flatnonzero(labels.face >= 0)
+    rows = near[on]
+    names = ("t_ns", "pass", "ping", "beam", "x_mbes_m", "y_mbes_m", "z_mbes_m")
+    columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on]}
+    counts = _counts("above or near the water line", wet, "footprint near an edge", near, labels)
     return Piece({"soundings_labelled": columns}, counts)
+
+
+def _counts(
+    other_side: str, own_side: NDArray[np.bool_], edge: str, near: NDArray[np.int64], labels: Labels
+) -> dict[str, int]:
+    """Why points got no label, and how many have one."""
+    return {
+        other_side: int((~own_side).sum()),
+        "off every face": int(own_side.sum()) - len(near) + int(labels.off_surface.sum()),
+        edge: int(labels.near_edge.sum()),
+        "ray too flat": int(labels.grazing.sum()),
+        "used": int((labels.face >= 0).sum()),
+    }
 
 
 def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:

@@ -8,7 +8,7 @@ small by half (2 mm and 0.002° common to a ping against 27 000 soundings). So t
 which needs no model of what is common (White 1980; Arellano 1987 for clusters), corrected by m / (m - u).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,7 +59,7 @@ def scores_of(state: State, rows: Rows, sensor: str, number: Integers, moment: I
     return Scores(dict(zip(found.tolist(), scores, strict=True)), cells)
 
 
-def merge_scores(pieces: Sequence[Scores]) -> Scores:
+def merge_scores(pieces: Iterable[Scores]) -> Scores:
     """All chunks together, in order."""
     scores: dict[int, Array] = {}
     cells: dict[tuple[str, int, int], dict[int, Array]] = {}

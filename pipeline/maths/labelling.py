@@ -1,7 +1,8 @@
 """Which face a point lies on: by polygon, with a margin of the footprint's half extent along its own direction."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class Beams:
 
 
 @dataclass(frozen=True)
-class _Plane:
+class NearPlane:
     """Faces in one plane, and the points near it: rows (m,) and their signed distances along ``axis`` (m,)."""
 
     faces: list[int]
@@ -63,8 +64,8 @@ class _Plane:
     distance_m: Array
 
 
-def _planes(model: TargetModel, points_m: Array, reach_m: float) -> Iterator[_Plane]:
-    """Each plane of the model with the points within ``reach_m``, parallel planes together.
+def _planes(model: TargetModel, points_m: Array, reach_m: float, among: Flags | None = None) -> Iterator[NearPlane]:
+    """Each plane of the model with the points (of those ``among``) within ``reach_m``, parallel planes together.
 
     Of parallel planes a point goes to the nearest: one projection and one search for all tops and bottoms, not forty.
     """
@@ -77,26 +78,42 @@ def _planes(model: TargetModel, points_m: Array, reach_m: float) -> Iterator[_Pl
     for axis, planes in parallel.items():
         direction, offsets = np.array(axis), np.array(sorted(planes))
         along = points_m @ direction
-        nearest = np.searchsorted((offsets[1:] + offsets[:-1]) / 2, along)
+        nearest = np.searchsorted((offsets[1:] + offsets[:-1]) / 2, along) if len(offsets) > 1 else 0
         distance = along - offsets[nearest]
-        rows = np.flatnonzero(np.abs(distance) <= reach_m)
-        for k in np.unique(nearest[rows]).tolist():
-            here = rows[nearest[rows] == k]
-            yield _Plane(planes[float(offsets[k])], direction, here, distance[here])
+        near = np.abs(distance) <= reach_m
+        rows = np.flatnonzero(near if among is None else near & among)
+        which = np.broadcast_to(nearest, len(points_m))[rows].astype(np.int16)
+        rows = rows[np.argsort(which, kind="stable")]
+        ends = np.cumsum(np.bincount(which, minlength=len(offsets)))
+        for k, (start, end) in enumerate(pairwise([0, *ends.tolist()])):
+            if end > start:
+                here = rows[start:end]
+                yield NearPlane(planes[float(offsets[k])], direction, here, distance[here])
 
 
-def near_planes(model: TargetModel, points_m: Array, reach_m: float) -> Flags:
-    """Points (n,) within ``reach_m`` of the plane of some face: a quick way to leave out the rest."""
+def near_planes(
+    model: TargetModel, points_m: Array, reach_m: float, among: Flags
+) -> tuple[NDArray[np.int64], tuple[NearPlane, ...]]:
+    """Rows of the points ``among`` (n,) these that lie within ``reach_m`` of some face's plane, ascending; and the
+    planes, with the points numbered within those rows: for :func:`label_points` of these points alone."""
+    planes = tuple(_planes(model, points_m, reach_m, among))
     near = np.zeros(len(points_m), dtype=bool)
-    for plane in _planes(model, points_m, reach_m):
+    for plane in planes:
         near[plane.rows] = True
-    return near
+    number = np.cumsum(near) - 1
+    return np.flatnonzero(near), tuple(replace(plane, rows=number[plane.rows]) for plane in planes)
 
 
 def label_points(
-    model: TargetModel, points_m: Array, beams: Beams, gate_m: float, margin_m: float, min_grazing_rad: float
+    model: TargetModel,
+    points_m: Array,
+    beams: Beams,
+    gate_m: float,
+    margin_m: float,
+    min_grazing_rad: float,
+    planes: Iterable[NearPlane] | None = None,
 ) -> Labels:
-    """Label points (n, 3) in the target frame.
+    """Label points (n, 3) in the target frame; ``planes``: from :func:`near_planes`, where they are known already.
 
     A point belongs to a face if it lies within ``gate_m`` of the face's plane, its ray meets the front at no less than
     ``min_grazing_rad`` and its whole footprint lies within the polygon with ``margin_m`` to spare. Of several faces the
@@ -108,7 +125,7 @@ def label_points(
     best = np.full(n, np.inf)
     near_plane, seen_flat = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     sine = np.sin(min_grazing_rad) if beams.directions.any() else 0.0
-    for plane in _planes(model, points_m, gate_m):
+    for plane in _planes(model, points_m, gate_m) if planes is None else planes:
         z = points_m[plane.rows, 2]
         for number in plane.faces:
             face = model.faces[number]

@@ -42,10 +42,12 @@ def skew(vector: Array) -> Array:
 def exp_coefficients(squared_angle: Array) -> tuple[Array, Array]:
     """sin(t)/t and (1 - cos t)/t² of t² (series below t = 1e-3, where they are exact to 1e-17)."""
     small = squared_angle < 1e-6
+    first = 1 - squared_angle / 6 + squared_angle**2 / 120
+    second = 0.5 - squared_angle / 24 + squared_angle**2 / 720
+    if np.all(small):
+        return first, second
     t = np.sqrt(np.where(small, 1.0, squared_angle))
-    first = np.where(small, 1 - squared_angle / 6 + squared_angle**2 / 120, np.sin(t) / t)
-    second = np.where(small, 0.5 - squared_angle / 24 + squared_angle**2 / 720, 2 * (np.sin(t / 2) / t) ** 2)
-    return first, second
+    return np.where(small, first, np.sin(t) / t), np.where(small, second, 2 * (np.sin(t / 2) / t) ** 2)
 
 
 def exp_so3(rotation_vector: Array) -> Array:

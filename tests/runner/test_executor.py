@@ -69,9 +69,8 @@ def test_a_stream_folds_over_workers() -> None:
 
     parts = tuple(MemoryPart(str(k), {"x_m": np.full(10, float(k))}) for k in range(20))
     with workers(2) as two:
-        assert Stream(parts, two.map).fold(lambda batch, factor: float(batch["x_m"].sum()) * factor, 2.0) == [
-            20.0 * k for k in range(20)
-        ]
+        found = Stream(parts, two.map).fold(lambda batch, factor: float(batch["x_m"].sum()) * factor, 2.0)
+        assert list(found) == [20.0 * k for k in range(20)]
 
 
 def test_one_job_works_in_this_thread() -> None:
