@@ -41,7 +41,6 @@ from pipeline.maths.solution import Solution, redundancies, solve, variance_fact
 from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of
 from pipeline.poses import trajectory_in_target
-from pipeline.sampling import every_nth
 from pipeline.streams import Batch, Stream, xyz
 from pipeline.times import NS
 
@@ -107,7 +106,7 @@ class Scene:
 
 
 def _laser_histogram(batch: Batch, scene: Scene, state: State) -> Array:
-    rows, _ = scene.laser(every_nth(batch, SCALE_ONE_IN), state)
+    rows, _ = scene.laser({name: values[::SCALE_ONE_IN] for name, values in batch.items()}, state)
     return histogram(rows.residual_m / rows.sigma_m)
 
 

@@ -75,4 +75,6 @@ def weakest_direction(covariance: Array) -> str:
         return f"no two are hard to tell apart; least sure are {WORDS[worst[0]]} and {WORDS[worst[1]]}"
     pair = members[:2]
     rho = correlation[pair[0], pair[1]]
-    return f"{' and '.join(WORDS[k] for k in members)} move together (correlation of the first two {rho:+.3f})"
+    words = [WORDS[k] for k in members]
+    together = f"{', '.join(words[:-1])} and {words[-1]}"
+    return f"{together} move together (correlation of the first two {rho:+.3f})"
