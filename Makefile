@@ -2,9 +2,9 @@
 # Variables are taken from make's command line alone, never from the environment.
 # The program decides by content what is out of date and exits with its own statuses; make turns each failure into 2.
 
-SESSION  = runs/demo-session
-CONFIG   = $(SESSION)/pool.yaml
-RUN      = runs/demo
+SESSION  =
+CONFIG   =
+RUN      =
 JOBS     =
 SEED     = 1
 
@@ -37,7 +37,10 @@ $(DEMO)/.simulated: $(SETUP) $(shell find pipeline/simulation configs/scenarios 
 	$(POOLCAL) simulate $(DEMO) --seed $(SEED)
 	@touch $@
 
+GIVEN = $(foreach name,SESSION CONFIG RUN,$(if $($(name)),,$(error $(name)= is missing: make $@ SESSION=dir CONFIG=configs/pool.yaml RUN=runs/name)))
+
 calibrate: $(SETUP) ## all stages that are out of date: SESSION= CONFIG= RUN=
+	@:$(GIVEN)
 	$(POOLCAL) run '$(SESSION)' --config '$(CONFIG)' --run '$(RUN)' $(if $(JOBS),--jobs $(JOBS))
 
 # The same, one rule a stage with real files as targets. (Paths with blanks: make cannot have them as targets;
@@ -59,6 +62,9 @@ $(eval $(call STAGE_RULE,offsets,$(RUN)/angle_iterate/manifest.json))
 $(eval $(call STAGE_RULE,adjust,$(RUN)/offsets/manifest.json))
 $(eval $(call STAGE_RULE,report,$(RUN)/adjust/manifest.json))
 .PRECIOUS: $(STAGES:%=$(RUN)/%/manifest.json)
+else
+stages:
+	@:$(GIVEN)$(error make stages takes no paths with blanks: use make calibrate)
 endif
 
 # --- developing --------------------------------------------------------------------------------------------------------

@@ -81,7 +81,7 @@ PASSES = Artefact(
         Column("speed_m_s", F64, "m/s", "mean along-track speed"),
         Column("azimuth_deg", F64, "deg", "mean heading, clockwise from true north"),
         Column("heading_swing_deg", F64, "deg", "standard deviation of the heading"),
-        Column("distance_m", F64, "m", "median horizontal distance of the INS from the target's origin"),
+        Column("distance_m", F64, "m", "median distance of the INS from the wall's plane while the wall is abeam"),
     ),
 )
 FILES = Artefact(

@@ -301,6 +301,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
         content = yaml.load(text, Loader=_StrictLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
+    if content is None:
+        raise ConfigError(f"{path}: is empty; see README.md for what it must say")
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: holds {type(content).__name__}, not a mapping of keys; see README.md")
     return content
@@ -318,7 +320,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
             raise ConfigError(f"{where}: {key}: unknown key; known here: {known}") from error
         if fault["type"] == "missing":
             raise ConfigError(f"{where}: {key}: is missing; add it") from error
-        message = fault["msg"].removeprefix("Value error, ")
+        message = fault["msg"].removeprefix("Value error, ").replace("a valid array", "a list, in square brackets")
         shown = repr(fault["input"])
         shown = shown if len(shown) <= 60 else shown[:57] + "..."
         raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; mend this value") from error

@@ -51,10 +51,22 @@ def _planes(model: TargetModel) -> tuple[Array, Array]:
     return np.array([face.normal for face in model.faces]), np.array([face.distance_m for face in model.faces])
 
 
+@dataclass(frozen=True)
+class LaserSample:
+    """Dry laser points in the pool frame: means over voxels (n, 3) m, and some of the points themselves (k, 3) m.
+
+    Voxels are evenly dense, which a search wants, but biased where a face runs along their sides: each mean then lies
+    on its own side of the face. The pose itself comes from the points.
+    """
+
+    voxel_means_m: Array
+    points_m: Array
+
+
 def find_target(
-    points_pool_m: Array, model: TargetModel, swapped: TargetModel, settings: config.Segment, azimuth_known: bool
+    dry: LaserSample, model: TargetModel, swapped: TargetModel, settings: config.Segment, azimuth_known: bool
 ) -> FoundTarget:
-    """Pose of the target from dry laser points (n, 3) in the pool frame; rivals are the poses one block off.
+    """Pose of the target from dry laser points; rivals are the poses one block off.
 
     Shifting by one period, or by half of it with the sides swapped, changes nothing but the ends of the stacks and the
     wall's top edge. A rival half a period off loses the wall's width times half a period; if it loses less than
@@ -63,7 +75,7 @@ def find_target(
     azimuth = np.radians(settings.search_azimuth_deg if azimuth_known else max(10.0, settings.search_azimuth_deg))
     reach_xy, reach_z = settings.search_horizontal_m, settings.search_vertical_e * model.period_m / 2
     sigmas = np.array([azimuth, reach_xy, reach_xy, reach_z])
-    placement = TargetPose(points_pool_m, sigmas)
+    placement = TargetPose(dry.voxel_means_m, sigmas)
     normals, distances = _planes(model)
     closest = ClosestSurface(model)
     turns = np.linspace(-azimuth, azimuth, 5 if azimuth_known else 13)
@@ -82,13 +94,14 @@ def find_target(
     )
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
-        dry = points[:, 2] > model.water_level_m + settings.water_margin_m
-        labels = label_points(model, points, Beams.head_on(len(points)), WIDE_M, VOXEL_M / 2 + settings.margin_m, 0.0)
-        return np.where(dry, labels.face, -1).astype(np.int16)
+        above = points[:, 2] > model.water_level_m + settings.water_margin_m
+        labels = label_points(model, points, Beams.head_on(len(points)), WIDE_M, settings.margin_m, 0.0)
+        return np.where(above, labels.face, -1).astype(np.int16)
 
-    pose = refine(placement, found.parameters, label, normals, distances)
+    single = TargetPose(dry.points_m, sigmas)
+    pose = refine(single, found.parameters, label, normals, distances)
     best = _agreement(placement, pose.parameters, model, closest)
-    tilted = TiltedTarget(placement.points(pose.parameters), np.array([0.1, 0.1, 0.1, 1.0, 1.0, 1.0]))
+    tilted = TiltedTarget(single.points(pose.parameters), np.array([0.1, 0.1, 0.1, 1.0, 1.0, 1.0]))
     tilt = refine(tilted, np.zeros(6), label, normals, distances, rounds=2)
     name, rival = _rivals(placement, pose.parameters, model, swapped)
     R_target_from_pool = rotation_z(pose.parameters[0])

@@ -1,6 +1,7 @@
 """What is out of date in a run folder, and why: decided by content, never by times."""
 
 import dataclasses
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +19,7 @@ from pipeline.folder import Settings
 from pipeline.progress import Progress
 
 SENSORS = ("ins", "laser", "mbes")
+EMPTY = hashlib.sha256().hexdigest()  # empty files are all alike: the readers say what they think of them
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,12 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
     for name in names:
         if any("\udc80" <= letter <= "\udcff" for letter in name):  # Python's stand-ins for other bytes
             raise RawDataError(f"{name!a}: the file's name is not UTF-8; rename it")
-    return dict(zip(names, this.digests.of(paths), strict=True))
+    found = dict(zip(names, this.digests.of(paths), strict=True))
+    first: dict[str, str] = {}
+    for name, digest in found.items():
+        if first.setdefault(digest, name) != name and digest != EMPTY:
+            raise RawDataError(f"{name}: is the same as {first[digest]}; list one of the two under {sensor}.files")
+    return found
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:

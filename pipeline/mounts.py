@@ -1,5 +1,6 @@
 """From the configuration's degrees to what the mathematics takes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +21,9 @@ class Mounted:
     lever_arm_body_m: Array
 
     def settings(self) -> dict[str, float]:
-        """The contract's six numbers."""
+        """The contract's six numbers: pitch within ±90°, roll and yaw within ±180°, whatever way they were written."""
         names = ("roll_deg", "pitch_deg", "yaw_deg")
-        angles = (float(np.degrees(angle)) for angle in mount_from_rotation(self.R_body_from_sensor))
+        angles = (round(float(np.degrees(angle)), 12) for angle in mount_from_rotation(self.R_body_from_sensor))
         lever = (float(value) for value in self.lever_arm_body_m)
         return dict(zip(names, angles, strict=True)) | dict(zip(("x_m", "y_m", "z_m"), lever, strict=True))
 
@@ -31,6 +32,12 @@ def mount_of(mount: config.Mount) -> Mounted:
     """Radians and matrices from a mount's settings."""
     angles = np.radians([mount.roll_deg, mount.pitch_deg, mount.yaw_deg])
     return Mounted(rotation_from_mount(*map(float, angles)), np.array([mount.x_m, mount.y_m, mount.z_m]))
+
+
+def change_of(total: Mapping[str, float], coarse: Mapping[str, float], key: str) -> float:
+    """Calibrated minus coarse; of angles the way that is shorter, never a whole turn."""
+    change = total[key] - coarse[key]
+    return change - 360.0 * round(change / 360.0) if key.endswith("_deg") else change
 
 
 def target_of(target: config.Target, low_side: str | None = None) -> TargetModel:

@@ -87,11 +87,20 @@ def _bring_up_to_date(this: Run, stage: ModuleType) -> bool:
 
 
 def _losses(done: manifest.Manifest | None) -> list[str]:
-    """Records of raw files that could not be used, for the screen: a cut file must not pass in silence."""
-    if done is None or done.stage != "ingest":
+    """Data that could not be used, for the screen: a cut file, or a log that is too short, must not pass in silence."""
+    if done is None or done.stage not in ("ingest", "georeference"):
         return []
-    lost = [row for row in done.counts if row["count"] and row["reason"] not in ("used", "no detection")]
-    return [f"{row['source']}: left out {row['count']:,} x {row['reason']}" for row in lost]
+    total: dict[str, int] = {}
+    for row in done.counts:
+        total[row["source"]] = total.get(row["source"], 0) + row["count"]
+
+    def worth(source: str, reason: str, count: int) -> bool:
+        if done.stage == "ingest":
+            return count > 0 and reason not in ("used", "no detection")
+        return count > total[source] / 100 and reason in ("outside every pass", "hole in the INS")
+
+    lost = [row for row in done.counts if worth(row["source"], row["reason"], row["count"])]
+    return [f"{r['source']}: left out {r['count']:,} of {total[r['source']]:,}: {r['reason']}" for r in lost]
 
 
 def _execute(this: Run, stage: ModuleType) -> None:

@@ -14,10 +14,14 @@ KEY_BITS = 20
 Voxels = tuple[NDArray[np.int64], Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
 
 
-def voxel_sums(batch: Batch, suffix: str, voxel_m: float, lowest_m: float, one_in: float) -> Voxels:
-    """About one in ``one_in`` of a batch's points above ``lowest_m``, summed by voxel."""
-    points = xyz(every_nth(batch, one_in), suffix)
-    points = points[points[:, 2] >= lowest_m]
+def points_above(batch: Batch, suffix: str, lowest_m: float) -> Array:
+    """A batch's points above ``lowest_m``, (n, 3) m."""
+    points = xyz(batch, suffix)
+    return np.asarray(points[points[:, 2] >= lowest_m])
+
+
+def voxel_sums(points: Array, voxel_m: float) -> Voxels:
+    """Points (n, 3) summed by voxel."""
     cells = np.floor(points / voxel_m).astype(np.int64) + (1 << (KEY_BITS - 1))
     keys, inverse = np.unique(
         (cells[:, 0] << (2 * KEY_BITS)) | (cells[:, 1] << KEY_BITS) | cells[:, 2], return_inverse=True

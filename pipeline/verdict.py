@@ -33,13 +33,18 @@ def reasons(
     if doubts:
         return doubts
     found = []
-    summary = evidence.summary.iloc[0]
+    summary, cells = evidence.summary.iloc[0], evidence.cells
     if summary["reason"]:
         return [f"the adjustment has no result: {summary['reason']}; sail more passes, at different distances"]
     if not summary["converged"]:
         found.append(f"the adjustment did not converge in {summary['iterations']} steps")
+    if cells.loc[cells["sensor"] == "mbes", "pass"].nunique() < 2:
+        found.append(
+            "only one pass has soundings on the target, so that drift of the INS or a clock cannot show: sail at least "
+            "two, at different distances"
+        )
     if not summary["test_passed"]:
-        found.append(_inconsistency(summary, evidence.cells))
+        found.append(_inconsistency(summary, cells))
     found += _wide_sigmas(methods["adjustment"]["sigma"], limits)
     if chosen != "adjustment":
         found += _patent(chosen, evidence.corrections.set_index("method").loc[chosen], methods, limits)
@@ -52,10 +57,11 @@ def _ambiguities(evidence: Evidence) -> list[str]:
     if pose["ambiguous"]:
         better = pose["rival_agreement_m2"] > pose["agreement_m2"]
         how = "better" if better else "nearly as well"
-        remedy = "check target.low_side" if better else "let the laser see the wall's top edge; check target.low_side"
+        remedy = "check" if better else "let the laser see the wall's top edge; check"
         found.append(
             f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {how} "
-            f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} and target.origin"
+            f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} target.origin (a "
+            "height wrong by e or 2 e does this), azimuth_deg, a, b, c, e and low_side"
         )
     if not pose["within"]:
         found.append(
@@ -65,7 +71,8 @@ def _ambiguities(evidence: Evidence) -> list[str]:
     if not mount["within"]:
         found.append(
             "no mount within the search limits brings the soundings onto the target: the coarse mbes.mount is farther "
-            "off than segment.search_mount_deg and search_mount_m, or target.a, b, c, e are wrong"
+            "off than segment.search_mount_deg and search_mount_m, target.a, b, c, e are wrong, or the clocks differ "
+            "(UTC is 18 s behind GPS time)"
         )
     if mount["ambiguous"]:
         found.append(
@@ -78,7 +85,7 @@ def _ambiguities(evidence: Evidence) -> list[str]:
 def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
     worst = cells.iloc[int(cells["normalised"].abs().argmax())]
     sensor = "the laser" if worst["sensor"] == "laser" else "the sonar"
-    cause = "INS drift, a clock, the sound speed, or a moved bracket"
+    cause = "INS drift, a clock, the sound speed, a moved bracket, or a wrong laser.mount"
     if abs(worst["mean_m"]) > FAR_M:
         cause = "a wrong target.a, b, c or e, or a coarse mount farther off than segment searches"
     return (

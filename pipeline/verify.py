@@ -37,7 +37,6 @@ def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
     for path in sorted(where.rglob("*.parquet")):
         if path.relative_to(where).as_posix() not in old.outputs:
             yield f"{path.relative_to(where).as_posix()} is not its own"
-    plain = this.settings.as_json()
-    for name, value in old.key.config.items():
-        if plain.get(name) != value:
+    for name in sorted(now.config.keys() | old.key.config.keys()):
+        if now.config.get(name) != old.key.config.get(name):
             yield f"{name} is not as in {folder.RUN_YAML}"

@@ -35,7 +35,7 @@ from pipeline.maths.consistency import (
     merge_scores,
     scores_of,
 )
-from pipeline.maths.robust import histogram, scale_of
+from pipeline.maths.robust import scale_of
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.solution import Solution, redundancies, solve, variance_factors, weakest_direction
 from pipeline.maths.trajectory import Trajectory
@@ -48,7 +48,6 @@ Array = NDArray[np.float64]
 STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
 STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
 ROUGH_STEP = 1e-3  # weights become robust when the step is smaller (rad, m)
-SCALE_ONE_IN = 8  # the laser's robust scale is taken from one in so many of its points
 RESCALINGS = 2  # how often the groups' robust scales are then taken anew
 
 
@@ -88,10 +87,15 @@ class Scene:
     height_of_face: Array
     config: Config
 
+    def _heights(self, face: NDArray[np.int16], state: State) -> Array:
+        """What brings the points on all horizontal faces into one plane, (n, 3) m."""
+        (normal,) = (surface.normal for surface in state.surfaces if surface.family == "H")
+        return self.height_of_face[face][:, None] * normal
+
     def laser(self, batch: Batch, state: State) -> tuple[Rows, Array]:
         face, laser = batch["face"], self.config.laser
         points = xyz(batch, "target_m")
-        points[:, 2] -= self.height_of_face[face]
+        points -= self._heights(face, state)
         ranges = np.sqrt(batch["x_laser_m"] ** 2 + batch["y_laser_m"] ** 2 + batch["z_laser_m"] ** 2)
         sigmas = (laser.range_sigma_m, np.radians(laser.angle_sigma_deg))
         return laser_rows(state, self.surface_of_face[face], points, ranges, batch["cos_incidence"], *sigmas), points
@@ -99,15 +103,10 @@ class Scene:
     def soundings(self, batch: Batch, state: State) -> Rows:
         face, mbes = batch["face"], self.config.mbes
         positions, R_target_from_body = self.trajectory.poses_at(batch["t_ns"])
-        positions[:, 2] -= self.height_of_face[face]
+        positions -= self._heights(face, state)
         points = xyz(batch, "mbes_m")
         sigmas = (mbes.range_sigma_m, np.radians(mbes.angle_sigma_deg))
         return sounding_rows(state, self.surface_of_face[face], points, positions, R_target_from_body, *sigmas)
-
-
-def _laser_histogram(batch: Batch, scene: Scene, state: State) -> Array:
-    rows, _ = scene.laser({name: values[::SCALE_ONE_IN] for name, values in batch.items()}, state)
-    return histogram(rows.residual_m / rows.sigma_m)
 
 
 def _laser_moments(batch: Batch, scene: Scene, state: State) -> LaserMoments:
@@ -128,10 +127,7 @@ def _scores(batch: Batch, scene: Scene, state: State, sensor: str) -> Scores:
 def run(inputs: Inputs, config: Config) -> Outputs:
     scene, state = _start(inputs, config)
     settings = config.adjust
-    laser_scale = scale_of(_sum(inputs.laser_labelled.fold(_laser_histogram, scene, state)))
-    state = replace(state, scales={**state.scales, "laser": laser_scale})
-    robust = replace(state, robust=(settings.robust_k0, settings.robust_k1))
-    laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, robust))
+    laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
     converged, iterations, rescaled = False, 0, 0
     while True:
         sums = laser.sums(state) + _sum(inputs.soundings_labelled.fold(_sounding_sums, scene, state))
@@ -146,7 +142,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         if rescaled < RESCALINGS and np.max(np.abs(solution.step[:COMMON])) < ROUGH_STEP:
             rescaled += 1  # then the scales stay: weights that follow them for ever need not come to rest
             scales = {name: scale_of(group.histogram) for name, group in sums.groups.items()}
-            state = replace(state, robust=robust.robust, scales={**state.scales, **scales, "laser": laser_scale})
+            state = replace(state, robust=(settings.robust_k0, settings.robust_k1), scales={**state.scales, **scales})
+            laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
     scores = merge_scores(
         chain(
             inputs.laser_labelled.fold(_scores, scene, state, "laser"),

@@ -141,7 +141,7 @@ def compare(
 def _answer(run_folder: Path) -> int:
     """Print the result; 1 if it was rejected."""
     from pipeline.folder import calibration
-    from stages.report import summary
+    from pipeline.screen import summary
 
     result = calibration(run_folder)
     say(summary(result), sys.stdout)

@@ -136,6 +136,11 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
         of_source = counts[counts["source"] == source].set_index("reason")["count"]
         if not of_source["used"]:
             why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")
+            if of_source["hole in the INS"] > of_source.sum() / 2:
+                raise RawDataError(
+                    f"{sensor}: no point could be placed ({why}): INS records lie more than "
+                    f"{config.georeference.max_ins_interval_s:g} s apart; log the INS faster, 100 Hz or more"
+                )
             raise RawDataError(
                 f"{sensor}: no point within {config.georeference.box_margin_m:g} m of the target ({why}); "
                 f"check target.origin, target.azimuth_deg and {sensor}.mount"

@@ -180,7 +180,8 @@ def _passes(
     rows = []
     for k, (start, end) in enumerate(passes):
         inside = number == k
-        along, distance = points[inside, 1], np.hypot(points[inside, 0], points[inside, 1])
+        along, athwart = points[inside, 1], np.abs(points[inside, 0])
+        abeam = np.abs(along) <= athwart
         seconds = (end - start) / NS
         heading = trajectory["azimuth_rad"].to_numpy()[inside]
         mean = np.arctan2(np.sin(heading).mean(), np.cos(heading).mean()) if inside.any() else np.nan
@@ -195,7 +196,7 @@ def _passes(
                 "speed_m_s": abs(float(along[-1] - along[0])) / seconds if inside.any() else np.nan,
                 "azimuth_deg": float(np.degrees(mean)),
                 "heading_swing_deg": float(np.degrees(swing)),
-                "distance_m": float(np.median(distance)) if inside.any() else np.nan,
+                "distance_m": float(np.median(athwart[abeam] if abeam.any() else athwart)) if inside.any() else np.nan,
             }
         )
     return pd.DataFrame(rows)

@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from pipeline import artefacts, config
 from pipeline.maths.adjustment import COMMON, NAMES
 from pipeline.maths.rotations import exp_so3
-from pipeline.mounts import Mounted, mount_of
+from pipeline.mounts import Mounted, change_of, mount_of
+from pipeline.screen import AXES, VECTOR_OF_ANGLE
 from pipeline.times import utc_text
 from pipeline.verdict import Evidence, distance_advice, reasons
 
 Array = NDArray[np.float64]
 SCHEMA = 1
-AXES = ("roll", "pitch", "yaw", "x", "y", "z")
-VECTOR_OF_ANGLE = {"pitch": 0, "roll": 1, "yaw": 2}  # rotation vector's component about the same body axis
 
 
 @dataclass(frozen=True)
@@ -80,13 +79,14 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "result": config.result,
         "mbes": methods[config.result],
         "methods": methods,
-        "coarse": {"mount": config.mbes.mount.model_dump()},
+        "coarse": {"mount": coarse.settings()},
         "geometry": {
             "correlation": _matrix(inputs.covariance, "correlation"),
             "weakest": str(summary["weakest"]),
             "advice": distance_advice([one["distance_m"] for one in passes if one["soundings"]]),
             "test": {name: _plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
         },
+        "target": _target(inputs.target_pose.iloc[0]),
         "passes": passes,
         "ranges": _range_note(config.mbes),
         "inputs": inputs.provenance["inputs"],
@@ -105,6 +105,16 @@ def _plain(value: Any) -> Any:
         return bool(value)
     number = float(value)
     return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
+
+
+def _target(pose: pd.Series) -> dict[str, Any]:
+    """How the target was found, against the pool's config."""
+    return {
+        "offset_m": [float(pose[f"origin_{axis}_pool_m"]) for axis in "xyz"],
+        "azimuth_correction_deg": float(pose["azimuth_correction_deg"]),
+        "tilt_deg": [float(pose["tilt_x_deg"]), float(pose["tilt_y_deg"])],
+        "rms_m": _plain(pose["rms_m"]),
+    }
 
 
 def _passes(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]:
@@ -202,37 +212,9 @@ def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.Data
                     "unit": "deg" if angle else "m",
                     "coarse": coarse.settings()[key],
                     "total": block["mount"][key] if block["mount"] else np.nan,
-                    "change": block["mount"][key] - coarse.settings()[key] if block["mount"] else np.nan,
+                    "change": change_of(block["mount"], coarse.settings(), key) if block["mount"] else np.nan,
                     "correction": correction[index] if correction else np.nan,
                     "sigma": sigma[part][index] if sigma else np.nan,
                 }
             )
     return pd.DataFrame(rows)
-
-
-def summary(calibration: Mapping[str, Any]) -> str:
-    """The result on one screen, from calibration.json."""
-    lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]
-    lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    heads = f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'change':>14}{'sigma':>12}"
-    lines += ["", f"{heads}   (result: {calibration['result']})"]
-    block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
-    for parameter in AXES:
-        angle = parameter in VECTOR_OF_ANGLE
-        key, unit = (f"{parameter}_deg", "°") if angle else (f"{parameter}_m", "m")
-        part = "rotation_vector_deg" if angle else "lever_arm_m"
-        index = VECTOR_OF_ANGLE[parameter] if angle else "xyz".index(parameter)
-        total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
-        change = f"{block['mount'][key] - coarse[key]:+.4f} {unit}" if block["mount"] else "-"
-        sigma = f"{block['sigma'][part][index]:.4f} {unit}" if block["sigma"] else "-"
-        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
-    lines += ["", "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."]
-    if not block["sigma"]:
-        lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
-    lines.append("Passes with soundings on the target, distance and number:")
-    seen = [one for one in calibration["passes"] if one["soundings"]]
-    lines.append("  " + ", ".join(f"{p['pass']}: {p['distance_m']:.1f} m {p['soundings']}" for p in seen))
-    for key in ("weakest", "advice"):
-        if calibration["geometry"][key]:
-            lines.append(f"Geometry: {calibration['geometry'][key]}.")
-    return "\n".join(lines)

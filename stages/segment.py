@@ -1,5 +1,6 @@
 """Where the target is, and which points lie on which of its faces."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -11,19 +12,20 @@ from pipeline import artefacts, config
 from pipeline.beams import beams_in_target
 from pipeline.counting import counts_table
 from pipeline.errors import RawDataError
-from pipeline.finding import VOXEL_M, FoundMount, FoundTarget, SoundingSample, find_mount, find_target
+from pipeline.finding import VOXEL_M, FoundMount, FoundTarget, LaserSample, SoundingSample, find_mount, find_target
 from pipeline.maths.labelling import Beams, Labels, label_points, near_planes
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of, target_of
 from pipeline.poses import trajectory_in_pool
-from pipeline.sampling import every_nth, voxel_means, voxel_sums
+from pipeline.sampling import Voxels, every_nth, points_above, voxel_means, voxel_sums
 from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
 
 Array = NDArray[np.float64]
 SOUNDING_SAMPLE = 8_000  # soundings to search with
 LASER_SAMPLE = 2_000_000  # laser points, of which voxels are then made
+RAW_SAMPLE = 50_000  # of these taken singly
 
 
 @dataclass(frozen=True)
@@ -65,11 +67,10 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     model = target_of(config.target)
     other_side = "north" if config.target.low_side == "south" else "south"
     lowest = config.target.water_level_m - model.period_m / 4
-    one_in = _used(inputs, "laser_points") / LASER_SAMPLE
-    dry = voxel_means(inputs.laser_pool.fold(voxel_sums, "pool_m", VOXEL_M, lowest, one_in))
-    if len(dry) < 50:
+    dry = _laser_sample(inputs, lowest)
+    if len(dry.voxel_means_m) < 50:
         raise RawDataError(
-            f"laser: {len(dry)} places seen above the water near the target, at least 50 are needed; "
+            f"laser: {len(dry.voxel_means_m)} places seen above the water near the target, at least 50 are needed; "
             "check target.origin, target.water_level_m and laser.mount"
         )
     known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
@@ -93,6 +94,24 @@ def _beam_rad(config: Config) -> tuple[float, float]:
 def _used(inputs: Inputs, source: str) -> float:
     counts = inputs.counts
     return float(counts[(counts["source"] == source) & (counts["reason"] == "used")]["count"].sum())
+
+
+def _laser_sample(inputs: Inputs, lowest_m: float) -> LaserSample:
+    """The laser's points, at most about two million: as voxels, and at most about fifty thousand as they are."""
+    single: list[NDArray[np.float64]] = []
+
+    def voxels() -> Iterator[Voxels]:
+        for sums, points in inputs.laser_pool.fold(_thinned, _used(inputs, "laser_points"), lowest_m):
+            single.append(points)
+            yield sums
+
+    return LaserSample(voxel_means(voxels()), np.concatenate(single))
+
+
+def _thinned(batch: Batch, rows: float, lowest_m: float) -> tuple[Voxels, NDArray[np.float64]]:
+    some = every_nth(batch, rows / LASER_SAMPLE)
+    few = every_nth(some, rows / RAW_SAMPLE)  # the same hash: a part of these
+    return voxel_sums(points_above(some, "pool_m", lowest_m), VOXEL_M), points_above(few, "pool_m", lowest_m)
 
 
 def _sounding_sample(inputs: Inputs, trajectory: Trajectory) -> SoundingSample:
@@ -169,13 +188,11 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
         of_source = counts[counts["source"] == source].set_index("reason")["count"]
         if not of_source["used"]:
             why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")
-            mount = (
-                f", or the coarse mount by more than {config.segment.search_mount_deg:g}° and "
-                f"{config.segment.search_mount_m:g} m"
-            )
+            limits = f"{config.segment.search_mount_deg:g}° and {config.segment.search_mount_m:g} m"
+            mount = f"the coarse mount by more than {limits}, " if sensor == "mbes" else ""
             raise RawDataError(
                 f"{sensor}: no point on the target's faces ({why}); target.origin, target.azimuth_deg (of +y) "
-                f"or a, b, c, e may be wrong{mount if sensor == 'mbes' else ''}"
+                f"or a, b, c, e may be wrong, {mount}or a clock (UTC is 18 s behind GPS time)"
             )
     return Outputs(_faces(prepared.model), _target_pose(prepared.target), _mount(prepared.mount), counts)
 

@@ -75,4 +75,14 @@ def test_make_has_one_rule_a_stage_over_real_files(tmp_path: Path) -> None:
 
 def test_environment_does_not_steer_make(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RUN", "elsewhere")
-    assert "elsewhere" not in _make("-n", "calibrate")
+    command = ["make", "-n", "calibrate", "SESSION=a", "CONFIG=b.yaml"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "RUN= is missing" in done.stderr
+
+
+def test_make_stages_refuses_blanks_aloud() -> None:
+    command = ["make", "-n", "stages", "SESSION=a", "CONFIG=b.yaml", "RUN=c d"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "use make calibrate" in done.stderr

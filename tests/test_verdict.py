@@ -15,7 +15,7 @@ def methods(**patent):
     return {"adjustment": adjustment, "patent_alternating": {"sigma": None, "correction": ZERO | patent}}
 
 
-def evidence(pose=None, mount=None, summary=None, alternating=None):
+def evidence(pose=None, mount=None, summary=None, alternating=None, one_pass=False):
     pose_row = {
         "ambiguous": False,
         "rival": "one block higher",
@@ -35,13 +35,15 @@ def evidence(pose=None, mount=None, summary=None, alternating=None):
     row = {"method": "patent_alternating", "reason": "", "converged": True, "iterations": 9}
     cells = pd.DataFrame(
         {
-            "sensor": ["laser", "mbes"],
-            "family": ["P1", "P2"],
-            "pass": [0, 3],
-            "mean_m": [0.001, -0.012],
-            "normalised": [0.3, -4.0],
+            "sensor": ["laser", "mbes", "mbes"],
+            "family": ["P1", "P2", "P2"],
+            "pass": [0, 3, 4],
+            "mean_m": [0.001, -0.012, 0.001],
+            "normalised": [0.3, -4.0, 0.2],
         }
     )
+    if one_pass:
+        cells = cells[cells["pass"] != 4]
     return Evidence(
         pd.DataFrame([pose_row | (pose or {})]),
         pd.DataFrame([mount_row | (mount or {})]),
@@ -65,7 +67,7 @@ def test_a_good_session_has_no_reason():
         ),
         (
             {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0}},
-            "better (11.00 against 10.00 m²); check target.low_side",
+            "better (11.00 against 10.00 m²); check target.origin",
         ),
         ({"mount": {"ambiguous": True}}, "the soundings fit two ways"),
         ({"mount": {"within": False}}, "the coarse mbes.mount is farther"),
@@ -73,6 +75,7 @@ def test_a_good_session_has_no_reason():
         ({"summary": {"reason": "the data leave 2 directions open"}}, "no result: the data leave 2 directions open"),
         ({"summary": {"converged": False}}, "did not converge in 6 steps"),
         ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),
+        ({"one_pass": True}, "only one pass has soundings on the target"),
     ],
 )
 def test_each_evidence_is_one_reason(change, words):

@@ -60,15 +60,21 @@ CAMPAIGNS = (
     Campaign("azimuth -163", 64, 3000, WHITE | {"target": _target(azimuth_deg=-163.0)}),
     Campaign("target 6/2.4/0.8/0.4", 64, 4000, WHITE | {"target": _target(a=6.0, b=2.4, c=0.8, e=0.4)}),
     Campaign(
+        "the same, passes at 3.2 to 6.4 m",
+        64,
+        4500,
+        WHITE | {"target": _target(a=6.0, b=2.4, c=0.8, e=0.4), "track": {"distances_m": [3.2, 6.4, 4.0, 5.6]}},
+    ),
+    Campaign(
         "origin off by 0.3 m, azimuth by 1",
         64,
         5000,
         WHITE | {"surroundings": {"origin_error_m": [0.3, -0.3, 0.15], "azimuth_error_deg": 1.0}},
     ),
     Campaign("finite beams, outliers, echoes", 64, 6000, {"ins": WHITE["ins"]}),
-    Campaign("the same and INS white noise", 32, 7000, {}),
+    Campaign("finite beams and INS white noise", 32, 7000, {}),
     Campaign(
-        "the same and INS drift",
+        "finite beams and INS drift",
         32,
         8000,
         {

@@ -9,8 +9,9 @@ Observation: a point lies on its surface,
     v = n · (X - c) - shift,       X = p + T (Exp(ε) R x + l),
 
 with p, T the body's pose in the target frame, n the family's normal and c a fixed point near the surface. Horizontal
-faces are one family H: X is reduced by the design height of its face (X_z - h), so that all heights are one shift, the
-target's own (tops and bottoms are level, their heights known). With u = R x (body), n_body = Tᵀ n:
+faces are one family H: X is reduced by the design height of its face along their normal (X - h n), so that all are one
+plane: they are parallel and their distances known. (On a target out of plumb X_z - h would be wrong by h (1 - n_z).)
+With u = R x (body), n_body = Tᵀ n:
 
     ∂v/∂ε = u × n_body   (n · T (ε × u) = ε · (u × n_body)),   ∂v/∂l = n_body,
     ∂v/∂turn_k = t_k · (X - c),   ∂v/∂shift = -1,

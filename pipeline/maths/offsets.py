@@ -70,8 +70,8 @@ def offsets(
     X [0126]: mean X of the laser's wall points minus that of the MBES's, pass by pass, weighted by n_L n_M / (n_L +
     n_M). Z [0127]: (z_dry - z_wet) measured minus (z_dry - z_wet) by design, over every pair of horizontal faces.
     Y [0128]: P1 planes projected onto the floor (their traces at their own mean height), cut with a line parallel to Y
-    through the faces' centroid, laser minus MBES. An X displacement ΔX shifts the cut by -ΔX n_x / n_y: with
-    ``apply_x_first`` it is taken out, so that Y is what remains after X has been applied.
+    through the faces' centroid, laser minus MBES. Moving the MBES's points by ΔX moves their cut by ΔX n_x / n_y, laser
+    minus MBES by the opposite: with ``apply_x_first`` that is added, and Y is what remains after X has been applied.
     """
     if not passes:
         raise DegenerateGeometryError("no pass has laser points and soundings on both P1 and P2")

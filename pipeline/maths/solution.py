@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment import Sums
+from pipeline.maths.adjustment import COMMON, Sums
 from pipeline.maths.robust import LEAST_SCALE
 
 Array = NDArray[np.float64]
@@ -55,26 +55,18 @@ def variance_factors(sums: Sums, inverse: Array, current: Mapping[str, float]) -
     }
 
 
+TOGETHER = 0.5  # a weaker correlation is not worth a word
 WORDS = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")
 
 
 def weakest_direction(covariance: Array) -> str:
-    """The combination of the six that is known worst, in words: its members and their correlation.
-
-    The eigenvector of the largest eigenvalue of the correlation matrix (6, 6); members weigh at least half the largest.
-    """
+    """The two of the six that are hardest to tell apart, in words: the strongest correlation of (6, 6)."""
     sigma = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sigma, sigma)
-    values, vectors = np.linalg.eigh(correlation)
-    vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
-    members = [
-        k for k in np.argsort(-np.abs(vector), kind="stable").tolist() if abs(vector[k]) >= np.abs(vector).max() / 2
-    ]
-    if values[-1] < 1.5 or len(members) < 2:
+    above = np.triu(correlation, 1)
+    row, column = divmod(int(np.argmax(np.abs(above))), COMMON)
+    rho = above[row, column]
+    if abs(rho) < TOGETHER:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))
         return f"no two are hard to tell apart; least sure are {WORDS[worst[0]]} and {WORDS[worst[1]]}"
-    pair = members[:2]
-    rho = correlation[pair[0], pair[1]]
-    words = [WORDS[k] for k in members]
-    together = f"{', '.join(words[:-1])} and {words[-1]}"
-    return f"{together} move together (correlation of the first two {rho:+.3f})"
+    return f"{WORDS[row]} and {WORDS[column]} move together (correlation {rho:+.3f})"

@@ -28,6 +28,8 @@ def raw_files(settings: Settings, folder: Path) -> list[Path]:
         A pattern matches no file, or a file that lies outside the session folder (by way of a symbolic link).
     """
     sensor = type(settings).__name__.lower()
+    if not folder.is_dir():
+        raise RawDataError(f"{folder}: the session folder is gone; put it back, or name its new place")
     found: dict[Path, Path] = {}
     for pattern in settings.files:
         matches = _matches(folder, pattern, sensor)

@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import pandas as pd
 
 import pipeline.readers
+import pipeline.screen
 import stages
 from pipeline import artefacts, config
 from tests.runner import toys
@@ -59,8 +60,8 @@ def _run(inputs: Inputs, config: Config) -> Outputs:
 def install() -> None:
     report = types.ModuleType("stages.report")
     report.__file__ = __file__
-    summary = lambda result: f"{result['session']}: {result['verdict']}"  # noqa: E731
-    vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run, summary=summary)
+    vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
+    pipeline.screen.summary = lambda result: f"{result['session']}: {result['verdict']}"
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
     for module in (take, sift, report):

@@ -77,6 +77,10 @@ def _link_leads_out(place: Place) -> None:
     (place.session / "laser" / "pass_0.las").symlink_to(place.template / "laser" / "pass_0.las")
 
 
+def _listed_twice(place: Place) -> None:
+    shutil.copy(place.raw("mbes"), place.raw("mbes").with_name("copy.xtf"))
+
+
 RXP = b"\x00\x01\x0e\xf5\x00\x00\x00\x00RieglLMS-VZ1000" + bytes(5000)
 FILES: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "session folder missing": (_session_is_gone, ("session", "is no folder", "session.yaml")),
@@ -87,6 +91,7 @@ FILES: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "no sonar file": (_remove("mbes"), ("session.yaml", "mbes/*.xtf", "matches no file")),
     "pattern without file": (_files_name_nothing, ("session.yaml", "mbes/*.gsf", "matches no file")),
     "link out of the session": (_link_leads_out, ("pass_0.las", "out of the session", "copy")),
+    "sonar file listed twice": (_listed_twice, ("mbes/pass_0.xtf: is the same as mbes/copy.xtf", "list one")),
     "empty INS file": (_empty("ins"), ("ins.gps", "empty")),
     "one empty laser file": (_empty("laser"), ("pass_0.las", "empty")),
     "one empty sonar file": (_empty("mbes"), ("pass_0.xtf", "empty")),

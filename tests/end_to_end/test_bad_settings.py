@@ -49,7 +49,7 @@ YAML: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "infinity": (_config(water_level_m=float("inf")), ("pool.yaml", "target.water_level_m = inf", "finite", "mend")),
     "alias": (_add("pool.yaml", "verdict: &x {max_sigma_m: 1.0}\nadjust: *x\n"), ("pool.yaml", "alias")),
     "a list": (_write("pool.yaml", b"- 1\n- 2\n"), ("pool.yaml", "list", "mapping")),
-    "nothing": (_write("pool.yaml", b""), ("pool.yaml", "NoneType", "mapping")),
+    "nothing": (_write("pool.yaml", b""), ("pool.yaml", "is empty")),
     "binary": (_write("pool.yaml", bytes(range(256)) * 9), ("pool.yaml", "UTF-8")),
     "control characters": (_write("pool.yaml", bytes(99)), ("pool.yaml", "not valid YAML")),
     "no YAML": (_write("pool.yaml", b"target: {a: 1\n"), ("pool.yaml", "not valid YAML")),

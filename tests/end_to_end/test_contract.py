@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import simulate as simulate_in_memory
-from tests.end_to_end.places import Place, Told, result_of
+from tests.end_to_end.places import Place, Told, poolcal, result_of
 from tests.end_to_end.tables import place_soundings, write_tables
 
 KEYS = {"schema", "session", "verdict", "reasons", "mbes", "methods", "inputs", "software"}
@@ -189,3 +189,9 @@ def only_the_wall(small: Path, folder: Path) -> Place:
     write_tables(simulated, place.session, "parquet", keep)
     shutil.copy(small / "pool.yaml", place.config)
     return place
+
+
+def test_verify_of_a_real_run(undisturbed: tuple[Path, Told]) -> None:
+    told = poolcal("verify", undisturbed[0], "--jobs", 1)
+    assert (told.status, told.err) == (0, "")
+    assert "everything is as recorded" in told.out

@@ -71,7 +71,7 @@ def test_touching_or_moving_changes_nothing(pool: Pool) -> None:
 def test_raw_files_changed_new_and_gone_are_named(pool: Pool) -> None:
     pool.run()
     np.ones(10).tofile(pool.session / "laser" / "0.bin")
-    np.ones(10).tofile(pool.session / "laser" / "2.bin")
+    np.ones(11).tofile(pool.session / "laser" / "2.bin")
     assert pool.run() == ["take", "sift", "tell"]
     assert "take: laser/0.bin changed" in pool.said
     assert "take: laser/2.bin is new" in pool.said

@@ -1,0 +1,53 @@
+"""The result on one screen."""
+
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+from pipeline.mounts import change_of
+
+AXES = ("roll", "pitch", "yaw", "x", "y", "z")
+VECTOR_OF_ANGLE = {"pitch": 0, "roll": 1, "yaw": 2}  # rotation vector's component about the same body axis
+ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # a target found so far off is worth a word
+
+
+def summary(calibration: Mapping[str, Any]) -> str:
+    """The result on one screen, from calibration.json."""
+    lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]
+    lines += [f"  because {reason}" for reason in calibration["reasons"]]
+    heads = f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'change':>14}{'sigma':>12}"
+    lines += ["", f"{heads}   (result: {calibration['result']})"]
+    block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
+    for parameter in AXES:
+        angle = parameter in VECTOR_OF_ANGLE
+        key, unit = (f"{parameter}_deg", "°") if angle else (f"{parameter}_m", "m")
+        part = "rotation_vector_deg" if angle else "lever_arm_m"
+        index = VECTOR_OF_ANGLE[parameter] if angle else "xyz".index(parameter)
+        total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
+        change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
+        sigma = f"{block['sigma'][part][index]:.4f} {unit}" if block["sigma"] else "-"
+        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
+    lines += ["", "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."]
+    if not block["sigma"]:
+        lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
+    lines.append(_target_line(calibration["target"]))
+    lines.append("Points on the target by pass, distance of the INS from the wall, soundings + laser points:")
+    seen = [p for p in calibration["passes"] if p["soundings"] or p["laser_points"]]
+    listed = (f"{p['pass']}: {p['distance_m']:.1f} m {p['soundings']} + {p['laser_points']}" for p in seen)
+    lines += textwrap.wrap(", ".join(listed), 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+    for key in ("weakest", "advice"):
+        if calibration["geometry"][key]:
+            lines.append(f"Geometry: {calibration['geometry'][key]}.")
+    return "\n".join(lines)
+
+
+def _target_line(target: Mapping[str, Any]) -> str:
+    """The target's pose for the screen: an error of the laser's mount or of the origin is seen here first."""
+    x, y, z = target["offset_m"]
+    first, second = target["tilt_deg"]
+    line = (
+        f"Target found at x {x:+.3f}, y {y:+.3f}, z {z:+.3f} m from target.origin, azimuth "
+        f"{target['azimuth_correction_deg']:+.2f}°, tilt {first:+.2f}° {second:+.2f}°."
+    )
+    odd = max(map(abs, target["offset_m"])) > ODD_OFFSET_M or max(map(abs, target["tilt_deg"])) > ODD_TILT_DEG
+    return line + (" If it was set up and surveyed better than this, check laser.mount." if odd else "")
