@@ -163,6 +163,8 @@ def touch(stage: Path) -> None:
 def calibration(run: Path) -> dict[str, Any]:
     """RUN/report/calibration.json."""
     path = run / "report" / "calibration.json"
+    if run.is_file():
+        raise ConfigError(f"{run}: is a file; RUN is a run folder, and stands first")
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -95,7 +95,10 @@ def stage(
     jobs: Jobs = None,
     executor: Address = None,
 ) -> int:
-    """Run one stage, if it is out of date; the stages before it must not be."""
+    """Run one stage, if it is out of date.
+
+    The stages before it must not be.
+    """
     from pipeline import folder, runner
     from pipeline.executor import workers
     from pipeline.progress import Progress
@@ -112,7 +115,10 @@ def stage(
 
 @app.command()
 def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
-    """Hash again everything that a run read and wrote; list what is not as recorded."""
+    """Recheck every digest of a run.
+
+    Hashes again everything that it read and wrote, and lists what is not as recorded.
+    """
     from pipeline.executor import workers
     from pipeline.verify import verify as problems_of
 
@@ -130,7 +136,10 @@ def compare(
     run_folder: RunFolder,
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="OUT.truth.json of poolcal simulate")],
 ) -> int:
-    """Set a simulated session's result beside its truth; status 0 if every error is within four sigma."""
+    """Set a simulated session's result beside its truth.
+
+    Status 0 if it was accepted and every error is within four sigma.
+    """
     from stages.compare import compare as table_of
 
     text, good = table_of(run_folder, truth)
