@@ -84,6 +84,7 @@ bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare de
 
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.montecarlo
+	$(PY) -m tools.mistakes
 
 clean: ## remove the demo and the tools' caches; results of other runs stay
 	rm -rf runs/demo runs/demo-session runs/demo-session.truth.json
