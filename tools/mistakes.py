@@ -17,19 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from tools.montecarlo import THIN, errors_of
+from tools.montecarlo import DRIFT, THIN, errors_of
 
 SEEDS = (1, 2, 3)
 Change = Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None]  # of scenario, session and pool
-DRIFT = {
-    "drift": {
-        "horizontal_m": 0.015,
-        "vertical_m": 0.02,
-        "roll_pitch_deg": 0.01,
-        "heading_deg": 0.03,
-        "time_constant_s": 200.0,
-    }
-}
 
 
 def _scenario(**blocks: Any) -> Change:

@@ -39,6 +39,17 @@ WHITE: dict[str, Any] = {
 }
 
 
+DRIFT: dict[str, Any] = {
+    "drift": {
+        "horizontal_m": 0.015,
+        "vertical_m": 0.02,
+        "roll_pitch_deg": 0.01,
+        "heading_deg": 0.03,
+        "time_constant_s": 200.0,
+    }
+}
+
+
 @dataclass(frozen=True)
 class Campaign:
     name: str
@@ -77,17 +88,7 @@ CAMPAIGNS = (
         "finite beams and INS drift",
         32,
         8000,
-        {
-            "ins": {
-                "drift": {
-                    "horizontal_m": 0.015,
-                    "vertical_m": 0.02,
-                    "roll_pitch_deg": 0.01,
-                    "heading_deg": 0.03,
-                    "time_constant_s": 200.0,
-                }
-            }
-        },
+        {"ins": DRIFT},
     ),
 )
 
