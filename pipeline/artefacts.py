@@ -182,7 +182,7 @@ PROVISIONAL_MOUNT = Artefact(
         *_MOUNT_CORRECTION,
         Column("scale_m", F64, "m", "robust scale of the soundings' distances from their faces"),
         Column("gate_m", F64, "m", "largest distance from a face at which a sounding was labelled"),
-        Column("score", F64, "1", "robust share of soundings explained by the model"),
+        Column("score", F64, "1", "robust share of soundings explained by the model, less the share behind it"),
         Column("rival_score", F64, "1", "the same for the best other solution (another block)"),
         Column("ambiguous", BOOL, "", "true: another solution explains the soundings nearly as well"),
         Column("within", BOOL, "", "false: no mount within the search limits was found"),

@@ -1,4 +1,4 @@
-"""Nearest points on a surface: the only importer of open3d beside the simulator's ray caster."""
+"""Nearest points on a surface, and what it hides: the only importer of open3d beside the simulator's ray caster."""
 
 from typing import Any
 
@@ -31,3 +31,10 @@ class ClosestSurface:
         answer = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=THREADS)
         triangles = answer["primitive_ids"].numpy().astype(np.int64)
         return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]
+
+    def hides(self, origins_m: Array, points_m: Array, spare_m: float) -> NDArray[np.bool_]:
+        """Points (n,) that lie more than ``spare_m`` behind the surface, as seen from their origins (n, 3) m."""
+        away = points_m - origins_m
+        rays = np.hstack([origins_m, away]).astype(np.float32)
+        share = self._scene.cast_rays(self._tensor(rays), nthreads=THREADS)["t_hit"].numpy().astype(np.float64)
+        return np.asarray((1 - share) * np.linalg.norm(away, axis=1) > spare_m)

@@ -24,6 +24,7 @@ from pipeline.maths.targets import TargetModel
 
 Array = NDArray[np.float64]
 SHARP_M = 0.06  # reach of the final score
+BEHIND_M = 0.15  # farther behind a face than this is no noise
 WIDE_M = 0.08  # gate while the pose or the mount is still being refined
 GATE_SCALES = 5  # the final gate, in robust scales of what was labelled
 VOXEL_M = 0.1  # laser points are averaged over cubes of this size
@@ -89,9 +90,11 @@ def find_target(
     def same(p: Array, q: Array) -> bool:
         return bool(np.max(np.abs(p[1:] - q[1:])) < quarter)
 
-    found = search(
-        placement, starts, closest, normals, same, 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02]), SHARP_M, each=2
-    )
+    def judge(p: Array) -> float:
+        return score(placement, p, closest, SHARP_M)
+
+    limits = 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02])
+    found = search(placement, starts, closest, normals, same, limits, judge, each=2)
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
         above = points[:, 2] > model.water_level_m + settings.water_margin_m
@@ -226,7 +229,12 @@ def find_mount(
     def same(p: Array, q: Array) -> bool:
         return bool(np.max(np.abs(p[3:] - q[3:])) < model.period_m / 4)
 
-    found = search(placement, starts, closest, normals, same, 1.5 * sigmas, SHARP_M)
+    def judge(p: Array) -> float:
+        """A sounding behind a face cannot be: a stack shifted onto the floor or the next block explains as many."""
+        behind = closest.hides(placement.origins(p), placement.points(p), BEHIND_M)
+        return score(placement, p, closest, SHARP_M) - float(np.mean(behind))
+
+    found = search(placement, starts, closest, normals, same, 1.5 * sigmas, judge)
 
     def label(parameters: Array, points: Array) -> NDArray[np.int16]:
         R = exp_so3(parameters[:3]) @ R_body_from_mbes

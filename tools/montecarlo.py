@@ -71,10 +71,14 @@ CAMPAIGNS = (
     Campaign("azimuth -163", 64, 3000, WHITE | {"target": _target(azimuth_deg=-163.0)}),
     Campaign("target 6/2.4/0.8/0.4", 64, 4000, WHITE | {"target": _target(a=6.0, b=2.4, c=0.8, e=0.4)}),
     Campaign(
-        "the same, passes at 3.2 to 6.4 m",
+        "the same, six passes",
         64,
         4500,
-        WHITE | {"target": _target(a=6.0, b=2.4, c=0.8, e=0.4), "track": {"distances_m": [3.2, 6.4, 4.0, 5.6]}},
+        WHITE
+        | {
+            "target": _target(a=6.0, b=2.4, c=0.8, e=0.4),
+            "track": {"distances_m": [4.0, 8.0, 5.0, 7.0, 4.5, 6.0]},
+        },
     ),
     Campaign(
         "origin off by 0.3 m, azimuth by 1",

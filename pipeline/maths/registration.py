@@ -73,6 +73,10 @@ class MountCorrection:
         body = self.points_body_m @ exp_so3(parameters[:3]).T + self.lever_arm_m + parameters[3:]
         return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_target_from_body, body))
 
+    def origins(self, parameters: Array) -> Array:
+        """Where the sonar was, (n, 3) m."""
+        return np.asarray(self.positions_m + self.R_target_from_body @ (self.lever_arm_m + parameters[3:]))
+
     def rows(self, parameters: Array, directions: Array) -> Array:
         turned = self.points_body_m @ exp_so3(parameters[:3]).T
         g = np.einsum("nij,ni->nj", self.R_target_from_body, directions)
@@ -145,21 +149,21 @@ def search(
     normals: Array,
     same: Callable[[Array, Array], bool],
     limits: Array,
-    reach_m: float = 0.06,
+    judge: Callable[[Array], float],
     each: int = 1,
 ) -> Found:
-    """Best pose from many starts: all are scored with a wide reach, the best settle and are scored sharply.
+    """Best pose from many starts: all are scored with a wide reach, the best settle and are judged.
 
     ``starts`` come in groups, of each of which the ``each`` best settle: where blocks repeat, the best of all may lie
     round one wrong height. ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells
-    whether two settled poses are the same solution.
+    whether two settled poses are the same solution, ``judge`` how good one is.
     """
     chosen = [
         start for group in starts for start in sorted(group, key=lambda p: -score(placement, p, closest, 0.25))[:each]
     ]
     settled = [settle(placement, start, closest, normals) for start in chosen]
     allowed = [p for p in settled if np.all(np.abs(p) <= limits)]
-    scored = [(score(placement, p, closest, reach_m), p) for p in allowed or settled]
+    scored = [(judge(p), p) for p in allowed or settled]
     best_score, best = max(scored, key=lambda one: one[0])
     rivals = [s for s, p in scored if not same(best, p)]
     return Found(best, best_score, max(rivals, default=0.0), bool(allowed))

@@ -129,3 +129,13 @@ def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
         middle = face.vertices_m.mean(axis=0)[None, :]
         ahead = Beams(-face.normal[None, :])  # a ray from straight in front
         assert label_points(model, middle, ahead, 0.05, 0.01, 0.1).face[0] == number, face.name
+
+
+def test_what_lies_behind_a_face_is_hidden():
+    from pipeline.clouds import ClosestSurface
+
+    surface = ClosestSurface(build_target(8.0, 3.0, 1.0, 0.5))
+    origin = np.array([[-5.0, 0.0, 1.0]])
+    for x, hidden in ((-0.5, False), (0.0, False), (0.1, False), (0.2, True), (2.0, True)):  # the wall stands at x = 0
+        assert surface.hides(origin, np.array([[x, 0.0, 0.0]]), 0.15).tolist() == [hidden], x
+    assert surface.hides(origin, np.array([[3.0, 9.0, 0.0]]), 0.15).tolist() == [False]  # past the target

@@ -107,6 +107,24 @@ def test_an_unseen_top_makes_the_registration_ambiguous(quiet):
     assert any("ambiguous" in reason for reason in calibration["reasons"])
 
 
+def test_a_stack_shifted_onto_the_floor_is_no_rival():
+    """Met in a campaign: 0.7 m up, the floor passes for tops of blocks, and more soundings are explained than by the
+    truth; but others then lie behind faces."""
+    target = {"a": 6.0, "b": 2.4, "c": 0.8, "e": 0.4, "azimuth_deg": 0.0}
+    target["origin"] = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}
+    coarse = {"roll_deg": 2.5, "pitch_deg": -2.5, "yaw_deg": -2.5, "x_m": -0.25, "y_m": 0.25, "z_m": 0.25}
+    session = made(
+        {"target": target, "track": {"distances_m": [4.0, 8.0, 5.0, 7.0, 4.5, 6.0]}, "mbes": {"coarse_error": coarse}},
+        {"ins": QUIET["ins"], "laser": {"point_rate_hz": 5000.0, "outlier_share": 0.0, "water_return_share": 0.0}},
+        {"mbes": {"ping_rate_hz": 20.0, "point_beams": True, "corner_share": 0.0, "outlier_share": 0.0}},
+        {"mbes": {"surface_share": 0.0}},
+        seed=4549,
+    )
+    found = calibrated(session, "segment")["segment/provisional_mount"].iloc[0]
+    assert found["lever_arm_z_m"] == pytest.approx(-0.25, abs=0.01)
+    assert found["rival_score"] < 0.95 * found["score"]
+
+
 def test_a_swapped_low_side_is_seen(quiet):
     found = calibrated(quiet, "segment", pool={"target": {"low_side": "north"}})
     pose = found["segment/target_pose"].iloc[0]
