@@ -5,6 +5,8 @@
 SESSION  =
 CONFIG   =
 RUN      =
+A        =
+B        =
 JOBS     =
 SEED     = 1
 
@@ -17,7 +19,7 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help setup demo calibrate stages test lint format bench montecarlo clean
+.PHONY: help setup demo calibrate stages diff test lint format bench montecarlo clean
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-18s %s\n", $$1, $$2}'
@@ -42,6 +44,10 @@ GIVEN = $(foreach name,SESSION CONFIG RUN,$(if $($(name)),,$(error $(name)= is m
 calibrate: $(SETUP) ## all stages that are out of date: SESSION= CONFIG= RUN=
 	@:$(GIVEN)
 	$(POOLCAL) run '$(SESSION)' --config '$(CONFIG)' --run '$(RUN)' $(if $(JOBS),--jobs $(JOBS))
+
+diff: $(SETUP) ## compare two runs: A= B=
+	@:$(foreach name,A B,$(if $($(name)),,$(error $(name)= is missing: make diff A=runs/x B=runs/y)))
+	$(POOLCAL) diff '$(A)' '$(B)'
 
 # The same, one rule a stage with real files as targets. (Paths with blanks: make cannot have them as targets;
 # `make calibrate` takes them.)

@@ -3,6 +3,7 @@
 import os
 import sys
 import traceback
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -129,6 +130,54 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
     many = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
     say(many if problems else f"{run_folder}: everything is as recorded", sys.stdout)
     return 1 if problems else 0
+
+
+@app.command()
+def diff(
+    first: Annotated[Path, typer.Argument(metavar="A", help="run folder")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="run folder, compared with A")],
+    tolerance_deg: Annotated[
+        float | None, typer.Option(min=0.0, help="an angle that differs by more is a no, significant or not")
+    ] = None,
+    tolerance_mm: Annotated[float | None, typer.Option(min=0.0, help="the same for the lever arm")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON, for programs")] = False,
+) -> int:
+    """Compare two runs: has the sonar moved?
+
+    Status 1 if the mounts differ significantly, or by more than a tolerance, or cannot be compared.
+    """
+    import json
+
+    from pipeline import diff as comparing
+
+    one, other = (comparing.RunRead.read(run, ORDER) for run in (first, second))
+    found = comparing.diff(one, other, tolerance_deg, tolerance_mm)
+    say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else comparing.text(found), sys.stdout)
+    return 1 if comparing.is_moved(found) else 0
+
+
+@app.command()
+def history(
+    folder: Annotated[Path, typer.Argument(metavar="RUNS_DIR", help="folder that holds run folders")],
+    out: Annotated[Path | None, typer.Option(help="folder for the page; default: RUNS_DIR/history")] = None,
+    name: Annotated[str, typer.Option(help="sessions whose name matches this pattern, such as 'boat_a*'")] = "*",
+    since: Annotated[datetime | None, typer.Option(formats=["%Y-%m-%d"], help="first day, UTC")] = None,
+    until: Annotated[datetime | None, typer.Option(formats=["%Y-%m-%d"], help="last day, UTC")] = None,
+) -> int:
+    """All sessions of a boat on one page: charts, table, jumps.
+
+    Writes history.html, history.csv and history.parquet.
+    """
+    from pipeline.history import Filter, read_history, write_history
+
+    chosen = Filter(name, since.date() if since else None, until.date() if until else None)
+    found = read_history(folder, chosen)
+    target = folder / "history" if out is None else out
+    write_history(found, target, chosen)
+    for problem in found.unreadable:
+        say(f"left out: {problem}", sys.stderr)
+    say(f"{len(found.table)} sessions: {target / 'history.html'}", sys.stdout)
+    return 0
 
 
 @app.command()

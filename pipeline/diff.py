@@ -1,0 +1,246 @@
+"""Two runs side by side: what was different in what went in, and whether the sonar's mount has moved.
+
+Nothing is recomputed: both runs are read as they are. What cannot be compared is said, and never left out in silence.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline import artefacts, manifest
+from pipeline.errors import ArtefactError
+from pipeline.folder import Settings, calibration, read_settings
+from pipeline.maths.comparison import Estimate, compare
+from pipeline.store import read_table
+from pipeline.verdict import SIX
+
+LEVEL = 0.01  # of the joint test: so many false alarms where nothing has moved
+UNITS = ("deg",) * 3 + ("m",) * 3
+SHOWN = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}
+FAMILIES = ("P1", "P2", "P3")
+TARGET = ("a", "b", "c", "e", "low_side", "blocks_per_side", "first_base_m", "stagger_m")
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class RunRead:
+    """A run as it was written."""
+
+    path: Path
+    settings: Settings
+    result: Mapping[str, Any]
+    manifests: Mapping[str, manifest.Manifest]
+
+    @classmethod
+    def read(cls, path: Path, stages: tuple[str, ...]) -> "RunRead":
+        found = {}
+        for stage in stages:
+            one = manifest.read(path / stage)
+            if one is None:
+                raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")
+            found[stage] = one
+        return cls(path, read_settings(path), calibration(path), found)
+
+    def table(self, artefact: artefacts.Artefact) -> pd.DataFrame:
+        return read_table(self.path / artefact.owner / f"{artefact.name}.parquet", artefact)
+
+    def estimate(self) -> Estimate | None:
+        """The adjustment's: the patent's forms have no covariance to test with."""
+        block = self.result["methods"]["adjustment"]
+        if block["covariance"] is None:
+            return None
+        return Estimate(*(np.array(block[name]) for name in ("R_body_from_mbes", "lever_arm_m", "covariance")))
+
+
+def diff(
+    first: RunRead, second: RunRead, tolerance_deg: float | None = None, tolerance_mm: float | None = None
+) -> dict[str, Any]:
+    """Everything that differs, as plain values; ``second`` minus ``first``."""
+    heads = [
+        {"run": str(r.path), "session": r.result["session"], "verdict": r.result["verdict"]} for r in (first, second)
+    ]
+    found: dict[str, Any] = {"schema": 1, "a": heads[0], "b": heads[1]}
+    found["config"] = list(_config(first, second))
+    found["inputs"] = list(_changes(first.result["inputs"], second.result["inputs"]))
+    found["software"] = list(_changes(first.result["software"], second.result["software"]))
+    found["counts"] = list(_counts(first, second))
+    found["not_compared"] = []
+    found |= _mount(first, second, found["not_compared"], tolerance_deg, tolerance_mm)
+    found["planes"] = list(_planes(first, second, found["not_compared"]))
+    found["sentence"] = sentence(found)
+    return found
+
+
+def is_moved(found: Mapping[str, Any]) -> bool:
+    """Whether the answer is no: significantly different, beyond a tolerance, or not to be told."""
+    return not found["comparable"] or found["joint"]["significant"] or bool(found["beyond_tolerance"])
+
+
+# --- what went in ----------------------------------------------------------------------------------------------------
+def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            yield from _flat(item, f"{prefix}.{name}" if prefix else str(name))
+    else:
+        yield prefix, value
+
+
+def _changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Row]:
+    one, other = dict(_flat(first)), dict(_flat(second))
+    for key in sorted(one.keys() | other.keys()):
+        if one.get(key) != other.get(key) or (key in one) != (key in other):
+            yield {"key": key, "a": one.get(key), "b": other.get(key)}
+
+
+def _config(first: RunRead, second: RunRead) -> Iterator[Row]:
+    return _changes(first.settings.as_json(), second.settings.as_json())
+
+
+def _counts(first: RunRead, second: RunRead) -> Iterator[Row]:
+    for stage in first.manifests:
+        one, other = (
+            {(c["source"], c["reason"]): c["count"] for c in run.manifests[stage].counts} for run in (first, second)
+        )
+        for source, reason in sorted(one.keys() | other.keys()):
+            a, b = one.get((source, reason), 0), other.get((source, reason), 0)
+            if a != b:
+                yield {"stage": stage, "source": source, "reason": reason, "a": a, "b": b}
+
+
+# --- the mount -------------------------------------------------------------------------------------------------------
+def _mount(
+    first: RunRead, second: RunRead, missing: list[str], tolerance_deg: float | None, tolerance_mm: float | None
+) -> dict[str, Any]:
+    one, other = first.estimate(), second.estimate()
+    if one is None or other is None:
+        which = [run.result["session"] for run, e in ((first, one), (second, other)) if e is None]
+        missing.append(f"mount: {' and '.join(which)} has no result with a covariance")
+        return {"comparable": False, "parameters": [], "joint": None, "beyond_tolerance": []}
+    found = compare(one, other)
+    moved = found.moved(LEVEL)
+    scale = [np.degrees(1.0)] * 3 + [1.0] * 3
+    limits = [tolerance_deg] * 3 + [None if tolerance_mm is None else tolerance_mm / 1000] * 3
+    rows: list[Row] = []
+    beyond = []
+    for k, name in enumerate(SIX):
+        difference = float(found.difference[k] * scale[k])
+        limit = limits[k]
+        if limit is not None and abs(difference) > limit:
+            beyond.append(name)
+        rows.append(
+            {
+                "parameter": name,
+                "unit": UNITS[k],
+                "difference": difference,
+                "sigma": float(found.sigma[k] * scale[k]),
+                "z": float(found.z[k]),
+                "moved": k in moved,
+            }
+        )
+    joint = {
+        "statistic": found.statistic,
+        "dof": 6,
+        "probability": found.probability,
+        "level": LEVEL,
+        "significant": found.probability < LEVEL,
+    }
+    return {"comparable": True, "parameters": rows, "joint": joint, "beyond_tolerance": beyond}
+
+
+# --- planes ----------------------------------------------------------------------------------------------------------
+def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row]:
+    """Each family's plane over all passes, laser and sonar (with the coarse mount), in its own target frame."""
+    one, other = (run.settings.pool.target.model_dump(mode="json") for run in (first, second))
+    differing = [name for name in TARGET if one[name] != other[name]]
+    if differing:
+        missing.append(f"planes: the targets differ ({', '.join(f'target.{name}' for name in differing)})")
+        return
+    tables = []
+    for run in (first, second):
+        rows = run.table(artefacts.PLANES).query("`pass` == -1").to_dict("records")
+        tables.append({(row["sensor"], row["plane"]): row for row in rows})
+    for sensor in ("laser", "mbes"):
+        for family in FAMILIES:
+            key = (sensor, family)
+            if not all(key in table for table in tables):
+                missing.append(f"planes: {family} of {sensor} is not in both")
+                continue
+            a, b = (table[key] for table in tables)
+            one_n, other_n = (np.array([float(row[f"normal_{axis}_target_1"]) for axis in "xyz"]) for row in (a, b))
+            angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(one_n, other_n)), one_n @ other_n)))
+            shift, rms = float(b["distance_m"] - a["distance_m"]), float(b["rms_m"] - a["rms_m"])
+            if angle or shift or rms:
+                yield {"sensor": sensor, "plane": family, "angle_deg": angle, "distance_m": shift, "rms_m": rms}
+
+
+# --- words -----------------------------------------------------------------------------------------------------------
+def shown(value: float, unit: str, sign: str = "+") -> str:
+    suffix, scale, digits = SHOWN[unit]
+    return f"{value * scale:{sign}.{digits}f}{suffix}"
+
+
+def _with_sigma(row: Row) -> str:
+    return f"{row['parameter']} by {shown(row['difference'], row['unit'])} ± {shown(row['sigma'], row['unit'], '')}"
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+
+
+def sentence(found: Mapping[str, Any]) -> str:
+    """The answer in one sentence."""
+    if not found["comparable"]:
+        return f"no answer: {found['not_compared'][0]}"
+    moved = [row for row in found["parameters"] if row["moved"]]
+    chance = f"p = {found['joint']['probability']:.2g}"
+    if moved:
+        each = [_with_sigma(row) for row in moved]
+        rest = "" if len(moved) == len(SIX) else "; the rest within noise"
+        text = f"the sonar has moved, {_listed(each)}: significant ({chance}){rest}"
+    elif not any(row["difference"] for row in found["parameters"]):
+        text = "the same result in both"
+    else:
+        text = f"nothing has moved: all six differences are within their noise ({chance})"
+    if found["beyond_tolerance"]:
+        text += f"; beyond the tolerance: {_listed(found['beyond_tolerance'])}"
+    rejected = [f"{found[k]['session']} was rejected" for k in ("a", "b") if found[k]["verdict"] == "rejected"]
+    return text + "".join(f"; {word}" for word in rejected)
+
+
+def text(found: Mapping[str, Any]) -> str:
+    """The whole comparison for the screen; what does not differ is not listed."""
+    lines = [f"{key}: {found[key]['session']} ({found[key]['verdict']}), {found[key]['run']}" for key in ("a", "b")]
+    if found["inputs"]:
+        new, gone = (sum(row[key] is None for row in found["inputs"]) for key in ("a", "b"))
+        lines += ["", f"raw files: {len(found['inputs']) - new - gone} changed, {new} in b alone, {gone} in a alone"]
+    for title, key in (("config and session", "config"), ("software", "software")):
+        if found[key]:
+            lines += ["", f"{title}:", *(f"  {r['key']}: {_brief(r['a'])} -> {_brief(r['b'])}" for r in found[key])]
+    if found["counts"]:
+        lines += ["", "counts:"]
+        lines += [f"  {r['stage']}, {r['source']}, {r['reason']}: {r['a']:,} -> {r['b']:,}" for r in found["counts"]]
+    if found["planes"]:
+        lines += ["", f"{'planes, b - a':<16}{'turned':>12}{'distance':>14}{'rms':>14}"]
+        for r in found["planes"]:
+            name = f"  {r['sensor']} {r['plane']}"
+            cells = (shown(r["angle_deg"], "deg", ""), shown(r["distance_m"], "m"), shown(r["rms_m"], "m"))
+            lines.append(f"{name:<16}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}")
+    if any(row["difference"] for row in found["parameters"]):
+        lines += ["", f"{'mount, b - a':<16}{'difference':>14}{'sigma':>14}{'in sigmas':>12}"]
+        for r in found["parameters"]:
+            size = f"{shown(r['difference'], r['unit']):>14}{shown(r['sigma'], r['unit'], ''):>14}{r['z']:>12.1f}"
+            lines.append(f"  {r['parameter']:<14}{size}{'  moved' if r['moved'] else ''}")
+    lines += [f"not compared: {why}" for why in found["not_compared"]]
+    return "\n".join([*lines, "", found["sentence"] + "."])
+
+
+def _brief(value: Any) -> str:
+    if value is None:
+        return "-"
+    written = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    return written if len(written) <= 24 else f"{written[:12]}..."

@@ -1,0 +1,127 @@
+"""All sessions of one boat on one page: has the mount moved, and when?
+
+Each accepted session is compared with the accepted one before it by the joint test of :mod:`pipeline.maths.comparison`.
+Rejected sessions are shown, never compared.
+"""
+
+import fnmatch
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.errors import ConfigError, PoolcalError
+from pipeline.files import write_text, writing
+from pipeline.folder import calibration
+from pipeline.maths.comparison import Estimate, compare
+from pipeline.verdict import SIX
+
+LEVEL = 0.01
+PARAMETERS = {"roll": "deg", "pitch": "deg", "yaw": "deg", "x": "m", "y": "m", "z": "m"}
+OF_SIX = {"pitch": 0, "roll": 1, "yaw": 2, "x": 3, "y": 4, "z": 5}  # place among the six of covariance and test
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which sessions to show; dates are those of the first pass, UTC."""
+
+    name: str = "*"
+    since: date | None = None
+    until: date | None = None
+
+    def takes(self, session: str, day: str) -> bool:
+        inside = (self.since is None or day >= self.since.isoformat()) and (
+            self.until is None or day <= self.until.isoformat()
+        )
+        return inside and fnmatch.fnmatchcase(session.casefold(), self.name.casefold())
+
+    def words(self) -> str:
+        said = [f"name {self.name}"] if self.name != "*" else []
+        said += [f"since {self.since}"] if self.since else []
+        return ", ".join([*said, *([f"until {self.until}"] if self.until else [])])
+
+
+@dataclass(frozen=True)
+class History:
+    """One row a session in order of time; and the runs that could not be read, with the reason."""
+
+    table: pd.DataFrame
+    unreadable: list[str] = field(default_factory=list)
+
+
+def read_history(folder: Path, chosen: Filter) -> History:
+    """Every run in ``folder``, two levels deep."""
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: is no folder; RUNS_DIR is the folder that holds run folders")
+    found, unreadable = [], []
+    for path in sorted({*folder.glob("*/report/calibration.json"), *folder.glob("*/*/report/calibration.json")}):
+        run = path.parent.parent
+        try:
+            result = calibration(run)
+            row = _row(run.relative_to(folder).as_posix(), result)
+        except PoolcalError as error:
+            unreadable.append(str(error))
+            continue
+        except (KeyError, TypeError, ValueError, IndexError):
+            unreadable.append(f"{run}: its calibration.json is not as poolcal writes it")
+            continue
+        if chosen.takes(row["session"], row["date_utc"][:10]):
+            found.append((row["date_utc"], row["run"], row, result))
+    found.sort(key=lambda one: one[:2])
+    rows = list(_with_jumps([(row, result) for *_, row, result in found]))
+    return History(pd.DataFrame(rows, columns=list(_columns())), unreadable)
+
+
+def _columns() -> Iterator[str]:
+    yield from ("date_utc", "session", "run", "verdict")
+    for name, unit in PARAMETERS.items():
+        yield from (f"{name}_{unit}", f"sigma_{name}_{unit}")
+    yield from ("probability", "moved")
+
+
+def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
+    """The result as chosen in its config; sigmas are the adjustment's, NaN where there is no result."""
+    mount, block = result["mbes"]["mount"], result["methods"]["adjustment"]
+    passes: Sequence[Mapping[str, Any]] = result["passes"]
+    row: dict[str, Any] = {
+        "date_utc": str(passes[0]["start_utc"]) if passes else "",
+        "session": str(result["session"]),
+        "run": run,
+        "verdict": str(result["verdict"]),
+    }
+    sigma = np.full(6, np.nan) if block["covariance"] is None else np.sqrt(np.diag(np.array(block["covariance"])))
+    for name, unit in PARAMETERS.items():
+        size = float(sigma[OF_SIX[name]])
+        row[f"{name}_{unit}"] = float(mount[f"{name}_{unit}"]) if mount else np.nan
+        row[f"sigma_{name}_{unit}"] = float(np.degrees(size)) if unit == "deg" else size
+    return row | {"probability": np.nan, "moved": ""}
+
+
+def _with_jumps(found: list[tuple[dict[str, Any], Mapping[str, Any]]]) -> Iterator[dict[str, Any]]:
+    before: Estimate | None = None
+    for row, result in found:
+        block = result["methods"]["adjustment"]
+        if row["verdict"] == "accepted" and block["covariance"] is not None:
+            names = ("R_body_from_mbes", "lever_arm_m", "covariance")
+            now = Estimate(*(np.array(block[name], dtype=np.float64) for name in names))
+            if before is not None:
+                compared = compare(before, now)
+                moved = ", ".join(SIX[k] for k in compared.moved(LEVEL))
+                row = row | {"probability": compared.probability, "moved": moved}
+            before = now
+        yield row
+
+
+def write_history(history: History, out: Path, chosen: Filter) -> None:
+    """history.html, .csv and .parquet in ``out``."""
+    from pipeline.pages.history import page
+
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+        history.table.to_csv(out / "history.csv", index=False, lineterminator="\n")
+        history.table.to_parquet(out / "history.parquet", index=False)
+    write_text(out / "history.html", page(history, chosen.words()))

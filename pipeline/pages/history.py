@@ -1,0 +1,75 @@
+"""The history's page: a control chart of each parameter, and the table behind it."""
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from pipeline.history import OF_SIX, PARAMETERS, History
+from pipeline.pages import ALARM, INK, QUIET, STYLE, render, svg
+from pipeline.verdict import SIX
+
+UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
+WITHIN_95 = 1.959964
+
+
+def page(history: History, filters: str) -> str:
+    table = history.table
+    parameters = [{"name": name, "unit": "°" if unit == "deg" else "m"} for name, unit in PARAMETERS.items()]
+    rows = [
+        {
+            "date": row["date_utc"][:16].replace("T", " "),
+            "session": row["session"],
+            "verdict": row["verdict"],
+            "cells": {name: _number(row[f"{name}_{unit}"], 4) for name, unit in PARAMETERS.items()},
+            "probability": "" if np.isnan(row["probability"]) else f"{row['probability']:.2g}",
+            "moved": row["moved"],
+        }
+        for row in table.to_dict("records")
+    ]
+    jumps = table[table["moved"] != ""]
+    each = "; ".join(f"{row['session']}: {row['moved']}" for row in jumps.to_dict("records"))
+    sentence = f"Significant movements: {each}." if each else "No movement of the mount is significant."
+    return render(
+        "history.html",
+        rows=rows,
+        parameters=parameters,
+        chart=_chart(table),
+        sentence=sentence,
+        filters=filters,
+        unreadable=history.unreadable,
+    )
+
+
+def _number(value: float, digits: int) -> str:
+    return "" if np.isnan(value) else f"{value:.{digits}f}"
+
+
+def _chart(table: pd.DataFrame) -> Markup:
+    """Six panels over the sessions in order of time."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+        axes = figure.subplots(3, 2, sharex=True).T.ravel()
+        place = np.arange(len(table))
+        accepted = (table["verdict"] == "accepted").to_numpy()
+        for axis, (name, unit) in zip(axes, PARAMETERS.items(), strict=True):
+            word, scale = UNITS[unit]
+            values = table[f"{name}_{unit}"].to_numpy(dtype=float) * scale
+            sigma = table[f"sigma_{name}_{unit}"].to_numpy(dtype=float) * scale
+            good = accepted & np.isfinite(values)
+            if good.any():
+                values = values - np.median(values[good])
+            axis.axhline(0.0, color=QUIET, linewidth=0.6)
+            for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
+                bars = WITHIN_95 * np.nan_to_num(sigma[use])
+                axis.errorbar(place[use], values[use], bars, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
+            word_of_six = SIX[OF_SIX[name]]
+            moved = np.array([word_of_six in words.split(", ") for words in table["moved"]], dtype=bool)
+            ring = {"color": ALARM, "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.4}
+            axis.plot(place[moved], values[moved], "o", **ring)
+            axis.set_title(f"{name}, {word}")
+            axis.margins(x=0.05, y=0.15)
+        for axis in (axes[2], axes[5]):
+            axis.set_xticks(place, [day[:10] for day in table["date_utc"]], rotation=30, ha="right")
+        return svg(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")

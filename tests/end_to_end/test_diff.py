@@ -1,0 +1,91 @@
+"""poolcal diff: a run with itself, with other settings, with a moved sonar, and where nothing can be compared."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.end_to_end.places import Place, Told, poolcal, simulate
+
+
+def compared(first: Path, second: Path, *more: object) -> tuple[int, dict[str, Any]]:
+    told = poolcal("diff", first, second, "--json", *more)
+    assert told.err == ""
+    return told.status, json.loads(told.out)
+
+
+def run_of(session: Path) -> Path:
+    run = session.with_name(session.name + ".run")
+    told = poolcal("run", session, "--config", session / "pool.yaml", "--run", run, "--jobs", 1)
+    assert told.status in (0, 1), told.err
+    return run
+
+
+@pytest.fixture
+def again(place: Place) -> Place:
+    """The small session in a run folder of one's own."""
+    assert place.calibrate().status == 0
+    return place
+
+
+def test_with_itself_nothing(undisturbed: tuple[Path, Told]) -> None:
+    run = undisturbed[0]
+    status, found = compared(run, run, "--tolerance-deg", 0, "--tolerance-mm", 0)
+    assert status == 0
+    for key in ("config", "inputs", "software", "counts", "planes", "not_compared", "beyond_tolerance"):
+        assert found[key] == [], key
+    assert not any(row["difference"] for row in found["parameters"])
+    assert found["joint"]["probability"] == 1.0
+    told = poolcal("diff", run, run)
+    assert told.status == 0
+    assert told.out.splitlines()[-1] == "the same result in both."
+
+
+def test_other_settings_are_named(undisturbed: tuple[Path, Told], again: Place) -> None:
+    again.edit_config("segment", margin_m=0.05)
+    assert again.calibrate().status == 0
+    status, found = compared(undisturbed[0], again.run)
+    assert status == 0, found["sentence"]
+    assert found["config"] == [{"key": "segment.margin_m", "a": 0.03, "b": 0.05}]
+    assert found["inputs"] == []
+    assert {row["stage"] for row in found["counts"]} == {"segment"}
+    assert found["planes"]
+    assert "within their noise" in found["sentence"]
+    largest = max(abs(row["difference"]) for row in found["parameters"] if row["unit"] == "deg")
+    for factor, expected in ((0.99, 1), (1.01, 0)):
+        status, found = compared(undisturbed[0], again.run, "--tolerance-deg", largest * factor)
+        assert (status, bool(found["beyond_tolerance"])) == (expected, bool(expected))
+
+
+def test_a_moved_sonar_is_found(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    moved = {"roll_deg": -48.6, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.00}
+    run = run_of(simulate(tmp_path / "session", 2, mbes={"mount": moved, "ping_rate_hz": 8.0}))
+    status, found = compared(undisturbed[0], run)
+    assert status == 1
+    rows = {row["parameter"]: row for row in found["parameters"]}
+    assert rows["roll"]["moved"]
+    assert rows["roll"]["difference"] == pytest.approx(0.2, abs=0.05)
+    assert rows["lever arm z"]["moved"]
+    assert rows["lever arm z"]["difference"] == pytest.approx(0.01, abs=0.003)
+    assert not rows["lever arm x"]["moved"]
+    assert "roll by +0." in found["sentence"]
+    assert "significant" in found["sentence"]
+
+
+def test_another_target_compares_the_mount_alone(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    target = {"a": 6.0, "b": 2.4, "c": 0.8, "e": 0.4, "azimuth_deg": 30.0}
+    target["origin"] = {"latitude_deg": 36.1, "longitude_deg": 120.3, "height_m": 20.0}  # type: ignore[assignment]
+    run = run_of(simulate(tmp_path / "session", 3, target=target))
+    status, found = compared(undisturbed[0], run)
+    assert status == 0, found["sentence"]
+    assert found["planes"] == []
+    assert found["not_compared"] == ["planes: the targets differ (target.a, target.b, target.c, target.e)"]
+    assert found["joint"]["probability"] > 0.01
+
+
+def test_a_folder_that_is_no_run_is_refused(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    told = poolcal("diff", undisturbed[0], tmp_path)
+    assert told.status == 2
+    assert "no complete result" in told.err
+    assert len(told.err.splitlines()) == 1
