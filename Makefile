@@ -19,7 +19,7 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help setup demo calibrate stages diff test lint format bench montecarlo clean
+.PHONY: help setup demo calibrate stages diff view test lint format bench montecarlo clean
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-18s %s\n", $$1, $$2}'
@@ -48,6 +48,10 @@ calibrate: $(SETUP) ## all stages that are out of date: SESSION= CONFIG= RUN=
 diff: $(SETUP) ## compare two runs: A= B=
 	@:$(foreach name,A B,$(if $($(name)),,$(error $(name)= is missing: make diff A=runs/x B=runs/y)))
 	$(POOLCAL) diff '$(A)' '$(B)'
+
+view: $(SETUP) ## open a run's recordings in the Rerun viewer: RUN=
+	@:$(if $(RUN),,$(error RUN= is missing: make view RUN=runs/x))
+	$(POOLCAL) view '$(RUN)'
 
 # The same, one rule a stage with real files as targets. (Paths with blanks: make cannot have them as targets;
 # `make calibrate` takes them.)

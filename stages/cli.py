@@ -28,6 +28,7 @@ app = typer.Typer(
 
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")]
 Jobs = Annotated[int | None, typer.Option("--jobs", metavar="N", help="workers; default: one a core, at most 4")]
+Recordings = Annotated[bool, typer.Option("--recordings/--no-recordings", help="draw recordings for the Rerun viewer")]
 Address = Annotated[
     str | None, typer.Option("--executor", metavar="ADDRESS", help="dask scheduler; its workers must see these folders")
 ]
@@ -76,6 +77,7 @@ def run(
     run_folder: Annotated[Path, typer.Option("--run", metavar="RUN", help="folder for the results")],
     jobs: Jobs = None,
     executor: Address = None,
+    recordings: Recordings = True,
 ) -> int:
     """Run all stages that are out of date, and say why each is."""
     from pipeline import runner
@@ -84,7 +86,10 @@ def run(
 
     with workers(jobs, executor) as pool:
         runner.run(load(), session, config, run_folder, pool, Progress())
-    return _answer(run_folder)
+    status = _answer(run_folder)
+    if recordings:
+        _draw(run_folder)
+    return status
 
 
 @app.command()
@@ -95,6 +100,7 @@ def stage(
     config: Annotated[Path | None, typer.Option("--config", help="default: as in RUN/run.yaml")] = None,
     jobs: Jobs = None,
     executor: Address = None,
+    recordings: Recordings = True,
 ) -> int:
     """Run one stage, if it is out of date.
 
@@ -111,6 +117,8 @@ def stage(
     settings = folder.load_settings(session, config) if session is not None and config is not None else None
     with workers(jobs, executor) as pool:
         runner.run_stage(load(), name, run_folder, settings, pool, Progress())
+    if recordings:
+        _draw(run_folder)
     return _answer(run_folder) if name == ORDER[-1] else 0
 
 
@@ -130,6 +138,22 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
     many = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
     say(many if problems else f"{run_folder}: everything is as recorded", sys.stdout)
     return 1 if problems else 0
+
+
+@app.command()
+def view(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="run folder, or two to set side by side")],
+    stage: Annotated[str | None, typer.Option(help=f"one of {', '.join(ORDER)} alone")] = None,
+) -> int:
+    """Open a run's recordings in the Rerun viewer.
+
+    Nothing is served beyond this machine.
+    """
+    from stages.views import draw, recordings_of, show
+
+    for run_folder in runs:
+        draw(run_folder)
+    return show([path for run_folder in runs for path in recordings_of(run_folder, stage)])
 
 
 @app.command()
@@ -194,6 +218,17 @@ def compare(
     text, good = table_of(run_folder, truth)
     say(text, sys.stdout)
     return 0 if good else 1
+
+
+def _draw(run_folder: Path) -> None:
+    """Recordings are a help to see by: whatever goes wrong in drawing is said, and the calibration stands."""
+    try:
+        from stages.views import draw
+
+        draw(run_folder)
+    except Exception as error:
+        reason = str(error).partition("\n")[0]
+        say(f"recordings: not drawn ({type(error).__name__}: {reason}); the calibration is complete", sys.stderr)
 
 
 def _answer(run_folder: Path) -> int:

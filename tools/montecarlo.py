@@ -139,9 +139,10 @@ def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
         scenario.write_text(yaml.safe_dump(scenario_of(campaign, number)))
         poolcal = [sys.executable, "-m", "stages.cli"]
         seed = str(campaign.first_seed + number)
+        place = ["--config", str(session / "pool.yaml"), "--run", str(run)]
         for command in (
             ["simulate", str(session), "--scenario", str(scenario), "--seed", seed],
-            ["run", str(session), "--config", str(session / "pool.yaml"), "--run", str(run), "--jobs", "1"],
+            ["run", str(session), *place, "--jobs", "1", "--no-recordings"],
         ):
             done = subprocess.run(poolcal + command, capture_output=True, text=True)
             if done.returncode not in (0, 1):

@@ -43,7 +43,7 @@ def test_help_is_quick_and_imports_nothing_that_computes() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert time.monotonic() - start < 1.0
-    for command in ("simulate", "run", "stage", "verify", "compare"):
+    for command in ("simulate", "run", "stage", "verify", "view", "diff", "history", "compare"):
         assert command in done.stdout
 
 
@@ -52,7 +52,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"poolcal {pipeline.__version__}\n"
 
 
-@pytest.mark.parametrize("command", ["simulate", "run", "stage", "verify", "compare"])
+@pytest.mark.parametrize("command", ["simulate", "run", "stage", "verify", "view", "diff", "history", "compare"])
 def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert call([command, "--help"]) == 0
     assert "Usage: poolcal" in capsys.readouterr().out

@@ -1,0 +1,69 @@
+"""The iteration, step by step: soundings swing from the coarse mount towards the laser's planes, normals close."""
+
+from typing import Any
+
+import numpy as np
+
+from pipeline import artefacts
+from pipeline.fitted import ALL_PASSES, laser_planes, lifted_moments
+from pipeline.folder import read_settings
+from pipeline.maths.moments import plane_moments
+from pipeline.maths.offsets import by_family
+from pipeline.maths.planes import fit_plane
+from pipeline.maths.rotations import exp_so3
+from pipeline.mounts import mount_of
+from pipeline.poses import trajectory_in_target
+from pipeline.streams import xyz
+from pipeline.tables import Tables
+from stages.views import COLOURS, GREY, SONAR
+
+SOUNDINGS = 40_000  # for all the family's points of one step
+FAMILIES = ("P1", "P2", "P3")
+
+
+def log(recording: Any, tables: Tables) -> None:
+    import rerun as rr
+
+    faces, iterations = tables.table(artefacts.FACES), tables.table(artefacts.ITERATIONS)
+    mount = mount_of(read_settings(tables.run).session.mbes.mount)
+    trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
+    columns, step = tables.sample(artefacts.SOUNDINGS_LABELLED, SOUNDINGS)
+    positions, R_target_from_body = trajectory.poses_at(columns["t_ns"].astype(np.int64))
+    body = xyz(columns, "mbes_m") @ mount.R_body_from_sensor.T
+    family = faces["family"].to_numpy()[columns["face"].astype(int)]
+    laser = laser_planes(tables.table(artefacts.PLANES))
+    lifted = _of_all_passes(by_family(dict(zip(faces["face"], faces["family"], strict=True)), _lifted(tables)))
+    for row in iterations.to_dict("records"):
+        recording.set_time("iteration", sequence=int(row["iteration"]))
+        correction = exp_so3(np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"]))
+        turned = body @ correction.T + mount.lever_arm_body_m
+        points = (positions + np.einsum("nij,nj->ni", R_target_from_body, turned)).astype(np.float32)
+        for name in FAMILIES:
+            cloud = rr.Points3D(points[family == name], radii=0.01, colors=COLOURS[name])
+            recording.log(f"iteration/soundings/{name}", cloud, rr.AnyValues(one_in=step))
+        seen = [name for name in FAMILIES if name in lifted and (ALL_PASSES, name) in laser]
+        planes = {name: laser[(ALL_PASSES, name)] for name in seen}
+        sonar = {
+            name: fit_plane(plane_moments(lifted[name], correction, mount.lever_arm_body_m), planes[name].normal)
+            for name in seen
+        }
+        for sensor, found, colour in (("laser", planes, GREY), ("mbes", sonar, SONAR)):
+            centres = np.array([planes[name].centroid_m for name in seen], dtype=np.float32).reshape(-1, 3)
+            normals = np.array([found[name].normal for name in seen], dtype=np.float32).reshape(-1, 3)
+            arrows = rr.Arrows3D(origins=centres, vectors=normals, radii=0.02, colors=colour, labels=seen)
+            recording.log(f"iteration/normals/{sensor}", arrows)
+        for axis in ("roll", "pitch", "yaw"):
+            recording.log(f"curves/deviation/{axis}", rr.Scalars(float(row[f"deviation_{axis}_deg"])))
+        for plane in FAMILIES:
+            recording.log(f"curves/angle/{plane}", rr.Scalars(float(row[f"angle_{plane}_deg"])))
+
+
+def _lifted(tables: Tables) -> Any:
+    return lifted_moments(tables.table(artefacts.SOUNDING_MOMENTS))
+
+
+def _of_all_passes(families: Any) -> dict[str, Any]:
+    total: dict[str, Any] = {}
+    for (_, name), moments in families.items():
+        total[name] = total[name] + moments if name in total else moments
+    return total

@@ -1,0 +1,34 @@
+"""The track of each pass, and the points near the target, in the pool frame."""
+
+from typing import Any
+
+import numpy as np
+
+from pipeline import artefacts
+from pipeline.passes import pass_of
+from pipeline.streams import xyz
+from pipeline.tables import Tables
+from stages.views import AT_MOST, GREY, SONAR
+
+TRACK_POINTS = 2000  # a pass
+
+
+def log(recording: Any, tables: Tables) -> None:
+    import rerun as rr
+
+    poses, passes = tables.table(artefacts.POSES), tables.table(artefacts.PASSES)
+    number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
+    track = poses[["x_pool_m", "y_pool_m", "z_pool_m"]].to_numpy()
+    for one in passes["pass"].tolist():
+        points = track[number == one]
+        points = points[:: max(1, len(points) // TRACK_POINTS)]
+        if len(points):
+            line = rr.LineStrips3D([points.astype(np.float32)], radii=0.02, colors=GREY)
+            recording.log(f"pool/trajectory/pass_{one}", line, static=True)
+    for name, artefact, colour in (
+        ("laser", artefacts.LASER_POOL, GREY),
+        ("soundings", artefacts.SOUNDINGS_POOL, SONAR),
+    ):
+        columns, step = tables.sample(artefact, AT_MOST)
+        cloud = rr.Points3D(xyz(columns, "pool_m").astype(np.float32), radii=0.006, colors=colour)
+        recording.log(f"pool/{name}", cloud, rr.AnyValues(one_in=step), static=True)

@@ -1,0 +1,31 @@
+"""The target by design, where the laser found it, and the labelled points by family of faces."""
+
+from typing import Any
+
+import numpy as np
+
+from pipeline import artefacts
+from pipeline.streams import xyz
+from pipeline.tables import Tables
+from stages.views import AT_MOST, COLOURS
+
+
+def log(recording: Any, tables: Tables) -> None:
+    import rerun as rr
+
+    pose = tables.table(artefacts.TARGET_POSE).iloc[0]
+    R_target_from_pool = np.array(pose["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
+    origin = np.array([pose[f"origin_{axis}_pool_m"] for axis in "xyz"], dtype=np.float64)
+    placed = rr.Transform3D(translation=-R_target_from_pool @ origin, mat3x3=R_target_from_pool)
+    recording.log("pool", placed, static=True)
+
+    faces = tables.table(artefacts.FACES)
+    family_of = faces["family"].to_numpy()
+    laser, step = tables.sample(artefacts.LASER_LABELLED, AT_MOST)
+    points, family = xyz(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
+    for name, colour in COLOURS.items():
+        corners = [np.reshape(c, (-1, 3)) for c in faces.loc[family_of == name, "vertices_target_m"]]
+        outlines = [np.vstack([one, one[:1]]).astype(np.float32) for one in corners]
+        recording.log(f"target/model/{name}", rr.LineStrips3D(outlines, radii=0.008, colors=colour), static=True)
+        cloud = rr.Points3D(points[family == name], radii=0.006, colors=colour)
+        recording.log(f"target/laser/{name}", cloud, rr.AnyValues(one_in=step), static=True)
