@@ -29,6 +29,7 @@ DRAWN = ("georeference", "segment", "angle_iterate")
 AT_MOST = 1_000_000  # points an entity
 COLOURS = {"P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167)}  # for all eyes
 GREY, SONAR = (150, 155, 165), (213, 94, 0)
+PAPER = (255, 255, 255)
 
 
 def draw(run: Path) -> list[str]:
@@ -87,11 +88,11 @@ def _blueprint() -> Any:
     return rrb.Blueprint(
         rrb.Tabs(
             rrb.Spatial3DView(
-                origin="/", contents=["+ /pool/**", "+ /target/**"], name="Overview", background=(255, 255, 255)
+                origin="/", contents=["+ /pool/**", "+ /target/**"], name="Overview", background=PAPER
             ),
             rrb.Horizontal(
                 rrb.Spatial3DView(
-                    origin="/", contents=["+ /iteration/**", "+ /target/model/**"], name="Iteration"
+                    origin="/", contents=["+ /iteration/**", "+ /target/model/**"], name="Iteration", background=PAPER
                 ),
                 rrb.TimeSeriesView(origin="/curves", name="Deviations, degrees"),
                 column_shares=[3, 2],
@@ -99,6 +100,6 @@ def _blueprint() -> Any:
             ),
             active_tab=0,
         ),
-        rrb.TimePanel(timeline="iteration", state="collapsed"),
+        rrb.TimePanel(timeline="iteration", state="collapsed", fps=3.0),
         collapse_panels=True,
     )

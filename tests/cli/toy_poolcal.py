@@ -72,6 +72,7 @@ def install() -> None:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal: a job in the background ignores it
     install()
     from stages.cli import main
 
