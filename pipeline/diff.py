@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from pipeline import artefacts, manifest
 from pipeline.errors import ArtefactError
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.comparison import Estimate, compare
-from pipeline.store import read_table
+from pipeline.tables import Tables
 from pipeline.verdict import SIX
 
 LEVEL = 0.01  # of the joint test: so many false alarms where nothing has moved
@@ -46,15 +45,14 @@ class RunRead:
             found[stage] = one
         return cls(path, read_settings(path), calibration(path), found)
 
-    def table(self, artefact: artefacts.Artefact) -> pd.DataFrame:
-        return read_table(self.path / artefact.owner / f"{artefact.name}.parquet", artefact)
 
-    def estimate(self) -> Estimate | None:
-        """The adjustment's: the patent's forms have no covariance to test with."""
-        block = self.result["methods"]["adjustment"]
-        if block["covariance"] is None:
-            return None
-        return Estimate(*(np.array(block[name]) for name in ("R_body_from_mbes", "lever_arm_m", "covariance")))
+def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
+    """The adjustment's, from calibration.json: the patent's forms have no covariance to test with."""
+    block = result["methods"]["adjustment"]
+    if block["covariance"] is None:
+        return None
+    shapes = {"R_body_from_mbes": (3, 3), "lever_arm_m": (3,), "covariance": (6, 6)}
+    return Estimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
 
 
 def diff(
@@ -65,7 +63,7 @@ def diff(
         {"run": str(r.path), "session": r.result["session"], "verdict": r.result["verdict"]} for r in (first, second)
     ]
     found: dict[str, Any] = {"schema": 1, "a": heads[0], "b": heads[1]}
-    found["config"] = list(_config(first, second))
+    found["config"] = list(_changes(first.settings.as_json(), second.settings.as_json()))
     found["inputs"] = list(_changes(first.result["inputs"], second.result["inputs"]))
     found["software"] = list(_changes(first.result["software"], second.result["software"]))
     found["counts"] = list(_counts(first, second))
@@ -82,23 +80,11 @@ def is_moved(found: Mapping[str, Any]) -> bool:
 
 
 # --- what went in ----------------------------------------------------------------------------------------------------
-def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    if isinstance(value, Mapping):
-        for name, item in value.items():
-            yield from _flat(item, f"{prefix}.{name}" if prefix else str(name))
-    else:
-        yield prefix, value
-
-
 def _changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Row]:
-    one, other = dict(_flat(first)), dict(_flat(second))
+    one, other = manifest.flattened(first), manifest.flattened(second)
     for key in sorted(one.keys() | other.keys()):
         if one.get(key) != other.get(key) or (key in one) != (key in other):
             yield {"key": key, "a": one.get(key), "b": other.get(key)}
-
-
-def _config(first: RunRead, second: RunRead) -> Iterator[Row]:
-    return _changes(first.settings.as_json(), second.settings.as_json())
 
 
 def _counts(first: RunRead, second: RunRead) -> Iterator[Row]:
@@ -116,7 +102,7 @@ def _counts(first: RunRead, second: RunRead) -> Iterator[Row]:
 def _mount(
     first: RunRead, second: RunRead, missing: list[str], tolerance_deg: float | None, tolerance_mm: float | None
 ) -> dict[str, Any]:
-    one, other = first.estimate(), second.estimate()
+    one, other = estimate_of(first.result), estimate_of(second.result)
     if one is None or other is None:
         which = [run.result["session"] for run, e in ((first, one), (second, other)) if e is None]
         missing.append(f"mount: {' and '.join(which)} has no result with a covariance")
@@ -162,7 +148,7 @@ def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row
         return
     tables = []
     for run in (first, second):
-        rows = run.table(artefacts.PLANES).query("`pass` == -1").to_dict("records")
+        rows = Tables(run.path).table(artefacts.PLANES).query("`pass` == -1").to_dict("records")
         tables.append({(row["sensor"], row["plane"]): row for row in rows})
     for sensor in ("laser", "mbes"):
         for family in FAMILIES:

@@ -14,15 +14,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.diff import LEVEL, estimate_of
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.files import write_text, writing
 from pipeline.folder import calibration
 from pipeline.maths.comparison import Estimate, compare
+from pipeline.mounts import PARAMETERS, six_of
 from pipeline.verdict import SIX
-
-LEVEL = 0.01
-PARAMETERS = {"roll": "deg", "pitch": "deg", "yaw": "deg", "x": "m", "y": "m", "z": "m"}
-OF_SIX = {"pitch": 0, "roll": 1, "yaw": 2, "x": 3, "y": 4, "z": 5}  # place among the six of covariance and test
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ def read_history(folder: Path, chosen: Filter) -> History:
         run = path.parent.parent
         try:
             result = calibration(run)
-            row = _row(run.relative_to(folder).as_posix(), result)
+            row, estimate = _row(run.relative_to(folder).as_posix(), result), estimate_of(result)
         except PoolcalError as error:
             unreadable.append(str(error))
             continue
@@ -70,22 +68,23 @@ def read_history(folder: Path, chosen: Filter) -> History:
             unreadable.append(f"{run}: its calibration.json is not as poolcal writes it")
             continue
         if chosen.takes(row["session"], row["date_utc"][:10]):
-            found.append((row["date_utc"], row["run"], row, result))
+            found.append((row["date_utc"], row["run"], row, estimate))
     found.sort(key=lambda one: one[:2])
-    rows = list(_with_jumps([(row, result) for *_, row, result in found]))
+    rows = list(_with_jumps([(row, estimate) for *_, row, estimate in found]))
     return History(pd.DataFrame(rows, columns=list(_columns())), unreadable)
 
 
 def _columns() -> Iterator[str]:
     yield from ("date_utc", "session", "run", "verdict")
-    for name, unit in PARAMETERS.items():
-        yield from (f"{name}_{unit}", f"sigma_{name}_{unit}")
+    for *_, key, _ in PARAMETERS:
+        yield from (key, f"sigma_{key}")
     yield from ("probability", "moved")
 
 
 def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
-    """The result as chosen in its config; sigmas are the adjustment's, NaN where there is no result."""
-    mount, block = result["mbes"]["mount"], result["methods"]["adjustment"]
+    """The adjustment's values and sigmas, whichever method the session's result is; NaN where there are none."""
+    block = result["methods"]["adjustment"]
+    sigma = six_of(block["sigma"])
     passes: Sequence[Mapping[str, Any]] = result["passes"]
     row: dict[str, Any] = {
         "date_utc": str(passes[0]["start_utc"]) if passes else "",
@@ -93,21 +92,15 @@ def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
         "run": run,
         "verdict": str(result["verdict"]),
     }
-    sigma = np.full(6, np.nan) if block["covariance"] is None else np.sqrt(np.diag(np.array(block["covariance"])))
-    for name, unit in PARAMETERS.items():
-        size = float(sigma[OF_SIX[name]])
-        row[f"{name}_{unit}"] = float(mount[f"{name}_{unit}"]) if mount else np.nan
-        row[f"sigma_{name}_{unit}"] = float(np.degrees(size)) if unit == "deg" else size
+    for _, place, key, _ in PARAMETERS:
+        row |= {key: float(block["mount"][key]) if block["mount"] else np.nan, f"sigma_{key}": float(sigma[place])}
     return row | {"probability": np.nan, "moved": ""}
 
 
-def _with_jumps(found: list[tuple[dict[str, Any], Mapping[str, Any]]]) -> Iterator[dict[str, Any]]:
+def _with_jumps(found: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator[dict[str, Any]]:
     before: Estimate | None = None
-    for row, result in found:
-        block = result["methods"]["adjustment"]
-        if row["verdict"] == "accepted" and block["covariance"] is not None:
-            names = ("R_body_from_mbes", "lever_arm_m", "covariance")
-            now = Estimate(*(np.array(block[name], dtype=np.float64) for name in names))
+    for row, now in found:
+        if row["verdict"] == "accepted" and now is not None:
             if before is not None:
                 compared = compare(before, now)
                 moved = ", ".join(SIX[k] for k in compared.moved(LEVEL))

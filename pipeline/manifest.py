@@ -24,8 +24,8 @@ SCHEMA = 1
 LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "lazrs", "novatel-edie")
 ROOT = Path(pipeline.__file__).parent.parent
 NO_INFLUENCE = (  # of pipeline/: cannot change a result
-    "simulation/", "exports/", "pages/", "progress.py", "executor.py", "verify.py", "diff.py", "history.py",
-    "maths/comparison.py",
+    "simulation/", "exports/", "pages/", "progress.py", "executor.py", "verify.py", "screen.py", "diff.py",
+    "history.py", "tables.py", "maths/comparison.py",
 )  # fmt: skip
 
 
@@ -144,7 +144,7 @@ def reasons(old: Manifest, key: Key, digests: Mapping[str, str | None]) -> list[
     written = {name: entry["sha256"] for name, entry in old.outputs.items()}
     return [
         *_file_changes(written, digests, "its result ", "edited"),
-        *_value_changes(_flat(old.key.config), _flat(key.config)),
+        *_value_changes(flattened(old.key.config), flattened(key.config)),
         *_file_changes(old.key.raw, key.raw, "", "changed"),
         *_file_changes(old.key.inputs, key.inputs, "its input ", "changed"),
         *_source_changes(old.key.source, key.source),
@@ -179,16 +179,16 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Nested keys joined by dots.
 
-    >>> _flat({"segment": {"margin_m": 0.05}})
+    >>> flattened({"segment": {"margin_m": 0.05}})
     {'segment.margin_m': 0.05}
     """
     flat: dict[str, Any] = {}
     for name, value in values.items():
         if isinstance(value, Mapping) and value:
-            flat |= _flat(value, f"{prefix}{name}.")
+            flat |= flattened(value, f"{prefix}{name}.")
         else:
             flat[f"{prefix}{name}"] = value
     return flat

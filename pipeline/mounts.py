@@ -1,6 +1,6 @@
 """From the configuration's degrees to what the mathematics takes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,14 @@ from pipeline.maths.rotations import mount_from_rotation, rotation_from_mount
 from pipeline.maths.targets import TargetModel, build_target
 
 Array = NDArray[np.float64]
+PARAMETERS = (  # as people list them: name, place among the six (rotation about body x, y, z, lever arm), setting, unit
+    ("roll", 1, "roll_deg", "deg"),
+    ("pitch", 0, "pitch_deg", "deg"),
+    ("yaw", 2, "yaw_deg", "deg"),
+    ("x", 3, "x_m", "m"),
+    ("y", 4, "y_m", "m"),
+    ("z", 5, "z_m", "m"),
+)
 
 
 @dataclass(frozen=True)
@@ -32,6 +40,15 @@ def mount_of(mount: config.Mount) -> Mounted:
     """Radians and matrices from a mount's settings."""
     angles = np.radians([mount.roll_deg, mount.pitch_deg, mount.yaw_deg])
     return Mounted(rotation_from_mount(*map(float, angles)), np.array([mount.x_m, mount.y_m, mount.z_m]))
+
+
+def six_of(block: Mapping[str, Sequence[float] | None] | None) -> list[float]:
+    """Correction or sigma of calibration.json in one list: rotation about body x, y, z (degrees), lever arm (m).
+
+    Not numbers where it has none.
+    """
+    parts = [] if block is None else [block["rotation_vector_deg"], block["lever_arm_m"]]
+    return [float(value) for part in parts if part is not None for value in part] or [float("nan")] * 6
 
 
 def change_of(total: Mapping[str, float], coarse: Mapping[str, float], key: str) -> float:

@@ -4,10 +4,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-from pipeline.mounts import change_of
+from pipeline.mounts import PARAMETERS, change_of, six_of
 
-AXES = ("roll", "pitch", "yaw", "x", "y", "z")
-VECTOR_OF_ANGLE = {"pitch": 0, "roll": 1, "yaw": 2}  # rotation vector's component about the same body axis
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # a target found so far off is worth a word
 
 
@@ -18,14 +16,11 @@ def summary(calibration: Mapping[str, Any]) -> str:
     heads = f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'change':>14}{'sigma':>12}"
     lines += ["", f"{heads}   (result: {calibration['result']})"]
     block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
-    for parameter in AXES:
-        angle = parameter in VECTOR_OF_ANGLE
-        key, unit = (f"{parameter}_deg", "°") if angle else (f"{parameter}_m", "m")
-        part = "rotation_vector_deg" if angle else "lever_arm_m"
-        index = VECTOR_OF_ANGLE[parameter] if angle else "xyz".index(parameter)
+    for parameter, place, key, of_setting in PARAMETERS:
+        unit = "°" if of_setting == "deg" else of_setting
         total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
         change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
-        sigma = f"{block['sigma'][part][index]:.4f} {unit}" if block["sigma"] else "-"
+        sigma = f"{six_of(block['sigma'])[place]:.4f} {unit}" if block["sigma"] else "-"
         lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
     lines += ["", "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."]
     if not block["sigma"]:

@@ -142,7 +142,7 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
 
 @app.command()
 def view(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="run folder, or two to set side by side")],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="run folders")],
     stage: Annotated[str | None, typer.Option(help=f"one of {', '.join(ORDER)} alone")] = None,
 ) -> int:
     """Open a run's recordings in the Rerun viewer.
@@ -151,6 +151,8 @@ def view(
     """
     from stages.views import draw, recordings_of, show
 
+    if stage is not None and stage not in ORDER:
+        raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     for run_folder in runs:
         draw(run_folder)
     return show([path for run_folder in runs for path in recordings_of(run_folder, stage)])
@@ -227,6 +229,8 @@ def _draw(run_folder: Path) -> None:
 
         draw(run_folder)
     except Exception as error:
+        if not isinstance(error, (PoolcalError, OSError)):
+            say(traceback.format_exc().rstrip(), sys.stderr)
         reason = str(error).partition("\n")[0]
         say(f"recordings: not drawn ({type(error).__name__}: {reason}); the calibration is complete", sys.stderr)
 

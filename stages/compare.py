@@ -16,16 +16,9 @@ from scipy.spatial.transform import Rotation
 from pipeline.config import Mount, Verdict
 from pipeline.errors import ConfigError
 from pipeline.folder import calibration, read_settings
+from pipeline.mounts import PARAMETERS
 
 LIMIT = 4.0
-ROWS = (  # name, index among the six (rotation about body x, y, z, then the lever arm), setting, unit
-    ("roll", 1, "roll_deg", "deg"),
-    ("pitch", 0, "pitch_deg", "deg"),
-    ("yaw", 2, "yaw_deg", "deg"),
-    ("x", 3, "x_m", "m"),
-    ("y", 4, "y_m", "m"),
-    ("z", 5, "z_m", "m"),
-)
 Array = NDArray[np.float64]
 
 
@@ -39,7 +32,7 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
     lines = [f"session {result['session']}: {result['verdict']}", *(f"  {reason}" for reason in result["reasons"])]
     lines += ["", f"{chosen} (the result)"]
     lines += _table(settings.session.mbes.mount, values, R_true, lever_arm_true_m, sigma)
-    lines += ["", f"errors of all:       {''.join(f'{name:>10}' for name, *_ in ROWS)}   (deg, m)"]
+    lines += ["", f"errors of all:       {''.join(f'{name:>10}' for name, *_ in PARAMETERS)}   (deg, m)"]
     for method, other in result["methods"].items():
         lines.append(f"  {method:19}{_error_row(errors_of(other, R_true, lever_arm_true_m))}")
     limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
@@ -53,7 +46,7 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
 
 
 def _error_row(error: Array | None) -> str:
-    return "  no result" if error is None else "".join(f"{error[index]:10.5f}" for _, index, *_ in ROWS)
+    return "  no result" if error is None else "".join(f"{error[index]:10.5f}" for _, index, *_ in PARAMETERS)
 
 
 def read_truth(path: Path) -> tuple[Array, Array]:
@@ -96,7 +89,7 @@ def _table(
     yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
     truth = (pitch, roll, yaw, *lever_arm_true_m)
     lines = [f"  {'':6}{'coarse':>11}{'calibrated':>12}{'truth':>11}{'error':>11}{'sigma':>10}{'error/sigma':>13}"]
-    for name, k, key, unit in ROWS:
+    for name, k, key, unit in PARAMETERS:
         spread = f"{'-':>10}{'-':>13}" if sigma is None else f"{sigma[k]:10.5f}{error[k] / sigma[k]:13.1f}"
         numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[k]:11.5f}{error[k]:11.5f}"
         lines.append(f"  {name:6}{numbers}{spread} {unit}")

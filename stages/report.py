@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from pipeline import artefacts, config
 from pipeline.maths.adjustment import COMMON, NAMES
 from pipeline.maths.rotations import exp_so3
-from pipeline.mounts import Mounted, change_of, mount_of
-from pipeline.screen import AXES, VECTOR_OF_ANGLE
+from pipeline.mounts import PARAMETERS, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
 from pipeline.verdict import Evidence, distance_advice, reasons
 
@@ -199,22 +198,18 @@ def _matrix(table: pd.DataFrame, column: str) -> list[list[float]] | None:
 def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.DataFrame:
     rows = []
     for method, block in methods.items():
-        for parameter in AXES:
-            angle = parameter in VECTOR_OF_ANGLE
-            key = f"{parameter}_deg" if angle else f"{parameter}_m"
-            part = "rotation_vector_deg" if angle else "lever_arm_m"
-            index = VECTOR_OF_ANGLE[parameter] if angle else "xyz".index(parameter)
-            correction, sigma = block["correction"][part], block["sigma"]
+        correction, sigma = (six_of(block[name]) for name in ("correction", "sigma"))
+        for parameter, place, key, unit in PARAMETERS:
             rows.append(
                 {
                     "method": method,
                     "parameter": parameter,
-                    "unit": "deg" if angle else "m",
+                    "unit": unit,
                     "coarse": coarse.settings()[key],
                     "total": block["mount"][key] if block["mount"] else np.nan,
                     "change": change_of(block["mount"], coarse.settings(), key) if block["mount"] else np.nan,
-                    "correction": correction[index] if correction else np.nan,
-                    "sigma": sigma[part][index] if sigma else np.nan,
+                    "correction": correction[place],
+                    "sigma": sigma[place],
                 }
             )
     return pd.DataFrame(rows)

@@ -6,7 +6,8 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from pipeline.history import OF_SIX, PARAMETERS, History
+from pipeline.history import History
+from pipeline.mounts import PARAMETERS
 from pipeline.pages import ALARM, INK, QUIET, STYLE, render, svg
 from pipeline.verdict import SIX
 
@@ -16,13 +17,13 @@ WITHIN_95 = 1.959964
 
 def page(history: History, filters: str) -> str:
     table = history.table
-    parameters = [{"name": name, "unit": "°" if unit == "deg" else "m"} for name, unit in PARAMETERS.items()]
+    parameters = [{"name": name, "unit": "°" if unit == "deg" else unit} for name, *_, unit in PARAMETERS]
     rows = [
         {
             "date": row["date_utc"][:16].replace("T", " "),
             "session": row["session"],
             "verdict": row["verdict"],
-            "cells": {name: _number(row[f"{name}_{unit}"], 4) for name, unit in PARAMETERS.items()},
+            "cells": {name: _number(row[key], 4) for name, _, key, _ in PARAMETERS},
             "probability": "" if np.isnan(row["probability"]) else f"{row['probability']:.2g}",
             "moved": row["moved"],
         }
@@ -53,18 +54,21 @@ def _chart(table: pd.DataFrame) -> Markup:
         axes = figure.subplots(3, 2, sharex=True).T.ravel()
         place = np.arange(len(table))
         accepted = (table["verdict"] == "accepted").to_numpy()
-        for axis, (name, unit) in zip(axes, PARAMETERS.items(), strict=True):
+        for axis, (name, place_of_six, key, unit) in zip(axes, PARAMETERS, strict=True):
             word, scale = UNITS[unit]
-            values = table[f"{name}_{unit}"].to_numpy(dtype=float) * scale
-            sigma = table[f"sigma_{name}_{unit}"].to_numpy(dtype=float) * scale
+            values = table[key].to_numpy(dtype=float)
+            sigma = table[f"sigma_{key}"].to_numpy(dtype=float) * scale
             good = accepted & np.isfinite(values)
             if good.any():
                 values = values - np.median(values[good])
+            if unit == "deg":
+                values = values - 360.0 * np.round(values / 360.0)  # a head turned round lies near ±180°
+            values = values * scale
             axis.axhline(0.0, color=QUIET, linewidth=0.6)
             for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
                 bars = WITHIN_95 * np.nan_to_num(sigma[use])
                 axis.errorbar(place[use], values[use], bars, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
-            word_of_six = SIX[OF_SIX[name]]
+            word_of_six = SIX[place_of_six]
             moved = np.array([word_of_six in words.split(", ") for words in table["moved"]], dtype=bool)
             ring = {"color": ALARM, "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.4}
             axis.plot(place[moved], values[moved], "o", **ring)

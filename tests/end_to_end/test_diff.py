@@ -74,8 +74,8 @@ def test_a_moved_sonar_is_found(undisturbed: tuple[Path, Told], tmp_path: Path) 
 
 
 def test_another_target_compares_the_mount_alone(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
-    target = {"a": 6.0, "b": 2.4, "c": 0.8, "e": 0.4, "azimuth_deg": 30.0}
-    target["origin"] = {"latitude_deg": 36.1, "longitude_deg": 120.3, "height_m": 20.0}  # type: ignore[assignment]
+    origin = {"latitude_deg": 36.1, "longitude_deg": 120.3, "height_m": 20.0}
+    target = {"a": 6.0, "b": 2.4, "c": 0.8, "e": 0.4, "azimuth_deg": 30.0, "origin": origin}
     run = run_of(simulate(tmp_path / "session", 3, target=target))
     status, found = compared(undisturbed[0], run)
     assert status == 0, found["sentence"]

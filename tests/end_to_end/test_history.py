@@ -86,12 +86,16 @@ def test_filters(runs: Path, tmp_path: Path) -> None:
 def test_broken_runs_are_named_and_left_out(runs: Path) -> None:
     (runs / "moved" / "report" / "calibration.json").write_text("{")
     (runs / "after" / "report" / "calibration.json").write_text('{"verdict": "accepted", "mbes": 3}')
+    damaged = runs / "b_first" / "report" / "calibration.json"
+    content = json.loads(damaged.read_text(encoding="utf-8"))
+    content["methods"]["adjustment"]["covariance"] = [[1.0]]
+    damaged.write_text(json.dumps(content), encoding="utf-8")
     told = poolcal("history", runs)
     assert told.status == 0
-    assert len(told.err.splitlines()) == 2
+    assert len(told.err.splitlines()) == 3
     assert "moved" in told.err
     assert "is not as poolcal writes it" in told.err
-    assert len(table_of(runs)) == 4
+    assert len(table_of(runs)) == 3
 
 
 def test_no_folder(tmp_path: Path) -> None:

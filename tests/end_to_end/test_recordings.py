@@ -105,18 +105,25 @@ def test_a_sample_says_so(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(run: Path) -> list[str]:
-        raise RuntimeError("no room\nfor pictures")
+    """The reason on one line; a bug keeps its traceback as well."""
+    for error, traced in ((OSError("no room\nfor pictures"), False), (ValueError("no room\nfor pictures"), True)):
 
-    monkeypatch.setattr(stages.views, "draw", fails)
-    told = place.calibrate("--recordings")
-    assert told.status == 0
-    assert told.complaints == ["recordings: not drawn (RuntimeError: no room); the calibration is complete"]
-    assert digests(place.run) == right
+        def fails(run: Path, error: Exception = error) -> list[str]:
+            raise error
+
+        monkeypatch.setattr(stages.views, "draw", fails)
+        told = place.calibrate("--recordings")
+        assert told.status == 0
+        last = f"recordings: not drawn ({type(error).__name__}: no room); the calibration is complete"
+        assert told.complaints[-1] == last
+        assert ("Traceback" in told.err) == traced
+        assert (len(told.complaints) > 1) == traced
+        assert digests(place.run) == right
 
 
 def test_none_when_not_wanted(place: Place) -> None:
     assert place.calibrate("--no-recordings").status == 0
     assert not list(place.run.rglob("*.rrd"))
-    told = poolcal("view", place.folder / "nowhere")
-    assert told.status == 2
+    assert poolcal("view", place.folder / "nowhere").status == 2
+    told = poolcal("view", place.run, "--stage", "../elsewhere")
+    assert (told.status, "is no stage" in told.err) == (2, True)
