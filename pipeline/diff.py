@@ -15,6 +15,7 @@ from pipeline import artefacts, manifest
 from pipeline.errors import ArtefactError
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.comparison import Estimate, compare
+from pipeline.maths.planes import angle_between
 from pipeline.tables import Tables
 from pipeline.verdict import SIX
 
@@ -158,7 +159,7 @@ def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row
                 continue
             a, b = (table[key] for table in tables)
             one_n, other_n = (np.array([float(row[f"normal_{axis}_target_1"]) for axis in "xyz"]) for row in (a, b))
-            angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(one_n, other_n)), one_n @ other_n)))
+            angle = float(np.degrees(angle_between(one_n, other_n)))
             shift, rms = float(b["distance_m"] - a["distance_m"]), float(b["rms_m"] - a["rms_m"])
             if angle or shift or rms:
                 yield {"sensor": sensor, "plane": family, "angle_deg": angle, "distance_m": shift, "rms_m": rms}

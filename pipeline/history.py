@@ -19,7 +19,7 @@ from pipeline.errors import ConfigError, PoolcalError
 from pipeline.files import write_text, writing
 from pipeline.folder import calibration
 from pipeline.maths.comparison import Estimate, compare
-from pipeline.mounts import PARAMETERS, six_of
+from pipeline.mounts import SETTINGS
 from pipeline.verdict import SIX
 
 
@@ -76,7 +76,7 @@ def read_history(folder: Path, chosen: Filter) -> History:
 
 def _columns() -> Iterator[str]:
     yield from ("date_utc", "session", "run", "verdict")
-    for *_, key, _ in PARAMETERS:
+    for key in SETTINGS:
         yield from (key, f"sigma_{key}")
     yield from ("probability", "moved")
 
@@ -84,7 +84,8 @@ def _columns() -> Iterator[str]:
 def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
     """The adjustment's values and sigmas, whichever method the session's result is; NaN where there are none."""
     block = result["methods"]["adjustment"]
-    sigma = six_of(block["sigma"])
+    nothing = dict.fromkeys(SETTINGS, np.nan)
+    mount, sigma = (block[name] or nothing for name in ("mount", "sigma_mount"))
     passes: Sequence[Mapping[str, Any]] = result["passes"]
     row: dict[str, Any] = {
         "date_utc": str(passes[0]["start_utc"]) if passes else "",
@@ -92,8 +93,8 @@ def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
         "run": run,
         "verdict": str(result["verdict"]),
     }
-    for _, place, key, _ in PARAMETERS:
-        row |= {key: float(block["mount"][key]) if block["mount"] else np.nan, f"sigma_{key}": float(sigma[place])}
+    for key in SETTINGS:
+        row |= {key: float(mount[key]), f"sigma_{key}": float(sigma[key])}
     return row | {"probability": np.nan, "moved": ""}
 
 

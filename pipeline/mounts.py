@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import config
-from pipeline.maths.rotations import mount_from_rotation, rotation_from_mount
+from pipeline.maths.rotations import mount_from_rotation, mount_partials, rotation_from_mount
 from pipeline.maths.targets import TargetModel, build_target
 
 Array = NDArray[np.float64]
@@ -19,6 +19,9 @@ PARAMETERS = (  # as people list them: name, place among the six (rotation about
     ("y", 4, "y_m", "m"),
     ("z", 5, "z_m", "m"),
 )
+
+SETTINGS = tuple(key for *_, key, _ in PARAMETERS)
+WITHIN_95 = 1.959964  # sigmas on either side
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,13 @@ class Mounted:
         angles = (round(float(np.degrees(angle)), 12) for angle in mount_from_rotation(self.R_body_from_sensor))
         lever = (float(value) for value in self.lever_arm_body_m)
         return dict(zip(names, angles, strict=True)) | dict(zip(("x_m", "y_m", "z_m"), lever, strict=True))
+
+    def sigmas(self, covariance: Array) -> dict[str, float]:
+        """Standard deviations of the six settings, from the covariance (6, 6) of (ε about body x, y, z; lever arm)."""
+        partials = mount_partials(self.R_body_from_sensor)
+        angles = np.degrees(np.sqrt(np.diag(partials @ covariance[:3, :3] @ partials.T)))
+        six = [*angles, *np.sqrt(np.diag(covariance)[3:])]
+        return {key: float(six[place]) for _, place, key, _ in PARAMETERS}
 
 
 def mount_of(mount: config.Mount) -> Mounted:

@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-from pipeline.mounts import PARAMETERS, change_of, six_of
+from pipeline.mounts import PARAMETERS, change_of
 
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # a target found so far off is worth a word
 
@@ -16,14 +16,14 @@ def summary(calibration: Mapping[str, Any]) -> str:
     heads = f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'change':>14}{'sigma':>12}"
     lines += ["", f"{heads}   (result: {calibration['result']})"]
     block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
-    for parameter, place, key, of_setting in PARAMETERS:
+    for parameter, _, key, of_setting in PARAMETERS:
         unit = "°" if of_setting == "deg" else of_setting
         total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
         change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
-        sigma = f"{six_of(block['sigma'])[place]:.4f} {unit}" if block["sigma"] else "-"
+        sigma = f"{block['sigma_mount'][key]:.4f} {unit}" if block["sigma_mount"] else "-"
         lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
     lines += ["", "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."]
-    if not block["sigma"]:
+    if not block["sigma_mount"]:
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
     lines.append(_target_line(calibration["target"]))
     lines.append("Points on the target by pass, distance of the INS from the wall, soundings + laser points:")

@@ -28,7 +28,7 @@ def to_arrow(columns: Mapping[str, Any] | pd.DataFrame, artefact: Artefact) -> p
         return artefact.schema.empty_table()
     if set(given) != set(expected):
         missing, surplus = sorted(set(expected) - set(given)), sorted(set(given) - set(expected))
-        raise TypeError(f"{where}: missing columns {missing}, columns unknown to artefacts.py {surplus}")
+        raise TypeError(f"{where}: missing columns {missing}, columns unknown to the artefact {surplus}")
     schema = artefact.schema
     return pa.Table.from_arrays([_to_array(columns[f.name], f, where) for f in schema], schema=schema)
 

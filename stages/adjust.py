@@ -12,20 +12,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline import artefacts, config
-from pipeline.fitted import ALL_PASSES, laser_planes
 from pipeline.maths.adjustment import (
     COMMON,
     GROUPS,
     NAMES,
     LaserMoments,
-    Rows,
     State,
     Sums,
-    Surface,
     accumulate,
     laser_moments,
-    laser_rows,
-    sounding_rows,
 )
 from pipeline.maths.consistency import (
     Scores,
@@ -38,16 +33,17 @@ from pipeline.maths.consistency import (
 from pipeline.maths.robust import scale_of
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.solution import Solution, redundancies, solve, variance_factors, weakest_direction
-from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of
-from pipeline.poses import trajectory_in_target
-from pipeline.streams import Batch, Stream, xyz
+from pipeline.residuals import bins_table, map_table, residuals_table, step_for
+from pipeline.scene import Scene, scene_of
+from pipeline.streams import Batch, Stream
 from pipeline.times import NS
 
 Array = NDArray[np.float64]
 STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
 STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
 ROUGH_STEP = 1e-3  # weights become robust when the step is smaller (rad, m)
+SHOWN = 300_000  # points of a sensor in the table residuals, at most
 RESCALINGS = 2  # how often the groups' robust scales are then taken anew
 
 
@@ -76,57 +72,32 @@ class Outputs:
     groups: Annotated[pd.DataFrame, artefacts.GROUPS]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
     summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
-
-
-@dataclass(frozen=True)
-class Scene:
-    """What turns a batch into observations: poses, the surface and design height of each face, sigmas."""
-
-    trajectory: Trajectory
-    surface_of_face: NDArray[np.int64]
-    height_of_face: Array
-    config: Config
-
-    def _heights(self, face: NDArray[np.int16], state: State) -> Array:
-        """What brings the points on all horizontal faces into one plane, (n, 3) m."""
-        (normal,) = (surface.normal for surface in state.surfaces if surface.family == "H")
-        return self.height_of_face[face][:, None] * normal
-
-    def laser(self, batch: Batch, state: State) -> tuple[Rows, Array]:
-        face, laser = batch["face"], self.config.laser
-        points = xyz(batch, "target_m")
-        points -= self._heights(face, state)
-        ranges = np.sqrt(batch["x_laser_m"] ** 2 + batch["y_laser_m"] ** 2 + batch["z_laser_m"] ** 2)
-        sigmas = (laser.range_sigma_m, np.radians(laser.angle_sigma_deg))
-        return laser_rows(state, self.surface_of_face[face], points, ranges, batch["cos_incidence"], *sigmas), points
-
-    def soundings(self, batch: Batch, state: State) -> Rows:
-        face, mbes = batch["face"], self.config.mbes
-        positions, R_target_from_body = self.trajectory.poses_at(batch["t_ns"])
-        positions -= self._heights(face, state)
-        points = xyz(batch, "mbes_m")
-        sigmas = (mbes.range_sigma_m, np.radians(mbes.angle_sigma_deg))
-        return sounding_rows(state, self.surface_of_face[face], points, positions, R_target_from_body, *sigmas)
+    residuals: Annotated[pd.DataFrame, artefacts.RESIDUALS]
+    residual_bins: Annotated[pd.DataFrame, artefacts.RESIDUAL_BINS]
+    residual_map: Annotated[pd.DataFrame, artefacts.RESIDUAL_MAP]
 
 
 def _laser_moments(batch: Batch, scene: Scene, state: State) -> LaserMoments:
-    rows, points = scene.laser(batch, state)
+    rows, points = scene.laser_rows(batch, state)
     return laser_moments(state, rows, points)
 
 
 def _sounding_sums(batch: Batch, scene: Scene, state: State) -> Sums:
-    return accumulate(state, scene.soundings(batch, state))
+    return accumulate(state, scene.sounding_rows(batch, state))
 
 
-def _scores(batch: Batch, scene: Scene, state: State, sensor: str) -> Scores:
-    rows = scene.laser(batch, state)[0] if sensor == "laser" else scene.soundings(batch, state)
-    moment = batch["t_ns"] // round(scene.config.adjust.moment_s * NS)
-    return scores_of(state, rows, sensor, batch["pass"].astype(np.int64), moment)
+def _scores(batch: Batch, scene: Scene, state: State, sensor: str, step: int) -> tuple[Scores, Batch]:
+    rows = scene.rows(sensor, batch, state)
+    moment = batch["t_ns"] // round(scene.adjust.moment_s * NS)
+    scores = scores_of(state, rows, sensor, batch["pass"].astype(np.int64), moment)
+    return scores, scene.sample(sensor, batch, state, rows, step)
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    scene, state = _start(inputs, config)
     settings = config.adjust
+    given = (inputs.faces, inputs.poses, inputs.target_pose, inputs.planes)
+    scene = scene_of(*given, settings, config.laser, config.mbes)
+    state = scene.coarse
     laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
     converged, iterations, rescaled = False, 0, 0
     while True:
@@ -144,13 +115,32 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             scales = {name: scale_of(group.histogram) for name, group in sums.groups.items()}
             state = replace(state, robust=(settings.robust_k0, settings.robust_k1), scales={**state.scales, **scales})
             laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
+    seen = {"laser": sums.groups["laser"].count}
+    seen["mbes"] = sum(group.count for group in sums.groups.values()) - seen["laser"]
+    taken: list[Batch] = []
     scores = merge_scores(
-        chain(
-            inputs.laser_labelled.fold(_scores, scene, state, "laser"),
-            inputs.soundings_labelled.fold(_scores, scene, state, "mbes"),
+        _without(
+            chain.from_iterable(
+                stream.fold(_scores, scene, state, sensor, step_for(seen[sensor], SHOWN))
+                for sensor, stream in (("laser", inputs.laser_labelled), ("mbes", inputs.soundings_labelled))
+            ),
+            taken,
         )
     )
-    return _outputs(state, sums, solution, scores, converged, iterations, config)
+    residuals = residuals_table(taken)
+    return Outputs(
+        **_tables(state, sums, solution, scores, converged, iterations, config),
+        residuals=residuals,
+        residual_bins=bins_table(residuals, inputs.faces),
+        residual_map=map_table(residuals, inputs.faces),
+    )
+
+
+def _without(pieces: Iterator[tuple[Scores, Batch]], taken: list[Batch]) -> Iterator[Scores]:
+    """The scores one by one; the points to be looked at are put by."""
+    for scores, points in pieces:
+        taken.append(points)
+        yield scores
 
 
 def _negligible(solution: Solution) -> bool:
@@ -164,38 +154,9 @@ def _sum(pieces: Iterator[Any]) -> Any:
     return functools.reduce(operator.add, pieces)
 
 
-def _start(inputs: Inputs, config: Config) -> tuple[Scene, State]:
-    """Coarse mount, and the laser's planes as surfaces; the horizontal faces level at their design heights."""
-    faces, mount = inputs.faces, mount_of(config.mbes.mount)
-    laser = laser_planes(inputs.planes)
-    surfaces = []
-    for family in ("P1", "P2", "P3"):
-        rows = faces[faces["family"] == family]
-        plane = laser.get((ALL_PASSES, family))
-        if plane is not None:
-            surfaces.append(Surface(family, plane.normal, plane.centroid_m, 0.0))
-        elif len(rows):
-            first = rows.iloc[0]
-            normal = np.array([first[f"normal_{axis}_target_1"] for axis in "xyz"], dtype=np.float64)
-            surfaces.append(Surface(family, normal, normal * float(first["distance_m"]), 0.0))
-    horizontal = faces[faces["family"] == "H"]
-    corners = np.concatenate([np.reshape(corner, (-1, 3)) for corner in horizontal["vertices_target_m"]])
-    centre = np.array([corners[:, 0].mean(), 0.0, 0.0])
-    surfaces.append(Surface("H", np.array([0.0, 0.0, 1.0]), centre, 0.0))
-    number = {surface.family: k for k, surface in enumerate(surfaces)}
-    heights = np.where(faces["family"] == "H", faces["distance_m"] * faces["normal_z_target_1"], 0.0)
-    scene = Scene(
-        trajectory_in_target(inputs.poses, inputs.target_pose),
-        np.array([number[family] for family in faces["family"]]),
-        heights,
-        config,
-    )
-    return scene, State(mount.R_body_from_sensor, mount.lever_arm_body_m, tuple(surfaces))
-
-
-def _outputs(
+def _tables(
     state: State, sums: Sums, solution: Solution, scores: Scores, converged: bool, iterations: int, config: Config
-) -> Outputs:
+) -> dict[str, pd.DataFrame]:
     coarse = mount_of(config.mbes.mount)
     six = np.concatenate(
         [
@@ -238,14 +199,14 @@ def _outputs(
         "test_passed": statistic <= limit,
         "reason": reason,
     }
-    return Outputs(
-        estimate,
-        _covariance_table(covariance[:COMMON, :COMMON]),
-        _surfaces_table(state, cells),
-        _groups_table(sums, free),
-        _cells_table(state, cells),
-        pd.DataFrame([summary]),
-    )
+    return {
+        "estimate": estimate,
+        "covariance": _covariance_table(covariance[:COMMON, :COMMON]),
+        "surfaces": _surfaces_table(state, cells),
+        "groups": _groups_table(sums, free),
+        "cells": _cells_table(state, cells),
+        "summary": pd.DataFrame([summary]),
+    }
 
 
 def _covariance_table(covariance: Array) -> pd.DataFrame:

@@ -11,9 +11,10 @@ import yaml
 from numpy.typing import NDArray
 
 from pipeline import artefacts, config
+from pipeline.closing import closing_table
 from pipeline.maths.adjustment import COMMON, NAMES
 from pipeline.maths.rotations import exp_so3
-from pipeline.mounts import PARAMETERS, Mounted, change_of, mount_of, six_of
+from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
 from pipeline.verdict import Evidence, distance_advice, reasons
 
@@ -32,6 +33,9 @@ class Config:
 @dataclass(frozen=True)
 class Inputs:
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
+    faces: Annotated[pd.DataFrame, artefacts.FACES]
+    planes: Annotated[pd.DataFrame, artefacts.PLANES]
+    sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
     target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
     provisional_mount: Annotated[pd.DataFrame, artefacts.PROVISIONAL_MOUNT]
     corrections: Annotated[pd.DataFrame, artefacts.CORRECTIONS]
@@ -45,6 +49,7 @@ class Inputs:
 @dataclass(frozen=True)
 class Outputs:
     calibration: Annotated[pd.DataFrame, artefacts.CALIBRATION]
+    closing: Annotated[pd.DataFrame, artefacts.CLOSING]
     calibration_json: Annotated[str, artefacts.CALIBRATION_JSON]
     calibration_yaml: Annotated[str, artefacts.CALIBRATION_YAML]
 
@@ -91,8 +96,10 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
     }
+    mounts = {"coarse": coarse} | {name: _mounted(block) for name, block in methods.items() if block["mount"]}
     return Outputs(
         _table(methods, coarse),
+        closing_table(inputs.faces, inputs.planes, inputs.sounding_moments, coarse, mounts),
         json.dumps(result, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
         yaml.dump(result, Dumper=_PlainDumper, sort_keys=False, allow_unicode=True, width=120),
     )
@@ -165,12 +172,17 @@ def _method(
         if sigma is None
         else {"rotation_vector_deg": np.degrees(sigma[:3]).tolist(), "lever_arm_m": sigma[3:].tolist()},
         "covariance": covariance.tolist() if known and covariance is not None else None,
+        "sigma_mount": None if total is None or covariance is None or not known else total.sigmas(covariance),
     }
     return block | {
         "converged": bool(outcome["converged"]),
         "iterations": int(outcome["iterations"]),
         "no_result": str(outcome["reason"]),
     }
+
+
+def _mounted(block: Mapping[str, Any]) -> Mounted:
+    return Mounted(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]))
 
 
 def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dict[str, Any]]:
@@ -199,6 +211,7 @@ def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.Data
     rows = []
     for method, block in methods.items():
         correction, sigma = (six_of(block[name]) for name in ("correction", "sigma"))
+        total, sigma_mount = (block[name] or dict.fromkeys(SETTINGS, np.nan) for name in ("mount", "sigma_mount"))
         for parameter, place, key, unit in PARAMETERS:
             rows.append(
                 {
@@ -206,10 +219,13 @@ def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.Data
                     "parameter": parameter,
                     "unit": unit,
                     "coarse": coarse.settings()[key],
-                    "total": block["mount"][key] if block["mount"] else np.nan,
-                    "change": change_of(block["mount"], coarse.settings(), key) if block["mount"] else np.nan,
+                    "total": total[key],
+                    "change": change_of(total, coarse.settings(), key) if block["mount"] else np.nan,
                     "correction": correction[place],
                     "sigma": sigma[place],
+                    "sigma_total": sigma_mount[key],
+                    "low_95": total[key] - WITHIN_95 * sigma_mount[key],
+                    "high_95": total[key] + WITHIN_95 * sigma_mount[key],
                 }
             )
     return pd.DataFrame(rows)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.moments import attitude_sum, plane_moments
-from pipeline.maths.planes import Plane, fit_plane
+from pipeline.maths.planes import Plane, angle_between, fit_plane
 from pipeline.maths.rotations import exp_so3, log_so3
 
 Array = NDArray[np.float64]
@@ -61,10 +61,8 @@ def patent_cosines(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> dic
 
 
 def angles_between(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> dict[str, float]:
-    """Full angle between the sensors' normals of each plane, rad (by the chord: exact for small angles)."""
-    return {
-        name: float(2 * np.arcsin(np.linalg.norm(mbes[name] - laser[name]) / 2)) for name in ("P1", "P2", "P3", "P4")
-    }
+    """Full angle between the sensors' normals of each plane, rad."""
+    return {name: angle_between(mbes[name], laser[name]) for name in ("P1", "P2", "P3", "P4")}
 
 
 @dataclass(frozen=True)

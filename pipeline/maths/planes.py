@@ -80,6 +80,15 @@ def fit_plane(moments: Moments, toward: Array) -> Plane:
     return Plane(normal, float(normal @ mean), mean, n, float(np.sqrt(values[0])), values, tangents, covariance)
 
 
+def angle_between(one: Array, other: Array) -> float:
+    """Angle between two unit vectors, rad, by the chord: exact where it is small.
+
+    >>> round(angle_between(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])), 12) == round(np.pi / 2, 12)
+    True
+    """
+    return float(2 * np.arcsin(min(float(np.linalg.norm(one - other)) / 2, 1.0)))
+
+
 def _signed(rows: Array) -> Array:
     """Eigenvectors have no sign: make the largest component positive, so that tables are reproducible."""
     largest = np.take_along_axis(rows, np.argmax(np.abs(rows), axis=1)[:, None], axis=1)

@@ -129,6 +129,19 @@ def mount_from_rotation(R_body_from_sensor: Array) -> tuple[float, float, float]
     return float(np.arctan2(-m[2, 0], m[2, 2])), float(pitch), float(np.arctan2(-m[0, 1], m[1, 1]))
 
 
+def mount_partials(R_body_from_sensor: Array) -> Array:
+    """∂(pitch, roll, yaw)/∂ε (3, 3) of R = Exp(ε) · Rz(yaw)·Rx(pitch)·Ry(roll), ε about body x, y, z.
+
+    Each angle turns about its own axis in the body: pitch about Rz(yaw) e_x, roll about Rz(yaw) Rx(pitch) e_y, yaw
+    about e_z; so ε = A (dpitch, droll, dyaw) with these as columns, and the partials are A⁻¹ (none at pitch = ±90°,
+    where roll and yaw are one). Near a mount of zero it is the identity; with yaw 90° pitch and roll change places.
+    """
+    _, pitch, yaw = mount_from_rotation(R_body_from_sensor)
+    turned = rotation_z(yaw)
+    axes = np.column_stack([turned[:, 0], (turned @ rotation_x(pitch))[:, 1], [0.0, 0.0, 1.0]])
+    return np.asarray(np.linalg.inv(axes))
+
+
 def rotation_from_attitude(roll_rad: Array, pitch_rad: Array, azimuth_rad: Array) -> Array:
     """``R_level_from_body`` = Rz(-azimuth) · Rx(pitch) · Ry(roll), (n,) each -> (n, 3, 3).
 

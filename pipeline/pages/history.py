@@ -7,12 +7,11 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pipeline.history import History
-from pipeline.mounts import PARAMETERS
+from pipeline.mounts import PARAMETERS, WITHIN_95
 from pipeline.pages import ALARM, INK, QUIET, STYLE, render, svg
 from pipeline.verdict import SIX
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
-WITHIN_95 = 1.959964
 
 
 def page(history: History, filters: str) -> str:

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline import store
-from pipeline.artefacts import BOOL, F64, FLOATS, I16, I64, TEXT, Artefact, Column
+from pipeline.artefacts import Artefact, Column
+from pipeline.artefacts.shared import BOOL, F64, FLOATS, I16, I64, TEXT
 from pipeline.errors import ArtefactError
 from pipeline.store import PartWriter, from_arrow, read_table, to_arrow, write_table
 from pipeline.streams import ParquetPart
@@ -146,7 +147,7 @@ def test_a_table_without_rows_comes_back(tmp_path: Path) -> None:
         ({"x_m": ["1", "2"]}, "column x_m"),
         ({"good": [0.5, 1]}, "column good"),
         ({"values": [[1.0], None]}, "column values has 1 missing"),
-        ({"extra": [1, 2]}, "unknown to artefacts.py .'extra'"),
+        ({"extra": [1, 2]}, "unknown to the artefact .'extra'"),
     ],
 )
 def test_what_does_not_fit_is_a_bug(change: dict[str, list[object]], message: str) -> None:

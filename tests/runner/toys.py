@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline import artefacts, config
-from pipeline.artefacts import F64, I16, I64, TEXT, Artefact, Column, Document
+from pipeline.artefacts import Artefact, Column, Document
+from pipeline.artefacts.shared import F64, I16, I64, TEXT
 from pipeline.errors import RawDataError
 from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
 

@@ -1,0 +1,69 @@
+"""What is left over, laid out to be looked at: along one variable at a time, and over each face.
+
+All means are weighted with the robust weights w of the adjustment, mean = Σ w v / Σ w and rms = root(Σ w v² / Σ w), so
+that what the adjustment cut does not hide what is systematic. A bin in which every weight is zero has NaN for both.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Bins:
+    """keys (b, k): one row a bin, ascending; count (b,), mean_m (b,), rms_m (b,)."""
+
+    keys: Integers
+    count: Integers
+    mean_m: Array
+    rms_m: Array
+
+
+def binned(keys: Integers, residual_m: Array, weight: Array) -> Bins:
+    """Residuals (n,) with weights (n,) by whole-number keys (n, k), such as (family, pass, number of the bin).
+
+    >>> binned(np.array([[0], [0], [5]]), np.array([1.0, 3.0, 2.0]), np.array([1.0, 1.0, 0.5])).mean_m
+    array([2., 2.])
+    """
+    if not len(keys):
+        return Bins(keys, np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
+    low, spans = keys.min(axis=0), np.ptp(keys, axis=0) + 1
+    flat, inverse = np.unique(np.ravel_multi_index((keys - low).T, spans), return_inverse=True)
+    found, size = np.column_stack(np.unravel_index(flat, spans)) + low, len(flat)
+    w, wv, wvv = (
+        np.bincount(inverse, weights=part, minlength=size)
+        for part in (weight, weight * residual_m, weight * residual_m**2)
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean, rms = wv / w, np.sqrt(wvv / w)
+    return Bins(found, np.bincount(inverse, minlength=size), mean, rms)
+
+
+def face_axes(normal: Array) -> Array:
+    """Two unit vectors (2, 3) in a face: horizontal first; of a horizontal face the frame's x and y.
+
+    >>> face_axes(np.array([-1.0, 0.0, 0.0]))
+    array([[ 0., -1.,  0.],
+           [ 0.,  0.,  1.]])
+    """
+    if abs(normal[2]) > np.sqrt(0.5):
+        return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    first = np.cross([0.0, 0.0, 1.0], normal)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)]) + 0.0
+
+
+def cells_on_face(points_m: Array, normal: Array, size_m: float) -> Integers:
+    """Square cells (n, 2) of a grid on the face, counted from the frame's origin along :func:`face_axes`."""
+    return np.floor(points_m @ face_axes(normal).T / size_m).astype(np.int64)
+
+
+def cell_centres(cells: Integers, normal: Array, distance_m: float, size_m: float) -> Array:
+    """The cells' centres (n, 3) on the face normal · x = distance."""
+    axes = face_axes(normal)
+    flat = (cells + 0.5) * size_m @ axes
+    return np.asarray(flat + np.outer(distance_m - flat @ normal, normal))
