@@ -6,6 +6,7 @@ Both keep the units of the contract (degrees, metres); code that computes conver
 
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -355,6 +356,17 @@ def _known_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list
             return ["see README.md"]
         current = field.annotation
     return sorted(getattr(current, "model_fields", {"see README.md": None}))
+
+
+def changes(model: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """What was set to something else than its default: key, default (None: it has none), value."""
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        default = None if field.is_required() else field.get_default(call_default_factory=True)
+        if isinstance(value, BaseModel):
+            yield from changes(value, f"{prefix}{name}.")
+        elif field.is_required() or value != default:
+            yield f"{prefix}{name}", default, value
 
 
 def load_pool(path: Path) -> PoolConfig:

@@ -17,7 +17,12 @@ ALL_PASSES = -1
 
 def laser_planes(planes: pd.DataFrame) -> dict[tuple[int, str], Plane]:
     """The laser's planes by (pass, name), P4 left out."""
-    rows = planes[(planes["sensor"] == "laser") & (planes["plane"] != "P4")]
+    return planes_of(planes, "laser")
+
+
+def planes_of(planes: pd.DataFrame, sensor: str) -> dict[tuple[int, str], Plane]:
+    """One sensor's."""
+    rows = planes[(planes["sensor"] == sensor) & (planes["plane"] != "P4")]
     found = {}
     for row in rows.to_dict("records"):
         found[(int(row["pass"]), str(row["plane"]))] = Plane(

@@ -91,6 +91,18 @@ def artefact_digests(outputs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]
     return found | {name: digest.hexdigest() for name, digest in streams.items()}
 
 
+def consistent(manifests: Mapping[str, Manifest]) -> bool:
+    """Whether each stage was made from what the others hold now."""
+    held = {name: artefact_digests(one.outputs) for name, one in manifests.items()}
+
+    def holds(name: str, digest: str) -> bool:
+        owner, _, artefact = name.partition("/")
+        found = held.get(owner, {})
+        return digest == found.get(f"{artefact}.parquet", found.get(artefact))
+
+    return all(holds(*item) for one in manifests.values() for item in one.key.inputs.items())
+
+
 # --- what a result follows from, beside its inputs -------------------------------------------------------------------
 @functools.cache
 def versions() -> dict[str, str]:

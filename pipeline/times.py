@@ -47,15 +47,22 @@ def gps_ns_from_unix_utc(seconds: NDArray[np.int64], nanoseconds: NDArray[np.int
     return (seconds - GPS_EPOCH_UNIX_S + leaps[index]) * NS + np.asarray(nanoseconds, dtype=np.int64)
 
 
+def unix_ns_from_gps(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Unix UTC nanoseconds from GPS nanoseconds: the inverse of :func:`gps_ns_from_unix_utc`."""
+    starts = np.array([start + leap for start, leap in LEAP_SECONDS], dtype=np.int64)
+    leaps = np.array([leap for _, leap in LEAP_SECONDS], dtype=np.int64)
+    unix = np.asarray(t_ns, dtype=np.int64) + GPS_EPOCH_UNIX_S * NS
+    return unix - leaps[np.maximum(np.searchsorted(starts, unix // NS, side="right") - 1, 0)] * NS
+
+
 def utc_text(t_ns: int) -> str:
     """GPS nanoseconds as UTC, to the second.
 
     >>> utc_text(1_462_608_018 * NS)
     '2026-05-12T08:00:00Z'
     """
-    unix = t_ns // NS + GPS_EPOCH_UNIX_S
-    leap = max((leap for start, leap in LEAP_SECONDS if unix - leap >= start), default=0)
-    return f"{datetime.fromtimestamp(unix - leap, UTC):%Y-%m-%dT%H:%M:%SZ}"
+    unix = int(unix_ns_from_gps(np.array([t_ns]))[0]) // NS
+    return f"{datetime.fromtimestamp(unix, UTC):%Y-%m-%dT%H:%M:%SZ}"
 
 
 def gps_ns_from_week_seconds(week: int | NDArray[np.int64], seconds: NDArray[np.float64]) -> NDArray[np.int64]:

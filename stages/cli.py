@@ -86,9 +86,8 @@ def run(
 
     with workers(jobs, executor) as pool:
         runner.run(load(), session, config, run_folder, pool, Progress())
-    status = _answer(run_folder)
-    if recordings:
-        _draw(run_folder)
+        status = _answer(run_folder)
+        _draw(run_folder, recordings, pool)
     return status
 
 
@@ -117,9 +116,9 @@ def stage(
     settings = folder.load_settings(session, config) if session is not None and config is not None else None
     with workers(jobs, executor) as pool:
         runner.run_stage(load(), name, run_folder, settings, pool, Progress())
-    if recordings:
-        _draw(run_folder)
-    return _answer(run_folder) if name == ORDER[-1] else 0
+        status = _answer(run_folder) if name == ORDER[-1] else 0
+        _draw(run_folder, recordings, pool)
+    return status
 
 
 @app.command()
@@ -149,7 +148,8 @@ def view(
 
     Nothing is served beyond this machine.
     """
-    from stages.views import draw, recordings_of, show
+    from stages.drawing import draw
+    from stages.views import recordings_of, show
 
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
@@ -222,17 +222,15 @@ def compare(
     return 0 if good else 1
 
 
-def _draw(run_folder: Path) -> None:
-    """Recordings are a help to see by: whatever goes wrong in drawing is said, and the calibration stands."""
-    try:
-        from stages.views import draw
+def _draw(run_folder: Path, recordings: bool, pool: Any) -> None:
+    """Pictures are a help to see by: whatever goes wrong in drawing is said, and the calibration stands."""
+    from stages.drawing import draw
 
-        draw(run_folder)
-    except Exception as error:
-        if not isinstance(error, (PoolcalError, OSError)):
-            say(traceback.format_exc().rstrip(), sys.stderr)
-        reason = str(error).partition("\n")[0]
-        say(f"recordings: not drawn ({type(error).__name__}: {reason}); the calibration is complete", sys.stderr)
+    for what, why in draw(run_folder, recordings, pool).items():
+        if not isinstance(why, (PoolcalError, OSError)):
+            say("".join(traceback.format_exception(why)).rstrip(), sys.stderr)
+        reason = str(why).partition("\n")[0]
+        say(f"{what}: not drawn ({type(why).__name__}: {reason}); the calibration is complete", sys.stderr)
 
 
 def _answer(run_folder: Path) -> int:

@@ -1,9 +1,10 @@
 """Pages for people: self-contained HTML, no script, printable. Every text is escaped by the template engine.
 
-Pictures are SVG made by matplotlib and put into the page as they are; they carry numbers and our own words alone, never
-a name from a file or a config.
+Pictures are SVG made by matplotlib, each an image of its own in the page; they carry numbers and our own words alone,
+never a name from a file or a config.
 """
 
+import base64
 import io
 from typing import Any
 
@@ -11,7 +12,12 @@ import jinja2
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-INK, QUIET, LASER, SONAR, ALARM = "#1a1a1a", "#8a8f98", "#0072b2", "#d55e00", "#b00020"  # Okabe and Ito: for all eyes
+# Colours after Okabe and Ito, told apart by all eyes and in grey print.
+INK, QUIET, ALARM = "#1a1a1a", "#8a8f98", "#b00020"
+LASER, COARSE, SONAR = "#0072b2", "#b5b8bd", "#d55e00"
+FAMILY = {"P1": "#0072b2", "P2": "#e69f00", "P3": "#009e73", "H": "#cc79a7"}
+MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s"}
+DPI = 200  # of what is drawn as dots in a vector picture
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "poolcal",
@@ -39,10 +45,9 @@ def render(template: str, **values: Any) -> str:
     return environment.get_template(template).render(**values)
 
 
-def svg(figure: Figure, label: str) -> Markup:
-    """The figure as an element of the page, with words for those who cannot see it."""
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    text = buffer.getvalue()
-    picture = text[text.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{Markup.escape(label)}"', 1)
-    return Markup(picture)
+def picture(figure: Figure, label: str) -> Markup:
+    """The figure as an element of the page, complete in itself, with words for those who cannot see it."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return Markup('<img class="picture" alt="{}" src="data:image/svg+xml;base64,{}">').format(label, data)

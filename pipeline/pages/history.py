@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from pipeline.history import History
 from pipeline.mounts import PARAMETERS, WITHIN_95
-from pipeline.pages import ALARM, INK, QUIET, STYLE, render, svg
+from pipeline.pages import ALARM, INK, QUIET, STYLE, picture, render
 from pipeline.verdict import SIX
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
@@ -75,4 +75,4 @@ def _chart(table: pd.DataFrame) -> Markup:
             axis.margins(x=0.05, y=0.15)
         for axis in (axes[2], axes[5]):
             axis.set_xticks(place, [day[:10] for day in table["date_utc"]], rotation=30, ha="right")
-        return svg(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")
+        return picture(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")

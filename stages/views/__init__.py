@@ -1,61 +1,93 @@
 """Recordings for the Rerun viewer: RUN/<stage>/<stage>.rrd, drawn from Parquet alone, after the stage.
 
 A module a stage: ``log(recording, tables)``. All recordings of a run share the application's and the recording's id, so
-that opened together they are one scene. Entities (frame target unless said; README, "Recordings"):
+that opened together they are one scene. Entities (frame target unless said), * where one in so many points is shown
+(``one_in`` says how many):
 
-    /pool                        what is in the pool frame; a transform, known from stage segment on, places it
-    /pool/trajectory/pass_<n>    track of the INS
-    /pool/laser, /pool/soundings points near the target, soundings with the coarse mount
-    /target/model/<family>       outlines of the faces by design
-    /target/laser/<family>       labelled laser points
-    /iteration/soundings/<family>, /iteration/normals/{laser,mbes}   on the timeline ``iteration``
-    /curves/...                  deviations and steps on the same timeline
+    /pool                              what is in the pool frame; a transform, known from stage segment on, places it
+    /pool/trajectory/pass_<n>          georeference: track of the INS
+    /pool/laser *, /pool/soundings *   georeference: points near the target, soundings with the coarse mount
+    /target/model/<family>             segment: outlines of the faces by design
+    /target/laser/<family> *           segment: labelled laser points
+    /planes/<sensor>/<family>          fit_planes: the planes found, cut out at the faces; arrows: their normals
+    /before/<family> *, /after/<family> *   adjust: soundings with the coarse and with the calibrated mount
+    /residuals/<sensor>/<family> *     adjust: points by distance from the adjusted surface
+    /maps/<sensor>/<family>            adjust: mean residual of each cell of the faces
+    /fans/<sensor>/pass_<n>            adjust: rays of one moment in the middle of the pass
+    /tables/<name>                     ingest, adjust, report: what is said in words and numbers
+
+over the steps of the timeline ``iteration``:
+
+    /iteration/soundings/<family> *, /iteration/planes/<family>, /iteration/normals/<sensor>   angle_iterate
+    /curves/deviation/<axis>, /curves/planes/<family>              angle_iterate: degrees
+    /curves/turns/<angles or offsets>                              offsets: change in each turn of the alternation
+
+over the moments of the timeline ``time`` (UTC):
+
+    /quality/attitude/<axis>                                       ingest: degrees
+    /quality/points/<sensor>, /quality/residual/<sensor>/<family>  adjust: points in a second, their mean residual, mm
 """
 
 import contextlib
 import os
+import re
 import uuid
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipeline import folder, manifest
 from pipeline.errors import ArtefactError
 from pipeline.tables import Tables
 from stages import ORDER
 
 APPLICATION = "poolcal"
-DRAWN = ("georeference", "segment", "angle_iterate")
+DRAWN = ORDER  # stages that have a recording
 AT_MOST = 1_000_000  # points an entity
 COLOURS = {"P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167)}  # for all eyes
-GREY, SONAR = (150, 155, 165), (213, 94, 0)
-PAPER = (255, 255, 255)
+GREY, SONAR, LASER = (150, 155, 165), (213, 94, 0), (0, 114, 178)
+DOT_M = 0.008  # radius of a point
 
 
-def draw(run: Path) -> list[str]:
-    """Draw what is not drawn yet; the names of the stages drawn. A finished result is never touched."""
-    with folder.locked(run, ORDER):
-        return [stage for stage in DRAWN if manifest.read(run / stage) is not None and _draw(run, stage)]
+def record(run: Path, stage: str) -> bool:
+    """Draw a stage's recording, if it is not drawn yet."""
+    from stages.views.tour import tour
 
-
-def _draw(run: Path, stage: str) -> bool:
     path = run / stage / f"{stage}.rrd"
     if path.exists():
         return False
-    partial = path.with_suffix(".rrd.partial")
+    save(path, recording_id(run), tour(), lambda recording: log(recording, stage, Tables(run)))
+    return True
+
+
+def log(recording: Any, stage: str, tables: Tables) -> None:
+    import_module(f"stages.views.{stage}").log(recording, tables)
+
+
+def words(text: str) -> Any:
+    """Text as it is, in letters of one width: a code block whose fence is longer than any run of ` inside."""
     import rerun
 
-    recording = rerun.RecordingStream(APPLICATION, recording_id=recording_id(run), send_properties=False)
+    longest = max((len(run) for run in re.findall("`+", text)), default=0)
+    fence = "`" * max(3, longest + 1)
+    return rerun.TextDocument(f"{fence}text\n{text}\n{fence}", media_type=rerun.MediaType.MARKDOWN)
+
+
+def save(path: Path, identity: str, blueprint: Any, draw: Callable[[Any], None]) -> None:
+    """A recording file, whole or not at all."""
+    import rerun
+
+    partial = path.with_name(path.name + ".partial")
+    recording = rerun.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
     try:
-        recording.save(partial, default_blueprint=_blueprint())
-        import_module(f"stages.views.{stage}").log(recording, Tables(run))
+        recording.save(partial, default_blueprint=blueprint)
+        draw(recording)
         recording.flush()
         recording.disconnect()
         os.replace(partial, path)
     finally:
         with contextlib.suppress(OSError):
             partial.unlink()
-    return True
 
 
 def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
@@ -76,30 +108,6 @@ def show(paths: list[Path]) -> int:
     return subprocess.run([viewer, "--bind", "127.0.0.1", *paths], check=False).returncode and 1
 
 
-def recording_id(run: Path) -> str:
-    """One a run folder."""
-    return str(uuid.uuid5(uuid.NAMESPACE_URL, run.resolve().as_uri()))
-
-
-def _blueprint() -> Any:
-    """A crew's tour: the scene, and the iteration with its curves."""
-    import rerun.blueprint as rrb
-
-    return rrb.Blueprint(
-        rrb.Tabs(
-            rrb.Spatial3DView(
-                origin="/", contents=["+ /pool/**", "+ /target/**"], name="Overview", background=PAPER
-            ),
-            rrb.Horizontal(
-                rrb.Spatial3DView(
-                    origin="/", contents=["+ /iteration/**", "+ /target/model/**"], name="Iteration", background=PAPER
-                ),
-                rrb.TimeSeriesView(origin="/curves", name="Deviations, degrees"),
-                column_shares=[3, 2],
-                name="Iteration",
-            ),
-            active_tab=0,
-        ),
-        rrb.TimePanel(timeline="iteration", state="collapsed", fps=3.0),
-        collapse_panels=True,
-    )
+def recording_id(*runs: Path) -> str:
+    """One a run folder, and one for two together."""
+    return str(uuid.uuid5(uuid.NAMESPACE_URL, "\n".join(run.resolve().as_uri() for run in runs)))

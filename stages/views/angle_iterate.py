@@ -3,12 +3,13 @@
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from pipeline import artefacts
-from pipeline.fitted import ALL_PASSES, laser_planes, lifted_moments
+from pipeline.closing import families_of
+from pipeline.fitted import ALL_PASSES, laser_planes
 from pipeline.folder import read_settings
 from pipeline.maths.moments import plane_moments
-from pipeline.maths.offsets import by_family
 from pipeline.maths.planes import fit_plane
 from pipeline.maths.rotations import exp_so3
 from pipeline.mounts import mount_of
@@ -16,6 +17,7 @@ from pipeline.poses import trajectory_in_target
 from pipeline.streams import xyz
 from pipeline.tables import Tables
 from stages.views import COLOURS, GREY, SONAR
+from stages.views.fit_planes import cut_out
 
 SOUNDINGS = 40_000  # for all the family's points of one step
 FAMILIES = ("P1", "P2", "P3")
@@ -32,7 +34,8 @@ def log(recording: Any, tables: Tables) -> None:
     body = xyz(columns, "mbes_m") @ mount.R_body_from_sensor.T
     family = faces["family"].to_numpy()[columns["face"].astype(int)]
     laser = laser_planes(tables.table(artefacts.PLANES))
-    lifted = _of_all_passes(by_family(dict(zip(faces["face"], faces["family"], strict=True)), _lifted(tables)))
+    lifted = families_of(faces, tables.table(artefacts.SOUNDING_MOMENTS))
+    _curves(recording, iterations)
     for row in iterations.to_dict("records"):
         recording.set_time("iteration", sequence=int(row["iteration"]))
         correction = exp_so3(np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"]))
@@ -47,23 +50,26 @@ def log(recording: Any, tables: Tables) -> None:
             name: fit_plane(plane_moments(lifted[name], correction, mount.lever_arm_body_m), planes[name].normal)
             for name in seen
         }
+        for name in seen:
+            outlines = [np.vstack([one, one[:1]]).astype(np.float32) for one in cut_out(faces, name, sonar[name])]
+            recording.log(f"iteration/planes/{name}", rr.LineStrips3D(outlines, radii=0.008, colors=SONAR))
         for sensor, found, colour in (("laser", planes, GREY), ("mbes", sonar, SONAR)):
             centres = np.array([planes[name].centroid_m for name in seen], dtype=np.float32).reshape(-1, 3)
             normals = np.array([found[name].normal for name in seen], dtype=np.float32).reshape(-1, 3)
             arrows = rr.Arrows3D(origins=centres, vectors=normals, radii=0.02, colors=colour, labels=seen)
             recording.log(f"iteration/normals/{sensor}", arrows)
-        for axis in ("roll", "pitch", "yaw"):
-            recording.log(f"curves/deviation/{axis}", rr.Scalars(float(row[f"deviation_{axis}_deg"])))
-        for plane in FAMILIES:
-            recording.log(f"curves/angle/{plane}", rr.Scalars(float(row[f"angle_{plane}_deg"])))
 
 
-def _lifted(tables: Tables) -> Any:
-    return lifted_moments(tables.table(artefacts.SOUNDING_MOMENTS))
+def _curves(recording: Any, iterations: pd.DataFrame) -> None:
+    import rerun as rr
 
-
-def _of_all_passes(families: Any) -> dict[str, Any]:
-    total: dict[str, Any] = {}
-    for (_, name), moments in families.items():
-        total[name] = total[name] + moments if name in total else moments
-    return total
+    steps = rr.TimeColumn("iteration", sequence=iterations["iteration"].to_numpy())
+    deviations = dict(zip(("roll", "pitch", "yaw"), COLOURS.values(), strict=False))
+    for folder, stem, colours in (("deviation", "deviation", deviations), ("planes", "angle", COLOURS)):
+        for name, colour in colours.items():
+            column = f"{stem}_{name}_deg"
+            if column in iterations:
+                path = f"curves/{folder}/{name}"
+                recording.log(path, rr.SeriesLines(colors=colour, names=name), static=True)
+                values = iterations[column].to_numpy()
+                recording.send_columns(path, indexes=[steps], columns=rr.Scalars.columns(scalars=values))

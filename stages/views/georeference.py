@@ -8,7 +8,7 @@ from pipeline import artefacts
 from pipeline.passes import pass_of
 from pipeline.streams import xyz
 from pipeline.tables import Tables
-from stages.views import AT_MOST, GREY, SONAR
+from stages.views import AT_MOST, DOT_M, GREY, SONAR
 
 TRACK_POINTS = 2000  # a pass
 
@@ -30,5 +30,5 @@ def log(recording: Any, tables: Tables) -> None:
         ("soundings", artefacts.SOUNDINGS_POOL, SONAR),
     ):
         columns, step = tables.sample(artefact, AT_MOST)
-        cloud = rr.Points3D(xyz(columns, "pool_m").astype(np.float32), radii=0.006, colors=colour)
+        cloud = rr.Points3D(xyz(columns, "pool_m").astype(np.float32), radii=DOT_M, colors=colour)
         recording.log(f"pool/{name}", cloud, rr.AnyValues(one_in=step), static=True)

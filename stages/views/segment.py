@@ -7,7 +7,7 @@ import numpy as np
 from pipeline import artefacts
 from pipeline.streams import xyz
 from pipeline.tables import Tables
-from stages.views import AT_MOST, COLOURS
+from stages.views import AT_MOST, COLOURS, DOT_M
 
 
 def log(recording: Any, tables: Tables) -> None:
@@ -27,5 +27,5 @@ def log(recording: Any, tables: Tables) -> None:
         corners = [np.reshape(c, (-1, 3)) for c in faces.loc[family_of == name, "vertices_target_m"]]
         outlines = [np.vstack([one, one[:1]]).astype(np.float32) for one in corners]
         recording.log(f"target/model/{name}", rr.LineStrips3D(outlines, radii=0.008, colors=colour), static=True)
-        cloud = rr.Points3D(points[family == name], radii=0.006, colors=colour)
+        cloud = rr.Points3D(points[family == name], radii=DOT_M, colors=colour)
         recording.log(f"target/laser/{name}", cloud, rr.AnyValues(one_in=step), static=True)

@@ -1,0 +1,192 @@
+"""RUN/report/report.html: the answer, what it rests on, and where it came from, on one page.
+
+Every number on it is in calibration.json, run.yaml, a manifest or a Parquet of the run; nothing is computed here but
+the pictures' scales and mean values' intervals.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+
+from pipeline import artefacts, config, manifest
+from pipeline.files import write_text
+from pipeline.folder import Settings, calibration, read_settings
+from pipeline.mounts import PARAMETERS
+from pipeline.pages import STYLE, curves, render, sections
+from pipeline.passes import pass_of
+from pipeline.poses import trajectory_in_target
+from pipeline.tables import Tables
+from pipeline.times import utc_text
+
+Row = Mapping[str, Any]
+STRONG = 0.9  # correlation that is set in bold
+MOST_GAPS = 12
+METHODS = {
+    "coarse": "coarse mount",
+    "patent_sequential": "(1) patent, angles, then offsets",
+    "patent_alternating": "(2) patent, in turn",
+    "adjustment": "(3) adjustment",
+}
+NAME = "report.html"
+HEAD = 2000  # letters within which the page says what it was drawn from
+TRACK_POINTS = 300  # of a pass on the plan
+
+
+def write_page(run: Path, stages: Sequence[str]) -> bool:
+    """Write RUN/report/report.html if it is not there or shows something else; not from stages that do not agree."""
+    done = {stage: found for stage in stages if (found := manifest.read(run / stage)) is not None}
+    if len(done) < len(stages) or not manifest.consistent(done):
+        return False
+    path, drawn_from = run / "report" / NAME, _digest(done)
+    if path.is_file() and f'content="{drawn_from}"' in path.read_text(encoding="utf-8")[:HEAD]:
+        return False
+    write_text(path, page(Tables(run), done, drawn_from))
+    return True
+
+
+def _digest(done: Mapping[str, manifest.Manifest]) -> str:
+    """Of everything that the page shows: it changes whenever a result, a setting or a raw file does."""
+    shown = [[stage, one.outputs, one.key.config, one.key.raw] for stage, one in done.items()]
+    return hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
+
+
+def page(tables: Tables, done: Mapping[str, manifest.Manifest], drawn_from: str) -> str:
+    """The page of a finished run."""
+    result, settings = calibration(tables.run), read_settings(tables.run)
+    faces, passes = tables.table(artefacts.FACES), tables.table(artefacts.PASSES)
+    gaps = tables.table(artefacts.GAPS).sort_values("duration_s", ascending=False)
+    calibrations = tables.table(artefacts.CALIBRATION)
+    return render(
+        "report.html",
+        result=result,
+        run=tables.run.name,
+        date=str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
+        six=_six(calibrations, result["result"]),
+        methods=METHODS,
+        by_method=list(_by_method(calibrations)),
+        closing=tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
+        names=[name for name, *_ in PARAMETERS],
+        correlations=_correlations(result),
+        groups=tables.table(artefacts.GROUPS).to_dict("records"),
+        summary=tables.table(artefacts.ADJUST_SUMMARY).to_dict("records")[0],
+        pictures=_pictures(tables, faces, passes),
+        tracks=passes.to_dict("records"),
+        files=tables.table(artefacts.FILES).to_dict("records"),
+        gaps=gaps.head(MOST_GAPS).to_dict("records"),
+        more_gaps=max(0, len(gaps) - MOST_GAPS),
+        counts=[row | {"stage": stage} for stage, one in done.items() for row in one.counts if row["count"]],
+        changed=_changed(settings),
+        commit=done["report"].git_commit,
+        utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
+        drawn_from=drawn_from,
+    )
+
+
+# --- tables ----------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class _Value:
+    """A number with its unit, as people read it; "-" where there is none."""
+
+    number: float
+    unit: str
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, sign: str = "") -> str:
+        if not np.isfinite(self.number):
+            return "–"
+        return f"{round(self.number, 4) + 0.0:{sign}.4f} {'°' if self.unit == 'deg' else self.unit}"
+
+
+def _six(table: pd.DataFrame, method: str) -> list[dict[str, Any]]:
+    rows = table[table["method"] == method].to_dict("records")
+    values = ("coarse", "total", "change", "correction", "sigma_total", "low_95", "high_95")
+    return [{"name": row["parameter"]} | {key: _Value(row[key], row["unit"]) for key in values} for row in rows]
+
+
+def _by_method(table: pd.DataFrame) -> Iterator[Row]:
+    """A row a parameter: each method's total, and how far it lies from the adjustment's."""
+    for name, _, _, unit in PARAMETERS:
+        rows = table[table["parameter"] == name].set_index("method")
+        totals = {method: float(rows["total"][method]) for method in METHODS if method != "coarse"}
+        away = {method: value - totals["adjustment"] for method, value in totals.items()}
+        if unit == "deg":
+            away = {method: value - 360.0 * np.round(value / 360.0) for method, value in away.items()}
+        yield {
+            "name": name,
+            "totals": {method: _Value(value, unit) for method, value in totals.items()},
+            "away": {method: _Value(value, unit) for method, value in away.items()},
+        }
+
+
+def _correlations(result: Row) -> list[dict[str, Any]] | None:
+    """In the order of the six; None where there is no solution."""
+    matrix = result["geometry"]["correlation"]
+    if matrix is None:
+        return None
+    places = [place for _, place, *_ in PARAMETERS]
+
+    def cell(row: int, column: int) -> Row:
+        value = matrix[row][column]
+        return {"value": value, "strong": row != column and abs(value) >= STRONG}
+
+    return [{"name": name, "cells": [cell(row, column) for column in places]} for name, row, *_ in PARAMETERS]
+
+
+def _changed(settings: Settings) -> list[dict[str, str]]:
+    """What differs from the defaults, then what has none."""
+
+    def shown(value: Any) -> str:
+        return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+
+    rows = [
+        {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
+        for where, model in (("pool", settings.pool), ("session", settings.session))
+        for key, default, value in config.changes(model)
+    ]
+    return sorted(rows, key=lambda row: not row["default"])
+
+
+# --- pictures --------------------------------------------------------------------------------------------------------
+def _pictures(tables: Tables, faces: pd.DataFrame, passes: pd.DataFrame) -> dict[str, Markup]:
+    residuals = tables.table(artefacts.RESIDUALS)
+    family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
+    cells = tables.table(artefacts.RESIDUAL_MAP)
+    frame = tables.table(artefacts.POOL_FRAME).iloc[0]
+    turned = float(tables.table(artefacts.TARGET_POSE)["azimuth_correction_deg"].iloc[0])
+    with matplotlib.rc_context(STYLE):
+        return {
+            "sections": sections.sections(residuals, faces, family),
+            "distances": sections.distances(residuals, family),
+            "map_mbes": sections.maps(cells, faces, "mbes"),
+            "map_laser": sections.maps(cells, faces, "laser"),
+            "tracks": sections.tracks(_tracks(tables, passes), faces, float(frame["azimuth_deg"]) + turned),
+            "residuals": curves.residuals(
+                tables.table(artefacts.RESIDUAL_BINS), tables.table(artefacts.CELLS), passes
+            ),
+            "convergence": curves.convergence(
+                tables.table(artefacts.ITERATIONS), tables.table(artefacts.ALTERNATION)
+            ),
+        }
+
+
+def _tracks(tables: Tables, passes: pd.DataFrame) -> dict[int, Any]:
+    """The INS's track of each pass in the target frame."""
+    poses = tables.table(artefacts.POSES)
+    trajectory = trajectory_in_target(poses, tables.table(artefacts.TARGET_POSE))
+    number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
+    found = {}
+    for one in passes["pass"].tolist():
+        track = trajectory.positions_m[number == one]
+        if len(track):
+            found[int(one)] = track[:: max(1, len(track) // TRACK_POINTS)]
+    return found

@@ -1,0 +1,173 @@
+"""Before and after, residuals as colours and as maps, their course over time, the sensors' fans, correlations."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline import artefacts
+from pipeline.folder import read_settings
+from pipeline.maths.residuals import face_axes
+from pipeline.maths.rotations import exp_so3
+from pipeline.mounts import PARAMETERS, Mounted, mount_of
+from pipeline.poses import trajectory_in_target
+from pipeline.tables import Tables
+from pipeline.times import NS, unix_ns_from_gps
+from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, words
+
+Array = NDArray[np.float64]
+XYZ = [f"{axis}_target_m" for axis in "xyz"]
+SENSORS = {"laser": LASER, "mbes": SONAR}
+RAYS = 60  # of a fan
+MOMENT_NS = NS // 50  # points of one fan lie within this time
+
+
+def log(recording: Any, tables: Tables) -> None:
+    faces, residuals = tables.table(artefacts.FACES), tables.table(artefacts.RESIDUALS)
+    family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
+    span = _span(residuals)
+    _clouds(recording, residuals, family, tables.table(artefacts.GROUPS), span)
+    _maps(recording, tables.table(artefacts.RESIDUAL_MAP), faces, span)
+    _fans(recording, tables, residuals)
+    _over_time(recording, tables.table(artefacts.RESIDUAL_BINS))
+    _words(recording, tables, span)
+
+
+def _span(residuals: pd.DataFrame) -> dict[str, float]:
+    """Residual (m) of the strongest colour, by sensor: three times the RMS of what was not cut."""
+    found = {}
+    for sensor in SENSORS:
+        rows = residuals[(residuals["sensor"] == sensor) & (residuals["weight"] > 0)]
+        size = rows["residual_m"].to_numpy(np.float64)
+        found[sensor] = max(3 * float(np.sqrt(np.mean(size**2))), 1e-3) if len(size) else 1e-3
+    return found
+
+
+def coloured(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
+    """Blue before the surface is negative, grey zero, red positive; (n, 3)."""
+    share = np.clip(np.asarray(residual_m, dtype=np.float64) / span_m, -1, 1)[:, None]
+    end = np.where(share < 0, LASER, SONAR)
+    return np.asarray(np.round((1 - abs(share)) * np.array((205, 205, 205)) + abs(share) * end), dtype=np.uint8)
+
+
+def _clouds(recording: Any, residuals: pd.DataFrame, family: Any, groups: pd.DataFrame, span: dict[str, float]) -> None:
+    import rerun as rr
+
+    total = {"laser": 0, "mbes": 0}
+    for row in groups.to_dict("records"):
+        total["laser" if row["group"] == "laser" else "mbes"] += row["count"]
+    for sensor in SENSORS:
+        of_sensor = (residuals["sensor"] == sensor).to_numpy()
+        step = rr.AnyValues(one_in=round(total[sensor] / max(1, int(of_sensor.sum()))))
+        for name, colour in COLOURS.items():
+            rows = residuals[of_sensor & (family == name)]
+            points = rows[XYZ].to_numpy()
+            colours = coloured(rows["residual_m"].to_numpy(), span[sensor])
+            cloud = rr.Points3D(points, radii=DOT_M, colors=colours)
+            recording.log(f"residuals/{sensor}/{name}", cloud, step, static=True)
+            if sensor == "mbes":
+                coarse = rows[[f"coarse_{column}" for column in XYZ]].to_numpy()
+                for when, where in (("before", coarse), ("after", points)):
+                    cloud = rr.Points3D(where, radii=DOT_M, colors=colour)
+                    recording.log(f"{when}/{name}", cloud, step, static=True)
+
+
+def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[str, float]) -> None:
+    """Square cells as coloured quads a centimetre before their face."""
+    import rerun as rr
+
+    cells = cells[np.isfinite(cells["mean_m"])]
+    normals = np.column_stack([faces[f"normal_{axis}_target_1"] for axis in "xyz"])
+    family = faces["family"].to_numpy()
+    for sensor in SENSORS:
+        for name in COLOURS:
+            numbers = cells["face"].to_numpy().astype(int)
+            rows = cells[(cells["sensor"] == sensor).to_numpy() & (family[numbers] == name)]
+            if not len(rows):
+                continue
+            corners = []
+            for face, of_face in rows.groupby("face", sort=True):
+                half = face_axes(normals[int(str(face))]) * float(of_face["size_m"].iloc[0]) / 2
+                middle = of_face[XYZ].to_numpy(np.float64) + 0.01 * normals[int(str(face))]
+                signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+                corners.append(np.stack([middle + a * half[0] + b * half[1] for a, b in signs], axis=1))
+            quads = np.concatenate(corners)
+            first = 4 * np.arange(len(quads))[:, None, None]
+            triangles = (first + np.array([[[0, 1, 2], [0, 2, 3]]])).reshape(-1, 3)
+            ordered = rows.sort_values("face", kind="stable")
+            colours = np.repeat(coloured(ordered["mean_m"].to_numpy(), span[sensor] / 3), 4, axis=0)
+            mesh = rr.Mesh3D(
+                vertex_positions=quads.reshape(-1, 3).astype(np.float32),
+                triangle_indices=triangles.astype(np.uint32),
+                vertex_colors=colours,
+            )
+            recording.log(f"maps/{sensor}/{name}", mesh, static=True)
+
+
+def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
+    """Rays from the sensor to its points of one moment, in the middle of each pass."""
+    import rerun as rr
+
+    session = read_settings(tables.run).session
+    trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
+    mounts = {"laser": mount_of(session.laser.mount), "mbes": _calibrated(tables, mount_of(session.mbes.mount))}
+    for (sensor, number), rows in residuals.groupby(["sensor", "pass"], sort=True):
+        t_ns = rows["t_ns"].to_numpy()
+        middle = int(np.median(t_ns))
+        moment = int(t_ns[np.argmin(np.abs(t_ns - middle))])
+        fan = rows[np.abs(t_ns - moment) <= MOMENT_NS]
+        fan = fan.iloc[:: max(1, -(-len(fan) // RAYS))]
+        positions, R_target_from_body = trajectory.poses_at(fan["t_ns"].to_numpy())
+        origins = positions + R_target_from_body @ mounts[str(sensor)].lever_arm_body_m
+        rays = np.stack([origins, fan[XYZ].to_numpy(np.float64)], axis=1).astype(np.float32)
+        lines = rr.LineStrips3D(rays, radii=0.004, colors=SENSORS[str(sensor)])
+        recording.log(f"fans/{sensor}/pass_{number}", lines, static=True)
+
+
+def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
+    """The mount by the adjustment's estimate; the coarse one where there is none."""
+    values = tables.table(artefacts.ESTIMATE)["value"].to_numpy()[:6]
+    if not np.all(np.isfinite(values)):
+        return coarse
+    return Mounted(exp_so3(values[:3]) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + values[3:])
+
+
+def _over_time(recording: Any, bins: pd.DataFrame) -> None:
+    import rerun as rr
+
+    bins = bins[bins["by"] == "time"].sort_values("low", kind="stable")
+
+    def curve(path: str, seconds: Any, values: Any, colour: Any) -> None:
+        t_ns = np.round(np.asarray(seconds, dtype=np.float64) * NS).astype(np.int64)
+        times = rr.TimeColumn("time", timestamp=unix_ns_from_gps(t_ns).astype("datetime64[ns]"))
+        name = path.partition("/")[2].partition("/")[2]
+        recording.log(path, rr.SeriesPoints(colors=colour, names=name, marker_sizes=2.5), static=True)
+        recording.send_columns(path, indexes=[times], columns=rr.Scalars.columns(scalars=values))
+
+    for sensor in SENSORS:
+        rows = bins[bins["sensor"] == sensor]
+        if not len(rows):
+            continue
+        count = rows.groupby("low", sort=True)["count"].sum()
+        curve(f"quality/points/{sensor}", count.index + 0.5, count.to_numpy(np.float64), SENSORS[sensor])
+        for name, colour in COLOURS.items():
+            of_family = rows[(rows["family"] == name) & np.isfinite(rows["mean_m"])]
+            if len(of_family):
+                where = of_family["low"].to_numpy() + 0.5
+                shade = colour if sensor == "mbes" else GREY
+                curve(f"quality/residual/{sensor}/{name}", where, 1000 * of_family["mean_m"].to_numpy(), shade)
+
+
+def _words(recording: Any, tables: Tables, span: dict[str, float]) -> None:
+    matrix = tables.table(artefacts.COVARIANCE)["correlation"].to_numpy().reshape(6, 6)
+    places = [place for _, place, *_ in PARAMETERS]
+    lines = ["Colours: blue, grey, red from minus to plus; the strongest at"]
+    lines += [f"  {s}: {1000 * span[s]:.1f} mm (points), {1000 * span[s] / 3:.1f} mm (means)" for s in SENSORS]
+    lines += ["Plus: towards the boat, of horizontal faces up.", "", "Observations, and their variance factors:"]
+    for row in tables.table(artefacts.GROUPS).to_dict("records"):
+        lines.append(f"  {row['group']:<16}{row['count']:>10,}{row['variance_factor']:>8.3f}")
+    lines += ["", "Correlations", " " * 6 + "".join(f"{name:>7}" for name, *_ in PARAMETERS)]
+    for name, row_of, *_ in PARAMETERS:
+        lines.append(f"{name:<6}" + "".join(f"{matrix[row_of, column]:>7.2f}" for column in places))
+    recording.log("tables/residuals", words("\n".join(lines)), static=True)

@@ -1,0 +1,47 @@
+"""The planes found, laser's and sonar's (with the coarse mount), cut out where the faces are; with their normals."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline import artefacts
+from pipeline.fitted import ALL_PASSES, planes_of
+from pipeline.maths.planes import Plane
+from pipeline.tables import Tables
+from stages.views import GREY, SONAR
+
+SHOWN = {"laser": GREY, "mbes": SONAR}
+
+
+def log(recording: Any, tables: Tables) -> None:
+    import rerun as rr
+
+    faces, planes = tables.table(artefacts.FACES), tables.table(artefacts.PLANES)
+    for sensor, colour in SHOWN.items():
+        found = planes_of(planes, sensor)
+        for family in ("P1", "P2", "P3"):
+            plane = found.get((ALL_PASSES, family))
+            if plane is None:
+                continue
+            cut = cut_out(faces, family, plane)
+            starts = np.cumsum([0, *(len(one) for one in cut[:-1])])
+            triangles = np.concatenate([_fan(one, int(start)) for one, start in zip(cut, starts, strict=True)])
+            points = np.concatenate(cut).astype(np.float32)
+            patch = rr.Mesh3D(vertex_positions=points, triangle_indices=triangles, albedo_factor=(*colour, 110))
+            recording.log(f"planes/{sensor}/{family}", patch, static=True)
+            arrow = rr.Arrows3D(
+                origins=[plane.centroid_m], vectors=[plane.normal], radii=0.02, colors=colour, labels=family
+            )
+            recording.log(f"planes/{sensor}/{family}/normal", arrow, static=True)
+
+
+def cut_out(faces: pd.DataFrame, family: str, plane: Plane) -> list[np.ndarray]:
+    """The family's faces by design, their corners moved along the plane's normal onto it."""
+    corners = [np.reshape(one, (-1, 3)) for one in faces.loc[faces["family"] == family, "vertices_target_m"]]
+    return [one + np.outer(plane.distance_m - one @ plane.normal, plane.normal) for one in corners]
+
+
+def _fan(polygon: np.ndarray, start: int) -> np.ndarray:
+    """Triangles of a convex polygon whose first corner is number ``start``."""
+    return np.array([(start, start + k, start + k + 1) for k in range(1, len(polygon) - 1)], dtype=np.uint32)

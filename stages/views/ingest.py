@@ -1,0 +1,53 @@
+"""Attitude over time, and the raw files' quality in words."""
+
+from typing import Any
+
+import numpy as np
+
+from pipeline import artefacts
+from pipeline.tables import Tables
+from pipeline.times import NS, unix_ns_from_gps, utc_text
+from stages.views import words
+
+RECORDS = 20_000  # of a curve
+HOLE_NS = 2 * NS
+AXES = {"roll": (0, 114, 178), "pitch": (230, 159, 0), "heading": (0, 158, 115)}
+HOW_TO_READ = """\
+These curves run over the timeline 'time', the replay
+of the iteration over the timeline 'iteration': choose
+between them at the bottom left, beside the play button.
+
+Attitude   roll: starboard down, pitch: bow up,
+           heading: from its mean
+Points     on the target's faces, of those in the
+           table residuals, counted second by second
+Residual   mean of a second by family of faces, plus
+           towards the boat, of horizontal faces up
+"""
+
+
+def log(recording: Any, tables: Tables) -> None:
+    import rerun as rr
+
+    trajectory = tables.table(artefacts.TRAJECTORY)
+    trajectory = trajectory.iloc[:: max(1, -(-len(trajectory) // RECORDS))]
+    times = rr.TimeColumn("time", timestamp=unix_ns_from_gps(trajectory["t_ns"].to_numpy()).astype("datetime64[ns]"))
+    heading = np.unwrap(trajectory["azimuth_rad"].to_numpy())
+    values = {
+        "roll": trajectory["roll_rad"].to_numpy(),
+        "pitch": trajectory["pitch_rad"].to_numpy(),
+        "heading": heading - heading.mean(),
+    }
+    broken = np.diff(trajectory["t_ns"].to_numpy(), prepend=0) > HOLE_NS  # no line across a hole in the log
+    for name, angle in values.items():
+        path = f"quality/attitude/{name}"
+        recording.log(path, rr.SeriesLines(colors=AXES[name], names=name), static=True)
+        shown = np.where(broken, np.nan, np.degrees(angle))
+        recording.send_columns(path, indexes=[times], columns=rr.Scalars.columns(scalars=shown))
+    lines = [f"{'sensor':<8}{'records':>12}{'left out':>10}  {'from (UTC)':<22}{'rate, Hz':>10}  file"]
+    for row in tables.table(artefacts.FILES).to_dict("records"):
+        first = utc_text(int(row["first_ns"]))
+        numbers = f"{row['records']:>12,}{row['dropped']:>10,}  {first:<22}{row['rate_hz']:>10.1f}"
+        lines.append(f"{row['sensor']:<8}{numbers}  {row['file']}")
+    recording.log("tables/files", words("\n".join(lines)), static=True)
+    recording.log("tables/how_to_read", words(HOW_TO_READ), static=True)

@@ -1,0 +1,102 @@
+"""The blueprint: a crew's tour, from the whole scene to the quality of the data."""
+
+from typing import Any
+
+PAPER = (255, 255, 255)
+
+
+TABS = ("Overview", "Before and after", "Iteration", "Residuals", "Quality")
+
+
+def tour() -> Any:
+    """TABS: the scene, what the calibration did, how it got there, what is left, the data."""
+    import rerun.blueprint as rrb
+
+    overview, change, iteration, left, quality = TABS
+    return _blueprint(
+        rrb.Horizontal(
+            _scene("The boat before the target", "/pool/**", "/target/**", "/fans/**"),
+            _words("/tables/summary", "Summary"),
+            column_shares=[3, 2],
+            name=overview,
+        ),
+        rrb.Horizontal(
+            _scene("Soundings with the coarse mount", "/before/**", "/target/**", "/planes/**"),
+            _scene("Soundings with the calibrated mount", "/after/**", "/target/**"),
+            name=change,
+        ),
+        rrb.Horizontal(
+            _scene("Soundings and normals, step by step", "/iteration/**", "/target/model/**"),
+            rrb.Vertical(
+                _curves("/curves/deviation", "Deviation of the sonar's planes, degrees"),
+                _curves("/curves/planes", "Angle between sonar's and laser's planes, degrees"),
+                _curves("/curves/turns", "Angles and offsets in turn: what a turn still changes"),
+            ),
+            column_shares=[3, 2],
+            name=iteration,
+        ),
+        rrb.Horizontal(
+            _scene("Points by residual", "/residuals/**", "/target/model/**"),
+            _scene("Mean residual over the faces", "/maps/**", "/target/model/**"),
+            _words("/tables/residuals", "Residuals"),
+            column_shares=[2, 2, 2],
+            name=left,
+        ),
+        rrb.Horizontal(
+            rrb.Vertical(
+                _curves("/quality/attitude", "Attitude, degrees"),
+                _curves("/quality/points", "Points on the target in a second"),
+                _curves("/quality/residual", "Mean residual of a second, mm"),
+            ),
+            rrb.Vertical(_words("/tables/files", "Files"), _words("/tables/how_to_read", "How to read this")),
+            column_shares=[3, 2],
+            name=quality,
+        ),
+    )
+
+
+def side_by_side() -> Any:
+    """Two runs, a and b: each on its own target, both on one, and what differs in words."""
+    import rerun.blueprint as rrb
+
+    return _blueprint(
+        rrb.Horizontal(
+            _scene("a: soundings", "/a/before/**", "/a/after/**", "/a/target/model/**"),
+            _scene("b: soundings", "/b/before/**", "/b/after/**", "/b/target/model/**"),
+            name="Side by side",
+        ),
+        _scene("Both on one target", "/a/after/**", "/b/after/**", "/a/target/**", "/b/target/model/**"),
+        rrb.Horizontal(
+            _words("/tables/comparison", "Comparison"),
+            _words("/a/tables/summary", "a"),
+            _words("/b/tables/summary", "b"),
+            name="In words",
+        ),
+    )
+
+
+def _blueprint(*tabs: Any) -> Any:
+    import rerun.blueprint as rrb
+
+    panel = rrb.TimePanel(timeline="iteration", state="collapsed", fps=3.0)
+    return rrb.Blueprint(rrb.Tabs(*tabs, active_tab=0), panel, collapse_panels=True)
+
+
+def _scene(name: str, *contents: str) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.Spatial3DView(origin="/", contents=[f"+ {path}" for path in contents], name=name, background=PAPER)
+
+
+def _curves(origin: str, name: str) -> Any:
+    import rerun.blueprint as rrb
+    from rerun import TimeRange, TimeRangeBoundary
+
+    whole = rrb.TimeAxis(view_range=TimeRange(TimeRangeBoundary.infinite(), TimeRangeBoundary.infinite()))
+    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=whole, plot_legend=rrb.Corner2D.RightTop)
+
+
+def _words(origin: str, name: str) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.TextDocumentView(origin=origin, name=name)

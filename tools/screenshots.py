@@ -1,0 +1,119 @@
+"""Pictures of what people see, without a screen: the tabs of a run's recordings, and its report.
+
+    make setup-visual
+    .venv/bin/python -m tools.screenshots runs/demo docs/pictures
+
+Needs Chromium and a Vulkan driver in software, which ``make setup-visual`` installs where it may.
+"""
+
+import argparse
+import contextlib
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
+SETTLE_S = 1.5  # after a change of tab or time, before the picture
+WIDTH = 1280
+
+
+def missing() -> str:
+    """What is not installed, in words; empty when all is there."""
+    if not any(map(shutil.which, CHROMIUM)):
+        return "Chromium is not installed: make setup-visual"
+    found = any(Path(folder).glob("*.json") for folder in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"))
+    return "" if found else "no Vulkan driver is installed: make setup-visual"
+
+
+def chromium(*options: str, timeout: float = 60) -> subprocess.CompletedProcess[str]:
+    """Headless Chromium with a home of its own; what pages write to the console goes to standard error."""
+    program = next(path for name in CHROMIUM if (path := shutil.which(name)))
+    with tempfile.TemporaryDirectory() as home:
+        fixed = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr"]
+        command = [program, *fixed, f"--user-data-dir={home}", *options]
+        return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=True)
+
+
+@contextlib.contextmanager
+def viewer(*recordings: Path) -> Iterator[Any]:
+    """A headless viewer with these recordings open, its home its own."""
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    with tempfile.TemporaryDirectory() as home:
+        kept = {name: os.environ.get(name) for name in ("HOME", "PATH")}
+        os.environ |= {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+        try:
+            client = ViewerClient.spawn(headless=True, port=port, hide_welcome_screen=True)
+            try:
+                client.open([str(path) for path in recordings])
+                yield client
+            finally:
+                client.quit()
+        finally:
+            for name, value in kept.items():
+                os.environ.pop(name) if value is None else os.environ.update({name: value})
+
+
+def show_tab(client: Any, tab: str) -> None:
+    """Bring a tab of the open recording's blueprint to the top."""
+    blueprint = client.get_blueprint().blueprint
+    containers = {path: fields.get("ContainerBlueprint", {}) for path, fields in blueprint.items()}
+    (wanted,) = (path for path, fields in containers.items() if fields.get("display_name") == tab)
+    (tabbed,) = (path for path, fields in containers.items() if fields.get("container_kind") == "Tabs")
+    blueprint[tabbed]["ContainerBlueprint"]["active_tab"] = wanted.removeprefix("/")
+    client.set_blueprint(blueprint, of="recording")
+
+
+def tabs(run: Path, out: Path) -> None:
+    """A picture of each tab; of the iteration at its beginning and at its end; of the quality over time."""
+    import pandas as pd
+
+    from stages.views import recordings_of
+    from stages.views.tour import TABS
+
+    last = int(pd.read_parquet(run / "angle_iterate" / "iterations.parquet")["iteration"].iloc[-1])
+    with viewer(*recordings_of(run)) as client:
+        for tab in TABS:
+            show_tab(client, tab)
+            steps = {"Iteration": (0, 1, last)}.get(tab, (last,))
+            for step in steps:
+                if tab == "Quality":
+                    client.set_time("time", play_state="paused")
+                else:
+                    client.set_time("iteration", sequence=step, play_state="paused")
+                time.sleep(SETTLE_S)
+                suffix = f"-{step}" if len(steps) > 1 else ""
+                client.save_screenshot(str(out / f"recording-{tab.lower().replace(' ', '-')}{suffix}.png"))
+
+
+def report(run: Path, out: Path, height: int = 1500) -> None:
+    """The beginning of the report's page."""
+    page = (run / "report" / "report.html").resolve().as_uri()
+    chromium(f"--window-size={WIDTH},{height}", f"--screenshot={(out / 'report.png').resolve()}", page)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("out", type=Path)
+    options = parser.parse_args()
+    if why := missing():
+        sys.exit(why)
+    options.out.mkdir(parents=True, exist_ok=True)
+    out = options.out.resolve()
+    tabs(options.run, out)
+    report(options.run, out)
+
+
+if __name__ == "__main__":
+    main()
