@@ -141,7 +141,7 @@ def _mount(
 
 # --- planes ----------------------------------------------------------------------------------------------------------
 def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row]:
-    """Each family's plane over all passes, laser and sonar (with the coarse mount), in its own target frame."""
+    """Each family's plane over all passes in its own target frame; the sonar's are those with the coarse mount."""
     one, other = (run.settings.pool.target.model_dump(mode="json") for run in (first, second))
     differing = [name for name in TARGET if one[name] != other[name]]
     if differing:
@@ -151,7 +151,10 @@ def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row
     for run in (first, second):
         rows = Tables(run.path).table(artefacts.PLANES).query("`pass` == -1").to_dict("records")
         tables.append({(row["sensor"], row["plane"]): row for row in rows})
-    for sensor in ("laser", "mbes"):
+    same_mount = first.settings.session.mbes.mount == second.settings.session.mbes.mount
+    if not same_mount:
+        missing.append("planes of the sonar: they were placed with different coarse mounts")
+    for sensor in ("laser", "mbes") if same_mount else ("laser",):
         for family in FAMILIES:
             key = (sensor, family)
             if not all(key in table for table in tables):

@@ -39,7 +39,8 @@ def run(
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
         folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
-        return [name_of(stage) for stage in stages if _bring_up_to_date(this, stage)]
+        first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)
+        return [name_of(stage) for stage in stages if _bring_up_to_date(this, stage, first)]
 
 
 def run_stage(
@@ -71,14 +72,16 @@ def _open(path: Path, settings: Settings, workers: Workers, progress: Progress |
 
 
 # --- reading, running, writing ---------------------------------------------------------------------------------------
-def _bring_up_to_date(this: Run, stage: ModuleType) -> bool:
+def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool:
+    """Whether it had to be run; in a folder's ``first`` run nobody asks why."""
     name = name_of(stage)
     reasons = out_of_date(this, stage)
     if not reasons:
         folder.touch(this.folder(name))
         this.progress.note(f"{name}: up to date")
         return False
-    this.progress.reasons(name, reasons)
+    if not first:
+        this.progress.reasons(name, reasons)
     with this.progress.stage(name):
         _execute(this, stage)
     for line in _losses(manifest.read(this.folder(name))):

@@ -9,6 +9,15 @@ from pipeline.mounts import PARAMETERS, change_of
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # a target found so far off is worth a word
 
 
+def signed(value: float, digits: int) -> str:
+    """With its sign, and no minus before nothing.
+
+    >>> signed(-0.0004, 3), signed(-0.0006, 3)
+    ('+0.000', '-0.001')
+    """
+    return f"{round(value, digits) + 0.0:+.{digits}f}"
+
+
 def summary(calibration: Mapping[str, Any]) -> str:
     """The result on one screen, from calibration.json."""
     lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]
@@ -38,11 +47,8 @@ def summary(calibration: Mapping[str, Any]) -> str:
 
 def _target_line(target: Mapping[str, Any]) -> str:
     """The target's pose for the screen: an error of the laser's mount or of the origin is seen here first."""
-    x, y, z = target["offset_m"]
-    first, second = target["tilt_deg"]
-    line = (
-        f"Target found at x {x:+.3f}, y {y:+.3f}, z {z:+.3f} m from target.origin, azimuth "
-        f"{target['azimuth_correction_deg']:+.2f}°, tilt {first:+.2f}° {second:+.2f}°."
-    )
+    x, y, z = (signed(value, 3) for value in target["offset_m"])
+    azimuth, first, second = (signed(angle, 2) for angle in (target["azimuth_correction_deg"], *target["tilt_deg"]))
+    line = f"Target found at x {x}, y {y}, z {z} m from target.origin, azimuth {azimuth}°, tilt {first}° {second}°."
     odd = max(map(abs, target["offset_m"])) > ODD_OFFSET_M or max(map(abs, target["tilt_deg"])) > ODD_TILT_DEG
     return line + (" If it was set up and surveyed better than this, check laser.mount." if odd else "")

@@ -1,6 +1,7 @@
 """The command line: thin. Imports what computes only inside the command that computes."""
 
 import os
+import shlex
 import sys
 import traceback
 from datetime import datetime
@@ -29,6 +30,7 @@ app = typer.Typer(
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")]
 Jobs = Annotated[int | None, typer.Option("--jobs", metavar="N", help="workers; default: one a core, at most 4")]
 Recordings = Annotated[bool, typer.Option("--recordings/--no-recordings", help="draw recordings for the Rerun viewer")]
+Report = Annotated[bool, typer.Option("--report/--no-report", help="draw RUN/report/report.html")]
 Address = Annotated[
     str | None, typer.Option("--executor", metavar="ADDRESS", help="dask scheduler; its workers must see these folders")
 ]
@@ -78,6 +80,7 @@ def run(
     jobs: Jobs = None,
     executor: Address = None,
     recordings: Recordings = True,
+    report: Report = True,
 ) -> int:
     """Run all stages that are out of date, and say why each is."""
     from pipeline import runner
@@ -87,7 +90,8 @@ def run(
     with workers(jobs, executor) as pool:
         runner.run(load(), session, config, run_folder, pool, Progress())
         status = _answer(run_folder)
-        _draw(run_folder, recordings, pool)
+        _draw(run_folder, report, recordings, pool)
+    _say_where(run_folder)
     return status
 
 
@@ -100,6 +104,7 @@ def stage(
     jobs: Jobs = None,
     executor: Address = None,
     recordings: Recordings = True,
+    report: Report = True,
 ) -> int:
     """Run one stage, if it is out of date.
 
@@ -117,7 +122,7 @@ def stage(
     with workers(jobs, executor) as pool:
         runner.run_stage(load(), name, run_folder, settings, pool, Progress())
         status = _answer(run_folder) if name == ORDER[-1] else 0
-        _draw(run_folder, recordings, pool)
+        _draw(run_folder, report, recordings, pool)
     return status
 
 
@@ -141,21 +146,30 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
 
 @app.command()
 def view(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="run folders")],
+    first: RunFolder,
+    second: Annotated[Path | None, typer.Argument(metavar="[RUN]", help="another run, shown beside the first")] = None,
     stage: Annotated[str | None, typer.Option(help=f"one of {', '.join(ORDER)} alone")] = None,
 ) -> int:
-    """Open a run's recordings in the Rerun viewer.
+    """Open a run's recordings in the Rerun viewer, or two runs side by side.
 
     Nothing is served beyond this machine.
     """
+    import tempfile
+
     from stages.drawing import draw
     from stages.views import recordings_of, show
 
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
-    for run_folder in runs:
-        draw(run_folder)
-    return show([path for run_folder in runs for path in recordings_of(run_folder, stage)])
+    if second is None:
+        _say_failures(draw(first, report=False))
+        return show(recordings_of(first, stage))
+    if stage is not None:
+        raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pair.rrd"
+        _save_pair(first, second, _comparison(first, second), path)
+        return show([path])
 
 
 @app.command()
@@ -167,6 +181,8 @@ def diff(
     ] = None,
     tolerance_mm: Annotated[float | None, typer.Option(min=0.0, help="the same for the lever arm")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON, for programs")] = False,
+    html: Annotated[Path | None, typer.Option(metavar="FILE", help="write it as a page as well")] = None,
+    rrd: Annotated[Path | None, typer.Option(metavar="FILE", help="write both runs as one recording as well")] = None,
 ) -> int:
     """Compare two runs: has the sonar moved?
 
@@ -175,11 +191,31 @@ def diff(
     import json
 
     from pipeline import diff as comparing
+    from pipeline.files import write_text
 
-    one, other = (comparing.RunRead.read(run, ORDER) for run in (first, second))
-    found = comparing.diff(one, other, tolerance_deg, tolerance_mm)
+    found = _comparison(first, second, tolerance_deg, tolerance_mm)
+    if html is not None:
+        from pipeline.pages.comparison import page
+
+        write_text(html, page(found))
+    if rrd is not None:
+        _save_pair(first, second, found, rrd)
     say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else comparing.text(found), sys.stdout)
     return 1 if comparing.is_moved(found) else 0
+
+
+def _comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
+    from pipeline.diff import RunRead, diff
+
+    return diff(RunRead.read(first, ORDER), RunRead.read(second, ORDER), *tolerances)
+
+
+def _save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:
+    from pipeline.files import writing
+    from stages.views.pair import save_pair
+
+    with writing(path):
+        save_pair(first, second, found, path)
 
 
 @app.command()
@@ -222,11 +258,24 @@ def compare(
     return 0 if good else 1
 
 
-def _draw(run_folder: Path, recordings: bool, pool: Any) -> None:
+def _draw(run_folder: Path, report: bool, recordings: bool, pool: Any) -> None:
     """Pictures are a help to see by: whatever goes wrong in drawing is said, and the calibration stands."""
     from stages.drawing import draw
 
-    for what, why in draw(run_folder, recordings, pool).items():
+    _say_failures(draw(run_folder, report, recordings, pool))
+
+
+def _say_where(run_folder: Path) -> None:
+    """Where to look next."""
+    page = run_folder / "report" / "report.html"
+    if page.is_file():
+        say(f"Report: {page}", sys.stdout)
+    if any(run_folder.glob("*/*.rrd")):
+        say(f"Recordings: poolcal view {shlex.quote(str(run_folder))}", sys.stdout)
+
+
+def _say_failures(failed: dict[str, Exception]) -> None:
+    for what, why in failed.items():
         if not isinstance(why, (PoolcalError, OSError)):
             say("".join(traceback.format_exception(why)).rstrip(), sys.stderr)
         reason = str(why).partition("\n")[0]

@@ -11,11 +11,14 @@ PAGE = "report.html"
 RECORDINGS = "recordings"
 
 
-def draw(run: Path, recordings: bool = True, workers: Workers = SERIAL) -> dict[str, Exception]:
+def draw(
+    run: Path, report: bool = True, recordings: bool = True, workers: Workers = SERIAL
+) -> dict[str, Exception]:
     """Draw what is not drawn yet. A finished result is never touched; what could not be drawn comes back with why."""
     try:
         with folder.locked(run, ORDER):
-            tasks = [(run, PAGE), *((run, stage) for stage in _recorded(run) if recordings)]
+            wanted = [PAGE] * report + _recorded(run) * recordings
+            tasks = [(run, name) for name in wanted]
             failed = [one for one in workers.here(_draw, tasks) if one is not None]
     except (PoolcalError, OSError) as error:  # the folder is in use, or cannot be written
         return {"pictures": error}

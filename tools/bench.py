@@ -90,7 +90,7 @@ def bench(size: str, repeats: int, jobs: int) -> dict[str, float]:
         found: dict[str, float] = {}
         _, _, text = measured([sys.executable, "-c", DECODE, str(session)])
         found["decode_s"], found["points"] = (float(word) for word in text.split())
-        common = ["--jobs", str(jobs), "--no-recordings"]
+        common = ["--jobs", str(jobs), "--no-report", "--no-recordings"]
         where = ["--config", str(session / "pool.yaml")]
         found["run_s"], found["run_mib"], _ = measured(
             [*POOLCAL, "run", str(session), *where, "--run", str(run), *common]

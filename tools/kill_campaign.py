@@ -60,7 +60,8 @@ def digests(run: Path) -> dict[str, str]:
 
 
 def command(session: Path, config: Path, run: Path) -> list[str]:
-    return [*POOLCAL, "run", str(session), "--config", str(config), "--run", str(run), "--jobs", "2", "--no-recordings"]
+    places = [str(session), "--config", str(config), "--run", str(run)]
+    return [*POOLCAL, "run", *places, "--jobs", "2", "--no-report", "--no-recordings"]
 
 
 def calibrate(session: Path, config: Path, run: Path) -> float:

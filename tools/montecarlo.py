@@ -142,7 +142,7 @@ def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
         place = ["--config", str(session / "pool.yaml"), "--run", str(run)]
         for command in (
             ["simulate", str(session), "--scenario", str(scenario), "--seed", seed],
-            ["run", str(session), *place, "--jobs", "1", "--no-recordings"],
+            ["run", str(session), *place, "--jobs", "1", "--no-report", "--no-recordings"],
         ):
             done = subprocess.run(poolcal + command, capture_output=True, text=True)
             if done.returncode not in (0, 1):

@@ -18,6 +18,7 @@ import pandas as pd
 import pipeline.readers
 import pipeline.screen
 import stages
+import stages.drawing
 from pipeline import artefacts, config
 from tests.runner import toys
 
@@ -61,6 +62,7 @@ def install() -> None:
     report = types.ModuleType("stages.report")
     report.__file__ = __file__
     vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
+    stages.drawing.draw = lambda *_: {}  # toys have nothing to show
     pipeline.screen.summary = lambda result: f"{result['session']}: {result['verdict']}"
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"

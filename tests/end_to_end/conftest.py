@@ -25,7 +25,7 @@ def truth(small: Path) -> dict[str, Any]:
 def undisturbed(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Told]:
     """The run folder of the small session, calibrated once with one job and left alone, and what was said."""
     run = tmp_path_factory.mktemp("undisturbed") / "run"
-    told = poolcal("run", small, "--config", small / "pool.yaml", "--run", run, "--jobs", 1)
+    told = poolcal("run", small, "--config", small / "pool.yaml", "--run", run, "--jobs", 1, "--report")
     assert told.status == 0, told.err
     return run, told
 

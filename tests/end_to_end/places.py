@@ -51,9 +51,11 @@ class Told:
 
 
 def poolcal(*words: object) -> Told:
-    """The command line in this process; recordings only where they are asked for."""
-    if words[0] in ("run", "stage") and not {"--recordings", "--no-recordings"} & set(words):
-        words = (words[0], "--no-recordings", *words[1:])
+    """The command line in this process; pictures only where they are asked for."""
+    if words[0] in ("run", "stage"):
+        for what in ("report", "recordings"):
+            if not {f"--{what}", f"--no-{what}"} & set(words):
+                words = (words[0], f"--no-{what}", *words[1:])
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = call([str(word) for word in words])

@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
 
 import stages.views
+from stages import ORDER
+from stages.drawing import draw
 from tests.end_to_end.places import Place, Told, digests, poolcal
 
 Chunks = dict[str, list[Any]]
@@ -22,7 +25,8 @@ Chunks = dict[str, list[Any]]
 def drawn(undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = tmp_path_factory.mktemp("drawn") / "水池 <b>1</b>"
     shutil.copytree(undisturbed[0], run)
-    assert stages.views.draw(run) == list(stages.views.DRAWN)
+    assert draw(run) == {}
+    assert sorted(path.stem for path in run.glob("*/*.rrd")) == sorted(ORDER)
     return run
 
 
@@ -42,6 +46,18 @@ def points(chunks: list[Any]) -> np.ndarray:
     return np.array([point for row in lists for point in row])
 
 
+def curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:
+    rows = [chunk for chunk in chunks if "Scalars:scalars" in chunk.schema.names]
+    values = np.concatenate([np.ravel(chunk.column("Scalars:scalars").to_pylist()) for chunk in rows])
+    return values, [moment for chunk in rows for moment in chunk.column(timeline).to_pylist()]
+
+
+def text(found: Chunks, path: str) -> str:
+    (chunk,) = found[path]
+    ((written,),) = chunk.column("TextDocument:text").to_pylist()
+    return str(written)
+
+
 def test_every_point_is_there(drawn: Path) -> None:
     cloud = read(drawn, "georeference")
     assert len(points(cloud["/pool/laser"])) == rows_in(drawn / "georeference" / "laser_pool")
@@ -55,6 +71,75 @@ def test_every_point_is_there(drawn: Path) -> None:
     assert np.abs(wall[:, 0]).max() < 0.06  # in the target's frame the wall is x = 0
 
 
+def test_quality_over_time_is_the_trajectorys_and_the_bins(drawn: Path) -> None:
+    found = read(drawn, "ingest")
+    trajectory = pd.read_parquet(drawn / "ingest" / "trajectory.parquet")
+    roll, times = curve(found["/quality/attitude/roll"], "time")
+    step = -(-len(trajectory) // len(roll))
+    shown = trajectory.iloc[::step]
+    unbroken = np.isfinite(roll)
+    np.testing.assert_allclose(roll[unbroken], np.degrees(shown["roll_rad"].to_numpy())[unbroken])
+    breaks = np.diff(shown["t_ns"].to_numpy(), prepend=shown["t_ns"].iloc[0]) > 2e9
+    assert unbroken[1:].tolist() == (~breaks)[1:].tolist()
+    leap = 18  # GPS - UTC since 2017
+    unix = shown["t_ns"].to_numpy() + (315_964_800 - leap) * 10**9
+    assert [int(t.value) for t in pd.to_datetime(times)] == unix.tolist()
+    bins = pd.read_parquet(drawn / "adjust" / "residual_bins.parquet").query("by == 'time' and sensor == 'mbes'")
+    count, _ = curve(read(drawn, "adjust")["/quality/points/mbes"], "time")
+    assert count.sum() == bins["count"].sum()
+    files = text(found, "/tables/files")
+    for name in pd.read_parquet(drawn / "ingest" / "files.parquet")["file"]:
+        assert name in files
+
+
+def test_planes_lie_on_the_planes(drawn: Path) -> None:
+    found = read(drawn, "fit_planes")
+    planes = pd.read_parquet(drawn / "fit_planes" / "planes.parquet").query("`pass` == -1")
+    planes = planes.set_index(["sensor", "plane"])
+    for sensor in ("laser", "mbes"):
+        for family in ("P1", "P2", "P3"):
+            (chunk,) = found[f"/planes/{sensor}/{family}"]
+            corners = np.array(chunk.column("Mesh3D:vertex_positions").to_pylist()[0])
+            plane = planes.loc[(sensor, family)]
+            normal = plane[[f"normal_{axis}_target_1" for axis in "xyz"]].to_numpy(dtype=float)
+            np.testing.assert_allclose(corners @ normal, plane["distance_m"], atol=1e-5)
+            (chunk,) = found[f"/planes/{sensor}/{family}/normal"]
+            np.testing.assert_allclose(chunk.column("Arrows3D:vectors").to_pylist()[0][0], normal, atol=1e-6)
+
+
+def test_before_after_residuals_maps_and_fans(drawn: Path) -> None:
+    found = read(drawn, "adjust")
+    residuals = pd.read_parquet(drawn / "adjust" / "residuals.parquet")
+    faces = pd.read_parquet(drawn / "segment" / "faces.parquet")
+    family = faces["family"].to_numpy()[residuals["face"]]
+    for name in ("P1", "P2", "P3", "H"):
+        rows = residuals[(residuals["sensor"] == "mbes") & (family == name)]
+        for path, prefix in ((f"/before/{name}", "coarse_"), (f"/after/{name}", ""), (f"/residuals/mbes/{name}", "")):
+            expected = rows[[f"{prefix}{axis}_target_m" for axis in "xyz"]].to_numpy()
+            np.testing.assert_array_equal(points(found[path]).reshape(-1, 3), expected)
+    wall = np.abs(points(found["/before/P2"])[:, 0]).mean(), np.abs(points(found["/after/P2"])[:, 0]).mean()
+    assert wall[0] > 3 * wall[1]
+    cells = pd.read_parquet(drawn / "adjust" / "residual_map.parquet").query("sensor == 'mbes'")
+    cells = cells[np.isfinite(cells["mean_m"])]
+    for name in ("P1", "P2", "P3", "H"):
+        (chunk,) = found[f"/maps/mbes/{name}"]
+        corners = np.array(chunk.column("Mesh3D:vertex_positions").to_pylist()[0])
+        rows = cells[(faces["family"].to_numpy()[cells["face"]] == name)]
+        assert len(corners) == 4 * len(rows)
+        lift = 0.01 * faces[[f"normal_{axis}_target_1" for axis in "xyz"]].to_numpy()[rows["face"]]
+        middles = corners.reshape(-1, 4, 3).mean(axis=1)
+        np.testing.assert_allclose(middles, rows[[f"{axis}_target_m" for axis in "xyz"]].to_numpy() + lift, atol=1e-5)
+        colours = np.array(chunk.column("Mesh3D:vertex_colors").to_pylist()[0], dtype=np.uint32)[::4]
+        red, blue = colours >> 24, (colours >> 8) & 255
+        far = np.abs(rows["mean_m"].to_numpy()) > 0.001
+        assert ((red > blue) == (rows["mean_m"].to_numpy() > 0))[far].all()  # red is plus: toward the boat
+    rows = [row for chunk in found["/fans/mbes/pass_0"] for row in chunk.column("LineStrips3D:strips").to_pylist()]
+    rays = [ray for row in rows for ray in row]
+    lengths = np.linalg.norm(np.diff(np.array(rays), axis=1)[:, 0], axis=1)
+    assert lengths.min() > residuals["range_m"].min() - 0.01
+    assert lengths.max() < residuals["range_m"].max() + 0.01
+
+
 def test_the_iteration_closes_the_planes(drawn: Path) -> None:
     found = read(drawn, "angle_iterate")
     iterations = pd.read_parquet(drawn / "angle_iterate" / "iterations.parquet")
@@ -66,8 +151,19 @@ def test_the_iteration_closes_the_planes(drawn: Path) -> None:
     between = np.degrees(np.arccos(np.clip(np.sum(angles["laser"] * angles["mbes"], axis=2), -1, 1)))
     assert between[0].max() > 0.3
     assert between[-1].max() < between[0].max() / 4
-    curve = np.concatenate([c.column("Scalars:scalars").to_pylist() for c in found["/curves/deviation/yaw"]]).ravel()
-    np.testing.assert_allclose(curve, iterations["deviation_yaw_deg"])
+    for path, column in (("deviation/yaw", "deviation_yaw_deg"), ("planes/P3", "angle_P3_deg")):
+        values, steps = curve(found[f"/curves/{path}"], "iteration")
+        np.testing.assert_allclose(values, iterations[column])
+        assert steps == iterations["iteration"].tolist()
+    wall = found["/iteration/soundings/P2"]
+    clouds = [row for chunk in wall for row in chunk.column("Points3D:positions").to_pylist()]
+    first, last = (np.array(clouds[k])[:, 0].std() for k in (0, -1))
+    assert len(clouds) == len(iterations)
+    assert last < first / 1.5  # the wall's points swing into one plane
+    turns = pd.read_parquet(drawn / "offsets" / "alternation.parquet")
+    values, steps = curve(read(drawn, "offsets")["/curves/turns/offsets"], "iteration")
+    np.testing.assert_allclose(10**values, 1000 * turns["step_m"], rtol=1e-9)
+    assert steps == turns["iteration"].tolist()
 
 
 def test_one_scene_a_run_and_sound_files(drawn: Path) -> None:
@@ -84,9 +180,11 @@ def test_one_scene_a_run_and_sound_files(drawn: Path) -> None:
 
 
 def test_drawn_once_and_again_when_gone(drawn: Path) -> None:
-    assert stages.views.draw(drawn) == []
+    written = {path: path.stat().st_mtime_ns for path in drawn.glob("*/*.rrd")}
     (drawn / "segment" / "segment.rrd").unlink()
-    assert stages.views.draw(drawn) == ["segment"]
+    assert draw(drawn) == {}
+    changed = [path.stem for path, when in written.items() if path.stat().st_mtime_ns != when]
+    assert changed == ["segment"]
     assert not list(drawn.rglob("*.partial"))
     assert poolcal("verify", drawn).status == 0
 
@@ -96,22 +194,78 @@ def test_a_sample_says_so(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(georeference, "AT_MOST", 1000)
     (drawn / "georeference" / "georeference.rrd").unlink()
-    stages.views.draw(drawn)
+    draw(drawn)
     (chunk,) = read(drawn, "georeference")["/pool/laser"]
     (step,) = chunk.column("one_in").to_pylist()[0]
     total = rows_in(drawn / "georeference" / "laser_pool")
     assert step == -(-total // 1000)
     assert len(points([chunk])) == -(-total // step)
+    chunks = [c for chunks in read(drawn, "adjust").values() for c in chunks if "one_in" in c.schema.names]
+    assert {tuple(one) for chunk in chunks for one in chunk.column("one_in").to_pylist()} == {(1,)}
+
+
+def test_words_stay_words(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    """Names that would end a code block, load a picture or make a link stand inside the block as they are."""
+    run = tmp_path / "run"
+    shutil.copytree(undisturbed[0], run)
+    name = "laser/``` ![x](http://example.com/x.png) <b>水</b>.las"
+    path = run / "ingest" / "files.parquet"
+    table = pq.read_table(path)
+    names = table["file"].to_pylist()
+    changed = table.set_column(table.schema.get_field_index("file"), table.schema.field("file"), [[name, *names[1:]]])
+    pq.write_table(changed, path)
+    assert draw(run, report=False) == {}
+    written = text(read(run, "ingest"), "/tables/files")
+    fence = written.split("text\n")[0]
+    assert set(fence) == {"`"}
+    assert len(fence) == 4
+    assert written.endswith("\n" + fence)
+    assert fence not in written[4:-4]
+    assert name in written
+
+
+def test_two_runs_in_one_recording(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    run = tmp_path / "other"
+    shutil.copytree(undisturbed[0], run)
+    out = tmp_path / "both.rrd"
+    assert poolcal("diff", undisturbed[0], run, "--rrd", out).status == 0
+    found: Chunks = defaultdict(list)
+    for chunk in RrdReader(out).stream():
+        found[str(chunk.entity_path)].append(chunk.to_record_batch())
+    np.testing.assert_array_equal(points(found["/a/after/P2"]), points(found["/b/after/P2"]))
+    assert "/pool/laser" not in found
+    assert "the same result in both." in text(found, "/tables/comparison")
+    assert "ACCEPTED" in text(found, "/b/tables/summary")
+    told = poolcal("view", undisturbed[0], run, "--stage", "adjust")
+    assert (told.status, "two runs are shown as a whole" in told.err) == (2, True)
+
+
+def test_the_viewer_listens_on_this_machine_alone(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    called: list[list[str]] = []
+
+    def run(command: list[object], **_: object) -> subprocess.CompletedProcess[str]:
+        called.append([str(word) for word in command])
+        return subprocess.CompletedProcess([], 0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert poolcal("view", drawn).status == 0
+    assert poolcal("view", drawn, drawn).status == 0
+    assert poolcal("view", drawn, "--stage", "adjust").status == 0
+    whole, pair, one = called
+    assert all(words[1:3] == ["--bind", "127.0.0.1"] for words in called)
+    assert len(whole) == 3 + len(ORDER)
+    assert len(pair) == 4
+    assert one[3:] == [str(drawn / "adjust" / "adjust.rrd")]
 
 
 def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """The reason on one line; a bug keeps its traceback as well."""
     for error, traced in ((OSError("no room\nfor pictures"), False), (ValueError("no room\nfor pictures"), True)):
 
-        def fails(run: Path, error: Exception = error) -> list[str]:
+        def fails(run: Path, stage: str, error: Exception = error) -> bool:
             raise error
 
-        monkeypatch.setattr(stages.views, "draw", fails)
+        monkeypatch.setattr(stages.views, "record", fails)
         told = place.calibrate("--recordings")
         assert told.status == 0
         last = f"recordings: not drawn ({type(error).__name__}: no room); the calibration is complete"

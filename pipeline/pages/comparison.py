@@ -1,0 +1,45 @@
+"""The page of a comparison of two runs: the same that ``poolcal diff`` prints."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib
+import numpy as np
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from pipeline.diff import shown
+from pipeline.mounts import PARAMETERS, WITHIN_95
+from pipeline.pages import ALARM, INK, QUIET, STYLE, picture, render
+
+
+def page(found: Mapping[str, Any]) -> str:
+    """``found``: from :func:`pipeline.diff.diff`."""
+    by_place = dict(enumerate(found["parameters"]))
+    rows = [{"name": name} | by_place[place] for name, place, *_ in PARAMETERS if place in by_place]
+    return render(
+        "comparison.html",
+        found=found,
+        rows=rows,
+        shown=shown,
+        plain=lambda value: "–" if value is None else value if isinstance(value, str) else json.dumps(value),
+        chart=_chart(rows) if rows else None,
+    )
+
+
+def _chart(rows: list[dict[str, Any]]) -> Markup:
+    """Each difference in its own sigmas, with its 95 % interval; red: moved."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 2.0))
+        axis = figure.add_axes((0.08, 0.24, 0.9, 0.72))
+        z = np.array([row["z"] for row in rows])
+        for place, row in enumerate(rows):
+            colour = ALARM if row["moved"] else INK
+            axis.errorbar([z[place]], [place], xerr=[WITHIN_95], fmt="o", color=colour, markersize=4, linewidth=1.2)
+        axis.axvline(0, color=QUIET, linewidth=0.8)
+        widest = max(4.0, 1.1 * (float(np.max(np.abs(z))) + WITHIN_95))
+        axis.set(xlim=(-widest, widest), xlabel="b - a, in sigmas of the difference, with 95 % intervals")
+        axis.set_yticks(range(len(rows)), [row["name"] for row in rows])
+        axis.invert_yaxis()
+        return picture(figure, "differences of the six values in sigmas")

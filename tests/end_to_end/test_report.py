@@ -1,0 +1,167 @@
+"""RUN/report/report.html: its numbers are the run's, its texts are texts, and it is drawn when there is cause."""
+
+import base64
+import re
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from stages import ORDER
+from stages.drawing import draw
+from tests.end_to_end.pages import Page, assert_self_contained
+from tests.end_to_end.places import Place, Told, digests, poolcal, result_of
+
+HOSTILE = "<script>alert(1)</script> \"quotes\" '&amp;' 水池 ``` " + "x" * 240
+
+
+def page_of(run: Path) -> Page:
+    return Page((run / "report" / "report.html").read_text(encoding="utf-8"))
+
+
+def test_verdict_first_then_the_runs_numbers(undisturbed: tuple[Path, Told]) -> None:
+    run = undisturbed[0]
+    page, result = page_of(run), result_of(run)
+    assert page.headings[0] == result["session"]
+    assert page.text.index("accepted") < page.text.index("roll")
+    rows = page.table("", "coarse", "calibrated")
+    table = pd.read_parquet(run / "report" / "calibration.parquet").query("method == 'adjustment'")
+    assert [row[0] for row in rows] == table["parameter"].tolist()
+    for row, values in zip(rows, table.to_dict("records"), strict=True):
+        _, coarse, total, change, sigma, interval, correction = row
+        low, high = interval.split(" … ")
+        keys = ("coarse", "total", "change", "sigma_total", "low_95", "high_95", "correction")
+        for shown, key in zip((coarse, total, change, sigma, low, high, correction), keys, strict=True):
+            number, unit = shown.split()
+            assert float(number) == pytest.approx(values[key], abs=5.1e-5), key
+            assert unit == {"deg": "°", "m": "m"}[values["unit"]]
+    matrix = result["geometry"]["correlation"]
+    shown = page.table("correlation", "roll")
+    assert float(shown[2][5]) == pytest.approx(matrix[2][4], abs=0.0051)  # yaw with y
+    assert float(shown[0][2]) == pytest.approx(matrix[1][0], abs=0.0051)  # roll with pitch
+
+
+def test_files_counts_settings_and_origin_are_listed(undisturbed: tuple[Path, Told]) -> None:
+    run = undisturbed[0]
+    page, result = page_of(run), result_of(run)
+    files = pd.read_parquet(run / "ingest" / "files.parquet")
+    listed = page.table("sensor", "file", "records")
+    assert [(row[1], int(row[2].replace(",", ""))) for row in listed] == list(
+        zip(files["file"], files["records"], strict=True)
+    )
+    counts = pd.read_parquet(run / "segment" / "counts.parquet")
+    seen = [row[1:] for row in page.table("stage", "points of") if row[0] == "segment"]
+    assert sorted((a, b, int(n.replace(",", ""))) for a, b, n in seen) == sorted(
+        row for row in counts[["source", "reason", "count"]].itertuples(index=False, name=None) if row[2]
+    )
+    changed = {row[1]: (row[2], row[3]) for row in page.table("file", "key", "value")}
+    assert changed["target.a"] == ("8.0", "")
+    assert changed["ins.drift.heading_deg"] == ("0.0", "0.03")
+    assert "segment.margin_m" not in changed
+    assert dict(page.table("raw file", "SHA-256")) == result["inputs"]  # type: ignore[arg-type]
+
+
+def test_complete_in_itself_and_not_large(undisturbed: tuple[Path, Told]) -> None:
+    run = undisturbed[0]
+    page = page_of(run)
+    assert_self_contained(page)
+    assert (run / "report" / "report.html").stat().st_size < 5_000_000
+    pictures = page.named("img")
+    assert len(pictures) == 7
+    for picture in pictures:
+        assert picture["alt"]
+        svg = base64.b64decode(str(picture["src"]).partition(",")[2]).decode("utf-8")
+        assert "<script" not in svg
+        assert not re.search(r'href="(?!#|data:image/png)', svg)
+
+
+def test_names_stay_names(place: Place) -> None:
+    place.edit_session("", name=HOSTILE[:300])
+    hostile = place.session / "laser" / "<img src=x onerror=alert(1)> & '水池'.las"
+    place.raw("laser").rename(hostile)
+    place.edit_config("", result="patent_alternating")
+    assert place.calibrate("--report").status in (0, 1)
+    page = page_of(place.run)
+    assert_self_contained(page)
+    assert page.headings[0] == HOSTILE[:300]
+    assert f"laser/{hostile.name}" in [row[1] for row in page.table("sensor", "file")]
+    assert f"laser/{hostile.name}" in [row[0] for row in page.table("raw file")]
+    assert {"img", "script"} & {tag for tag, _ in page.tags} == {"img"}
+    assert all(attributes.keys() == {"class", "alt", "src"} for attributes in page.named("img"))
+
+
+def test_a_rejected_session_says_why_and_what_is_not_there(place: Place) -> None:
+    """One pass alone, and limits that nothing keeps."""
+    place.edit_config("verdict", max_sigma_deg=1e-6)
+    told = place.calibrate("--report")
+    assert told.status == 1
+    page, result = page_of(place.run), result_of(place.run)
+    assert page.text.index("rejected") < page.text.index("coarse")
+    for reason in result["reasons"]:
+        assert reason in page.text
+    assert "must not be used" in page.text
+
+
+def test_drawn_again_only_with_cause(place: Place) -> None:
+    assert place.calibrate("--report").status == 0
+    path = place.run / "report" / "report.html"
+    before = path.read_bytes()
+    written = path.stat().st_mtime_ns
+    assert place.calibrate("--report").status == 0
+    assert path.stat().st_mtime_ns == written
+    path.unlink()
+    assert draw(place.run, recordings=False) == {}
+    assert path.read_bytes() == before  # the same run, the same page
+    place.edit_config("ingest", max_gap_s=4.9)  # changes no pass here, and no input of the report
+    assert place.calibrate("--report").status == 0
+    changed = {row[1]: row[2] for row in page_of(place.run).table("file", "key")}
+    assert changed["ingest.max_gap_s"] == "4.9"
+    assert poolcal("verify", place.run).status == 0
+
+
+def test_stages_that_do_not_agree_are_not_drawn_together(place: Place) -> None:
+    assert place.calibrate("--report").status == 0
+    path = place.run / "report" / "report.html"
+    before = path.read_bytes()
+    place.edit_config("segment", margin_m=0.06)
+    words = ("--session", place.session, "--config", place.config)
+    assert poolcal("stage", "segment", place.run, *words, "--report").status == 0
+    assert path.read_bytes() == before
+    for name in ORDER[ORDER.index("segment") + 1 :]:
+        assert poolcal("stage", name, place.run, "--report").status == 0
+    assert path.read_bytes() != before
+
+
+def test_a_page_that_cannot_be_drawn_spoils_nothing(
+    place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import pipeline.pages.report
+
+    def fails(*_: object) -> str:
+        raise ValueError("no ink")
+
+    monkeypatch.setattr(pipeline.pages.report, "page", fails)
+    told = place.calibrate("--report")
+    assert told.status == 0
+    assert told.complaints[-1] == "report.html: not drawn (ValueError: no ink); the calibration is complete"
+    assert "Traceback" in told.err
+    assert digests(place.run) == right
+    assert not (place.run / "report" / "report.html").exists()
+    assert "report.html" not in told.out
+    monkeypatch.undo()
+    assert f"Report: {place.run / 'report' / 'report.html'}" in place.calibrate("--report").out
+
+
+def test_compared_as_a_page(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    run = tmp_path / "<b>run</b>"
+    shutil.copytree(undisturbed[0], run)
+    out = tmp_path / "diff.html"
+    told = poolcal("diff", undisturbed[0], run, "--html", out)
+    assert told.status == 0
+    page = Page(out.read_text(encoding="utf-8"))
+    assert_self_contained(page)
+    assert "The same result in both." in page.text
+    assert str(run) in [row[3] for row in page.table("", "session")]
+    assert not page.named("b")
+    assert poolcal("diff", undisturbed[0], run, "--html", tmp_path / "no" / "such" / "folder.html").status == 2
