@@ -30,6 +30,8 @@ from scipy.stats import chi2
 
 Array = NDArray[np.float64]
 NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about / along body x, y, z
+UNITS = np.array([np.radians(1.0)] * 3 + [1e-3] * 3)  # of errors and sigmas in the tables: degrees, millimetres
+MOVED_DEG, MOVED_MM = 0.05, 2.0
 COARSE_DEG, COARSE_M = 2.5, 0.25
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points to leave the sonar's noise in charge
 WHITE: dict[str, Any] = {
@@ -50,6 +52,12 @@ DRIFT: dict[str, Any] = {
 }
 
 
+HALF: dict[str, Any] = {  # half the pings, and passes just long enough
+    "mbes": WHITE["mbes"] | {"ping_rate_hz": 10.0},
+    "track": {"half_length_m": 3.6},
+}
+
+
 @dataclass(frozen=True)
 class Campaign:
     name: str
@@ -57,6 +65,7 @@ class Campaign:
     first_seed: int
     scenario: dict[str, Any] = field(default_factory=dict)
     through_files: bool = False
+    pairs: bool = False  # also: how often the comparison of two of these sessions says that the sonar has moved
 
 
 def _target(**letters: Any) -> dict[str, Any]:
@@ -94,6 +103,7 @@ CAMPAIGNS = (
         8000,
         {"ins": DRIFT},
     ),
+    Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
 )
 
 
@@ -162,8 +172,8 @@ def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, 
     row["nse"] = float(error @ np.linalg.solve(covariance, error))
     sigma = np.sqrt(np.diag(covariance))
     for k, name in enumerate(NAMES):
-        unit = np.degrees(1.0) if k < 3 else 1000.0  # degrees, millimetres
-        row |= {f"error_{name}": error[k] * unit, f"sigma_{name}": sigma[k] * unit}
+        row |= {f"error_{name}": error[k] / UNITS[k], f"sigma_{name}": sigma[k] / UNITS[k]}
+    row |= {f"covariance_{i}{k}": covariance[i, k] for i in range(6) for k in range(i + 1)}
     return row
 
 
@@ -195,6 +205,35 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
+def pairs(table: pd.DataFrame) -> str:
+    """Sessions 0 and 1, 2 and 3, … compared as poolcal diff does: as they are, and with one of the six moved."""
+    from pipeline.diff import LEVEL
+    from pipeline.maths.comparison import Estimate, compare
+    from pipeline.maths.rotations import exp_so3
+
+    def estimate(row: Any, moved: Array) -> Estimate:
+        """As found on a mount of zero moved by ``moved``: found = Exp(-error) · true."""
+        error = np.array([row[f"error_{name}"] for name in NAMES]) * UNITS
+        covariance = np.zeros((6, 6))
+        for i in range(6):
+            for k in range(i + 1):
+                covariance[i, k] = covariance[k, i] = row[f"covariance_{i}{k}"]
+        return Estimate(exp_so3(-error[:3]) @ exp_so3(moved[:3]), moved[3:] - error[3:], covariance)
+
+    rows = table.to_dict("records")
+    two = list(zip(rows[::2], rows[1::2], strict=True))
+    alarms = sum(compare(estimate(a, np.zeros(6)), estimate(b, np.zeros(6))).probability < LEVEL for a, b in two)
+    lines = [f"  compared in {len(two)} pairs: {alarms} false alarms, {100 * alarms / len(two):.1f} % (level 1 %)"]
+    for k, name in enumerate(NAMES):
+        move = np.zeros(6)
+        move[k] = np.radians(MOVED_DEG) if k < 3 else MOVED_MM / 1000
+        told = [compare(estimate(a, np.zeros(6)), estimate(b, move)).moved(LEVEL) for a, b in two]
+        found, named = (100 * np.mean([bool(one) for one in told]), 100 * np.mean([k in one for one in told]))
+        size = f"{MOVED_DEG}°" if k < 3 else f"{MOVED_MM} mm"
+        lines.append(f"  {name} moved by {size}: found in {found:.1f} % of the pairs, {name} named in {named:.1f} %")
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="*", help="names (or beginnings) of campaigns")
@@ -211,7 +250,8 @@ def main() -> None:
         with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
             table = pd.DataFrame(list(pool.map(one, tasks)))
         table.to_csv(folder / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.csv", index=False)
-        print(report(campaign, table), f"\n  ({time.monotonic() - started:.0f} s)\n", flush=True)
+        words = [report(campaign, table), *([pairs(table)] if campaign.pairs else [])]
+        print("\n".join(words), f"\n  ({time.monotonic() - started:.0f} s)\n", flush=True)
 
 
 if __name__ == "__main__":
