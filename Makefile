@@ -19,15 +19,18 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help setup demo calibrate stages diff view test lint format bench montecarlo clean
+.PHONY: help setup setup-visual demo calibrate stages diff view test lint format bench pictures montecarlo clean
 
 help: ## this list
-	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-18s %s\n", $$1, $$2}'
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
 	@echo 'Variables: SESSION CONFIG RUN JOBS SEED, e.g. make calibrate SESSION=dir CONFIG=configs/pool.yaml RUN=runs/name'
 
 setup: $(SETUP) ## .venv with everything; does nothing the second time
 $(SETUP): pyproject.toml constraints.txt tools/setup.sh
 	@tools/setup.sh
+
+setup-visual: $(SETUP) ## a browser and a Vulkan driver, for tests that look at pages and recordings
+	@tools/setup_visual.sh
 
 # --- calibrating -----------------------------------------------------------------------------------------------------
 demo: $(DEMO)/.simulated ## simulate a pool session, calibrate it, compare with its truth
@@ -91,6 +94,10 @@ test: lint ## lint, then every test
 
 bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare decoding
 	$(PY) -m tools.bench
+
+pictures: $(DEMO)/.simulated ## the README's pictures, anew (after make setup-visual)
+	$(POOLCAL) run $(DEMO) --config $(DEMO)/pool.yaml --run runs/demo
+	$(PY) -m tools.pictures runs/demo docs/pictures
 
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.montecarlo

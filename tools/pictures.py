@@ -1,7 +1,7 @@
 """Pictures of what people see, without a screen: the tabs of a run's recordings, and its report.
 
     make setup-visual
-    .venv/bin/python -m tools.screenshots runs/demo docs/pictures
+    .venv/bin/python -m tools.pictures runs/demo docs/pictures
 
 Needs Chromium and a Vulkan driver in software, which ``make setup-visual`` installs where it may.
 """
@@ -26,10 +26,20 @@ WIDTH = 1280
 
 def missing() -> str:
     """What is not installed, in words; empty when all is there."""
-    if not any(map(shutil.which, CHROMIUM)):
-        return "Chromium is not installed: make setup-visual"
-    found = any(Path(folder).glob("*.json") for folder in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"))
-    return "" if found else "no Vulkan driver is installed: make setup-visual"
+    driver = any(any(Path(folder).glob("*.json")) for folder in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"))
+    there = {
+        "Chromium": any(map(shutil.which, CHROMIUM)),
+        "pdftotext": shutil.which("pdftotext") is not None,
+        "a font with Chinese letters": _says("fc-list", ":lang=zh", "family"),
+        "a Vulkan driver": driver,
+    }
+    lacking = " and ".join(name for name, found in there.items() if not found)
+    return f"needs {lacking}: make setup-visual" if lacking else ""
+
+
+def _says(*command: str) -> bool:
+    """Whether a program is there and answers anything."""
+    return shutil.which(command[0]) is not None and bool(subprocess.run(command, capture_output=True).stdout.strip())
 
 
 def chromium(*options: str, timeout: float = 60) -> subprocess.CompletedProcess[str]:
@@ -74,6 +84,12 @@ def show_tab(client: Any, tab: str) -> None:
     client.set_blueprint(blueprint, of="recording")
 
 
+def picture_of(client: Any, path: Path) -> None:
+    """The whole window, once what was changed last is drawn."""
+    time.sleep(SETTLE_S)
+    client.save_screenshot(str(path))
+
+
 def tabs(run: Path, out: Path) -> None:
     """A picture of each tab; of the iteration at its beginning and at its end; of the quality over time."""
     import pandas as pd
@@ -91,9 +107,8 @@ def tabs(run: Path, out: Path) -> None:
                     client.set_time("time", play_state="paused")
                 else:
                     client.set_time("iteration", sequence=step, play_state="paused")
-                time.sleep(SETTLE_S)
                 suffix = f"-{step}" if len(steps) > 1 else ""
-                client.save_screenshot(str(out / f"recording-{tab.lower().replace(' ', '-')}{suffix}.png"))
+                picture_of(client, out / f"recording-{tab.lower().replace(' ', '-')}{suffix}.png")
 
 
 def report(run: Path, out: Path, height: int = 1500) -> None:

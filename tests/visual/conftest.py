@@ -1,0 +1,24 @@
+"""Pages and recordings looked at. Without the visual packages these tests say what is missing."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.end_to_end.conftest import right, small, undisturbed
+from tests.end_to_end.places import Told
+from tools.pictures import missing
+
+__all__ = ["right", "small", "undisturbed"]
+HERE = Path(__file__).parent
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    why = missing()
+    for item in items:
+        if why and item.path.is_relative_to(HERE):
+            item.add_marker(pytest.mark.skip(reason=why))
+
+
+@pytest.fixture(scope="session")
+def run(undisturbed: tuple[Path, Told]) -> Path:
+    return undisturbed[0]
