@@ -25,7 +25,7 @@ LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "las
 ROOT = Path(pipeline.__file__).parent.parent
 NO_INFLUENCE = (  # of pipeline/: cannot change a result
     "simulation/", "exports/", "pages/", "progress.py", "executor.py", "verify.py", "screen.py", "diff.py",
-    "history.py", "tables.py", "maths/comparison.py",
+    "history.py", "tables.py", "drawn.py", "maths/comparison.py",
 )  # fmt: skip
 
 

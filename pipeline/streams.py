@@ -51,9 +51,10 @@ class Part(Protocol):
 
 @dataclass(frozen=True)
 class ParquetPart:
-    """One Parquet file of a stream in a run folder."""
+    """One Parquet file of a stream in a run folder; ``columns``: these alone (None: all)."""
 
     path: Path
+    columns: tuple[str, ...] | None = None
 
     @property
     def name(self) -> str:
@@ -67,9 +68,10 @@ class ParquetPart:
 
     def _groups(self) -> Iterator[pa.Table]:
         try:
+            wanted = None if self.columns is None else list(self.columns)
             with pq.ParquetFile(self.path) as file:
                 for group in range(file.num_row_groups):
-                    yield file.read_row_group(group, use_threads=False)
+                    yield file.read_row_group(group, columns=wanted, use_threads=False)
         except (OSError, pa.ArrowException) as error:
             raise ArtefactError(f"{self.path}: cannot be read ({error}); delete its folder and run again") from error
 

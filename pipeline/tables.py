@@ -20,13 +20,13 @@ class Tables:
     def table(self, artefact: Artefact) -> pd.DataFrame:
         return read_table(self.run / artefact.owner / f"{artefact.name}.parquet", artefact)
 
-    def stream(self, artefact: Artefact) -> Stream:
+    def stream(self, artefact: Artefact, *columns: str) -> Stream:
         folder = self.run / artefact.owner / artefact.name
-        return Stream(tuple(ParquetPart(path) for path in sorted(folder.glob("part-*.parquet"))))
+        return Stream(tuple(ParquetPart(path, columns or None) for path in sorted(folder.glob("part-*.parquet"))))
 
-    def sample(self, artefact: Artefact, at_most: int) -> tuple[dict[str, np.ndarray], int]:
-        """Evenly spaced rows of a stream, at most so many; and one in how many that is."""
-        stream = self.stream(artefact)
+    def sample(self, artefact: Artefact, at_most: int, *columns: str) -> tuple[dict[str, np.ndarray], int]:
+        """These columns of evenly spaced rows of a stream, at most so many; and one in how many that is."""
+        stream = self.stream(artefact, *columns)
         total = sum(rows_of(part.path) for part in stream.parts if isinstance(part, ParquetPart))
         step, seen = max(1, -(-total // at_most)), 0
         pieces: list[dict[str, np.ndarray]] = []
@@ -35,7 +35,6 @@ class Tables:
             first = -seen % step
             pieces.append({name: values[first::step].copy() for name, values in batch.items()})  # no view of all
             seen += rows
-        names = [column.name for column in artefact.columns]
         if not pieces:
-            return {name: np.empty(0) for name in names}, step
-        return {name: np.concatenate([piece[name] for piece in pieces]) for name in names}, step
+            return {name: np.empty(0) for name in columns}, step
+        return {name: np.concatenate([piece[name] for piece in pieces]) for name in columns}, step

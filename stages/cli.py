@@ -6,7 +6,7 @@ import sys
 import traceback
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +14,11 @@ import pipeline
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.progress import say
 from stages import ORDER, load
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from stages.drawing import Failure
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 
@@ -86,11 +91,12 @@ def run(
     from pipeline import runner
     from pipeline.executor import workers
     from pipeline.progress import Progress
+    from stages.drawing import painters
 
-    with workers(jobs, executor) as pool:
+    with workers(jobs, executor) as pool, painters(report, recordings, pool.jobs > 1) as drawing:
         runner.run(load(), session, config, run_folder, pool, Progress())
         status = _answer(run_folder)
-        _draw(run_folder, report, recordings, pool)
+        _say_failures(drawing.draw(run_folder))
     _say_where(run_folder)
     return status
 
@@ -113,6 +119,7 @@ def stage(
     from pipeline import folder, runner
     from pipeline.executor import workers
     from pipeline.progress import Progress
+    from stages.drawing import Painters
 
     if name not in ORDER:
         raise ConfigError(f"NAME {name!r}: is no stage; the stages are {', '.join(ORDER)}")
@@ -121,8 +128,8 @@ def stage(
     settings = folder.load_settings(session, config) if session is not None and config is not None else None
     with workers(jobs, executor) as pool:
         runner.run_stage(load(), name, run_folder, settings, pool, Progress())
-        status = _answer(run_folder) if name == ORDER[-1] else 0
-        _draw(run_folder, report, recordings, pool)
+    status = _answer(run_folder) if name == ORDER[-1] else 0
+    _say_failures(Painters(report, recordings).draw(run_folder))
     return status
 
 
@@ -156,13 +163,13 @@ def view(
     """
     import tempfile
 
-    from stages.drawing import draw
+    from stages.drawing import Painters
     from stages.views import recordings_of, show
 
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
-        _say_failures(draw(first, report=False))
+        _say_failures(Painters(report=False, recordings=True).draw(first))
         return show(recordings_of(first, stage))
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
@@ -258,13 +265,6 @@ def compare(
     return 0 if good else 1
 
 
-def _draw(run_folder: Path, report: bool, recordings: bool, pool: Any) -> None:
-    """Pictures are a help to see by: whatever goes wrong in drawing is said, and the calibration stands."""
-    from stages.drawing import draw
-
-    _say_failures(draw(run_folder, report, recordings, pool))
-
-
 def _say_where(run_folder: Path) -> None:
     """Where to look next."""
     page = run_folder / "report" / "report.html"
@@ -274,12 +274,12 @@ def _say_where(run_folder: Path) -> None:
         say(f"Recordings: poolcal view {shlex.quote(str(run_folder))}", sys.stdout)
 
 
-def _say_failures(failed: dict[str, Exception]) -> None:
-    for what, why in failed.items():
-        if not isinstance(why, (PoolcalError, OSError)):
-            say("".join(traceback.format_exception(why)).rstrip(), sys.stderr)
-        reason = str(why).partition("\n")[0]
-        say(f"{what}: not drawn ({type(why).__name__}: {reason}); the calibration is complete", sys.stderr)
+def _say_failures(failed: "Sequence[Failure]") -> None:
+    """Pictures are a help to see by: whatever goes wrong in drawing is said, and the calibration stands."""
+    for one in failed:
+        if one.trace:
+            say(one.trace, sys.stderr)
+        say(f"{one.what}: not drawn ({one.reason}); the calibration is complete", sys.stderr)
 
 
 def _answer(run_folder: Path) -> int:

@@ -1,7 +1,7 @@
-"""Pictures of what people see, without a screen: the tabs of a run's recordings, and its report.
+"""Pictures of what people see, without a screen: the tabs of a run's recordings, its report, and the pipeline.
 
     make setup-visual
-    .venv/bin/python -m tools.pictures runs/demo docs/pictures
+    make pictures
 
 Needs Chromium and a Vulkan driver in software, which ``make setup-visual`` installs where it may.
 """
@@ -18,6 +18,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from tools.pipeline_picture import picture
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 SETTLE_S = 1.5  # after a change of tab or time, before the picture
@@ -101,13 +103,12 @@ def tabs(run: Path, out: Path) -> None:
     with viewer(*recordings_of(run)) as client:
         for tab in TABS:
             show_tab(client, tab)
-            steps = {"Iteration": (0, 1, last)}.get(tab, (last,))
-            for step in steps:
+            steps = {"-first": 0, "-second": 1, "-last": last} if tab == "Iteration" else {"": last}
+            for suffix, step in steps.items():
                 if tab == "Quality":
                     client.set_time("time", play_state="paused")
                 else:
                     client.set_time("iteration", sequence=step, play_state="paused")
-                suffix = f"-{step}" if len(steps) > 1 else ""
                 picture_of(client, out / f"recording-{tab.lower().replace(' ', '-')}{suffix}.png")
 
 
@@ -128,6 +129,18 @@ def main() -> None:
     out = options.out.resolve()
     tabs(options.run, out)
     report(options.run, out)
+    for path in out.glob("*.png"):
+        _lighten(path)
+    picture(out / "pipeline.svg")
+
+
+def _lighten(path: Path) -> None:
+    """As wide as a README shows it, and in 128 colours: a tenth of the size."""
+    from PIL import Image
+
+    image = Image.open(path).convert("RGB")
+    image.thumbnail((WIDTH, 4 * WIDTH))
+    image.quantize(128).save(path, optimize=True)
 
 
 if __name__ == "__main__":

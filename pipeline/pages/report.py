@@ -4,7 +4,6 @@ Every number on it is in calibration.json, run.yaml, a manifest or a Parquet of 
 the pictures' scales and mean values' intervals.
 """
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from pipeline import artefacts, config, manifest
+from pipeline.drawn import PAGE, drawn_from
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.mounts import PARAMETERS
@@ -35,31 +35,17 @@ METHODS = {
     "patent_alternating": "(2) patent, in turn",
     "adjustment": "(3) adjustment",
 }
-NAME = "report.html"
-HEAD = 2000  # letters within which the page says what it was drawn from
 TRACK_POINTS = 300  # of a pass on the plan
 
 
-def write_page(run: Path, stages: Sequence[str]) -> bool:
-    """Write RUN/report/report.html if it is not there or shows something else; not from stages that do not agree."""
+def write_page(run: Path, stages: Sequence[str]) -> None:
+    """Write RUN/report/report.html of a finished run."""
     done = {stage: found for stage in stages if (found := manifest.read(run / stage)) is not None}
-    if len(done) < len(stages) or not manifest.consistent(done):
-        return False
-    path, drawn_from = run / "report" / NAME, _digest(done)
-    if path.is_file() and f'content="{drawn_from}"' in path.read_text(encoding="utf-8")[:HEAD]:
-        return False
-    write_text(path, page(Tables(run), done, drawn_from))
-    return True
+    write_text(run / "report" / PAGE, page(Tables(run), done))
 
 
-def _digest(done: Mapping[str, manifest.Manifest]) -> str:
-    """Of everything that the page shows: it changes whenever a result, a setting or a raw file does."""
-    shown = [[stage, one.outputs, one.key.config, one.key.raw] for stage, one in done.items()]
-    return hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
-
-
-def page(tables: Tables, done: Mapping[str, manifest.Manifest], drawn_from: str) -> str:
-    """The page of a finished run."""
+def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
+    """``done``: the manifests of all stages."""
     result, settings = calibration(tables.run), read_settings(tables.run)
     faces, passes = tables.table(artefacts.FACES), tables.table(artefacts.PASSES)
     gaps = tables.table(artefacts.GAPS).sort_values("duration_s", ascending=False)
@@ -86,7 +72,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], drawn_from: str)
         changed=_changed(settings),
         commit=done["report"].git_commit,
         utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
-        drawn_from=drawn_from,
+        drawn_from=drawn_from(done),
     )
 
 

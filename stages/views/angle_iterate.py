@@ -29,7 +29,9 @@ def log(recording: Any, tables: Tables) -> None:
     faces, iterations = tables.table(artefacts.FACES), tables.table(artefacts.ITERATIONS)
     mount = mount_of(read_settings(tables.run).session.mbes.mount)
     trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
-    columns, step = tables.sample(artefacts.SOUNDINGS_LABELLED, SOUNDINGS)
+    columns, step = tables.sample(
+        artefacts.SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", "face", *(f"{axis}_mbes_m" for axis in "xyz")
+    )
     positions, R_target_from_body = trajectory.poses_at(columns["t_ns"].astype(np.int64))
     body = xyz(columns, "mbes_m") @ mount.R_body_from_sensor.T
     family = faces["family"].to_numpy()[columns["face"].astype(int)]

@@ -29,6 +29,6 @@ def log(recording: Any, tables: Tables) -> None:
         ("laser", artefacts.LASER_POOL, GREY),
         ("soundings", artefacts.SOUNDINGS_POOL, SONAR),
     ):
-        columns, step = tables.sample(artefact, AT_MOST)
+        columns, step = tables.sample(artefact, AT_MOST, *(f"{axis}_pool_m" for axis in "xyz"))
         cloud = rr.Points3D(xyz(columns, "pool_m").astype(np.float32), radii=DOT_M, colors=colour)
         recording.log(f"pool/{name}", cloud, rr.AnyValues(one_in=step), static=True)

@@ -21,7 +21,9 @@ def log(recording: Any, tables: Tables) -> None:
 
     faces = tables.table(artefacts.FACES)
     family_of = faces["family"].to_numpy()
-    laser, step = tables.sample(artefacts.LASER_LABELLED, AT_MOST)
+    laser, step = tables.sample(
+        artefacts.LASER_LABELLED, AT_MOST, "face", *(f"{axis}_target_m" for axis in "xyz")
+    )
     points, family = xyz(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
     for name, colour in COLOURS.items():
         corners = [np.reshape(c, (-1, 3)) for c in faces.loc[family_of == name, "vertices_target_m"]]

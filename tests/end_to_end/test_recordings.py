@@ -1,5 +1,6 @@
 """Recordings: drawn from Parquet, read back with the SDK, and never in the way of a calibration."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from rerun.chunk import RrdReader
 
 import stages.views
 from stages import ORDER
-from stages.drawing import draw
+from stages.drawing import Painters, painters
 from tests.end_to_end.places import Place, Told, digests, poolcal
 
 Chunks = dict[str, list[Any]]
@@ -25,7 +26,7 @@ Chunks = dict[str, list[Any]]
 def drawn(undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = tmp_path_factory.mktemp("drawn") / "水池 <b>1</b>"
     shutil.copytree(undisturbed[0], run)
-    assert draw(run) == {}
+    assert Painters(report=True, recordings=True).draw(run) == []
     assert sorted(path.stem for path in run.glob("*/*.rrd")) == sorted(ORDER)
     return run
 
@@ -182,7 +183,7 @@ def test_one_scene_a_run_and_sound_files(drawn: Path) -> None:
 def test_drawn_once_and_again_when_gone(drawn: Path) -> None:
     written = {path: path.stat().st_mtime_ns for path in drawn.glob("*/*.rrd")}
     (drawn / "segment" / "segment.rrd").unlink()
-    assert draw(drawn) == {}
+    assert Painters(report=True, recordings=True).draw(drawn) == []
     changed = [path.stem for path, when in written.items() if path.stat().st_mtime_ns != when]
     assert changed == ["segment"]
     assert not list(drawn.rglob("*.partial"))
@@ -194,7 +195,7 @@ def test_a_sample_says_so(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(georeference, "AT_MOST", 1000)
     (drawn / "georeference" / "georeference.rrd").unlink()
-    draw(drawn)
+    assert Painters(report=False, recordings=True).draw(drawn) == []
     (chunk,) = read(drawn, "georeference")["/pool/laser"]
     (step,) = chunk.column("one_in").to_pylist()[0]
     total = rows_in(drawn / "georeference" / "laser_pool")
@@ -214,7 +215,7 @@ def test_words_stay_words(undisturbed: tuple[Path, Told], tmp_path: Path) -> Non
     names = table["file"].to_pylist()
     changed = table.set_column(table.schema.get_field_index("file"), table.schema.field("file"), [[name, *names[1:]]])
     pq.write_table(changed, path)
-    assert draw(run, report=False) == {}
+    assert Painters(report=False, recordings=True).draw(run) == []
     written = text(read(run, "ingest"), "/tables/files")
     fence = written.split("text\n")[0]
     assert set(fence) == {"`"}
@@ -273,6 +274,38 @@ def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], m
         assert ("Traceback" in told.err) == traced
         assert (len(told.complaints) > 1) == traced
         assert digests(place.run) == right
+
+
+def test_painters_beside_the_run(place: Place, right: dict[str, str], drawn: Path) -> None:
+    """With two workers the pictures come from processes of their own: the same ones, and no process stays behind."""
+    told = poolcal(*place.words()[:-1], 2, "--report", "--recordings")
+    assert told.status == 0
+    assert told.complaints == []
+    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
+    page = (place.run / "report" / "report.html").read_text(encoding="utf-8")
+    assert page.count("<img ") == 7
+    assert digests(place.run) == right
+    assert not [name for name in commands() if "stages.drawing" in name]
+    here, there = (read(run, "adjust")["/after/P2"] for run in (place.run, drawn))
+    np.testing.assert_array_equal(points(here), points(there))
+    assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").status == 0  # with nothing to draw
+
+
+def test_a_painter_that_dies_is_said(place: Place) -> None:
+    with painters(report=True, recordings=True, beside=True) as found:
+        assert place.calibrate().status == 0
+        found._processes["recordings"].kill()
+        found._processes["recordings"].wait()
+        failed = found.draw(place.run)
+    assert [(one.what, one.trace) for one in failed] == [("recordings", "")]
+    assert (place.run / "report" / "report.html").is_file()
+    assert not list(place.run.rglob("*.partial"))
+
+
+def commands() -> list[str]:
+    """The command lines of this process's children and theirs."""
+    told = subprocess.run(["ps", "-eo", "ppid,args"], capture_output=True, text=True, check=True).stdout
+    return [line for line in told.splitlines() if line.split()[0] == str(os.getpid())]
 
 
 def test_none_when_not_wanted(place: Place) -> None:

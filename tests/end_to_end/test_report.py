@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from stages import ORDER
-from stages.drawing import draw
+from stages.drawing import Painters
 from tests.end_to_end.pages import Page, assert_self_contained
 from tests.end_to_end.places import Place, Told, digests, poolcal, result_of
 
@@ -111,7 +111,7 @@ def test_drawn_again_only_with_cause(place: Place) -> None:
     assert place.calibrate("--report").status == 0
     assert path.stat().st_mtime_ns == written
     path.unlink()
-    assert draw(place.run, recordings=False) == {}
+    assert Painters(report=True, recordings=False).draw(place.run) == []
     assert path.read_bytes() == before  # the same run, the same page
     place.edit_config("ingest", max_gap_s=4.9)  # changes no pass here, and no input of the report
     assert place.calibrate("--report").status == 0

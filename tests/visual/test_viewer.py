@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from stages.drawing import draw
+from stages.drawing import Painters
 from stages.views import recordings_of
 from stages.views.tour import TABS
 from tools.pictures import picture_of, show_tab, viewer
@@ -19,7 +19,7 @@ LEAST_COLOURS = 40
 
 @pytest.fixture(scope="module")
 def client(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    assert draw(run, report=False) == {}
+    assert Painters(report=False, recordings=True).draw(run) == []
     with viewer(*recordings_of(run)) as opened:
         yield opened
 
