@@ -110,12 +110,24 @@ def _with_jumps(found: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator
         yield row
 
 
+def _no_formula(text: str) -> str:
+    """A spreadsheet takes text that begins like this for a formula, and would run it.
+
+    >>> _no_formula("=1+1"), _no_formula("2026-05-12")
+    ("'=1+1", '2026-05-12')
+    """
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
+
+
 def write_history(history: History, out: Path, chosen: Filter) -> None:
     """history.html, .csv and .parquet in ``out``."""
     from pipeline.pages.history import page
 
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
-        history.table.to_csv(out / "history.csv", index=False, lineterminator="\n")
-        history.table.to_parquet(out / "history.parquet", index=False)
+        beside = out / "history.parquet.new"
+        history.table.to_parquet(beside, index=False)
+        beside.replace(out / "history.parquet")
+    plain = history.table.assign(**{name: history.table[name].map(_no_formula) for name in ("session", "run")})
+    write_text(out / "history.csv", plain.to_csv(index=False, lineterminator="\n"))
     write_text(out / "history.html", page(history, chosen.words()))

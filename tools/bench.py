@@ -1,9 +1,10 @@
 """Time and memory of whole runs on simulated sessions of three sizes, a factor four apart.
 
 ``make bench`` prints, for each size, in one run on this machine: seconds and peak memory of each stage, the whole run
-against bare decoding of the same files (laspy, the INS and BTH0 readers, one after another in one process),
-georeferencing in million points a second, and the seconds of a second run, which finds nothing to do. Figures are
-medians of ``--repeats``; machines differ and are busy: trust the ratios.
+against bare decoding of the same files (laspy, the INS and BTH0 readers, one after another in one process), the whole
+run with report and recordings (memory: of all its processes together), georeferencing in million points a second, and
+the seconds of a second run, which finds nothing to do. Figures are medians of ``--repeats``; machines differ and are
+busy: trust the ratios.
 
     python -m tools.bench [--sizes small medium large] [--repeats 3] [--jobs 2]
 """
@@ -68,6 +69,34 @@ def measured(command: list[str]) -> tuple[float, float, str]:
     return time.perf_counter() - start, usage.ru_maxrss / 1024, output
 
 
+def memory_together(command: list[str]) -> tuple[float, float]:
+    """Seconds of a command, and the peak MiB of it and its child processes at one moment (what they share is counted
+    with each of them)."""
+    start = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    peak = 0.0
+    while process.poll() is None:
+        peak = max(peak, sum(_resident_mib(pid) for pid in _family(process.pid)))
+        time.sleep(0.02)
+    return time.perf_counter() - start, peak
+
+
+def _family(pid: int) -> list[int]:
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+    except OSError:
+        return [pid]
+    return [pid, *(one for child in children for one in _family(int(child)))]
+
+
+def _resident_mib(pid: int) -> float:
+    try:
+        status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    except OSError:
+        return 0.0
+    return sum(int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("VmRSS:"))
+
+
 def session_of(size: str) -> Path:
     """The simulated session, made once."""
     folder = FOLDER / f"session-{size}"
@@ -90,12 +119,14 @@ def bench(size: str, repeats: int, jobs: int) -> dict[str, float]:
         found: dict[str, float] = {}
         _, _, text = measured([sys.executable, "-c", DECODE, str(session)])
         found["decode_s"], found["points"] = (float(word) for word in text.split())
-        common = ["--jobs", str(jobs), "--no-report", "--no-recordings"]
-        where = ["--config", str(session / "pool.yaml")]
-        found["run_s"], found["run_mib"], _ = measured(
-            [*POOLCAL, "run", str(session), *where, "--run", str(run), *common]
-        )
-        found["again_s"], _, _ = measured([*POOLCAL, "run", str(session), *where, "--run", str(run), *common])
+        workers = ["--jobs", str(jobs)]
+        common = [*workers, "--no-report", "--no-recordings"]
+        whole = [*POOLCAL, "run", str(session), "--config", str(session / "pool.yaml"), "--run", str(run)]
+        found["drawn_s"], found["drawn_mib"] = memory_together([*whole, *workers])
+        shutil.rmtree(run)
+        found["run_s"], found["run_mib"], _ = measured([*whole, *common])
+        found["drawing_share"] = found["drawn_s"] / found["run_s"] - 1
+        found["again_s"], _, _ = measured([*whole, *common])
         for stage in STAGES:
             found[f"{stage}_s"] = json.loads((run / stage / "manifest.json").read_text())["wall_s"]
             shutil.rmtree(run / stage)
@@ -116,6 +147,8 @@ def table(results: dict[str, dict[str, float]]) -> str:
     for stage in STAGES:
         row(f"{stage}: s, peak MiB", [f"{v[f'{stage}_s']:.1f}, {v[f'{stage}_mib']:.0f}" for v in values])
     row("whole run: s, peak MiB", [f"{v['run_s']:.1f}, {v['run_mib']:.0f}" for v in values])
+    row("with report and recordings: s, peak MiB", [f"{v['drawn_s']:.1f}, {v['drawn_mib']:.0f}" for v in values])
+    row("drawing adds", [f"{100 * v['drawing_share']:.0f} %" for v in values])
     row("bare decoding, s", [f"{v['decode_s']:.1f}" for v in values])
     row("whole run ÷ bare decoding", [f"{v['run_s'] / v['decode_s']:.2f}" for v in values])
     row("georeferencing, million points a second", [f"{v['points'] / v['georeference_s'] / 1e6:.1f}" for v in values])

@@ -58,19 +58,18 @@ def test_other_settings_are_named(undisturbed: tuple[Path, Told], again: Place) 
         assert (status, bool(found["beyond_tolerance"])) == (expected, bool(expected))
 
 
-def test_a_moved_sonar_is_found(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
-    moved = {"roll_deg": -48.6, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.00}
+def test_a_sonar_moved_by_little_is_found_and_named(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    moved = {"roll_deg": -48.75, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.302, "y_m": 0.20, "z_m": -2.01}
     run = run_of(simulate(tmp_path / "session", 2, mbes={"mount": moved, "ping_rate_hz": 8.0}))
     status, found = compared(undisturbed[0], run)
     assert status == 1
     rows = {row["parameter"]: row for row in found["parameters"]}
-    assert rows["roll"]["moved"]
-    assert rows["roll"]["difference"] == pytest.approx(0.2, abs=0.05)
-    assert rows["lever arm z"]["moved"]
-    assert rows["lever arm z"]["difference"] == pytest.approx(0.01, abs=0.003)
-    assert not rows["lever arm x"]["moved"]
-    assert "roll by +0." in found["sentence"]
-    assert "significant" in found["sentence"]
+    assert rows["roll"]["difference"] == pytest.approx(0.05, abs=0.025)
+    assert rows["lever arm x"]["difference"] == pytest.approx(0.002, abs=0.0012)
+    assert [name for name, row in rows.items() if row["moved"]] == ["roll", "lever arm x"]
+    assert "roll by +0.0" in found["sentence"]
+    assert "lever arm x by +" in found["sentence"]
+    assert "the rest within noise" in found["sentence"]
 
 
 def test_another_target_compares_the_mount_alone(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
