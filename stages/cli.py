@@ -271,7 +271,8 @@ def _say_where(run_folder: Path) -> None:
     if page.is_file():
         say(f"Report: {page}", sys.stdout)
     if any(run_folder.glob("*/*.rrd")):
-        say(f"Recordings: poolcal view {shlex.quote(str(run_folder))}", sys.stdout)
+        program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as it was called
+        say(f"Recordings: {program} view {shlex.quote(str(run_folder))}", sys.stdout)
 
 
 def _say_failures(failed: "Sequence[Failure]") -> None:

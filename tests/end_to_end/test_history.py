@@ -58,7 +58,7 @@ def test_in_order_of_time_with_the_jump_alone(runs: Path) -> None:
     assert np.isnan(table["roll_deg"].iloc[-1])
     text = pd.read_csv(runs / "history" / "history.csv")
     assert text["session"].str.removeprefix("'").tolist() == table["session"].tolist()
-    assert "'=HYPERLINK" in (runs / "history" / "history.csv").read_text(encoding="utf-8")  # no formula for a spreadsheet
+    assert "'=HYPERLINK" in (runs / "history" / "history.csv").read_text(encoding="utf-8")  # no formula
     np.testing.assert_allclose(text["z_m"], table["z_m"], rtol=1e-12)
 
 
