@@ -36,6 +36,7 @@ setup-visual: $(SETUP) ## a browser and a Vulkan driver, for tests that look at 
 demo: $(DEMO)/.simulated ## simulate a pool session, calibrate it, compare with its truth
 	$(POOLCAL) run $(DEMO) --config $(DEMO)/pool.yaml --run runs/demo
 	$(POOLCAL) compare runs/demo $(DEMO).truth.json
+	@echo 'Look next at runs/demo/report/report.html, and at the recordings: make view RUN=runs/demo'
 
 $(DEMO)/.simulated: $(SETUP) $(shell find pipeline/simulation configs/scenarios -name '*.py' -o -name '*.yaml')
 	rm -rf $(DEMO) $(DEMO).truth.json

@@ -16,6 +16,7 @@ from pipeline.errors import ArtefactError
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.planes import angle_between
+from pipeline.mounts import PARAMETERS
 from pipeline.tables import Tables
 from pipeline.verdict import SIX
 
@@ -41,6 +42,8 @@ class RunRead:
         found = {}
         for stage in stages:
             one = manifest.read(path / stage)
+            if one is None and not path.is_dir():
+                raise ArtefactError(f"{path}: there is no such folder; name a run folder")
             if one is None:
                 raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")
             found[stage] = one
@@ -70,6 +73,9 @@ def diff(
     found["counts"] = list(_counts(first, second))
     found["not_compared"] = []
     found |= _mount(first, second, found["not_compared"], tolerance_deg, tolerance_mm)
+    rejected = [key for key in ("a", "b") if found[key]["verdict"] == "rejected"]
+    # values that must not be used answer nothing, unless they are the same
+    found["answered"] = found["comparable"] and (not rejected or first_is_second(found))
     found["planes"] = list(_planes(first, second, found["not_compared"]))
     found["sentence"] = sentence(found)
     return found
@@ -77,7 +83,7 @@ def diff(
 
 def is_moved(found: Mapping[str, Any]) -> bool:
     """Whether the answer is no: significantly different, beyond a tolerance, or not to be told."""
-    return not found["comparable"] or found["joint"]["significant"] or bool(found["beyond_tolerance"])
+    return not found["answered"] or found["joint"]["significant"] or bool(found["beyond_tolerance"])
 
 
 # --- what went in ----------------------------------------------------------------------------------------------------
@@ -114,7 +120,8 @@ def _mount(
     limits = [tolerance_deg] * 3 + [None if tolerance_mm is None else tolerance_mm / 1000] * 3
     rows: list[Row] = []
     beyond = []
-    for k, name in enumerate(SIX):
+    for _, k, *_ in PARAMETERS:
+        name = SIX[k]
         difference = float(found.difference[k] * scale[k])
         limit = limits[k]
         if limit is not None and abs(difference) > limit:
@@ -182,8 +189,17 @@ def _listed(words: list[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
+def first_is_second(found: Mapping[str, Any]) -> bool:
+    return found["comparable"] and not any(row["difference"] for row in found["parameters"])
+
+
 def sentence(found: Mapping[str, Any]) -> str:
     """The answer in one sentence."""
+    rejected = [f"{k} ({found[k]['session']}) was rejected" for k in ("a", "b") if found[k]["verdict"] == "rejected"]
+    if rejected and first_is_second(found):
+        return f"the same result in both; {_listed(rejected)}"
+    if rejected:
+        return f"no answer: {_listed(rejected)}, and what must not be used cannot be compared"
     if not found["comparable"]:
         return f"no answer: {found['not_compared'][0]}"
     moved = [row for row in found["parameters"] if row["moved"]]
@@ -192,14 +208,13 @@ def sentence(found: Mapping[str, Any]) -> str:
         each = [_with_sigma(row) for row in moved]
         rest = "" if len(moved) == len(SIX) else "; the rest within noise"
         text = f"the sonar has moved, {_listed(each)}: significant ({chance}){rest}"
-    elif not any(row["difference"] for row in found["parameters"]):
+    elif first_is_second(found):
         text = "the same result in both"
     else:
         text = f"nothing has moved: all six differences are within their noise ({chance})"
     if found["beyond_tolerance"]:
         text += f"; beyond the tolerance: {_listed(found['beyond_tolerance'])}"
-    rejected = [f"{found[k]['session']} was rejected" for k in ("a", "b") if found[k]["verdict"] == "rejected"]
-    return text + "".join(f"; {word}" for word in rejected)
+    return text
 
 
 def text(found: Mapping[str, Any]) -> str:
@@ -221,7 +236,8 @@ def text(found: Mapping[str, Any]) -> str:
             cells = (shown(r["angle_deg"], "deg", ""), shown(r["distance_m"], "m"), shown(r["rms_m"], "m"))
             lines.append(f"{name:<16}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}")
     if any(row["difference"] for row in found["parameters"]):
-        lines += ["", f"{'mount, b - a':<16}{'difference':>14}{'sigma':>14}{'in sigmas':>12}"]
+        lines += ["", "mount, b - a; angles are rotations about the body's axes y (roll), x (pitch), z (yaw)"]
+        lines.append(f"{'':<16}{'difference':>14}{'sigma':>14}{'in sigmas':>12}")
         for r in found["parameters"]:
             size = f"{shown(r['difference'], r['unit']):>14}{shown(r['sigma'], r['unit'], ''):>14}{r['z']:>12.1f}"
             lines.append(f"  {r['parameter']:<14}{size}{'  moved' if r['moved'] else ''}")

@@ -69,6 +69,9 @@ def read_history(folder: Path, chosen: Filter) -> History:
             continue
         if chosen.takes(row["session"], row["date_utc"][:10]):
             found.append((row["date_utc"], row["run"], row, estimate))
+    begun = {*folder.glob("*/run.yaml"), *folder.glob("*/*/run.yaml")}
+    for path in sorted(one.parent for one in begun if not (one.parent / "report" / "calibration.json").is_file()):
+        unreadable.append(f"{path}: has no result; run poolcal run again, and see what it says")
     found.sort(key=lambda one: one[:2])
     rows = list(_with_jumps([(row, estimate) for *_, row, estimate in found]))
     return History(pd.DataFrame(rows, columns=list(_columns())), unreadable)

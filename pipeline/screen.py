@@ -6,8 +6,6 @@ from typing import Any
 
 from pipeline.mounts import PARAMETERS, change_of
 
-ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # a target found so far off is worth a word
-
 
 def signed(value: float, digits: int) -> str:
     """With its sign, and no minus before nothing.
@@ -21,8 +19,10 @@ def signed(value: float, digits: int) -> str:
 def summary(calibration: Mapping[str, Any]) -> str:
     """The result on one screen, from calibration.json."""
     lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]
+    rejected = calibration["verdict"] == "rejected"
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    heads = f"{'mbes mount':<12}{'coarse':>12}{'calibrated':>14}{'change':>14}{'sigma':>12}"
+    lines += [f"  but look: {warning}" for warning in calibration["warnings"]]
+    heads = f"{'mbes mount':<12}{'coarse':>12}{'computed' if rejected else 'calibrated':>14}{'change':>14}{'sigma':>12}"
     lines += ["", f"{heads}   (result: {calibration['result']})"]
     block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
     for parameter, _, key, of_setting in PARAMETERS:
@@ -31,8 +31,9 @@ def summary(calibration: Mapping[str, Any]) -> str:
         change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
         sigma = f"{block['sigma_mount'][key]:.4f} {unit}" if block["sigma_mount"] else "-"
         lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
-    lines += ["", "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."]
-    if not block["sigma_mount"]:
+    use = "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."
+    lines += ["", "Do not use these values." if rejected else use]
+    if not block["sigma_mount"] and calibration["result"] != "adjustment":
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
     lines.append(_target_line(calibration["target"]))
     lines.append("Points on the target by pass, distance of the INS from the wall, soundings + laser points:")
@@ -49,6 +50,4 @@ def _target_line(target: Mapping[str, Any]) -> str:
     """The target's pose for the screen: an error of the laser's mount or of the origin is seen here first."""
     x, y, z = (signed(value, 3) for value in target["offset_m"])
     azimuth, first, second = (signed(angle, 2) for angle in (target["azimuth_correction_deg"], *target["tilt_deg"]))
-    line = f"Target found at x {x}, y {y}, z {z} m from target.origin, azimuth {azimuth}°, tilt {first}° {second}°."
-    odd = max(map(abs, target["offset_m"])) > ODD_OFFSET_M or max(map(abs, target["tilt_deg"])) > ODD_TILT_DEG
-    return line + (" If it was set up and surveyed better than this, check laser.mount." if odd else "")
+    return f"Target found at x {x}, y {y}, z {z} m from target.origin, azimuth {azimuth}°, tilt {first}° {second}°."

@@ -8,9 +8,18 @@ import numpy as np
 import pandas as pd
 
 from pipeline import config
+from pipeline.mounts import PARAMETERS
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
 FAR_M = 0.05  # a mean residual beyond this is no drift: the model is another
+WORDS_OF_GROUP = {
+    "laser": "laser points",
+    "mbes_vertical": "soundings on vertical faces",
+    "mbes_horizontal": "soundings on horizontal faces",
+}
+ODD_FACTOR = 2.0  # a variance factor above this, or below its inverse, is worth a look
+ODD_CUT = 0.01  # and so is a share of cut observations above this
+ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # and a target found so far off
 NEAR_M = 1.5  # passes whose distances differ by less tell yaw from lever arm y badly
 
 
@@ -45,7 +54,7 @@ def reasons(
         )
     if not summary["test_passed"]:
         found.append(_inconsistency(summary, cells))
-    found += _wide_sigmas(methods["adjustment"]["sigma"], limits)
+    found += _wide_sigmas(methods["adjustment"]["sigma_mount"], limits)
     if chosen != "adjustment":
         found += _patent(chosen, evidence.corrections.set_index("method").loc[chosen], methods, limits)
     return found
@@ -83,27 +92,37 @@ def _ambiguities(evidence: Evidence) -> list[str]:
 
 
 def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
+    """The cell that lies off most; and whether the other sensor lies off there as well."""
     worst = cells.iloc[int(cells["normalised"].abs().argmax())]
-    sensor = "the laser" if worst["sensor"] == "laser" else "the sonar"
-    cause = "INS drift, a clock, the sound speed, a moved bracket, or a wrong laser.mount"
+    place = (cells["family"] == worst["family"]) & (cells["pass"] == worst["pass"])
+    other = cells[place & (cells["sensor"] != worst["sensor"])]["mean_m"]
+    both = bool(len(other)) and float(other.iloc[0]) * worst["mean_m"] > worst["mean_m"] ** 2 / 4
+    one, another = ("the laser", "the sonar") if worst["sensor"] == "laser" else ("the sonar", "the laser")
+    also = f" and {another} {1000 * other.iloc[0]:+.1f} mm" if both else ""
     if abs(worst["mean_m"]) > FAR_M:
         cause = "a wrong target.a, b, c or e, or a coarse mount farther off than segment searches"
+    elif both:
+        cause = "drift of the INS in that pass, or its clock: sail again, in shorter time"
+    elif worst["sensor"] == "mbes":
+        cause = "the sonar's clock, the sound speed, or a bracket that moved"
+    else:
+        cause = "a wrong laser.mount, the laser's clock, or INS drift between the passes"
     return (
-        f"the passes do not agree: in pass {worst['pass']} {sensor} lies {1000 * worst['mean_m']:+.1f} mm off "
-        f"{worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely "
+        f"the passes do not agree: in pass {worst['pass']} {one} lies {1000 * worst['mean_m']:+.1f} mm{also} "
+        f"off {worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely "
         f"{cause}"
     )
 
 
-def _wide_sigmas(sigma: Mapping[str, Any] | None, limits: config.Verdict) -> list[str]:
+def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict) -> list[str]:
     if sigma is None:
         return ["the adjustment has no covariance"]
-    values = [*sigma["rotation_vector_deg"], *sigma["lever_arm_m"]]
-    bounds = [(limits.max_sigma_deg, "°")] * 3 + [(limits.max_sigma_m, " m")] * 3
+    bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
     return [
-        f"sigma of {name} is {value:.4g}{unit}, above the limit of {limit:g}{unit}"
-        for name, value, (limit, unit) in zip(SIX, values, bounds, strict=True)
-        if value > limit
+        f"sigma of {SIX[place]} is {sigma[key]:.4g}{bounds[unit][1]}, above the limit of "
+        f"{bounds[unit][0]:g}{bounds[unit][1]}"
+        for _, place, key, unit in PARAMETERS
+        if sigma[key] > bounds[unit][0]
     ]
 
 
@@ -123,11 +142,37 @@ def _patent(chosen: str, row: Any, methods: Mapping[str, Mapping[str, Any]], lim
     ]
 
 
+def warnings(groups: pd.DataFrame, target: Mapping[str, Any]) -> list[str]:
+    """What does not reject a session, and still wants to be looked at before anyone leaves."""
+    found = []
+    for row in groups.to_dict("records"):
+        factor, cut = row["variance_factor"], row["cut"] / max(row["count"], 1)
+        name = WORDS_OF_GROUP[row["group"]]
+        if (factor > ODD_FACTOR or factor < 1 / ODD_FACTOR) and row["redundancy"] > 1:
+            how = "more" if factor > 1 else "less"
+            found.append(
+                f"{name} scatter {np.sqrt(factor):.1f} times as much as the session's sigmas say: {how} noise, or a "
+                "target that is not as configured"
+            )
+        if cut > ODD_CUT:
+            found.append(f"{100 * cut:.1f} % of {name} were cut as outliers: look at the residuals of the faces")
+    x, y, z = target["offset_m"]
+    tilts = target["tilt_deg"]
+    if max(abs(x), abs(y), abs(z)) > ODD_OFFSET_M or max(map(abs, tilts)) > ODD_TILT_DEG:
+        found.append(
+            f"the target was found {x:+.2f}, {y:+.2f}, {z:+.2f} m (x, y, z) from target.origin, out of plumb by "
+            f"{tilts[0]:+.2f}° and {tilts[1]:+.2f}°: if it was set up and surveyed better than this, check laser.mount"
+        )
+    return found
+
+
 def distance_advice(distances_m: Sequence[float]) -> str:
     """What to sail when all passes lie at about one distance; empty otherwise."""
     if not distances_m or np.ptp(distances_m) >= NEAR_M:
         return ""
     low, high = min(distances_m), max(distances_m)
+    if len(distances_m) == 1:
+        return f"one pass alone has soundings, at {low:.1f} m: sail passes at different distances, such as 4 m and 8 m"
     return (
         f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart: sail passes "
         "at different distances, such as 4 m and 8 m"

@@ -52,6 +52,8 @@ class Seen:
     dropped: dict[str, int]
     epochs_ns: NDArray[np.int64]
     trajectory: Columns
+    lowest_speed_m_s: float = np.inf  # sound speeds recorded with the pings
+    highest_speed_m_s: float = -np.inf
 
 
 def prepare(inputs: Inputs, config: Config) -> None:
@@ -66,7 +68,9 @@ def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Piec
     if source == "laser":
         span = np.array([t_ns.min(), t_ns.max()]) if len(t_ns) else t_ns
         return Piece({"laser_points": chunk.columns}, Seen(len(t_ns), dropped, span, {}))
-    return Piece({"soundings": chunk.columns}, Seen(len(t_ns), dropped, np.unique(t_ns), {}))
+    speed = np.asarray(chunk.columns["sound_speed_m_s"]) if len(t_ns) else np.empty(0)
+    lowest, highest = (float(speed.min()), float(speed.max())) if len(speed) else (np.inf, -np.inf)
+    return Piece({"soundings": chunk.columns}, Seen(len(t_ns), dropped, np.unique(t_ns), {}, lowest, highest))
 
 
 def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config: Config) -> Outputs:
@@ -226,9 +230,15 @@ def _files(partials: dict[str, list[tuple[str, Seen]]]) -> pd.DataFrame:
                     "first_ns": int(epochs.min()) if len(epochs) else -1,
                     "last_ns": int(epochs.max()) if len(epochs) else -1,
                     "rate_hz": rate,
+                    "sound_speed_low_m_s": _finite(min(seen.lowest_speed_m_s for seen in seen_list)),
+                    "sound_speed_high_m_s": _finite(max(seen.highest_speed_m_s for seen in seen_list)),
                 }
             )
     return pd.DataFrame(rows)
+
+
+def _finite(value: float) -> float:
+    return value if np.isfinite(value) else np.nan
 
 
 def _gaps(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.DataFrame:

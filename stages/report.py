@@ -16,7 +16,7 @@ from pipeline.maths.adjustment import COMMON, NAMES
 from pipeline.maths.rotations import exp_so3
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
-from pipeline.verdict import Evidence, distance_advice, reasons
+from pipeline.verdict import Evidence, distance_advice, reasons, warnings
 
 Array = NDArray[np.float64]
 SCHEMA = 1
@@ -42,6 +42,7 @@ class Inputs:
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
+    groups: Annotated[pd.DataFrame, artefacts.GROUPS]
     summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
     provenance: Annotated[dict[str, Any], artefacts.Provenance]
 
@@ -74,12 +75,13 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         config.verdict,
         config.result,
     )
-    summary = inputs.summary.iloc[0]
+    summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0])
     result = {
         "schema": SCHEMA,
         "session": config.name,
         "verdict": "rejected" if found else "accepted",
         "reasons": found,
+        "warnings": warnings(inputs.groups, target),
         "result": config.result,
         "mbes": methods[config.result],
         "methods": methods,
@@ -90,7 +92,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             "advice": distance_advice([one["distance_m"] for one in passes if one["soundings"]]),
             "test": {name: _plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
         },
-        "target": _target(inputs.target_pose.iloc[0]),
+        "target": target,
         "passes": passes,
         "ranges": _range_note(config.mbes),
         "inputs": inputs.provenance["inputs"],

@@ -4,15 +4,15 @@ import pandas as pd
 import pytest
 
 from pipeline.config import Verdict
-from pipeline.verdict import Evidence, distance_advice, reasons
+from pipeline.verdict import Evidence, distance_advice, reasons, warnings
 
-SIGMA = {"rotation_vector_deg": [0.005, 0.002, 0.006], "lever_arm_m": [1e-4, 6e-4, 3e-4]}
+SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
 
 
 def methods(**patent):
-    adjustment = {"sigma": SIGMA, "correction": ZERO}
-    return {"adjustment": adjustment, "patent_alternating": {"sigma": None, "correction": ZERO | patent}}
+    adjustment = {"sigma_mount": SIGMA, "correction": ZERO}
+    return {"adjustment": adjustment, "patent_alternating": {"sigma_mount": None, "correction": ZERO | patent}}
 
 
 def evidence(pose=None, mount=None, summary=None, alternating=None, one_pass=False):
@@ -116,3 +116,44 @@ def test_advice_on_distances():
     assert "all passes lie at 5.9 to 6.1 m" in distance_advice([5.9, 6.1, 6.0])
     assert distance_advice([4.0, 8.0]) == ""
     assert distance_advice([]) == ""
+
+
+def test_both_sensors_off_together_is_the_ins():
+    found = evidence(summary={"test_passed": False})
+    for laser, expected in ((-0.011, "and the laser -11.0 mm off P2"), (0.011, "sonar lies -12.0 mm off P2")):
+        cells = found.cells.copy()
+        cells.loc[len(cells)] = ["laser", "P2", 3, laser, -2.0]
+        (reason,) = reasons(
+            Evidence(found.target_pose, found.provisional_mount, found.corrections, found.summary, cells),
+            methods(), Verdict(), "adjustment",
+        )  # fmt: skip
+        assert expected in reason
+        assert ("drift of the INS" in reason) == (laser < 0)
+
+
+def groups(**changes):
+    row = {"group": "mbes_horizontal", "count": 1000, "redundancy": 990.0, "variance_factor": 1.0, "cut": 0}
+    return pd.DataFrame([row | changes])
+
+
+FOUND = {"offset_m": [0.0, 0.05, -0.09], "tilt_deg": [0.05, -0.05]}
+
+
+@pytest.mark.parametrize(
+    ("change", "pose", "words"),
+    [
+        ({}, {}, None),
+        ({"variance_factor": 1.99}, {}, None),
+        ({"variance_factor": 2.01}, {}, "soundings on horizontal faces scatter 1.4 times as much"),
+        ({"variance_factor": 0.49}, {}, "less noise"),
+        ({"variance_factor": 9.0, "redundancy": 0.0}, {}, None),
+        ({"cut": 10}, {}, None),
+        ({"cut": 11}, {}, "1.1 % of soundings on horizontal faces were cut"),
+        ({}, {"offset_m": [0.0, -0.11, 0.0]}, "check laser.mount"),
+        ({}, {"tilt_deg": [0.0, 0.11]}, "out of plumb by +0.00° and +0.11°"),
+    ],
+)
+def test_what_wants_to_be_looked_at(change, pose, words):
+    found = warnings(groups(**change), FOUND | pose)
+    assert len(found) == (0 if words is None else 1)
+    assert words is None or words in found[0]

@@ -135,12 +135,13 @@ def main() -> None:
 
 
 def _lighten(path: Path) -> None:
-    """As wide as a README shows it, and in 128 colours: a tenth of the size."""
+    """As wide as a README shows it, and a tenth of the size."""
     from PIL import Image
 
     image = Image.open(path).convert("RGB")
     image.thumbnail((WIDTH, 4 * WIDTH))
-    image.quantize(128).save(path, optimize=True)
+    image.save(path.with_suffix(".webp"), quality=85, method=6)
+    path.unlink()
 
 
 if __name__ == "__main__":

@@ -56,6 +56,8 @@ FILES = Artefact(
         Column("first_ns", I64, "ns", "first usable record"),
         Column("last_ns", I64, "ns", "last usable record"),
         Column("rate_hz", F64, "Hz", "median rate of epochs (INS records, pings) or mean rate of laser points"),
+        Column("sound_speed_low_m_s", F64, "m/s", "lowest sound speed recorded with the pings (NaN: no sonar file)"),
+        Column("sound_speed_high_m_s", F64, "m/s", "highest"),
     ),
 )
 GAPS = Artefact(

@@ -10,14 +10,13 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pipeline.diff import shown
-from pipeline.mounts import PARAMETERS, WITHIN_95
+from pipeline.mounts import WITHIN_95
 from pipeline.pages import ALARM, INK, QUIET, STYLE, picture, render
 
 
 def page(found: Mapping[str, Any]) -> str:
     """``found``: from :func:`pipeline.diff.diff`."""
-    by_place = dict(enumerate(found["parameters"]))
-    rows = [{"name": name} | by_place[place] for name, place, *_ in PARAMETERS if place in by_place]
+    rows = found["parameters"]
     return render(
         "comparison.html",
         found=found,
@@ -40,6 +39,6 @@ def _chart(rows: list[dict[str, Any]]) -> Markup:
         axis.axvline(0, color=QUIET, linewidth=0.8)
         widest = max(4.0, 1.1 * (float(np.max(np.abs(z))) + WITHIN_95))
         axis.set(xlim=(-widest, widest), xlabel="b - a, in sigmas of the difference, with 95 % intervals")
-        axis.set_yticks(range(len(rows)), [row["name"] for row in rows])
+        axis.set_yticks(range(len(rows)), [row["parameter"] for row in rows])
         axis.invert_yaxis()
         return picture(figure, "differences of the six values in sigmas")

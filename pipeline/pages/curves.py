@@ -9,17 +9,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.mounts import WITHIN_95
-from pipeline.pages import FAMILY, LASER, MARKS, QUIET, SONAR, picture
+from pipeline.pages import AXIS, FAMILY, FEWEST, LASER, MARKS, QUIET, SONAR, picture
 from pipeline.times import NS
 
-FEWEST = 10  # points in a bin that is shown
+WORDS = {"angle": "swath angle", "range": "distance"}
 LABELS = {"angle": "angle across track, degrees (starboard +)", "range": "distance from the sonar, m"}
 
 
 def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame) -> Markup:
     """Mean residuals of the sonar by face, angle and distance, and of both sensors over time."""
     figure = Figure(figsize=(7.2, 6.0))
-    grid = figure.add_gridspec(3, 2, left=0.08, right=0.99, bottom=0.09, top=0.96, wspace=0.2, hspace=0.55)
+    grid = figure.add_gridspec(3, 2, left=0.08, right=0.98, bottom=0.05, top=0.91, wspace=0.2, hspace=0.55)
     by_face, by_angle, by_range = (figure.add_subplot(grid[place]) for place in ((0, 0), (0, 1), (1, 0)))
     _by_face(by_face, cells)
     shown = bins[(bins["count"] >= FEWEST) & np.isfinite(bins["mean_m"])]
@@ -30,14 +30,14 @@ def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame) -> 
             mean, sigma = 1000 * rows["mean_m"], 1000 * rows["rms_m"] / np.sqrt(rows["count"])
             bars: dict[str, Any] = {"markersize": 3, "linewidth": 0.8, "color": colour}
             axis.errorbar(rows["low"] + rows["width"] / 2, mean, WITHIN_95 * sigma, fmt=f"{MARKS[name]}-", **bars)
-        axis.set(title=f"sonar, by {by}", xlabel=LABELS[by], ylabel="mean residual, mm")
+        axis.set(title=f"sonar, by {WORDS[by]}", xlabel=LABELS[by], ylabel="mean residual, mm")
     spread = figure.add_subplot(grid[1, 1])
     for name, colour in FAMILY.items():
         rows = sonar[(sonar["by"] == "angle") & (sonar["family"] == name)]
         spread.plot(rows["low"] + rows["width"] / 2, 1000 * rows["rms_m"], f"{MARKS[name]}-", color=colour, label=name)
         spread.lines[-1].set(markersize=3, linewidth=0.8)
-    spread.set(title="sonar, scatter by angle", xlabel=LABELS["angle"], ylabel="RMS residual, mm", ylim=(0, None))
-    figure.legend(*spread.get_legend_handles_labels(), loc="lower center", ncols=4, frameon=False)
+    spread.set(title="sonar, scatter by swath angle", xlabel=LABELS["angle"], ylabel="RMS residual, mm", ylim=(0, None))
+    figure.legend(*spread.get_legend_handles_labels(), loc="upper center", ncols=4, frameon=False)
     _over_time(figure.add_subplot(grid[2, :]), shown[shown["by"] == "time"], passes)
     for axis in (by_face, by_angle, by_range):
         axis.axhline(0, color=QUIET, linewidth=0.6)
@@ -51,9 +51,15 @@ def _by_face(axis: Axes, cells: pd.DataFrame) -> None:
             rows = cells[(cells["sensor"] == sensor) & (cells["family"] == name)]
             at = place + side + np.linspace(-0.12, 0.12, len(rows)) if len(rows) > 1 else [place + side] * len(rows)
             bars: dict[str, Any] = {"markersize": 3, "linewidth": 0.8, "color": colour}
-            axis.errorbar(at, 1000 * rows["mean_m"], 1000 * WITHIN_95 * rows["sigma_mean_m"], fmt=MARKS[name], **bars)
+            mean = 1000 * rows["mean_m"].to_numpy()
+            axis.errorbar(at, mean, 1000 * WITHIN_95 * rows["sigma_mean_m"], fmt=MARKS[name], **bars)
+            for x, y, number in zip(at, mean, rows["pass"], strict=True):
+                axis.annotate(f"{number}", (x, y), (2, 2), textcoords="offset points", fontsize=5, color=colour)
+    if len(cells):
+        inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # one cell far off must not hide the others
+        axis.set_ylim(-inner, inner)
     axis.set_xticks(range(len(FAMILY)), list(FAMILY))
-    axis.set(title="by face and pass: laser left (blue), sonar right (red)", ylabel="mean residual, mm")
+    axis.set(title="by face; a mark a pass: laser light blue, sonar orange", ylabel="mean residual, mm")
 
 
 def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
@@ -73,7 +79,7 @@ def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
     if len(middles) <= 20:
         axis.set_xticks(middles, names)
     axis.axhline(0, color=QUIET, linewidth=0.6)
-    axis.set(title="by time: a dot a second and family of faces, laser blue, sonar red", ylabel="mean residual, mm")
+    axis.set(title="by time: a dot a second and family; laser light blue, sonar orange", ylabel="mean residual, mm")
 
 
 def convergence(iterations: pd.DataFrame, alternation: pd.DataFrame) -> Markup:
@@ -81,11 +87,10 @@ def convergence(iterations: pd.DataFrame, alternation: pd.DataFrame) -> Markup:
     figure = Figure(figsize=(7.2, 2.5))
     where = {"left": 0.1, "right": 0.99, "bottom": 0.18, "top": 0.9, "wspace": 0.22}
     angles, turns = figure.subplots(1, 2, gridspec_kw=where)
-    for axis, style in (("roll", "o-"), ("pitch", "s-"), ("yaw", "^-")):
-        colour = dict(zip(("roll", "pitch", "yaw"), FAMILY.values(), strict=False))[axis]
+    for (axis, colour), style in zip(AXIS.items(), ("o-", "s-", "^-"), strict=True):
         size = iterations[f"deviation_{axis}_deg"].abs().clip(lower=1e-9)
         angles.semilogy(iterations["iteration"], size, style, color=colour, label=axis, markersize=3, linewidth=0.8)
-    angles.set(title="angle iteration", xlabel="step", ylabel="deviation of the sonar's planes, °")
+    angles.set(title="angle iteration (offsets not yet applied)", xlabel="step", ylabel="deviation of the planes, °")
     for column, scale, style, label, colour in (
         ("step_deg", 1.0, "o-", "angles, °", SONAR),
         ("step_m", 1000.0, "s-", "offsets, mm", LASER),

@@ -21,6 +21,7 @@ def page(history: History, filters: str) -> str:
         {
             "date": row["date_utc"][:16].replace("T", " "),
             "session": row["session"],
+            "run": row["run"],
             "verdict": row["verdict"],
             "cells": {name: _number(row[key], 4) for name, _, key, _ in PARAMETERS},
             "probability": "" if np.isnan(row["probability"]) else f"{row['probability']:.2g}",
@@ -73,6 +74,13 @@ def _chart(table: pd.DataFrame) -> Markup:
             axis.plot(place[moved], values[moved], "o", **ring)
             axis.set_title(f"{name}, {word}")
             axis.margins(x=0.05, y=0.15)
+            if good.any():  # a rejected session far off must not hide the others: it goes to the edge
+                reach = 1.15 * float(np.max(np.abs(values[good]) + WITHIN_95 * np.nan_to_num(sigma[good]))) + 1e-9
+                axis.set_ylim(-reach, reach)
+                beyond = np.isfinite(values) & (np.abs(values) > reach)
+                for x, up in zip(place[beyond], values[beyond] > 0, strict=True):
+                    edge, mark = (0.96 * reach, "^") if up else (-0.96 * reach, "v")
+                    axis.plot([x], [edge], mark, color=QUIET, markersize=4)
         for axis in (axes[2], axes[5]):
             axis.set_xticks(place, [day[:10] for day in table["date_utc"]], rotation=30, ha="right")
         return picture(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")

@@ -49,13 +49,18 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
     result, settings = calibration(tables.run), read_settings(tables.run)
     faces, passes = tables.table(artefacts.FACES), tables.table(artefacts.PASSES)
     gaps = tables.table(artefacts.GAPS).sort_values("duration_s", ascending=False)
-    calibrations = tables.table(artefacts.CALIBRATION)
+    calibrations, files = tables.table(artefacts.CALIBRATION), tables.table(artefacts.FILES)
     return render(
         "report.html",
         result=result,
         run=tables.run.name,
         date=str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
-        six=_six(calibrations, result["result"]),
+        six=_six(calibrations, result["result"], settings.pool.verdict),
+        frame=tables.table(artefacts.POOL_FRAME).to_dict("records")[0],
+        largest=_largest(tables.table(artefacts.CELLS)),
+        tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
+        given_speed=settings.session.mbes.sound_speed_m_s,
+        speeds=_speeds(files),
         methods=METHODS,
         by_method=list(_by_method(calibrations)),
         closing=tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
@@ -65,7 +70,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
         summary=tables.table(artefacts.ADJUST_SUMMARY).to_dict("records")[0],
         pictures=_pictures(tables, faces, passes),
         tracks=passes.to_dict("records"),
-        files=tables.table(artefacts.FILES).to_dict("records"),
+        files=files.to_dict("records"),
         gaps=gaps.head(MOST_GAPS).to_dict("records"),
         more_gaps=max(0, len(gaps) - MOST_GAPS),
         counts=[row | {"stage": stage} for stage, one in done.items() for row in one.counts if row["count"]],
@@ -87,16 +92,41 @@ class _Value:
     def __str__(self) -> str:
         return self.text()
 
+    @property
+    def known(self) -> bool:
+        return bool(np.isfinite(self.number))
+
     def text(self, sign: str = "") -> str:
         if not np.isfinite(self.number):
             return "–"
         return f"{round(self.number, 4) + 0.0:{sign}.4f} {'°' if self.unit == 'deg' else self.unit}"
 
 
-def _six(table: pd.DataFrame, method: str) -> list[dict[str, Any]]:
+def _six(table: pd.DataFrame, method: str, limits: config.Verdict) -> list[dict[str, Any]]:
     rows = table[table["method"] == method].to_dict("records")
+    bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
     values = ("coarse", "total", "change", "correction", "sigma_total", "low_95", "high_95")
-    return [{"name": row["parameter"]} | {key: _Value(row[key], row["unit"]) for key in values} for row in rows]
+    return [
+        {"name": row["parameter"], "limit": _Value(bounds[row["unit"]], row["unit"])}
+        | {key: _Value(row[key], row["unit"]) for key in values}
+        for row in rows
+    ]
+
+
+def _largest(cells: pd.DataFrame) -> Row:
+    """The mean residual that lies off most."""
+    if not len(cells):
+        return {"mean_m": np.nan, "sensor": "no points", "family": "", "pass": ""}
+    rows: list[Any] = cells.to_dict("records")
+    return dict(max(rows, key=lambda row: abs(row["mean_m"])))
+
+
+def _speeds(files: pd.DataFrame) -> str:
+    """The sound speeds recorded, from the lowest to the highest."""
+    low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
+    if not np.isfinite(low):
+        return ""
+    return f"{low:.1f} m/s" if high - low < 0.05 else f"{low:.1f} to {high:.1f} m/s"
 
 
 def _by_method(table: pd.DataFrame) -> Iterator[Row]:

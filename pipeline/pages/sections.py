@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pipeline.maths.residuals import face_axes
-from pipeline.pages import COARSE, INK, LASER, QUIET, SONAR, picture
+from pipeline.pages import COARSE, FEWEST, INK, LASER, QUIET, SONAR, picture
 
 Array = NDArray[np.float64]
 FAMILIES = ("P1", "P2", "P3", "H")
@@ -29,7 +29,7 @@ CLOUDS = (  # sensor, prefix of the columns, words, colour; in the order in whic
 def sections(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any]) -> Markup:
     """Target from above and from the boat, to scale, and one wet block near by; ``family``: of each residual."""
     figure = Figure(figsize=(7.2, 3.8))
-    where = {"left": 0.07, "right": 0.99, "bottom": 0.19, "top": 0.93, "wspace": 0.25}
+    where = {"left": 0.07, "right": 0.98, "bottom": 0.19, "top": 0.93, "wspace": 0.25}
     above, ahead, near = figure.subplots(1, 3, width_ratios=[1.0, 2.6, 2.6], gridspec_kw=where)
     corners = {row["face"]: np.reshape(row["vertices_target_m"], (-1, 3)) for row in faces.to_dict("records")}
     depth = max(float(points[:, 0].max()) for points in corners.values()) / 2
@@ -40,7 +40,8 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any])
         cloud = residuals.loc[of_sensor & vertical, columns].to_numpy()
         _dots(above, cloud[:, 0], cloud[:, 1], colour, label)
         cloud = residuals.loc[of_sensor & blocks, columns].to_numpy()
-        cloud = cloud[np.abs(cloud[:, 0] - depth) < HALF_SLICE_M]
+        near_cut = np.abs(cloud[:, 0] - depth) < HALF_SLICE_M
+        cloud = _along_faces(cloud[near_cut], family[of_sensor & blocks][near_cut], depth)
         _dots(ahead, cloud[:, 1], cloud[:, 2], colour, label)
         _dots(near, cloud[:, 1], cloud[:, 2], colour, label, 5.0)
     for points in corners.values():
@@ -60,13 +61,24 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any])
     return picture(figure, "sections through the target with points of laser and sonar, coarse and calibrated")
 
 
+def _along_faces(points: Array, family: NDArray[Any], depth: float) -> Array:
+    """Points moved into the cutting plane x = depth along their faces, which stand at 45° to it, or lie flat."""
+    moved = points.copy()
+    slope = np.where(family == "P3", 1.0, np.where(family == "P1", -1.0, 0.0))
+    moved[:, 1] += slope * (depth - points[:, 0])
+    return moved
+
+
 def _near(axis: Axes, soundings: pd.DataFrame, corners: Mapping[int, Array], depth: float) -> None:
     """Set the panel to the block whose slanted face has the most soundings."""
-    if len(soundings):
+    if len(soundings) >= FEWEST:
         (cut,) = _cut(corners[int(soundings["face"].mode().iloc[0])], depth)
         low, high = cut[:, 1:].min(axis=0), cut[:, 1:].max(axis=0)
         middle, half = (low + high) / 2, max(high - low) * 1.1
         axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
+    else:
+        axis.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
+        axis.text(0.5, 0.5, "too few soundings", transform=axis.transAxes, ha="center", color=QUIET)
 
 
 def _cut(corners: Array, x: float) -> list[Array]:
@@ -82,7 +94,7 @@ def _cut(corners: Array, x: float) -> list[Array]:
 def distances(residuals: pd.DataFrame, family: NDArray[Any]) -> Markup:
     """Each family's points by their distance from the adjusted surface, in millimetres."""
     figure = Figure(figsize=(7.2, 3.2))
-    where = {"left": 0.07, "right": 0.99, "bottom": 0.23, "top": 0.92, "wspace": 0.1}
+    where = {"left": 0.07, "right": 0.97, "bottom": 0.23, "top": 0.92, "wspace": 0.16}
     panels = figure.subplots(1, 4, sharey=True, gridspec_kw=where)
     for axis, name in zip(panels, FAMILIES, strict=True):
         largest = 5.0
@@ -112,26 +124,29 @@ def _legend(figure: Figure, axis: Axes) -> None:
 
 def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
     """Mean residual over each family of faces as one sees it from the boat; H from above."""
-    figure = Figure(figsize=(7.2, 3.1))
-    where = {"left": 0.07, "right": 0.87, "bottom": 0.1, "top": 0.9, "wspace": 0.25}
+    figure = Figure(figsize=(7.2, 2.9))
+    where = {"left": 0.07, "right": 0.87, "bottom": 0.15, "top": 0.92, "wspace": 0.25}
     panels = figure.subplots(1, 4, width_ratios=[1, 2, 1, 0.8], gridspec_kw=where)
+    order = ("P3", "P2", "P1", "H")  # as one sees them from the boat, y growing to the left
     family = dict(zip(faces["face"], faces["family"], strict=True))
     normal = {
         row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in faces.to_dict("records")
     }
-    cells = residual_map[(residual_map["sensor"] == sensor) & np.isfinite(residual_map["mean_m"])]
+    enough = (residual_map["count"] >= FEWEST) & np.isfinite(residual_map["mean_m"])
+    cells = residual_map[(residual_map["sensor"] == sensor) & enough]
     of_family = np.array([family[face] for face in cells["face"]], dtype=object)
     span = max(1.0, 1000 * float(np.quantile(np.abs(cells["mean_m"]), 0.95))) if len(cells) else 1.0
     z = cells.loc[of_family != "H", "z_target_m"]
     heights = (z.min() - 0.1, z.max() + 0.1) if len(z) else (0.0, 1.0)
     image = None
-    for axis, name in zip(panels, FAMILIES, strict=True):
+    for axis, name in zip(panels, order, strict=True):
         inside = cells[of_family == name]
         flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
         size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
         image = _grid(axis, flat[:, 0], flat[:, 1], 1000 * inside["mean_m"].to_numpy(), size, span) or image
         axis.set(title=name if name != "H" else "H, from above", aspect="equal")
         axis.set_xticks(np.round(axis.get_xlim(), 1))
+        axis.set_xlabel("x, m" if name == "H" else "to the right, m")
         if name != "H":
             axis.set_ylim(*heights)
     panels[0].set_ylabel("z, height, m")

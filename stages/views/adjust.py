@@ -19,6 +19,7 @@ from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, words
 Array = NDArray[np.float64]
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SENSORS = {"laser": LASER, "mbes": SONAR}
+FEWEST = 10  # points behind a mean that is shown
 RAYS = 60  # of a fan
 MOMENT_NS = NS // 50  # points of one fan lie within this time
 
@@ -27,7 +28,7 @@ def log(recording: Any, tables: Tables) -> None:
     faces, residuals = tables.table(artefacts.FACES), tables.table(artefacts.RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span = _span(residuals)
-    _clouds(recording, residuals, family, tables.table(artefacts.GROUPS), span)
+    _clouds(recording, tables, residuals, family, span)
     _maps(recording, tables.table(artefacts.RESIDUAL_MAP), faces, span)
     _fans(recording, tables, residuals)
     _over_time(recording, tables.table(artefacts.RESIDUAL_BINS))
@@ -45,17 +46,20 @@ def _span(residuals: pd.DataFrame) -> dict[str, float]:
 
 
 def coloured(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
-    """Blue before the surface is negative, grey zero, red positive; (n, 3)."""
+    """Blue is negative, grey zero, orange positive; (n, 3)."""
     share = np.clip(np.asarray(residual_m, dtype=np.float64) / span_m, -1, 1)[:, None]
     end = np.where(share < 0, LASER, SONAR)
     return np.asarray(np.round((1 - abs(share)) * np.array((205, 205, 205)) + abs(share) * end), dtype=np.uint8)
 
 
-def _clouds(recording: Any, residuals: pd.DataFrame, family: Any, groups: pd.DataFrame, span: dict[str, float]) -> None:
+def _clouds(recording: Any, tables: Tables, residuals: pd.DataFrame, family: Any, span: dict[str, float]) -> None:
     import rerun as rr
 
+    surfaces: Any = tables.table(artefacts.SURFACES).to_dict("records")
+    # shown on its surface: in front of it a point would hide those behind, and all would look as if they stood before
+    normals = {row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in surfaces}
     total = {"laser": 0, "mbes": 0}
-    for row in groups.to_dict("records"):
+    for row in tables.table(artefacts.GROUPS).to_dict("records"):
         total["laser" if row["group"] == "laser" else "mbes"] += row["count"]
     for sensor in SENSORS:
         of_sensor = (residuals["sensor"] == sensor).to_numpy()
@@ -64,7 +68,8 @@ def _clouds(recording: Any, residuals: pd.DataFrame, family: Any, groups: pd.Dat
             rows = residuals[of_sensor & (family == name)]
             points = rows[XYZ].to_numpy()
             colours = coloured(rows["residual_m"].to_numpy(), span[sensor])
-            cloud = rr.Points3D(points, radii=DOT_M, colors=colours)
+            away = rows["residual_m"].to_numpy()[:, None] * normals.get(name, np.zeros(3))
+            cloud = rr.Points3D((points - away).astype(np.float32), radii=DOT_M, colors=colours)
             recording.log(f"residuals/{sensor}/{name}", cloud, step, static=True)
             if sensor == "mbes":
                 coarse = rows[[f"coarse_{column}" for column in XYZ]].to_numpy()
@@ -77,7 +82,7 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
     """Square cells as coloured quads a centimetre before their face."""
     import rerun as rr
 
-    cells = cells[np.isfinite(cells["mean_m"])]
+    cells = cells[np.isfinite(cells["mean_m"]) & (cells["count"] >= FEWEST)]
     normals = np.column_stack([faces[f"normal_{axis}_target_1"] for axis in "xyz"])
     family = faces["family"].to_numpy()
     for sensor in SENSORS:
@@ -121,7 +126,7 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
         positions, R_target_from_body = trajectory.poses_at(fan["t_ns"].to_numpy())
         origins = positions + R_target_from_body @ mounts[str(sensor)].lever_arm_body_m
         rays = np.stack([origins, fan[XYZ].to_numpy(np.float64)], axis=1).astype(np.float32)
-        lines = rr.LineStrips3D(rays, radii=0.004, colors=SENSORS[str(sensor)])
+        lines = rr.LineStrips3D(rays, radii=0.004, colors=SONAR if sensor == "mbes" else GREY)
         recording.log(f"fans/{sensor}/pass_{number}", lines, static=True)
 
 
@@ -155,14 +160,14 @@ def _over_time(recording: Any, bins: pd.DataFrame) -> None:
             of_family = rows[(rows["family"] == name) & np.isfinite(rows["mean_m"])]
             if len(of_family):
                 where = of_family["low"].to_numpy() + 0.5
-                shade = colour if sensor == "mbes" else GREY
+                shade = colour if sensor == "mbes" else tuple((part + 2 * 160) // 3 for part in colour)
                 curve(f"quality/residual/{sensor}/{name}", where, 1000 * of_family["mean_m"].to_numpy(), shade)
 
 
 def _words(recording: Any, tables: Tables, span: dict[str, float]) -> None:
     matrix = tables.table(artefacts.COVARIANCE)["correlation"].to_numpy().reshape(6, 6)
     places = [place for _, place, *_ in PARAMETERS]
-    lines = ["Colours: blue, grey, red from minus to plus; the strongest at"]
+    lines = ["Colours: blue, grey, orange from minus to plus; the strongest at"]
     lines += [f"  {s}: {1000 * span[s]:.1f} mm (points), {1000 * span[s] / 3:.1f} mm (means)" for s in SENSORS]
     lines += ["Plus: towards the boat, of horizontal faces up.", "", "Observations, and their variance factors:"]
     for row in tables.table(artefacts.GROUPS).to_dict("records"):

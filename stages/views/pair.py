@@ -1,13 +1,20 @@
-"""Two runs in one recording: everything of the first under /a, of the second under /b, and what differs in words."""
+"""Two runs in one recording: the first under /a, the second under /b, and both with the mount of the first."""
 
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from pipeline import artefacts
 from pipeline.diff import text
+from pipeline.folder import calibration
+from pipeline.poses import trajectory_in_target
+from pipeline.streams import xyz
 from pipeline.tables import Tables
-from stages.views import log, recording_id, save, words
+from stages.views import DOT_M, LASER, SONAR, log, recording_id, save, words
 from stages.views.tour import side_by_side
 
+SOUNDINGS = 200_000  # of a run, on one target
 SHOWN = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # in the target's frame
 
 
@@ -34,6 +41,26 @@ def save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> N
         for name, run in (("a", first), ("b", second)):
             for stage in SHOWN:
                 log(Below(recording, name), stage, Tables(run))
+        _on_one_target(recording, Tables(first), Tables(second))
         recording.log("tables/comparison", words(text(found)), static=True)
 
     save(path, recording_id(first, second), side_by_side(), draw)
+
+
+def _on_one_target(recording: Any, first: Tables, second: Tables) -> None:
+    """Soundings of both runs with the mount of the first: a sonar that has moved hangs beside the faces."""
+    import rerun as rr
+
+    block = calibration(first.run)["mbes"]
+    if block["mount"] is None:
+        return
+    rotation, lever_arm = np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"])
+    for name, tables, colour in (("a", first, LASER), ("b", second, SONAR)):
+        axes = [f"{axis}_mbes_m" for axis in "xyz"]
+        columns, step = tables.sample(artefacts.SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", *axes)
+        trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
+        positions, R_target_from_body = trajectory.poses_at(columns["t_ns"].astype(np.int64))
+        body = xyz(columns, "mbes_m") @ rotation.T + lever_arm
+        points = (positions + np.einsum("nij,nj->ni", R_target_from_body, body)).astype(np.float32)
+        cloud = rr.Points3D(points, radii=DOT_M, colors=colour)
+        recording.log(f"both/{name}", cloud, rr.AnyValues(one_in=step), static=True)

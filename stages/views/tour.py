@@ -21,12 +21,12 @@ def tour() -> Any:
             name=overview,
         ),
         rrb.Horizontal(
-            _scene("Soundings with the coarse mount", "/before/**", "/target/**", "/planes/**"),
+            _scene("Soundings and their planes with the coarse mount", "/before/**", "/target/**", "/planes/mbes/**"),
             _scene("Soundings with the calibrated mount", "/after/**", "/target/**"),
             name=change,
         ),
         rrb.Horizontal(
-            _scene("Soundings and normals, step by step", "/iteration/**", "/target/model/**"),
+            _scene("Step by step, offsets not yet applied", "/iteration/**", "/target/model/**"),
             rrb.Vertical(
                 _curves("/curves/deviation", "Deviation of the sonar's planes, degrees"),
                 _curves("/curves/planes", "Angle between sonar's and laser's planes, degrees"),
@@ -61,11 +61,11 @@ def side_by_side() -> Any:
 
     return _blueprint(
         rrb.Horizontal(
-            _scene("a: soundings", "/a/before/**", "/a/after/**", "/a/target/model/**"),
-            _scene("b: soundings", "/b/before/**", "/b/after/**", "/b/target/model/**"),
+            _scene("a: soundings, calibrated", "/a/after/**", "/a/target/model/**"),
+            _scene("b: soundings, calibrated", "/b/after/**", "/b/target/model/**"),
             name="Side by side",
         ),
-        _scene("Both on one target", "/a/after/**", "/b/after/**", "/a/target/**", "/b/target/model/**"),
+        _scene("Both with the mount of a: a blue, b orange", "/both/**", "/a/target/model/**"),
         rrb.Horizontal(
             _words("/tables/comparison", "Comparison"),
             _words("/a/tables/summary", "a"),

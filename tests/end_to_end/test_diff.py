@@ -83,7 +83,21 @@ def test_another_target_compares_the_mount_alone(undisturbed: tuple[Path, Told],
     assert found["joint"]["probability"] > 0.01
 
 
+def test_a_rejected_run_answers_nothing(undisturbed: tuple[Path, Told], again: Place) -> None:
+    """Its values must not be used, so they say neither yes nor no; unless they are the same."""
+    again.edit_config("verdict", max_sigma_deg=1e-6)
+    again.edit_config("segment", margin_m=0.05)
+    assert again.calibrate().status == 1
+    status, found = compared(undisturbed[0], again.run)
+    assert (status, found["answered"]) == (1, False)
+    assert found["sentence"].startswith("no answer: b (2026-05-12_small) was rejected")
+    status, found = compared(again.run, again.run)
+    assert (status, found["answered"]) == (0, True)
+    assert found["sentence"].startswith("the same result in both; a (")
+
+
 def test_a_folder_that_is_no_run_is_refused(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    assert "there is no such folder" in poolcal("diff", undisturbed[0], tmp_path / "nowhere").err
     told = poolcal("diff", undisturbed[0], tmp_path)
     assert told.status == 2
     assert "no complete result" in told.err

@@ -113,16 +113,26 @@ def test_before_after_residuals_maps_and_fans(drawn: Path) -> None:
     residuals = pd.read_parquet(drawn / "adjust" / "residuals.parquet")
     faces = pd.read_parquet(drawn / "segment" / "faces.parquet")
     family = faces["family"].to_numpy()[residuals["face"]]
+    surfaces = pd.read_parquet(drawn / "adjust" / "surfaces.parquet").set_index("family")
     for name in ("P1", "P2", "P3", "H"):
         rows = residuals[(residuals["sensor"] == "mbes") & (family == name)]
-        for path, prefix in ((f"/before/{name}", "coarse_"), (f"/after/{name}", ""), (f"/residuals/mbes/{name}", "")):
+        for path, prefix in ((f"/before/{name}", "coarse_"), (f"/after/{name}", "")):
             expected = rows[[f"{prefix}{axis}_target_m" for axis in "xyz"]].to_numpy()
             np.testing.assert_array_equal(points(found[path]).reshape(-1, 3), expected)
+        surface = surfaces.loc[name]
+        normal = surface[[f"normal_{axis}_target_1" for axis in "xyz"]].to_numpy(dtype=float)
+        shown = points(found[f"/residuals/mbes/{name}"]).reshape(-1, 3)
+        face = faces.loc[rows["face"]]
+        height = (face["distance_m"] * face["normal_z_target_1"]).to_numpy() if name == "H" else 0.0
+        np.testing.assert_allclose(shown @ normal, surface["distance_m"] + height, atol=5e-6)  # on its surface
     wall = np.abs(points(found["/before/P2"])[:, 0]).mean(), np.abs(points(found["/after/P2"])[:, 0]).mean()
     assert wall[0] > 3 * wall[1]
     cells = pd.read_parquet(drawn / "adjust" / "residual_map.parquet").query("sensor == 'mbes'")
-    cells = cells[np.isfinite(cells["mean_m"])]
+    cells = cells[np.isfinite(cells["mean_m"]) & (cells["count"] >= 10)]
     for name in ("P1", "P2", "P3", "H"):
+        if f"/maps/mbes/{name}" not in found:
+            assert not (faces["family"].to_numpy()[cells["face"]] == name).any()
+            continue
         (chunk,) = found[f"/maps/mbes/{name}"]
         corners = np.array(chunk.column("Mesh3D:vertex_positions").to_pylist()[0])
         rows = cells[(faces["family"].to_numpy()[cells["face"]] == name)]
@@ -234,6 +244,10 @@ def test_two_runs_in_one_recording(undisturbed: tuple[Path, Told], tmp_path: Pat
     for chunk in RrdReader(out).stream():
         found[str(chunk.entity_path)].append(chunk.to_record_batch())
     np.testing.assert_array_equal(points(found["/a/after/P2"]), points(found["/b/after/P2"]))
+    np.testing.assert_allclose(points(found["/both/a"]), points(found["/both/b"]), atol=1e-6)
+    after = np.concatenate([points(found[f"/a/after/{family}"]) for family in ("P1", "P2", "P3", "H")])
+    shown = points(found["/both/a"])
+    np.testing.assert_allclose(shown[np.lexsort(shown.T)], after[np.lexsort(after.T)], atol=1e-5)  # the mount is a's
     assert "/pool/laser" not in found
     assert "the same result in both." in text(found, "/tables/comparison")
     assert "ACCEPTED" in text(found, "/b/tables/summary")

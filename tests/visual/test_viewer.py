@@ -61,7 +61,7 @@ def views_of(blueprint: dict[str, Any], tab: str) -> set[str]:
 def test_a_scrub_through_the_iteration_closes_the_planes(client: Any, tmp_path: Path) -> None:
     """The sonar's planes and points move from step to step, and come to rest."""
     show_tab(client, "Iteration")
-    (scene,) = (view.view_id for view in client.get_state().views if view.name.startswith("Soundings and normals"))
+    (scene,) = (view.view_id for view in client.get_state().views if view.name.startswith("Step by step"))
     end = next(t.end for t in client.get_state().recordings[0].timelines if t.name == "iteration")
     frames = []
     for step in (0, 1, 2, end - 1, end):
