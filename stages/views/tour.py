@@ -65,7 +65,10 @@ def side_by_side() -> Any:
             _scene("b: soundings, calibrated", "/b/after/**", "/b/target/model/**"),
             name="Side by side",
         ),
-        _scene("Both with the mount of a: a blue, b orange", "/both/**", "/a/target/model/**"),
+        rrb.Horizontal(
+            _scene("Both with the mount of a: a blue, b orange", "/both/**", "/a/target/model/**"),
+            name="On one target",
+        ),
         rrb.Horizontal(
             _words("/tables/comparison", "Comparison"),
             _words("/a/tables/summary", "a"),
