@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import artefacts, manifest
+from pipeline.drawn import agreeing
 from pipeline.errors import ArtefactError
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.comparison import Estimate, compare
@@ -39,24 +40,36 @@ class RunRead:
 
     @classmethod
     def read(cls, path: Path, stages: tuple[str, ...]) -> "RunRead":
-        found = {}
+        if not path.is_dir():
+            raise ArtefactError(f"{path}: there is no such folder; name a run folder")
         for stage in stages:
-            one = manifest.read(path / stage)
-            if one is None and not path.is_dir():
-                raise ArtefactError(f"{path}: there is no such folder; name a run folder")
-            if one is None:
+            if manifest.read(path / stage) is None:
                 raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")
-            found[stage] = one
-        return cls(path, read_settings(path), calibration(path), found)
+        found = agreeing(path, stages)
+        for stage in stages:
+            if stage not in found:
+                raise ArtefactError(f"{path}: {stage} was made from other settings or results; run poolcal run again")
+        result = calibration(path)
+        try:
+            estimate_of(result)
+            for name in ("inputs", "software"):
+                manifest.flattened(result[name])
+            str(result["session"])
+        except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
+            raise ArtefactError(f"{path}: its calibration.json is not as poolcal writes it; run it again") from error
+        return cls(path, read_settings(path), result, found)
 
 
 def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
     """The adjustment's, from calibration.json: the patent's forms have no covariance to test with."""
     block = result["methods"]["adjustment"]
-    if block["covariance"] is None:
+    if block["covariance"] is None or block["mount"] is None:
         return None
     shapes = {"R_body_from_mbes": (3, 3), "lever_arm_m": (3,), "covariance": (6, 6)}
-    return Estimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
+    found = Estimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
+    if not np.linalg.eigvalsh(found.covariance).min() > 0:
+        raise ValueError("the covariance is not positive")
+    return found
 
 
 def diff(
@@ -236,8 +249,8 @@ def text(found: Mapping[str, Any]) -> str:
             cells = (shown(r["angle_deg"], "deg", ""), shown(r["distance_m"], "m"), shown(r["rms_m"], "m"))
             lines.append(f"{name:<16}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}")
     if any(row["difference"] for row in found["parameters"]):
-        lines += ["", "mount, b - a; angles are rotations about the body's axes y (roll), x (pitch), z (yaw)"]
-        lines.append(f"{'':<16}{'difference':>14}{'sigma':>14}{'in sigmas':>12}")
+        lines += [""]
+        lines.append(f"{'mount, b - a':<16}{'difference':>14}{'sigma':>14}{'in sigmas':>12}")
         for r in found["parameters"]:
             size = f"{shown(r['difference'], r['unit']):>14}{shown(r['sigma'], r['unit'], ''):>14}{r['z']:>12.1f}"
             lines.append(f"  {r['parameter']:<14}{size}{'  moved' if r['moved'] else ''}")

@@ -1,26 +1,47 @@
-"""Whether RUN/report/report.html shows the run as it is now. (Apart from drawing it, which loads a lot.)"""
+"""What may be drawn together, and whether RUN/report/report.html shows the run as it is now."""
 
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from pipeline import manifest
+from pipeline import folder, manifest
 
 PAGE = "report.html"
-HEAD = 2000  # letters within which the page says what it was drawn from
+HEAD = 2000  # bytes within which the page says what it was drawn from
 
 
-def drawn_from(done: Mapping[str, manifest.Manifest]) -> str:
+def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
+    """The finished stages that follow from each other and from run.yaml, in order."""
+    settings = folder.read_settings(run).resolved_plainly()
+    found: dict[str, manifest.Manifest] = {}
+    for stage in stages:
+        one = manifest.read(run / stage)
+        if one is not None and manifest.consistent(found | {stage: one}) and _as_set(one, settings):
+            found[stage] = one
+    return found
+
+
+def _as_set(one: manifest.Manifest, settings: Mapping[str, Any]) -> bool:
+    """Whether the stage ran with the settings in run.yaml."""
+    return all(name in settings and settings[name] == value for name, value in one.key.config.items())
+
+
+def drawn_from(run: Path, done: Mapping[str, manifest.Manifest]) -> str:
     """Of everything that the page shows: it changes whenever a result, a setting or a raw file does."""
-    shown = [[stage, one.outputs, one.key.config, one.key.raw] for stage, one in done.items()]
-    return hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
+    shown = [[stage, one.outputs, one.key.raw] for stage, one in done.items()]
+    settings = folder.read_settings(run).as_json()
+    return hashlib.sha256(json.dumps([shown, settings], sort_keys=True).encode()).hexdigest()
 
 
 def page_to_draw(run: Path, stages: Sequence[str]) -> bool:
     """Whether the page is missing or shows something else. Stages that do not agree are not drawn together."""
-    done = {stage: found for stage in stages if (found := manifest.read(run / stage)) is not None}
-    if len(done) < len(stages) or not manifest.consistent(done):
+    done = agreeing(run, stages)
+    if len(done) < len(stages):
         return False
     path = run / "report" / PAGE
-    return not path.is_file() or f'content="{drawn_from(done)}"' not in path.read_text(encoding="utf-8")[:HEAD]
+    if not path.is_file():
+        return True
+    with path.open("rb") as file:
+        return f'content="{drawn_from(run, done)}"'.encode() not in file.read(HEAD)

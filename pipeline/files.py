@@ -51,11 +51,20 @@ def _errno_in(message: str) -> int | None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """UTF-8, and whole or not at all: written beside, then renamed over."""
+    """UTF-8, and whole or not at all."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Whole or not at all: written beside, on the disk, then renamed over. No link that lies in the way is followed."""
     beside = path.with_name(path.name + ".new")
     with writing(path):
         try:
-            beside.write_text(text, encoding="utf-8", newline="\n")
+            beside.unlink(missing_ok=True)
+            with beside.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
             beside.replace(path)
         except OSError:
             with contextlib.suppress(OSError):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import yaml
+from pydantic import BaseModel
 
 from pipeline import config, manifest
 from pipeline.errors import ArtefactError, ConfigError
@@ -33,6 +34,13 @@ class Settings:
         blocks = (self.pool, self.session)
         found = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
         return found | {"target_place": self.pool.target_place, "recordings": self.session.recordings}
+
+    def resolved_plainly(self) -> dict[str, Any]:
+        """The same as plain values."""
+        return {
+            name: value.model_dump(mode="json") if isinstance(value, BaseModel) else value
+            for name, value in self.resolved().items()
+        }
 
     def as_json(self) -> dict[str, Any]:
         """The same as plain values, defaults filled in."""

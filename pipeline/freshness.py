@@ -5,9 +5,6 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
-
-from pydantic import BaseModel
 
 from pipeline import manifest, readers
 from pipeline.artefacts import Artefact, Document, Provenance, Raw
@@ -52,7 +49,7 @@ def present(this: Run, where: Path, old: manifest.Manifest) -> dict[str, str | N
 
 
 def key_of(this: Run, stage: ModuleType) -> manifest.Key:
-    settings = this.settings.resolved()
+    settings = this.settings.resolved_plainly()
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
     for marker in declared(stage.Inputs).values():
@@ -62,12 +59,8 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
             raw |= {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
-    config = {field.name: _plain(settings[field.name]) for field in dataclasses.fields(stage.Config)}
+    config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
     return manifest.Key(config, raw, inputs, manifest.source_of(stage), manifest.versions())
-
-
-def _plain(setting: Any) -> Any:
-    return setting.model_dump(mode="json") if isinstance(setting, BaseModel) else setting
 
 
 def raw_digests(this: Run, sensor: str) -> dict[str, str]:

@@ -163,18 +163,20 @@ def view(
     """
     import tempfile
 
+    from pipeline import folder
     from stages.drawing import Painters
     from stages.views import recordings_of, show
 
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
+        folder.read_settings(first)
         _say_failures(Painters(report=False, recordings=True).draw(first))
         return show(recordings_of(first, stage))
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "pair.rrd"
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place) / "pair.rrd"
         _save_pair(first, second, _comparison(first, second), path)
         return show([path])
 
@@ -201,6 +203,8 @@ def diff(
     from pipeline.files import write_text
 
     found = _comparison(first, second, tolerance_deg, tolerance_mm)
+    for option, file in (("--html", html), ("--rrd", rrd)):
+        _refuse_output(option, file, first, second)
     if html is not None:
         from pipeline.pages.comparison import page
 
@@ -209,6 +213,20 @@ def diff(
         _save_pair(first, second, found, rrd)
     say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else comparing.text(found), sys.stdout)
     return 1 if comparing.is_moved(found) else 0
+
+
+def _refuse_output(option: str, file: Path | None, *runs: Path) -> None:
+    """A picture goes to a file of its kind, never over a run's results or anything else."""
+    if file is None:
+        return
+    suffix = option.replace("--", ".")
+    if file.suffix != suffix:
+        raise ConfigError(f"{option} {file}: name a file that ends in {suffix}")
+    if file.exists() and not file.is_file():
+        raise ConfigError(f"{option} {file}: is no file; name another")
+    for run_folder in runs:
+        if file.resolve().is_relative_to(run_folder.resolve()):
+            raise ConfigError(f"{option} {file}: lies in the run folder {run_folder}; name a file elsewhere")
 
 
 def _comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
@@ -320,6 +338,9 @@ def call(arguments: list[str]) -> int:
 
 def main() -> None:
     """The console script."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by the shell; open to the end
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         reconfigure: Any = getattr(stream, "reconfigure", None)
         if reconfigure is not None:

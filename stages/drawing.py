@@ -7,6 +7,7 @@ stages run, and draw when they are told to: ``python -m stages.drawing`` reads o
 import contextlib
 import ctypes
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -16,12 +17,13 @@ from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 
-from pipeline import folder, manifest
-from pipeline.drawn import PAGE, page_to_draw
+from pipeline import folder
+from pipeline.drawn import PAGE, agreeing, page_to_draw
 from pipeline.errors import PoolcalError
 from stages import ORDER
 
 RECORDINGS = "recordings"
+PATIENCE_S = 600
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
 
 
@@ -38,50 +40,69 @@ class Failure:
         expected = isinstance(error, (PoolcalError, OSError))
         trace = "" if expected else "".join(traceback.format_exception(error)).rstrip()
         first = str(error).partition("\n")[0]
-        return cls(PAGE if name == PAGE else RECORDINGS, f"{type(error).__name__}: {first}", trace)
+        return cls(RECORDINGS if name in ORDER else name, f"{type(error).__name__}: {first}", trace)
 
 
 class Painters:
     """One process for the page and one for the recordings, loading; or none, and this process draws."""
 
     def __init__(self, report: bool, recordings: bool, beside: bool = False) -> None:
-        self._wanted = {PAGE: report, RECORDINGS: recordings}
-        command = [sys.executable, "-m", "stages.drawing"]
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "start_new_session": True, "text": True}
-        self._processes: dict[str, subprocess.Popen[str]] = {
-            what: subprocess.Popen([*command, what], **pipes)  # type: ignore[call-overload]
-            for what, wanted in self._wanted.items()
-            if wanted and beside
-        }
+        self._wanted = [what for what, wanted in ((PAGE, report), (RECORDINGS, recordings)) if wanted]
+        self._processes: dict[str, subprocess.Popen[str]] = {}
+        if beside:
+            with contextlib.suppress(OSError):  # no room for another process: this one draws
+                for what in self._wanted:
+                    self._processes[what] = _start(what)
 
     def draw(self, run: Path) -> list[Failure]:
         """Draw what is not drawn yet. A finished result is never touched; what could not be drawn comes back."""
+        if not self._wanted:
+            return []
         try:
+            folder.read_settings(run)  # never lock, and so make, a folder that is no run's
             with folder.locked(run, ORDER):
-                missing = {what: _missing(run, what) for what, wanted in self._wanted.items() if wanted}
-                if not self._processes:
-                    return [one for names in missing.values() for one in paint(run, names)]
-                return self._elsewhere(run, {what: names for what, names in missing.items() if names})
-        except (PoolcalError, OSError) as error:  # the folder is in use, or cannot be written
-            return [Failure.of("", error)]
+                missing = {what: names for what in self._wanted if (names := _missing(run, what))}
+                for what, names in missing.items():
+                    if what in self._processes:
+                        _tell(self._processes[what], run, names)
+                return [one for what, names in missing.items() for one in self._drawn(what, run, names)]
+        except Exception as error:
+            return [Failure.of(" and ".join(self._wanted), error)]
 
-    def _elsewhere(self, run: Path, missing: dict[str, list[str]]) -> list[Failure]:
-        for what, names in missing.items():
-            pipe = self._processes[what].stdin
-            assert pipe is not None
-            with contextlib.suppress(BrokenPipeError):  # it has ended: there will be no answer
-                print(json.dumps([str(run.absolute()), names]), file=pipe, flush=True)
-        answers = {what: self._processes[what].communicate()[0] for what in missing}
-        found = []
-        for what, answer in answers.items():
-            told = answer.rpartition("\n")[2] if answer else ""
-            found += [Failure(**one) for one in json.loads(told)] if told else [Failure(what, "its process has ended")]
-        return found
+    def _drawn(self, what: str, run: Path, names: Sequence[str]) -> list[Failure]:
+        if what not in self._processes:
+            return paint(run, names)
+        try:
+            answer, _ = self._processes[what].communicate(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            return [Failure(what, f"not done within {PATIENCE_S} s")]
+        told = answer.rpartition("\n")[2]
+        return [Failure(**one) for one in json.loads(told)] if told else [Failure(what, "its process has ended")]
 
     def close(self) -> None:
         for process in self._processes.values():
             process.kill()
             process.communicate()
+
+
+def _start(what: str) -> "subprocess.Popen[str]":
+    """-P: nothing in the folder one happens to stand in is code of this program."""
+    command = [sys.executable, "-P", "-m", "stages.drawing", what]
+    return subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, text=True, env=_environment()
+    )
+
+
+def _environment() -> dict[str, str]:
+    """With the program's own root first, for where it was not installed."""
+    root = str(Path(__file__).parent.parent)
+    return os.environ | {"PYTHONPATH": os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])}
+
+
+def _tell(process: "subprocess.Popen[str]", run: Path, names: Sequence[str]) -> None:
+    assert process.stdin is not None
+    with contextlib.suppress(BrokenPipeError):  # it has ended: there will be no answer
+        print(json.dumps([str(run.absolute()), names]), file=process.stdin, flush=True)
 
 
 @contextlib.contextmanager
@@ -95,11 +116,10 @@ def painters(report: bool, recordings: bool, beside: bool) -> Iterator[Painters]
 
 
 def _missing(run: Path, what: str) -> list[str]:
-    """Names of what is not drawn yet: the page, or stages."""
+    """Names of what is not drawn yet: the page, or stages; of stages that agree with each other alone."""
     if what == PAGE:
         return [PAGE] if page_to_draw(run, ORDER) else []
-    finished = [stage for stage in ORDER if manifest.read(run / stage) is not None]
-    return [stage for stage in finished if not (run / stage / f"{stage}.rrd").is_file()]
+    return [stage for stage in agreeing(run, ORDER) if not (run / stage / f"{stage}.rrd").is_file()]
 
 
 def paint(run: Path, names: Sequence[str]) -> list[Failure]:

@@ -4,13 +4,13 @@ import sys
 import textwrap
 from pathlib import Path
 
-import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 from pipeline.artefacts import Artefact, Document, Raw
 from pipeline.evaluate import declared, name_of
-from pipeline.pages import INK, LASER, QUIET, SONAR, STYLE
+from pipeline.pages import INK, LASER, QUIET, SONAR, style
 from stages import load
 
 STEP, HEIGHT, WIDTH = 1.15, 0.62, 2.3
@@ -21,7 +21,7 @@ def picture(path: Path) -> None:
     """Stages from top to bottom; left, from which earlier stages they take; right, what they write."""
     stages = load()
     place = {name_of(stage): -STEP * k for k, stage in enumerate(stages)}
-    with matplotlib.rc_context(STYLE):
+    with style():
         figure = Figure(figsize=(8.6, 6.6))
         axis = figure.add_axes((0, 0, 1, 1))
         axis.set(xlim=(-4.2, 7.4), ylim=(-STEP * len(stages) - 0.1, 1.35))
@@ -51,7 +51,7 @@ def picture(path: Path) -> None:
         figure.savefig(path, metadata={"Date": None, "Creator": None})
 
 
-def _arrow(axis: matplotlib.axes.Axes, start: float, end: float) -> None:
+def _arrow(axis: Axes, start: float, end: float) -> None:
     """Straight to the next stage; to a later one round the left, the wider the farther."""
     steps = round((start - end) / STEP)
     if steps == 1:

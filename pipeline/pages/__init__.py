@@ -5,10 +5,13 @@ never a name from a file or a config.
 """
 
 import base64
+import contextlib
 import io
+from collections.abc import Iterator
 from typing import Any
 
 import jinja2
+import matplotlib
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -33,6 +36,15 @@ STYLE: dict[Any, Any] = {
     "xtick.color": INK,
     "ytick.color": INK,
 }
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Our style on matplotlib's own defaults, whatever file of settings lies about."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
 
 
 def render(template: str, **values: Any) -> str:

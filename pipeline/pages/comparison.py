@@ -4,14 +4,13 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-import matplotlib
 import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pipeline.diff import shown
 from pipeline.mounts import WITHIN_95
-from pipeline.pages import ALARM, INK, QUIET, STYLE, picture, render
+from pipeline.pages import ALARM, INK, QUIET, picture, render, style
 
 
 def page(found: Mapping[str, Any]) -> str:
@@ -29,7 +28,7 @@ def page(found: Mapping[str, Any]) -> str:
 
 def _chart(rows: list[dict[str, Any]]) -> Markup:
     """Each difference in its own sigmas, with its 95 % interval; red: moved."""
-    with matplotlib.rc_context(STYLE):
+    with style():
         figure = Figure(figsize=(7.2, 2.0))
         axis = figure.add_axes((0.08, 0.24, 0.9, 0.72))
         z = np.array([row["z"] for row in rows])

@@ -13,7 +13,7 @@ from pipeline.pages import AXIS, FAMILY, FEWEST, LASER, MARKS, QUIET, SONAR, pic
 from pipeline.times import NS
 
 WORDS = {"angle": "swath angle", "range": "distance"}
-LABELS = {"angle": "angle across track, degrees (starboard +)", "range": "distance from the sonar, m"}
+LABELS = {"angle": "angle across track in the sonar's frame, degrees", "range": "distance from the sonar, m"}
 
 
 def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame) -> Markup:
@@ -27,7 +27,8 @@ def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame) -> 
     for axis, by in ((by_angle, "angle"), (by_range, "range")):
         for name, colour in FAMILY.items():
             rows = sonar[(sonar["by"] == by) & (sonar["family"] == name)]
-            mean, sigma = 1000 * rows["mean_m"], 1000 * rows["rms_m"] / np.sqrt(rows["count"])
+            scatter = np.sqrt(np.maximum(rows["rms_m"] ** 2 - rows["mean_m"] ** 2, 0.0))
+            mean, sigma = 1000 * rows["mean_m"], 1000 * scatter / np.sqrt(rows["count"])
             bars: dict[str, Any] = {"markersize": 3, "linewidth": 0.8, "color": colour}
             axis.errorbar(rows["low"] + rows["width"] / 2, mean, WITHIN_95 * sigma, fmt=f"{MARKS[name]}-", **bars)
         axis.set(title=f"sonar, by {WORDS[by]}", xlabel=LABELS[by], ylabel="mean residual, mm")

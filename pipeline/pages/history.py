@@ -1,6 +1,5 @@
 """The history's page: a control chart of each parameter, and the table behind it."""
 
-import matplotlib
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
@@ -8,7 +7,7 @@ from matplotlib.figure import Figure
 
 from pipeline.history import History
 from pipeline.mounts import PARAMETERS, WITHIN_95
-from pipeline.pages import ALARM, INK, QUIET, STYLE, picture, render
+from pipeline.pages import ALARM, INK, QUIET, picture, render, style
 from pipeline.verdict import SIX
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
@@ -49,7 +48,7 @@ def _number(value: float, digits: int) -> str:
 
 def _chart(table: pd.DataFrame) -> Markup:
     """Six panels over the sessions in order of time."""
-    with matplotlib.rc_context(STYLE):
+    with style():
         figure = Figure(figsize=(9.0, 6.0), layout="constrained")
         axes = figure.subplots(3, 2, sharex=True).T.ravel()
         place = np.arange(len(table))

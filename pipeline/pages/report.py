@@ -1,7 +1,7 @@
 """RUN/report/report.html: the answer, what it rests on, and where it came from, on one page.
 
-Every number on it is in calibration.json, run.yaml, a manifest or a Parquet of the run; nothing is computed here but
-the pictures' scales and mean values' intervals.
+Every number on it is in calibration.json, run.yaml, a manifest or a Parquet of the run, or the difference of two of
+them; nothing else is computed here but the pictures' scales and the intervals of means.
 """
 
 import json
@@ -10,17 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
 from pipeline import artefacts, config, manifest
-from pipeline.drawn import PAGE, drawn_from
+from pipeline.drawn import PAGE, agreeing, drawn_from
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.mounts import PARAMETERS
-from pipeline.pages import STYLE, curves, render, sections
+from pipeline.pages import curves, render, sections, style
 from pipeline.passes import pass_of
 from pipeline.poses import trajectory_in_target
 from pipeline.tables import Tables
@@ -40,8 +39,7 @@ TRACK_POINTS = 300  # of a pass on the plan
 
 def write_page(run: Path, stages: Sequence[str]) -> None:
     """Write RUN/report/report.html of a finished run."""
-    done = {stage: found for stage in stages if (found := manifest.read(run / stage)) is not None}
-    write_text(run / "report" / PAGE, page(Tables(run), done))
+    write_text(run / "report" / PAGE, page(Tables(run), agreeing(run, stages)))
 
 
 def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
@@ -53,7 +51,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
     return render(
         "report.html",
         result=result,
-        run=tables.run.name,
+        run=tables.run.absolute().name,
         date=str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
         six=_six(calibrations, result["result"], settings.pool.verdict),
         frame=tables.table(artefacts.POOL_FRAME).to_dict("records")[0],
@@ -77,7 +75,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
         changed=_changed(settings),
         commit=done["report"].git_commit,
         utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
-        drawn_from=drawn_from(done),
+        drawn_from=drawn_from(tables.run, done),
     )
 
 
@@ -179,10 +177,11 @@ def _pictures(tables: Tables, faces: pd.DataFrame, passes: pd.DataFrame) -> dict
     cells = tables.table(artefacts.RESIDUAL_MAP)
     frame = tables.table(artefacts.POOL_FRAME).iloc[0]
     turned = float(tables.table(artefacts.TARGET_POSE)["azimuth_correction_deg"].iloc[0])
-    with matplotlib.rc_context(STYLE):
+    solved = calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
+    with style():
         return {
-            "sections": sections.sections(residuals, faces, family),
-            "distances": sections.distances(residuals, family),
+            "sections": sections.sections(residuals, faces, family, solved),
+            "distances": sections.distances(residuals, family, solved),
             "map_mbes": sections.maps(cells, faces, "mbes"),
             "map_laser": sections.maps(cells, faces, "laser"),
             "tracks": sections.tracks(_tracks(tables, passes), faces, float(frame["azimuth_deg"]) + turned),

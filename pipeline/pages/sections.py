@@ -26,7 +26,7 @@ CLOUDS = (  # sensor, prefix of the columns, words, colour; in the order in whic
 )
 
 
-def sections(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any]) -> Markup:
+def sections(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any], solved: bool) -> Markup:
     """Target from above and from the boat, to scale, and one wet block near by; ``family``: of each residual."""
     figure = Figure(figsize=(7.2, 3.8))
     where = {"left": 0.07, "right": 0.98, "bottom": 0.19, "top": 0.93, "wspace": 0.25}
@@ -34,7 +34,7 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any])
     corners = {row["face"]: np.reshape(row["vertices_target_m"], (-1, 3)) for row in faces.to_dict("records")}
     depth = max(float(points[:, 0].max()) for points in corners.values()) / 2
     vertical, blocks = np.isin(family, ("P1", "P2", "P3")), np.isin(family, ("P1", "P3", "H"))
-    for sensor, prefix, label, colour in CLOUDS:
+    for sensor, prefix, label, colour in CLOUDS[: None if solved else -1]:  # without a result nothing is calibrated
         of_sensor = (residuals["sensor"] == sensor).to_numpy()
         columns = [prefix + name for name in XYZ]
         cloud = residuals.loc[of_sensor & vertical, columns].to_numpy()
@@ -91,14 +91,14 @@ def _cut(corners: Array, x: float) -> list[Array]:
     return [np.array(found)] if len(found) == 2 else []
 
 
-def distances(residuals: pd.DataFrame, family: NDArray[Any]) -> Markup:
+def distances(residuals: pd.DataFrame, family: NDArray[Any], solved: bool) -> Markup:
     """Each family's points by their distance from the adjusted surface, in millimetres."""
     figure = Figure(figsize=(7.2, 3.2))
     where = {"left": 0.07, "right": 0.97, "bottom": 0.23, "top": 0.92, "wspace": 0.16}
     panels = figure.subplots(1, 4, sharey=True, gridspec_kw=where)
     for axis, name in zip(panels, FAMILIES, strict=True):
         largest = 5.0
-        for sensor, prefix, label, colour in CLOUDS:
+        for sensor, prefix, label, colour in CLOUDS[: None if solved else -1]:  # without a result nothing is calibrated
             points = residuals[(residuals["sensor"] == sensor).to_numpy() & (family == name)]
             away = 1000 * points[prefix + "residual_m"].to_numpy()
             _dots(axis, away, points[prefix + "z_target_m"].to_numpy(), colour, label)

@@ -28,8 +28,6 @@ over the moments of the timeline ``time`` (UTC):
     /quality/points/<sensor>, /quality/residual/<sensor>/<family>  adjust: points in a second, their mean residual, mm
 """
 
-import contextlib
-import os
 import re
 import uuid
 from collections.abc import Callable
@@ -37,7 +35,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from pipeline.drawn import agreeing
 from pipeline.errors import ArtefactError
+from pipeline.files import write_bytes
 from pipeline.tables import Tables
 from stages import ORDER
 
@@ -74,25 +74,20 @@ def words(text: str) -> Any:
 
 
 def save(path: Path, identity: str, blueprint: Any, draw: Callable[[Any], None]) -> None:
-    """A recording file, whole or not at all."""
+    """A recording file, whole or not at all: the SDK's own writing hangs or leaves a stump when a disk is full."""
     import rerun
 
-    partial = path.with_name(path.name + ".partial")
     recording = rerun.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
-    try:
-        recording.save(partial, default_blueprint=blueprint)
-        draw(recording)
-        recording.flush()
-        recording.disconnect()
-        os.replace(partial, path)
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink()
+    memory = recording.memory_recording()
+    recording.send_blueprint(blueprint, make_active=False, make_default=True)
+    draw(recording)
+    recording.flush()
+    write_bytes(path, memory.drain_as_bytes())
 
 
 def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
-    """The recordings there are, in the stages' order."""
-    wanted = ORDER if stage is None else (stage,)
+    """The recordings there are, in the stages' order, of stages that agree with each other."""
+    wanted = agreeing(run, ORDER) if stage is None else (stage,)
     found = [path for name in wanted if (path := run / name / f"{name}.rrd").is_file()]
     if not found:
         raise ArtefactError(f"{run}: has no recording{'' if stage is None else f' of {stage}'}; run poolcal run first")
@@ -105,7 +100,11 @@ def show(paths: list[Path]) -> int:
     import sys
 
     viewer = Path(sys.executable).with_name("rerun")
-    return subprocess.run([viewer, "--bind", "127.0.0.1", *paths], check=False).returncode and 1
+    try:
+        places = [str(path.absolute()) for path in paths]
+        return subprocess.run([viewer, "--bind", "127.0.0.1", *places], check=False).returncode and 1
+    except FileNotFoundError as error:
+        raise ArtefactError(f"{viewer}: there is no such program; run make setup again") from error
 
 
 def recording_id(*runs: Path) -> str:

@@ -29,8 +29,11 @@ Residual   mean of a second by family of faces, plus
 def log(recording: Any, tables: Tables) -> None:
     import rerun as rr
 
-    trajectory = tables.table(artefacts.TRAJECTORY)
-    trajectory = trajectory.iloc[:: max(1, -(-len(trajectory) // RECORDS))]
+    whole = tables.table(artefacts.TRAJECTORY)
+    t_ns = whole["t_ns"].to_numpy()
+    trajectory = whole.iloc[:: max(1, -(-len(whole) // RECORDS))]
+    after = np.searchsorted(trajectory["t_ns"].to_numpy(), t_ns[1:][np.diff(t_ns) > HOLE_NS])
+    broken = np.isin(np.arange(len(trajectory)), after)  # no line across a hole in the log
     times = rr.TimeColumn("time", timestamp=unix_ns_from_gps(trajectory["t_ns"].to_numpy()).astype("datetime64[ns]"))
     heading = np.unwrap(trajectory["azimuth_rad"].to_numpy())
     values = {
@@ -38,7 +41,6 @@ def log(recording: Any, tables: Tables) -> None:
         "pitch": trajectory["pitch_rad"].to_numpy(),
         "heading": heading - heading.mean(),
     }
-    broken = np.diff(trajectory["t_ns"].to_numpy(), prepend=0) > HOLE_NS  # no line across a hole in the log
     for name, angle in values.items():
         path = f"quality/attitude/{name}"
         recording.log(path, rr.SeriesLines(colors=AXES[name], names=name), static=True)

@@ -1,5 +1,6 @@
 """Recordings: drawn from Parquet, read back with the SDK, and never in the way of a calibration."""
 
+import errno
 import os
 import shutil
 import subprocess
@@ -314,6 +315,48 @@ def test_a_painter_that_dies_is_said(place: Place) -> None:
     assert [(one.what, one.trace) for one in failed] == [("recordings", "")]
     assert (place.run / "report" / "report.html").is_file()
     assert not list(place.run.rglob("*.partial"))
+
+
+def test_nothing_in_the_working_directory_is_run(place: Place) -> None:
+    """Neither code nor settings of a folder that came from somewhere."""
+    for name in ("numpy.py", "rerun.py", "matplotlib.py"):
+        (place.folder / name).write_text("open('run by mistake', 'w').write('x')\n")
+    (place.folder / "matplotlibrc").write_text("text.usetex: True\n")
+    command = [Path(sys.executable).with_name("poolcal"), *map(str, place.words()[:-1]), "2"]
+    done = subprocess.run(command, cwd=place.folder, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0
+    assert "not drawn" not in done.stderr
+    assert (place.run / "report" / "report.html").is_file()
+    assert len(list(place.run.glob("*/*.rrd"))) == len(ORDER)
+    assert not (place.folder / "run by mistake").exists()
+
+
+def test_a_full_disk_is_one_line_and_no_stump(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert place.calibrate().status == 0
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    failed = Painters(report=False, recordings=True).draw(place.run)
+    assert [one.trace for one in failed] == [""]
+    assert "make room" in failed[0].reason
+    assert not [path for path in place.run.rglob("*") if path.suffix in (".rrd", ".new", ".partial")]
+
+
+def test_no_room_for_another_process(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(subprocess, "Popen", none)
+    assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").complaints == []
+    assert (place.run / "report" / "report.html").is_file()
+
+
+def test_a_mistyped_run_is_refused_and_not_made(place: Place) -> None:
+    told = poolcal("view", place.folder / "typo")
+    assert (told.status, len(told.err.splitlines())) == (2, 1)
+    assert not (place.folder / "typo").exists()
 
 
 def commands() -> list[str]:

@@ -135,6 +135,36 @@ def test_stages_that_do_not_agree_are_not_drawn_together(place: Place) -> None:
     assert path.read_bytes() != before
 
 
+def test_settings_that_were_not_used_are_not_shown(place: Place) -> None:
+    """run.yaml may be newer than the results: then nothing is drawn, and nothing is compared."""
+    assert place.calibrate().status == 0
+    place.edit_session("mbes", mount={"roll_deg": -20.0})
+    words = ("--session", place.session, "--config", place.config, "--report", "--recordings")
+    assert poolcal("stage", "ingest", place.run, *words).status == 0
+    assert not (place.run / "report" / "report.html").exists()
+    assert [path.stem for path in place.run.glob("*/*.rrd")] == ["ingest"]
+    told = poolcal("diff", place.run, place.run)
+    assert (told.status, len(told.err.splitlines())) == (2, 1)
+    assert "was made from other settings or results" in told.err
+
+
+def test_what_lies_in_the_pages_place_is_no_matter(place: Place) -> None:
+    assert place.calibrate().status == 0
+    path = place.run / "report" / "report.html"
+    for content in (b"\xff\xfe", b"", "·".encode()[:1]):
+        path.write_bytes(content)
+        told = place.calibrate("--report")
+        assert (told.status, told.complaints) == (0, [])
+        assert "accepted" in page_of(place.run).text
+    outside = place.folder / "outside.txt"
+    outside.write_text("mine")
+    path.unlink()
+    path.with_name("report.html.new").symlink_to(outside)
+    assert place.calibrate("--report").complaints == []
+    assert outside.read_text() == "mine"
+    assert not path.is_symlink()
+
+
 def test_a_page_that_cannot_be_drawn_spoils_nothing(
     place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -166,4 +196,15 @@ def test_compared_as_a_page(undisturbed: tuple[Path, Told], tmp_path: Path) -> N
     assert "The same result in both." in page.text
     assert str(run) in [row[3] for row in page.table("", "session")]
     assert not page.named("b")
-    assert poolcal("diff", undisturbed[0], run, "--html", tmp_path / "no" / "such" / "folder.html").status == 2
+    kept = digests(run)
+    for place, words in (
+        (tmp_path / "no" / "such" / "folder.html", "cannot be written"),
+        (run / "report" / "page.html", "lies in the run folder"),
+        (run / "report" / "calibration.json", "ends in .html"),
+        ("/dev/null", "ends in .html"),
+        (tmp_path, "ends in .html"),
+    ):
+        told = poolcal("diff", undisturbed[0], run, "--html", place)
+        assert (told.status, len(told.err.splitlines())) == (2, 1)
+        assert words in told.err
+    assert digests(run) == kept
