@@ -5,7 +5,7 @@ squared error (its expectation is 6 if the covariance is true) with the 99 % ban
 accepted. Seeds are fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and
 the combination of signs goes through all 64. Results go to runs/montecarlo/ as CSV as well.
 
-    python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2]
+    python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2] [--resume]
 """
 
 import argparse
@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about / along body x, y, z
 UNITS = np.array([np.radians(1.0)] * 3 + [1e-3] * 3)  # of errors and sigmas in the tables: degrees, millimetres
 MOVED_DEG, MOVED_MM = 0.05, 2.0
+TASKS_OF_A_WORKER = 20  # then a fresh process: hundreds of ray casting scenes in one make it slow and large
 COARSE_DEG, COARSE_M = 2.5, 0.25
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points to leave the sonar's noise in charge
 WHITE: dict[str, Any] = {
@@ -239,6 +240,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", help="names (or beginnings) of campaigns")
     parser.add_argument("--share", type=float, default=1.0, help="share of the sessions, for a quick look")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--resume", action="store_true", help="go on where an interrupted campaign of this code ended")
     options = parser.parse_args()
     folder = Path("runs/montecarlo")
     folder.mkdir(parents=True, exist_ok=True)
@@ -246,10 +248,14 @@ def main() -> None:
         if options.only and not any(campaign.name.startswith(name) for name in options.only):
             continue
         started = time.monotonic()
-        tasks = [(campaign, number) for number in range(max(2, round(campaign.sessions * options.share)))]
-        with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
-            table = pd.DataFrame(list(pool.map(one, tasks)))
-        table.to_csv(folder / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.csv", index=False)
+        path = folder / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.csv"
+        done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
+        tasks = [(campaign, number) for number in range(done, max(2, round(campaign.sessions * options.share)))]
+        context = get_context("spawn")
+        with ProcessPoolExecutor(options.jobs, mp_context=context, max_tasks_per_child=TASKS_OF_A_WORKER) as pool:
+            for number, row in enumerate(pool.map(one, tasks), start=done):  # written as they come: nothing is lost
+                pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
+        table = pd.read_csv(path)
         words = [report(campaign, table), *([pairs(table)] if campaign.pairs else [])]
         print("\n".join(words), f"\n  ({time.monotonic() - started:.0f} s)\n", flush=True)
 
