@@ -15,7 +15,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
@@ -251,9 +250,8 @@ def main() -> None:
         path = folder / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.csv"
         done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
         tasks = [(campaign, number) for number in range(done, max(2, round(campaign.sessions * options.share)))]
-        context = get_context("spawn")
-        with ProcessPoolExecutor(options.jobs, mp_context=context, max_tasks_per_child=TASKS_OF_A_WORKER) as pool:
-            for number, row in enumerate(pool.map(one, tasks), start=done):  # written as they come: nothing is lost
+        with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
+            for number, row in enumerate(pool.imap(one, tasks), start=done):  # written as they come: nothing is lost
                 pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
         table = pd.read_csv(path)
         words = [report(campaign, table), *([pairs(table)] if campaign.pairs else [])]
