@@ -15,6 +15,7 @@ from pipeline.times import NS
 SENSORS = ("laser", "mbes")
 WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # degrees, m, s
 CELL_M = 0.1
+FEWEST = 10  # points behind a mean that is shown to people
 ALL_PASSES = -1
 
 

@@ -20,7 +20,6 @@ INK, QUIET, ALARM = "#1a1a1a", "#8a8f98", "#b00020"
 LASER, COARSE, SONAR = "#3aa0dc", "#b9bcc1", "#d55e00"
 FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a"}
 AXIS = {"roll": "#0072b2", "pitch": "#e6a000", "yaw": "#009e73"}
-FEWEST = 10  # points behind a mean that is shown
 MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s"}
 DPI = 200  # of what is drawn as dots in a vector picture
 STYLE: dict[Any, Any] = {

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.mounts import WITHIN_95
-from pipeline.pages import AXIS, FAMILY, FEWEST, LASER, MARKS, QUIET, SONAR, picture
+from pipeline.pages import AXIS, FAMILY, LASER, MARKS, QUIET, SONAR, picture
+from pipeline.residuals import FEWEST
 from pipeline.times import NS
 
 WORDS = {"angle": "swath angle", "range": "distance"}

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pipeline.maths.residuals import face_axes
-from pipeline.pages import COARSE, FEWEST, INK, LASER, QUIET, SONAR, picture
+from pipeline.pages import COARSE, INK, LASER, QUIET, SONAR, picture
+from pipeline.residuals import FEWEST
 
 Array = NDArray[np.float64]
 FAMILIES = ("P1", "P2", "P3", "H")

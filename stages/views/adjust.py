@@ -12,6 +12,7 @@ from pipeline.maths.residuals import face_axes
 from pipeline.maths.rotations import exp_so3
 from pipeline.mounts import PARAMETERS, Mounted, mount_of
 from pipeline.poses import trajectory_in_target
+from pipeline.residuals import FEWEST
 from pipeline.tables import Tables
 from pipeline.times import NS, unix_ns_from_gps
 from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, words
@@ -19,7 +20,6 @@ from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, words
 Array = NDArray[np.float64]
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SENSORS = {"laser": LASER, "mbes": SONAR}
-FEWEST = 10  # points behind a mean that is shown
 RAYS = 60  # of a fan
 MOMENT_NS = NS // 50  # points of one fan lie within this time
 
@@ -27,11 +27,11 @@ MOMENT_NS = NS // 50  # points of one fan lie within this time
 def log(recording: Any, tables: Tables) -> None:
     faces, residuals = tables.table(artefacts.FACES), tables.table(artefacts.RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
-    span = _span(residuals)
-    _clouds(recording, tables, residuals, family, span)
+    span, steps = _span(residuals), _steps(tables, residuals)
+    _clouds(recording, tables, residuals, family, span, steps)
     _maps(recording, tables.table(artefacts.RESIDUAL_MAP), faces, span)
     _fans(recording, tables, residuals)
-    _over_time(recording, tables.table(artefacts.RESIDUAL_BINS))
+    _over_time(recording, tables.table(artefacts.RESIDUAL_BINS), steps)
     _words(recording, tables, span)
 
 
@@ -45,6 +45,14 @@ def _span(residuals: pd.DataFrame) -> dict[str, float]:
     return found
 
 
+def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
+    """One in how many observations of each sensor is in the table residuals."""
+    total = dict.fromkeys(SENSORS, 0)
+    for row in tables.table(artefacts.GROUPS).to_dict("records"):
+        total["laser" if row["group"] == "laser" else "mbes"] += row["count"]
+    return {s: round(total[s] / max(1, int((residuals["sensor"] == s).sum()))) for s in SENSORS}
+
+
 def coloured(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
     """Blue is negative, grey zero, orange positive; (n, 3)."""
     share = np.clip(np.asarray(residual_m, dtype=np.float64) / span_m, -1, 1)[:, None]
@@ -52,18 +60,23 @@ def coloured(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
     return np.asarray(np.round((1 - abs(share)) * np.array((205, 205, 205)) + abs(share) * end), dtype=np.uint8)
 
 
-def _clouds(recording: Any, tables: Tables, residuals: pd.DataFrame, family: Any, span: dict[str, float]) -> None:
+def _clouds(
+    recording: Any,
+    tables: Tables,
+    residuals: pd.DataFrame,
+    family: Any,
+    span: dict[str, float],
+    steps: dict[str, int],
+) -> None:
     import rerun as rr
 
     surfaces: Any = tables.table(artefacts.SURFACES).to_dict("records")
     # shown on its surface: in front of it a point would hide those behind, and all would look as if they stood before
     normals = {row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in surfaces}
-    total = {"laser": 0, "mbes": 0}
-    for row in tables.table(artefacts.GROUPS).to_dict("records"):
-        total["laser" if row["group"] == "laser" else "mbes"] += row["count"]
+    solved = bool(np.isfinite(tables.table(artefacts.ESTIMATE)["value"].to_numpy()[:6]).all())
     for sensor in SENSORS:
         of_sensor = (residuals["sensor"] == sensor).to_numpy()
-        step = rr.AnyValues(one_in=round(total[sensor] / max(1, int(of_sensor.sum()))))
+        step = rr.AnyValues(one_in=steps[sensor])
         for name, colour in COLOURS.items():
             rows = residuals[of_sensor & (family == name)]
             points = rows[XYZ].to_numpy()
@@ -73,7 +86,7 @@ def _clouds(recording: Any, tables: Tables, residuals: pd.DataFrame, family: Any
             recording.log(f"residuals/{sensor}/{name}", cloud, step, static=True)
             if sensor == "mbes":
                 coarse = rows[[f"coarse_{column}" for column in XYZ]].to_numpy()
-                for when, where in (("before", coarse), ("after", points)):
+                for when, where in (("before", coarse), *([("after", points)] if solved else [])):
                     cloud = rr.Points3D(where, radii=DOT_M, colors=colour)
                     recording.log(f"{when}/{name}", cloud, step, static=True)
 
@@ -138,15 +151,14 @@ def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
     return Mounted(exp_so3(values[:3]) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + values[3:])
 
 
-def _over_time(recording: Any, bins: pd.DataFrame) -> None:
+def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int]) -> None:
     import rerun as rr
 
     bins = bins[bins["by"] == "time"].sort_values("low", kind="stable")
 
-    def curve(path: str, seconds: Any, values: Any, colour: Any) -> None:
+    def curve(path: str, name: str, seconds: Any, values: Any, colour: Any) -> None:
         t_ns = np.round(np.asarray(seconds, dtype=np.float64) * NS).astype(np.int64)
         times = rr.TimeColumn("time", timestamp=unix_ns_from_gps(t_ns).astype("datetime64[ns]"))
-        name = path.partition("/")[2].partition("/")[2]
         recording.log(path, rr.SeriesPoints(colors=colour, names=name, marker_sizes=2.5), static=True)
         recording.send_columns(path, indexes=[times], columns=rr.Scalars.columns(scalars=values))
 
@@ -155,13 +167,16 @@ def _over_time(recording: Any, bins: pd.DataFrame) -> None:
         if not len(rows):
             continue
         count = rows.groupby("low", sort=True)["count"].sum()
-        curve(f"quality/points/{sensor}", count.index + 0.5, count.to_numpy(np.float64), SENSORS[sensor])
+        thinned = f", one in {steps[sensor]} of them" if steps[sensor] > 1 else ""
+        shown = count.to_numpy(np.float64)
+        curve(f"quality/points/{sensor}", f"{sensor}{thinned}", count.index + 0.5, shown, SENSORS[sensor])
         for name, colour in COLOURS.items():
             of_family = rows[(rows["family"] == name) & np.isfinite(rows["mean_m"])]
             if len(of_family):
                 where = of_family["low"].to_numpy() + 0.5
                 shade = colour if sensor == "mbes" else tuple((part + 2 * 160) // 3 for part in colour)
-                curve(f"quality/residual/{sensor}/{name}", where, 1000 * of_family["mean_m"].to_numpy(), shade)
+                mean = 1000 * of_family["mean_m"].to_numpy()
+                curve(f"quality/residual/{sensor}/{name}", f"{sensor}/{name}", where, mean, shade)
 
 
 def _words(recording: Any, tables: Tables, span: dict[str, float]) -> None:

@@ -236,6 +236,19 @@ def test_words_stay_words(undisturbed: tuple[Path, Told], tmp_path: Path) -> Non
     assert name in written
 
 
+def test_without_a_result_nothing_is_shown_as_calibrated(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(undisturbed[0], run)
+    path = run / "adjust" / "estimate.parquet"
+    table = pq.read_table(path)
+    place = table.schema.get_field_index("value")
+    pq.write_table(table.set_column(place, table.schema.field("value"), [[float("nan")] * len(table)]), path)
+    assert Painters(report=False, recordings=True).draw(run) == []
+    found = read(run, "adjust")
+    assert "/before/P2" in found
+    assert not [name for name in found if name.startswith("/after")]
+
+
 def test_two_runs_in_one_recording(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
     run = tmp_path / "other"
     shutil.copytree(undisturbed[0], run)
