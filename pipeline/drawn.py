@@ -1,4 +1,4 @@
-"""What may be drawn together, and whether RUN/report/report.html shows the run as it is now."""
+"""What may be drawn together, where it lies, and whether RUN/report/report.html shows the run as it is now."""
 
 import hashlib
 import json
@@ -10,6 +10,11 @@ from pipeline import folder, manifest
 
 PAGE = "report.html"
 HEAD = 2000  # bytes within which the page says what it was drawn from
+
+
+def recording_path(run: Path, stage: str) -> Path:
+    """Where a stage's recording lies."""
+    return run / stage / f"{stage}.rrd"
 
 
 def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:

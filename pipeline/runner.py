@@ -6,7 +6,7 @@ not their names.
 
 import dataclasses
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -32,15 +32,21 @@ def run(
     run_folder: Path,
     workers: Workers = SERIAL,
     progress: Progress | None = None,
+    finished: Callable[[str], object] = lambda _: None,
 ) -> list[str]:
-    """Bring every stage up to date; the names of those that had to be run."""
+    """Bring every stage up to date; the names of those that had to be run, each told to ``finished`` in its turn."""
     settings = folder.load_settings(session_folder, config_path)
     folder.refuse_overlap(run_folder, session_folder)
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
         folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
         first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)
-        return [name_of(stage) for stage in stages if _bring_up_to_date(this, stage, first)]
+        had_to_run = []
+        for stage in stages:
+            if _bring_up_to_date(this, stage, first):
+                had_to_run.append(name_of(stage))
+                finished(name_of(stage))
+        return had_to_run
 
 
 def run_stage(

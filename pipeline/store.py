@@ -1,7 +1,7 @@
 """Tables and streams as Parquet. The bytes depend on the rows alone: not on batch sizes, jobs or threads."""
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, cast
@@ -73,13 +73,15 @@ def write_table(path: Path, table: pa.Table) -> None:
         writer.write_table(table, row_group_size=BATCH_ROWS)
 
 
-def read_table(path: Path, artefact: Artefact) -> pd.DataFrame:
-    """The table as pandas; a file that does not hold this artefact is an ArtefactError."""
+def read_table(path: Path, artefact: Artefact, columns: Sequence[str] = ()) -> pd.DataFrame:
+    """The table, or these columns of it, as pandas; a file that does not hold this artefact is an ArtefactError."""
     try:
-        table = pq.read_table(path, use_threads=False, partitioning=None)
+        with pq.ParquetFile(path) as file:
+            schema = file.schema_arrow
+            table = file.read(list(columns) or None, use_threads=False)
     except (OSError, pa.ArrowException) as error:
         raise ArtefactError(f"{path}: cannot be read ({error}); delete {path.parent} and run again") from error
-    if not table.schema.equals(artefact.schema):
+    if not schema.equals(artefact.schema):
         raise ArtefactError(f"{path}: is no {artefact.owner}/{artefact.name}; delete {path.parent} and run again")
     return from_arrow(table)
 

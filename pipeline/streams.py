@@ -92,7 +92,7 @@ class MemoryPart:
 class Mapper(Protocol):
     """Applies a function to each item; results come back in order. ``executor.py`` has the parallel one."""
 
-    def __call__(self, function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]: ...
+    def __call__(self, function: Callable[..., T], /, *items: Iterable[object]) -> Iterable[T]: ...
 
 
 def serial(function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]:

@@ -17,8 +17,9 @@ class Tables:
 
     run: Path
 
-    def table(self, artefact: Artefact) -> pd.DataFrame:
-        return read_table(self.run / artefact.owner / f"{artefact.name}.parquet", artefact)
+    def table(self, artefact: Artefact, *columns: str) -> pd.DataFrame:
+        """The table, or these columns of it."""
+        return read_table(self.run / artefact.owner / f"{artefact.name}.parquet", artefact, columns)
 
     def stream(self, artefact: Artefact, *columns: str) -> Stream:
         folder = self.run / artefact.owner / artefact.name

@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
 STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
 ROUGH_STEP = 1e-3  # weights become robust when the step is smaller (rad, m)
-SHOWN = 150_000  # points of a sensor in the table residuals, at most
+SHOWN = 100_000  # points of a sensor in the table residuals, at most
 RESCALINGS = 2  # how often the groups' robust scales are then taken anew
 
 

@@ -5,6 +5,7 @@ import shlex
 import sys
 import traceback
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -94,7 +95,8 @@ def run(
     from stages.drawing import painters
 
     with workers(jobs, executor) as pool, painters(report, recordings, pool.jobs > 1) as drawing:
-        runner.run(load(), session, config, run_folder, pool, Progress())
+        finished = partial(drawing.begin, run_folder)
+        runner.run(load(), session, config, run_folder, pool, Progress(), finished)
         status = _answer(run_folder)
         _say_failures(drawing.draw(run_folder))
     _say_where(run_folder)

@@ -5,7 +5,7 @@ them; nothing else is computed here but the pictures' scales and the intervals o
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,8 @@ from pipeline.drawn import PAGE, agreeing, drawn_from
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.mounts import PARAMETERS
-from pipeline.pages import curves, render, sections, style
-from pipeline.passes import pass_of
-from pipeline.poses import trajectory_in_target
+from pipeline.pages import render
+from pipeline.pages.pictures import PICTURES
 from pipeline.tables import Tables
 from pipeline.times import utc_text
 
@@ -34,18 +33,17 @@ METHODS = {
     "patent_alternating": "(2) patent, in turn",
     "adjustment": "(3) adjustment",
 }
-TRACK_POINTS = 300  # of a pass on the plan
 
 
-def write_page(run: Path, stages: Sequence[str]) -> None:
-    """Write RUN/report/report.html of a finished run."""
-    write_text(run / "report" / PAGE, page(Tables(run), agreeing(run, stages)))
+def write_page(run: Path, stages: Sequence[str], pictures: Iterable[Markup]) -> None:
+    """Write RUN/report/report.html of a finished run; ``pictures``: those of :data:`PICTURES`, in their order."""
+    write_text(run / "report" / PAGE, page(Tables(run), agreeing(run, stages), pictures))
 
 
-def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
+def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterable[Markup]) -> str:
     """``done``: the manifests of all stages."""
     result, settings = calibration(tables.run), read_settings(tables.run)
-    faces, passes = tables.table(artefacts.FACES), tables.table(artefacts.PASSES)
+    passes = tables.table(artefacts.PASSES)
     gaps = tables.table(artefacts.GAPS).sort_values("duration_s", ascending=False)
     calibrations, files = tables.table(artefacts.CALIBRATION), tables.table(artefacts.FILES)
     return render(
@@ -66,7 +64,6 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
         correlations=_correlations(result),
         groups=tables.table(artefacts.GROUPS).to_dict("records"),
         summary=tables.table(artefacts.ADJUST_SUMMARY).to_dict("records")[0],
-        pictures=_pictures(tables, faces, passes),
         tracks=passes.to_dict("records"),
         files=files.to_dict("records"),
         gaps=gaps.head(MOST_GAPS).to_dict("records"),
@@ -76,6 +73,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest]) -> str:
         commit=done["report"].git_commit,
         utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
         drawn_from=drawn_from(tables.run, done),
+        pictures=dict(zip(PICTURES, pictures, strict=True)),  # last: others may still be drawing them
     )
 
 
@@ -168,40 +166,3 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
         for key, default, value in config.changes(model)
     ]
     return sorted(rows, key=lambda row: not row["default"])
-
-
-# --- pictures --------------------------------------------------------------------------------------------------------
-def _pictures(tables: Tables, faces: pd.DataFrame, passes: pd.DataFrame) -> dict[str, Markup]:
-    residuals = tables.table(artefacts.RESIDUALS)
-    family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
-    cells = tables.table(artefacts.RESIDUAL_MAP)
-    frame = tables.table(artefacts.POOL_FRAME).iloc[0]
-    turned = float(tables.table(artefacts.TARGET_POSE)["azimuth_correction_deg"].iloc[0])
-    solved = calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
-    with style():
-        return {
-            "sections": sections.sections(residuals, faces, family, solved),
-            "distances": sections.distances(residuals, family, solved),
-            "map_mbes": sections.maps(cells, faces, "mbes"),
-            "map_laser": sections.maps(cells, faces, "laser"),
-            "tracks": sections.tracks(_tracks(tables, passes), faces, float(frame["azimuth_deg"]) + turned),
-            "residuals": curves.residuals(
-                tables.table(artefacts.RESIDUAL_BINS), tables.table(artefacts.CELLS), passes
-            ),
-            "convergence": curves.convergence(
-                tables.table(artefacts.ITERATIONS), tables.table(artefacts.ALTERNATION)
-            ),
-        }
-
-
-def _tracks(tables: Tables, passes: pd.DataFrame) -> dict[int, Any]:
-    """The INS's track of each pass in the target frame."""
-    poses = tables.table(artefacts.POSES)
-    trajectory = trajectory_in_target(poses, tables.table(artefacts.TARGET_POSE))
-    number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
-    found = {}
-    for one in passes["pass"].tolist():
-        track = trajectory.positions_m[number == one]
-        if len(track):
-            found[int(one)] = track[:: max(1, len(track) // TRACK_POINTS)]
-    return found

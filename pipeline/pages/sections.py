@@ -20,6 +20,8 @@ FAMILIES = ("P1", "P2", "P3", "H")
 HALF_SLICE_M = 0.04  # half the thickness of a section
 DOTS = 6000  # a cloud in one panel, at most
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
+SECTIONS = ("sensor", "face", *XYZ, *(f"coarse_{name}" for name in XYZ))  # columns of residuals
+DISTANCES = ("sensor", "face", "residual_m", "coarse_residual_m", "z_target_m", "coarse_z_target_m")
 CLOUDS = (  # sensor, prefix of the columns, words, colour; in the order in which they are drawn
     ("mbes", "coarse_", "sonar, coarse mount", COARSE),
     ("laser", "", "laser", LASER),
@@ -44,7 +46,7 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any],
         near_cut = np.abs(cloud[:, 0] - depth) < HALF_SLICE_M
         cloud = _along_faces(cloud[near_cut], family[of_sensor & blocks][near_cut], depth)
         _dots(ahead, cloud[:, 1], cloud[:, 2], colour, label)
-        _dots(near, cloud[:, 1], cloud[:, 2], colour, label, 5.0)
+        _dots(near, cloud[:, 1], cloud[:, 2], colour, label, 2.2)
     for points in corners.values():
         if np.ptp(points[:, 2]) > 0:
             above.plot(*np.vstack([points, points[:1]]).T[:2], color=INK, linewidth=0.6)
@@ -113,9 +115,9 @@ def distances(residuals: pd.DataFrame, family: NDArray[Any], solved: bool) -> Ma
     return picture(figure, "distances of the points from the adjusted surfaces in millimetres, over the height")
 
 
-def _dots(axis: Axes, x: Any, y: Any, colour: str, label: str, size: float = 1.2) -> None:
+def _dots(axis: Axes, x: Any, y: Any, colour: str, label: str, size: float = 1.1) -> None:
     step = max(1, -(-len(x) // DOTS))
-    axis.scatter(x[::step], y[::step], s=size, color=colour, label=label, linewidths=0, rasterized=True)
+    axis.plot(x[::step], y[::step], "o", ms=size, mew=0, color=colour, label=label, rasterized=True)
 
 
 def _legend(figure: Figure, axis: Axes) -> None:

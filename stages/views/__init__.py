@@ -35,7 +35,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipeline.drawn import agreeing
+from pipeline.drawn import agreeing, recording_path
 from pipeline.errors import ArtefactError
 from pipeline.files import write_bytes
 from pipeline.tables import Tables
@@ -43,7 +43,7 @@ from stages import ORDER
 
 APPLICATION = "poolcal"
 DRAWN = ORDER  # stages that have a recording
-AT_MOST = 1_000_000  # points an entity
+AT_MOST = 300_000  # points of a cloud: dense enough to see, few enough for any laptop
 COLOURS = {"P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167)}  # for all eyes
 GREY, SONAR, LASER = (150, 155, 165), (213, 94, 0), (0, 114, 178)
 DOT_M = 0.008  # radius of a point
@@ -53,7 +53,7 @@ def record(run: Path, stage: str) -> bool:
     """Draw a stage's recording, if it is not drawn yet."""
     from stages.views.tour import tour
 
-    path = run / stage / f"{stage}.rrd"
+    path = recording_path(run, stage)
     if path.exists():
         return False
     save(path, recording_id(run), tour(), lambda recording: log(recording, stage, Tables(run)))
@@ -88,7 +88,7 @@ def save(path: Path, identity: str, blueprint: Any, draw: Callable[[Any], None])
 def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
     """The recordings there are, in the stages' order, of stages that agree with each other."""
     wanted = agreeing(run, ORDER) if stage is None else (stage,)
-    found = [path for name in wanted if (path := run / name / f"{name}.rrd").is_file()]
+    found = [path for name in wanted if (path := recording_path(run, name)).is_file()]
     if not found:
         raise ArtefactError(f"{run}: has no recording{'' if stage is None else f' of {stage}'}; run poolcal run first")
     return found

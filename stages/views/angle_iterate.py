@@ -19,7 +19,7 @@ from pipeline.tables import Tables
 from stages.views import COLOURS, GREY, SONAR
 from stages.views.fit_planes import cut_out
 
-SOUNDINGS = 40_000  # for all the family's points of one step
+SOUNDINGS = 20_000  # for all the family's points of one step
 STEPS = 60  # that are replayed
 FAMILIES = ("P1", "P2", "P3")
 

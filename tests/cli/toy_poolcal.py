@@ -62,7 +62,8 @@ def install() -> None:
     report = types.ModuleType("stages.report")
     report.__file__ = __file__
     vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
-    stages.drawing.Painters.draw = lambda *_: []  # type: ignore[method-assign]  # toys have nothing to show
+    stages.drawing.Painters.begin = lambda *_: None  # type: ignore[method-assign]  # toys have nothing to show
+    stages.drawing.Painters.draw = lambda *_: []  # type: ignore[method-assign]
     pipeline.screen.summary = lambda result: f"{result['session']}: {result['verdict']}"
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"

@@ -2,9 +2,11 @@
 
 import errno
 import os
+import re
 import shutil
 import subprocess
 import sys
+import time
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,25 @@ from stages.drawing import Painters, painters
 from tests.end_to_end.places import Place, Told, digests, poolcal
 
 Chunks = dict[str, list[Any]]
+MARK = f"STARTED_BY_TEST_{os.getpid()}"
+
+
+@pytest.fixture(autouse=True)
+def marked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(MARK, "yes")
+
+
+def painting() -> list[Path]:
+    """The processes that draw, of those started by these tests, wherever they hang."""
+    return [place for place in Path("/proc").glob("[0-9]*") if _draws(place)]
+
+
+def _draws(process: Path) -> bool:
+    try:
+        words, given = (process / "cmdline").read_bytes(), (process / "environ").read_bytes()
+    except OSError:  # gone, or not ours
+        return False
+    return b"stages.drawing" in words and MARK.encode() in given
 
 
 @pytest.fixture(scope="module")
@@ -310,24 +331,69 @@ def test_painters_beside_the_run(place: Place, right: dict[str, str], drawn: Pat
     assert told.status == 0
     assert told.complaints == []
     assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
-    page = (place.run / "report" / "report.html").read_text(encoding="utf-8")
-    assert page.count("<img ") == 7
+    one, other = (re.findall("<img .*?>", (run / "report" / "report.html").read_text()) for run in (place.run, drawn))
+    assert one == other
+    assert len(one) == 7
     assert digests(place.run) == right
-    assert not [name for name in commands() if "stages.drawing" in name]
+    assert not painting()
     here, there = (read(run, "adjust")["/after/P2"] for run in (place.run, drawn))
     np.testing.assert_array_equal(points(here), points(there))
-    assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").status == 0  # with nothing to draw
+
+
+def test_nothing_is_started_where_nothing_is_to_be_drawn(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert place.calibrate("--report", "--recordings").status == 0
+    monkeypatch.setattr(subprocess, "Popen", None)
+    assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").complaints == []
+
+
+def test_recordings_are_drawn_as_stages_finish(place: Place) -> None:
+    assert place.calibrate().status == 0
+    with painters(report=True, recordings=True, beside=True) as found:
+        for stage in ORDER:
+            found.begin(place.run, stage)
+        deadline = time.monotonic() + 60
+        while not (place.run / "offsets" / "offsets.rrd").is_file() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER[:-2])
+        assert not (place.run / "report" / "report.html").exists()  # not before the verdict
+        assert found.draw(place.run) == []
+    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
+    assert (place.run / "report" / "report.html").is_file()
+
+
+def test_what_fails_while_stages_run_is_drawn_after_them(place: Place) -> None:
+    with painters(report=False, recordings=True, beside=True) as found:
+        found.begin(place.run, "ingest")  # not there yet
+        assert place.calibrate().status == 0
+        assert found.draw(place.run) == []
+    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
 
 
 def test_a_painter_that_dies_is_said(place: Place) -> None:
+    assert place.calibrate().status == 0
     with painters(report=True, recordings=True, beside=True) as found:
-        assert place.calibrate().status == 0
-        found._processes["recordings"].kill()
-        found._processes["recordings"].wait()
+        found.begin(place.run, "adjust")
+        assert found._process is not None
+        found._process.kill()
         failed = found.draw(place.run)
-    assert [(one.what, one.trace) for one in failed] == [("recordings", "")]
-    assert (place.run / "report" / "report.html").is_file()
+        assert not painting()
+    assert [(one.what, one.trace) for one in failed] == [("report.html and recordings", "")]
+    assert not list(place.run.rglob("*.new"))
     assert not list(place.run.rglob("*.partial"))
+
+
+def test_nothing_stays_behind_of_a_killed_run(place: Place) -> None:
+    command = [Path(sys.executable).with_name("poolcal"), *map(str, place.words()[:-1]), "2"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        deadline = time.monotonic() + 60
+        while len(painting()) < 3 and time.monotonic() < deadline:  # loaded, and with its copies
+            time.sleep(0.01)
+        assert len(painting()) == 3
+        process.kill()
+    deadline = time.monotonic() + 10
+    while painting() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not painting()
 
 
 def test_nothing_in_the_working_directory_is_run(place: Place) -> None:
@@ -370,12 +436,6 @@ def test_a_mistyped_run_is_refused_and_not_made(place: Place) -> None:
     told = poolcal("view", place.folder / "typo")
     assert (told.status, len(told.err.splitlines())) == (2, 1)
     assert not (place.folder / "typo").exists()
-
-
-def commands() -> list[str]:
-    """The command lines of this process's children and theirs."""
-    told = subprocess.run(["ps", "-eo", "ppid,args"], capture_output=True, text=True, check=True).stdout
-    return [line for line in told.splitlines() if line.split()[0] == str(os.getpid())]
 
 
 def test_none_when_not_wanted(place: Place) -> None:

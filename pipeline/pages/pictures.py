@@ -1,0 +1,87 @@
+"""The report's pictures, each drawn by itself from a run's tables: they can be drawn side by side."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from pipeline import artefacts
+from pipeline.folder import calibration
+from pipeline.pages import curves, sections, style
+from pipeline.passes import pass_of
+from pipeline.poses import trajectory_in_target
+from pipeline.tables import Tables
+
+TRACK_POINTS = 300  # of a pass on the plan
+
+
+def draw(run: Path, name: str) -> Markup:
+    """One of :data:`PICTURES`."""
+    with style():
+        return PICTURES[name](Tables(run))
+
+
+def _residuals(tables: Tables) -> Markup:
+    passes = tables.table(artefacts.PASSES)
+    return curves.residuals(tables.table(artefacts.RESIDUAL_BINS), tables.table(artefacts.CELLS), passes)
+
+
+def _distances(tables: Tables) -> Markup:
+    residuals = tables.table(artefacts.RESIDUALS, *sections.DISTANCES)
+    return sections.distances(residuals, _family(residuals, tables), _solved(tables))
+
+
+def _sections(tables: Tables) -> Markup:
+    residuals = tables.table(artefacts.RESIDUALS, *sections.SECTIONS)
+    family = _family(residuals, tables)
+    return sections.sections(residuals, tables.table(artefacts.FACES), family, _solved(tables))
+
+
+def _map_laser(tables: Tables) -> Markup:
+    return sections.maps(tables.table(artefacts.RESIDUAL_MAP), tables.table(artefacts.FACES), "laser")
+
+
+def _map_mbes(tables: Tables) -> Markup:
+    return sections.maps(tables.table(artefacts.RESIDUAL_MAP), tables.table(artefacts.FACES), "mbes")
+
+
+def _convergence(tables: Tables) -> Markup:
+    return curves.convergence(tables.table(artefacts.ITERATIONS), tables.table(artefacts.ALTERNATION))
+
+
+def _tracks(tables: Tables) -> Markup:
+    """The INS's track of each pass in the target frame."""
+    poses, passes, pose = (tables.table(one) for one in (artefacts.POSES, artefacts.PASSES, artefacts.TARGET_POSE))
+    trajectory = trajectory_in_target(poses, pose)
+    number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
+    found = {}
+    for one in passes["pass"].tolist():
+        track = trajectory.positions_m[number == one]
+        if len(track):
+            found[int(one)] = track[:: max(1, len(track) // TRACK_POINTS)]
+    azimuth_deg = tables.table(artefacts.POOL_FRAME)["azimuth_deg"].iloc[0] + pose["azimuth_correction_deg"].iloc[0]
+    return sections.tracks(found, tables.table(artefacts.FACES), float(azimuth_deg))
+
+
+def _family(residuals: pd.DataFrame, tables: Tables) -> NDArray[Any]:
+    """The family of each residual's face."""
+    family = tables.table(artefacts.FACES)["family"].to_numpy()
+    return np.asarray(family[residuals["face"].to_numpy().astype(int)])
+
+
+def _solved(tables: Tables) -> bool:
+    return calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
+
+
+PICTURES = {  # those that take longest first
+    "residuals": _residuals,
+    "distances": _distances,
+    "sections": _sections,
+    "map_mbes": _map_mbes,
+    "map_laser": _map_laser,
+    "convergence": _convergence,
+    "tracks": _tracks,
+}
