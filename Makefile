@@ -39,8 +39,8 @@ demo: $(DEMO)/.simulated ## simulate a pool session, calibrate it, compare with 
 	@echo 'Look next at runs/demo/report/report.html, and at the recordings: make view RUN=runs/demo'
 
 $(DEMO)/.simulated: $(SETUP) $(shell find pipeline/simulation configs/scenarios -name '*.py' -o -name '*.yaml')
-	rm -rf $(DEMO) $(DEMO).truth.json
-	$(POOLCAL) simulate $(DEMO) --seed $(SEED)
+	@rm -rf $(DEMO) $(DEMO).truth.json
+	$(POOLCAL) simulate $(DEMO) --seed $(SEED) >/dev/null
 	@touch $@
 
 GIVEN = $(foreach name,SESSION CONFIG RUN,$(if $($(name)),,$(error $(name)= is missing: make $@ SESSION=dir CONFIG=configs/pool.yaml RUN=runs/name)))
