@@ -70,14 +70,14 @@ def measured(command: list[str]) -> tuple[float, float, str]:
 
 
 def memory_together(command: list[str]) -> tuple[float, float]:
-    """Seconds of a command, and the peak MiB of it and its child processes at one moment (what they share is counted
-    with each of them)."""
+    """Seconds of a command, and the peak MiB of it and its child processes at one moment; a page that several share
+    is counted once."""
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     peak = 0.0
     while process.poll() is None:
-        peak = max(peak, sum(_resident_mib(pid) for pid in _family(process.pid)))
-        time.sleep(0.02)
+        peak = max(peak, sum(_share_mib(pid) for pid in _family(process.pid)))
+        time.sleep(0.05)
     return time.perf_counter() - start, peak
 
 
@@ -89,12 +89,12 @@ def _family(pid: int) -> list[int]:
     return [pid, *(one for child in children for one in _family(int(child)))]
 
 
-def _resident_mib(pid: int) -> float:
+def _share_mib(pid: int) -> float:
     try:
-        status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+        status = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="utf-8")
     except OSError:
         return 0.0
-    return sum(int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("VmRSS:"))
+    return sum(int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("Pss:"))
 
 
 def session_of(size: str) -> Path:
