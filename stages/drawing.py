@@ -32,7 +32,7 @@ from stages import ORDER
 RECORDINGS = "recordings"
 PATIENCE_S = 600
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
-NICE = 19  # the stages come first
+NICE = 10  # the stages come first, but a busy machine draws as well
 SIDE_BY_SIDE = 2  # pictures of the page
 BESIDE_THE_PAGE = ORDER[-2:]  # recordings for which the page would have to wait
 
@@ -105,13 +105,18 @@ def _start(wanted: Sequence[str]) -> "subprocess.Popen[str]":
     )
 
 
+ALLOCATION = {  # no threads, for the process is to fork; memory kept, and in large pages where the system has them
+    "OPENBLAS_NUM_THREADS": "1",
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
+    "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",
+}
+
+
 def _environment() -> dict[str, str]:
-    """With the program's own root first, for where it was not installed; and no threads, for it is to fork: neither
-    BLAS's nor those of Arrow's own allocator (which gives pages back only to ask for them again).
-    """
+    """With the program's own root first, for where it was not installed."""
     root = str(Path(__file__).parent.parent)
     path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-    return os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
+    return os.environ | {"PYTHONPATH": path} | ALLOCATION
 
 
 def _tell(process: "subprocess.Popen[str]", run: Path, names: Sequence[str]) -> None:

@@ -69,16 +69,15 @@ def measured(command: list[str]) -> tuple[float, float, str]:
     return time.perf_counter() - start, usage.ru_maxrss / 1024, output
 
 
-def memory_together(command: list[str]) -> tuple[float, float]:
-    """Seconds of a command, and the peak MiB of it and its child processes at one moment; a page that several share
-    is counted once."""
-    start = time.perf_counter()
+def memory_together(command: list[str]) -> float:
+    """Peak MiB of a command and its child processes at one moment; a page that several share is counted once. Looking
+    takes time: not for measuring seconds."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     peak = 0.0
     while process.poll() is None:
         peak = max(peak, sum(_share_mib(pid) for pid in _family(process.pid)))
         time.sleep(0.05)
-    return time.perf_counter() - start, peak
+    return peak
 
 
 def _family(pid: int) -> list[int]:
@@ -122,7 +121,9 @@ def bench(size: str, repeats: int, jobs: int) -> dict[str, float]:
         workers = ["--jobs", str(jobs)]
         common = [*workers, "--no-report", "--no-recordings"]
         whole = [*POOLCAL, "run", str(session), "--config", str(session / "pool.yaml"), "--run", str(run)]
-        found["drawn_s"], found["drawn_mib"] = memory_together([*whole, *workers])
+        found["drawn_mib"] = memory_together([*whole, *workers])
+        shutil.rmtree(run)
+        found["drawn_s"], _, _ = measured([*whole, *workers])
         shutil.rmtree(run)
         found["run_s"], found["run_mib"], _ = measured([*whole, *common])
         found["drawing_share"] = found["drawn_s"] / found["run_s"] - 1
