@@ -53,8 +53,13 @@ def load_settings(session_folder: Path, config_path: Path) -> Settings:
     return Settings(session_folder.resolve(), pool, config.load_session(session_folder))
 
 
-def refuse_overlap(run: Path, session_folder: Path) -> None:
-    """Raw data and results never share a folder: a run folder is swapped and cleared."""
+def refuse_folders(run: Path, session_folder: Path) -> None:
+    """Raw data and results never share a folder: a run folder is swapped and cleared. And a name must be text."""
+    for path in (run, session_folder):
+        try:
+            str(path).encode()
+        except UnicodeEncodeError as error:
+            raise ConfigError(f"{str(path)!r}: the name is no UTF-8 text; rename the folder") from error
     inner, outer = run.resolve(), session_folder.resolve()
     if inner.is_relative_to(outer) or outer.is_relative_to(inner):
         raise ConfigError(f"--run {run}: lies in the session folder {session_folder}, or round it; name a folder apart")

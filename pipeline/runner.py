@@ -36,7 +36,7 @@ def run(
 ) -> list[str]:
     """Bring every stage up to date; the names of those that had to be run, each told to ``finished`` in its turn."""
     settings = folder.load_settings(session_folder, config_path)
-    folder.refuse_overlap(run_folder, session_folder)
+    folder.refuse_folders(run_folder, session_folder)
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
         folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
@@ -61,7 +61,7 @@ def run_stage(
     names = [name_of(stage) for stage in stages]
     if settings is None:
         settings = folder.read_settings(run_folder)
-    folder.refuse_overlap(run_folder, settings.session_folder)
+    folder.refuse_folders(run_folder, settings.session_folder)
     with folder.locked(run_folder, names):
         folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)

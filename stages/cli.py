@@ -2,6 +2,7 @@
 
 import os
 import shlex
+import signal
 import sys
 import traceback
 from datetime import datetime
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from stages.drawing import Failure
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
+STOPPED = "poolcal: interrupted; what was complete is kept"
 
 app = typer.Typer(
     name="poolcal",
@@ -98,7 +100,7 @@ def run(
         finished = partial(drawing.begin, run_folder)
         runner.run(load(), session, config, run_folder, pool, Progress(), finished)
         status = _answer(run_folder)
-        _say_failures(drawing.draw(run_folder))
+        _say_failures(drawing.draw(run_folder), "; the calibration is complete")
     _say_where(run_folder)
     return status
 
@@ -292,15 +294,16 @@ def _say_where(run_folder: Path) -> None:
         say(f"Report: {page}", sys.stdout)
     if any(run_folder.glob("*/*.rrd")):
         program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as it was called
-        say(f"Recordings: {program} view {shlex.quote(str(run_folder))}", sys.stdout)
+        place = str(run_folder) if not str(run_folder).startswith("-") else f"./{run_folder}"
+        say(f"Recordings: {program} view {shlex.quote(place)}", sys.stdout)
 
 
-def _say_failures(failed: "Sequence[Failure]") -> None:
-    """Pictures are a help to see by: whatever goes wrong in drawing is said, and the calibration stands."""
+def _say_failures(failed: "Sequence[Failure]", but: str = "") -> None:
+    """Pictures are a help to see by: whatever goes wrong in drawing is said, and what has been computed stands."""
     for one in failed:
         if one.trace:
             say(one.trace, sys.stderr)
-        say(f"{one.what}: not drawn ({one.reason}); the calibration is complete", sys.stderr)
+        say(f"{one.what}: not drawn ({one.reason}){but}", sys.stderr)
 
 
 def _answer(run_folder: Path) -> int:
@@ -321,7 +324,7 @@ def call(arguments: list[str]) -> int:
     try:
         status = int(app(words or ["--help"], prog_name="poolcal", standalone_mode=False) or 0)
         if status == INTERRUPTED:
-            say("poolcal: interrupted; what was complete is kept", sys.stderr)
+            say(STOPPED, sys.stderr)
         return status
     except PoolcalError as error:
         if debug:
@@ -333,13 +336,26 @@ def call(arguments: list[str]) -> int:
         say(f"poolcal: {usage or 'nothing to do'}; see poolcal --help", sys.stderr)
         return 2
     except Exception:
+        if _interrupts:  # a library that was being loaded has made another error of it
+            say(STOPPED, sys.stderr)
+            return INTERRUPTED
         say(traceback.format_exc().rstrip(), sys.stderr)
         say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
         return 3
 
 
+_interrupts: list[int] = []
+
+
+def _interrupted(number: int, _: object) -> None:
+    _interrupts.append(number)
+    raise KeyboardInterrupt
+
+
 def main() -> None:
     """The console script."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupted)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by the shell; open to the end
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115

@@ -1,39 +1,34 @@
 """What people look at, drawn from a run's files: the recordings as stages finish, the report's page after the verdict.
 
-Drawing needs heavy libraries and cannot share the interpreter with itself. A process of its own loads them while the
-stages run, in the time these leave, and draws when it is told to: ``python -m stages.drawing`` draws what each line
-names, and at the end of its input answers with what went wrong in drawing the last.
+Drawing needs heavy libraries and cannot share the interpreter with itself. A process of its own (:mod:`stages.painter`)
+loads them while the stages run, in the time these leave. It prepares recordings of finished stages, and keeps them:
+nothing is written before the verdict, so that pictures never take the room that a stage needs. Then it is told to draw,
+writes, and answers with what went wrong.
 """
 
 import contextlib
-import ctypes
-import gc
 import json
 import os
 import signal
 import subprocess
 import sys
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from pipeline import folder
+from pipeline import folder, manifest
 from pipeline.drawn import PAGE, agreeing, page_to_draw, recording_path
 from pipeline.errors import PoolcalError
+from pipeline.files import write_bytes
 from pipeline.streams import Mapper, serial
 from stages import ORDER
 
 RECORDINGS = "recordings"
-PATIENCE_S = 600
-DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
-NICE = 10  # the stages come first, but a busy machine draws as well
-SIDE_BY_SIDE = 2  # pictures of the page
+PATIENCE_S, ENDING_S = 600, 10
+PREPARE, DRAW = "prepare", "draw"
 BESIDE_THE_PAGE = ORDER[-2:]  # recordings for which the page would have to wait
 
 
@@ -62,7 +57,7 @@ class Painters:
         self._process: subprocess.Popen[str] | None = None
 
     def begin(self, run: Path, stage: str) -> None:
-        """Have a finished stage's recording drawn while others run. If that fails, :meth:`draw` does it again.
+        """Have a finished stage's recording prepared while others run. If that fails, :meth:`draw` does it again.
 
         The process is started by the first: reading the files needs every processor, what follows does not.
         """
@@ -75,7 +70,7 @@ class Painters:
                 self._beside = False
                 return
         if RECORDINGS in self._wanted and stage not in BESIDE_THE_PAGE:
-            _tell(self._process, run, [stage])
+            _tell(self._process, PREPARE, run, [stage])
 
     def draw(self, run: Path) -> list[Failure]:
         """Draw what is not drawn yet. A finished result is never touched; what could not be drawn comes back."""
@@ -83,23 +78,34 @@ class Painters:
             return []
         try:
             folder.read_settings(run)  # never lock, and so make, a folder that is no run's
+            if not self._missing(run):
+                return []
             with folder.locked(run, ORDER):
-                missing = [name for what in self._wanted for name in _missing(run, what)]
-                if self._process is None:
+                missing = self._missing(run)
+                if self._process is None or not missing:
                     return paint(run, missing)
-                return _drawn_by(self._process, run, missing) if missing else []
+                return _drawn_by(self._process, run, missing)
         except Exception as error:
             return [Failure.of(" and ".join(self._wanted), error)]
 
+    def _missing(self, run: Path) -> list[str]:
+        """Names of what is not drawn yet: the page, or stages; of stages that agree with each other alone."""
+        page = [PAGE] if PAGE in self._wanted and page_to_draw(run, ORDER) else []
+        if RECORDINGS not in self._wanted:
+            return page
+        return page + [stage for stage in agreeing(run, ORDER) if not recording_path(run, stage).is_file()]
+
     def close(self) -> None:
         if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
+            if self._process.poll() is None:
+                os.killpg(self._process.pid, signal.SIGKILL)  # with its copies: they are a group of their own
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.communicate(timeout=ENDING_S)
 
 
 def _start(wanted: Sequence[str]) -> "subprocess.Popen[str]":
     """-P: nothing in the folder one happens to stand in is code of this program."""
-    command = [sys.executable, "-P", "-m", "stages.drawing", *wanted]
+    command = [sys.executable, "-P", "-m", "stages.painter", str(os.getpid()), *wanted]
     return subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, text=True, env=_environment()
     )
@@ -119,14 +125,14 @@ def _environment() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": path} | ALLOCATION
 
 
-def _tell(process: "subprocess.Popen[str]", run: Path, names: Sequence[str]) -> None:
+def _tell(process: "subprocess.Popen[str]", order: str, run: Path, names: Sequence[str]) -> None:
     assert process.stdin is not None
     with contextlib.suppress(BrokenPipeError):  # it has ended: there will be no answer
-        print(json.dumps([str(run.absolute()), names]), file=process.stdin, flush=True)
+        print(json.dumps([order, str(run.absolute()), names]), file=process.stdin, flush=True)
 
 
 def _drawn_by(process: "subprocess.Popen[str]", run: Path, names: Sequence[str]) -> list[Failure]:
-    _tell(process, run, names)
+    _tell(process, DRAW, run, names)
     what = " and ".join(dict.fromkeys(RECORDINGS if name in ORDER else name for name in names))
     try:
         answer, _ = process.communicate(timeout=PATIENCE_S)
@@ -146,23 +152,35 @@ def painters(report: bool, recordings: bool, beside: bool) -> Iterator[Painters]
         found.close()
 
 
-def _missing(run: Path, what: str) -> list[str]:
-    """Names of what is not drawn yet: the page, or stages; of stages that agree with each other alone."""
-    if what == PAGE:
-        return [PAGE] if page_to_draw(run, ORDER) else []
-    return [stage for stage in agreeing(run, ORDER) if not recording_path(run, stage).is_file()]
+# --- drawing ---------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Prepared:
+    """A recording, and the manifest of the stage that is shown."""
+
+    shown: bytes
+    recording: bytes
+
+    @classmethod
+    def of(cls, run: Path, stage: str) -> "Prepared":
+        from stages.views import record
+
+        shown = (run / stage / manifest.NAME).read_bytes()
+        return cls(shown, record(run, stage))
 
 
-def paint(run: Path, names: Sequence[str], mapper: Mapper = serial) -> list[Failure]:
+def paint(
+    run: Path, names: Sequence[str], mapper: Mapper = serial, prepared: Mapping[str, Prepared] | None = None
+) -> list[Failure]:
     """Draw the page, its pictures through ``mapper``, and stages' recordings; what went wrong."""
     failed: list[Failure] = []
     pictures = None
     if PAGE in names:
         with _noting(failed, PAGE):
             pictures = _pictures(run, mapper)
-    if stages := [name for name in names if name != PAGE]:
-        with _noting(failed, RECORDINGS):
-            _record(run, stages)
+    with _noting(failed, RECORDINGS):
+        for stage in names:
+            if stage != PAGE:
+                _write_recording(run, stage, (prepared or {}).get(stage))
     if pictures is not None:
         with _noting(failed, PAGE):
             _write_page(run, pictures)
@@ -189,54 +207,7 @@ def _write_page(run: Path, pictures: Iterable[Any]) -> None:
     write_page(run, ORDER, pictures)
 
 
-def _record(run: Path, stages: Sequence[str]) -> None:
-    from stages.views import record
-
-    for stage in stages:
-        record(run, stage)
-
-
-# --- the process -----------------------------------------------------------------------------------------------------
-def main(wanted: Sequence[str]) -> None:
-    """Load, draw line by line, answer.
-
-    Nothing that it makes need be collected before it ends: looking for that would take a fifth of its time.
-    """
-    _end_with_parent()
-    os.nice(NICE)
-    gc.disable()
-    with _others() if PAGE in wanted else contextlib.nullcontext(serial) as mapper:
-        if RECORDINGS in wanted:  # after the others are made: this library runs threads, which do not go with a fork
-            for module in ("rerun", *(f"stages.views.{stage}" for stage in ORDER)):
-                import_module(module)
-        failed: list[Failure] = []
-        for line in sys.stdin:
-            run, names = json.loads(line)
-            failed = paint(Path(run), names, mapper)
-    sys.stdout.write("\n" + json.dumps([asdict(one) for one in failed]))
-    sys.stdout.flush()
-    os._exit(0)  # taking everything down again piece by piece takes as long as drawing a picture
-
-
-@contextlib.contextmanager
-def _others() -> Iterator[Mapper]:
-    """Copies of this process, with everything loaded that the page takes."""
-    import_module("pipeline.pages.report")
-    with ProcessPoolExecutor(SIDE_BY_SIDE, get_context("fork"), _ready) as executor:
-        executor.submit(int).result()  # makes all of them
-        yield executor.map
-
-
-def _ready() -> None:
-    from pipeline.pages import prepare
-
-    _end_with_parent()
-    prepare()
-
-
-def _end_with_parent() -> None:
-    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+def _write_recording(run: Path, stage: str, ready: Prepared | None) -> None:
+    if ready is None or ready.shown != (run / stage / manifest.NAME).read_bytes():
+        ready = Prepared.of(run, stage)
+    write_bytes(recording_path(run, stage), ready.recording)

@@ -37,7 +37,6 @@ from typing import Any
 
 from pipeline.drawn import agreeing, recording_path
 from pipeline.errors import ArtefactError
-from pipeline.files import write_bytes
 from pipeline.tables import Tables
 from stages import ORDER
 
@@ -49,15 +48,11 @@ GREY, SONAR, LASER = (150, 155, 165), (213, 94, 0), (0, 114, 178)
 DOT_M = 0.008  # radius of a point
 
 
-def record(run: Path, stage: str) -> bool:
-    """Draw a stage's recording, if it is not drawn yet."""
+def record(run: Path, stage: str) -> bytes:
+    """A stage's recording, as its file's content."""
     from stages.views.tour import tour
 
-    path = recording_path(run, stage)
-    if path.exists():
-        return False
-    save(path, recording_id(run), tour(), lambda recording: log(recording, stage, Tables(run)))
-    return True
+    return content(recording_id(run), tour(), lambda recording: log(recording, stage, Tables(run)))
 
 
 def log(recording: Any, stage: str, tables: Tables) -> None:
@@ -73,8 +68,8 @@ def words(text: str) -> Any:
     return rerun.TextDocument(f"{fence}text\n{text}\n{fence}", media_type=rerun.MediaType.MARKDOWN)
 
 
-def save(path: Path, identity: str, blueprint: Any, draw: Callable[[Any], None]) -> None:
-    """A recording file, whole or not at all: the SDK's own writing hangs or leaves a stump when a disk is full."""
+def content(identity: str, blueprint: Any, draw: Callable[[Any], None]) -> bytes:
+    """Of a recording's file. (The SDK's own writing hangs or leaves a stump when a disk is full.)"""
     import rerun
 
     recording = rerun.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
@@ -82,7 +77,7 @@ def save(path: Path, identity: str, blueprint: Any, draw: Callable[[Any], None])
     recording.send_blueprint(blueprint, make_active=False, make_default=True)
     draw(recording)
     recording.flush()
-    write_bytes(path, memory.drain_as_bytes())
+    return bytes(memory.drain_as_bytes())
 
 
 def recordings_of(run: Path, stage: str | None = None) -> list[Path]:

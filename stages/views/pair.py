@@ -7,11 +7,12 @@ import numpy as np
 
 from pipeline import artefacts
 from pipeline.diff import text
+from pipeline.files import write_bytes
 from pipeline.folder import calibration
 from pipeline.poses import trajectory_in_target
 from pipeline.streams import xyz
 from pipeline.tables import Tables
-from stages.views import DOT_M, LASER, SONAR, log, recording_id, save, words
+from stages.views import DOT_M, LASER, SONAR, content, log, recording_id, words
 from stages.views.tour import side_by_side
 
 SOUNDINGS = 200_000  # of a run, on one target
@@ -44,7 +45,7 @@ def save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> N
         _on_one_target(recording, Tables(first), Tables(second))
         recording.log("tables/comparison", words(text(found)), static=True)
 
-    save(path, recording_id(first, second), side_by_side(), draw)
+    write_bytes(path, content(recording_id(first, second), side_by_side(), draw))
 
 
 def _on_one_target(recording: Any, first: Tables, second: Tables) -> None:

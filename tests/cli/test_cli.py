@@ -223,3 +223,19 @@ def test_plain_output_has_no_control_characters(pool: Pool) -> None:
     done = _toy(*_words(pool), env={**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0
     assert done.stderr.replace("\n", "").isprintable()
+
+
+def test_an_interrupt_that_a_library_made_an_error_of(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Ctrl-C while a compiled module is being loaded comes out as an ImportError."""
+
+    def fails(*_: object, **__: object) -> None:
+        raise ImportError("initialization failed")
+
+    monkeypatch.setattr("stages.cli.app", fails)
+    assert call(["run"]) == 3
+    monkeypatch.setattr("stages.cli._interrupts", [2])
+    capsys.readouterr()
+    assert call(["run"]) == 130
+    assert capsys.readouterr().err == "poolcal: interrupted; what was complete is kept\n"

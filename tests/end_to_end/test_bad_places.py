@@ -52,6 +52,10 @@ def _name_too_long(place: Place) -> Path:
     return place.folder / ("r" * 300)
 
 
+def _no_text(place: Place) -> Path:
+    return place.folder / "r\udcff"
+
+
 FOLDERS: dict[str, tuple[Callable[[Place], Path], tuple[str, ...]]] = {
     "file in the way": (_file_in_the_way, ("taken", "cannot be written", "another run folder")),
     "file above": (_file_above, ("taken", "cannot be written", "another run folder")),
@@ -59,6 +63,7 @@ FOLDERS: dict[str, tuple[Callable[[Place], Path], tuple[str, ...]]] = {
     "round the session": (_round_session, ("--run", "lies in the session folder", "apart")),
     "somebody else's": (_foreign, ("foreign", "thesis.doc", "no run folder", "name another")),
     "where nothing can be": (_no_folder_can_be_there, ("/proc/", "cannot be written", "another run folder")),
+    "no text": (_no_text, ("udcff", "no UTF-8 text", "rename")),
     "name too long": (_name_too_long, ("cannot be written", "another run folder")),
 }
 

@@ -4,6 +4,7 @@ import errno
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -17,9 +18,12 @@ import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
 
+import stages.painter
 import stages.views
+from pipeline.folder import locked
+from pipeline.streams import serial
 from stages import ORDER
-from stages.drawing import Painters, painters
+from stages.drawing import Painters, Prepared, paint, painters
 from tests.end_to_end.places import Place, Told, digests, poolcal
 
 Chunks = dict[str, list[Any]]
@@ -41,7 +45,7 @@ def _draws(process: Path) -> bool:
         words, given = (process / "cmdline").read_bytes(), (process / "environ").read_bytes()
     except OSError:  # gone, or not ours
         return False
-    return b"stages.drawing" in words and MARK.encode() in given
+    return b"stages.painter" in words and MARK.encode() in given
 
 
 @pytest.fixture(scope="module")
@@ -346,19 +350,27 @@ def test_nothing_is_started_where_nothing_is_to_be_drawn(place: Place, monkeypat
     assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").complaints == []
 
 
-def test_recordings_are_drawn_as_stages_finish(place: Place) -> None:
+def test_recordings_are_prepared_as_stages_finish_and_written_after_the_verdict(place: Place) -> None:
+    """So that they never take the room on the disk that a stage needs."""
     assert place.calibrate().status == 0
     with painters(report=True, recordings=True, beside=True) as found:
         for stage in ORDER:
             found.begin(place.run, stage)
-        deadline = time.monotonic() + 60
-        while not (place.run / "offsets" / "offsets.rrd").is_file() and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER[:-2])
-        assert not (place.run / "report" / "report.html").exists()  # not before the verdict
+        time.sleep(2.0)  # long enough to have prepared some
+        assert not list(place.run.glob("*/*.rrd"))
+        assert not (place.run / "report" / "report.html").exists()
         assert found.draw(place.run) == []
     assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
     assert (place.run / "report" / "report.html").is_file()
+
+
+def test_what_was_prepared_is_written_only_beside_the_tables_that_it_shows(place: Place) -> None:
+    assert place.calibrate().status == 0
+    shown = (place.run / "ingest" / "manifest.json").read_bytes()
+    current, stale = Prepared(shown, b"prepared"), Prepared(shown + b" ", b"of tables that are gone")
+    assert paint(place.run, ["ingest", "offsets"], prepared={"ingest": current, "offsets": stale}) == []
+    assert (place.run / "ingest" / "ingest.rrd").read_bytes() == b"prepared"
+    assert "/curves/turns/angles" in read(place.run, "offsets")
 
 
 def test_what_fails_while_stages_run_is_drawn_after_them(place: Place) -> None:
@@ -380,6 +392,54 @@ def test_a_painter_that_dies_is_said(place: Place) -> None:
     assert [(one.what, one.trace) for one in failed] == [("report.html and recordings", "")]
     assert not list(place.run.rglob("*.new"))
     assert not list(place.run.rglob("*.partial"))
+
+
+@pytest.mark.parametrize("wait_s", [0.0, 0.3, 1.0])
+def test_without_its_copies_it_draws_all_the_same(place: Place, wait_s: float) -> None:
+    """They may be killed at any moment, by a system short of memory: while they load, or with a picture half done."""
+    assert place.calibrate().status == 0
+    with painters(report=True, recordings=True, beside=True) as found:
+        found.begin(place.run, "ingest")
+        deadline = time.monotonic() + 60
+        while len(copies := _children(found)) < 2 and time.monotonic() < deadline:
+            time.sleep(0.005)
+        time.sleep(wait_s)
+        for copy in copies:
+            os.kill(copy, signal.SIGKILL)
+        assert found.draw(place.run) == []
+    assert (place.run / "report" / "report.html").is_file()
+    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
+
+
+@pytest.mark.parametrize("wait_s", [0.0, 0.001, 0.01])
+def test_a_painter_killed_while_it_forks_leaves_nothing(place: Place, wait_s: float) -> None:
+    assert place.calibrate().status == 0
+    with painters(report=True, recordings=True, beside=True) as found:
+        found.begin(place.run, "ingest")
+        assert found._process is not None
+        deadline = time.monotonic() + 60
+        while not _children(found) and time.monotonic() < deadline:
+            pass
+        time.sleep(wait_s)
+        found._process.kill()
+        assert [one.trace for one in found.draw(place.run)] == [""]
+    assert not painting()
+
+
+def test_no_shared_memory_no_copies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a pool of processes cannot be made the process draws alone."""
+
+    def none(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(stages.painter, "ProcessPoolExecutor", none)
+    assert stages.painter._others() is serial
+
+
+def _children(found: Painters) -> list[int]:
+    assert found._process is not None
+    place = Path(f"/proc/{found._process.pid}/task/{found._process.pid}/children")
+    return [int(word) for word in place.read_text().split()]
 
 
 def test_nothing_stays_behind_of_a_killed_run(place: Place) -> None:
@@ -430,6 +490,16 @@ def test_no_room_for_another_process(place: Place, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(subprocess, "Popen", none)
     assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").complaints == []
     assert (place.run / "report" / "report.html").is_file()
+
+
+def test_nothing_missing_nothing_said(place: Place) -> None:
+    """A folder that is in use, or that cannot be written, is looked at all the same."""
+    assert place.calibrate("--recordings").status == 0
+    with locked(place.run, ORDER):
+        assert Painters(report=False, recordings=True).draw(place.run) == []
+        (place.run / "adjust" / "adjust.rrd").unlink()
+        (failed,) = Painters(report=False, recordings=True).draw(place.run)
+    assert "is in use" in failed.reason
 
 
 def test_a_mistyped_run_is_refused_and_not_made(place: Place) -> None:
