@@ -29,6 +29,7 @@ from stages import ORDER
 RECORDINGS = "recordings"
 PATIENCE_S, ENDING_S = 600, 10
 PREPARE, DRAW = "prepare", "draw"
+READING = ORDER[:1]
 BESIDE_THE_PAGE = ORDER[-2:]  # recordings for which the page would have to wait
 
 
@@ -55,13 +56,15 @@ class Painters:
         self._wanted = [what for what, wanted in ((PAGE, report), (RECORDINGS, recordings)) if wanted]
         self._beside = beside and bool(self._wanted)
         self._process: subprocess.Popen[str] | None = None
+        self._finished: list[str] = []
 
     def begin(self, run: Path, stage: str) -> None:
         """Have a finished stage's recording prepared while others run. If that fails, :meth:`draw` does it again.
 
-        The process is started by the first: reading the files needs every processor, what follows does not.
+        The process is started when the files have been read: that needs every processor, what follows does not.
         """
-        if not self._beside:
+        self._finished.append(stage)
+        if not self._beside or stage in READING:
             return
         if self._process is None:
             try:
@@ -69,8 +72,10 @@ class Painters:
             except OSError:  # no room for another process
                 self._beside = False
                 return
-        if RECORDINGS in self._wanted and stage not in BESIDE_THE_PAGE:
-            _tell(self._process, PREPARE, run, [stage])
+        names = [name for name in self._finished if name not in BESIDE_THE_PAGE]
+        self._finished.clear()
+        if RECORDINGS in self._wanted and names:
+            _tell(self._process, PREPARE, run, names)
 
     def draw(self, run: Path) -> list[Failure]:
         """Draw what is not drawn yet. A finished result is never touched; what could not be drawn comes back."""

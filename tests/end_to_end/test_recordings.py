@@ -375,7 +375,7 @@ def test_what_was_prepared_is_written_only_beside_the_tables_that_it_shows(place
 
 def test_what_fails_while_stages_run_is_drawn_after_them(place: Place) -> None:
     with painters(report=False, recordings=True, beside=True) as found:
-        found.begin(place.run, "ingest")  # not there yet
+        found.begin(place.run, "georeference")  # not there yet
         assert place.calibrate().status == 0
         assert found.draw(place.run) == []
     assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
@@ -399,7 +399,7 @@ def test_without_its_copies_it_draws_all_the_same(place: Place, wait_s: float) -
     """They may be killed at any moment, by a system short of memory: while they load, or with a picture half done."""
     assert place.calibrate().status == 0
     with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(place.run, "ingest")
+        found.begin(place.run, "georeference")
         deadline = time.monotonic() + 60
         while len(copies := _children(found)) < 2 and time.monotonic() < deadline:
             time.sleep(0.005)
@@ -415,7 +415,7 @@ def test_without_its_copies_it_draws_all_the_same(place: Place, wait_s: float) -
 def test_a_painter_killed_while_it_forks_leaves_nothing(place: Place, wait_s: float) -> None:
     assert place.calibrate().status == 0
     with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(place.run, "ingest")
+        found.begin(place.run, "georeference")
         assert found._process is not None
         deadline = time.monotonic() + 60
         while not _children(found) and time.monotonic() < deadline:
