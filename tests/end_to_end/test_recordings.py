@@ -40,6 +40,14 @@ def painting() -> list[Path]:
     return [place for place in Path("/proc").glob("[0-9]*") if _draws(place)]
 
 
+def assert_all_end() -> None:
+    """What was told to end takes a moment."""
+    deadline = time.monotonic() + 10
+    while painting() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not painting()
+
+
 def _draws(process: Path) -> bool:
     try:
         words, given = (process / "cmdline").read_bytes(), (process / "environ").read_bytes()
@@ -339,7 +347,7 @@ def test_painters_beside_the_run(place: Place, right: dict[str, str], drawn: Pat
     assert one == other
     assert len(one) == 7
     assert digests(place.run) == right
-    assert not painting()
+    assert_all_end()
     here, there = (read(run, "adjust")["/after/P2"] for run in (place.run, drawn))
     np.testing.assert_array_equal(points(here), points(there))
 
@@ -388,7 +396,7 @@ def test_a_painter_that_dies_is_said(place: Place) -> None:
         assert found._process is not None
         found._process.kill()
         failed = found.draw(place.run)
-        assert not painting()
+    assert_all_end()
     assert [(one.what, one.trace) for one in failed] == [("report.html and recordings", "")]
     assert not list(place.run.rglob("*.new"))
     assert not list(place.run.rglob("*.partial"))
@@ -423,7 +431,7 @@ def test_a_painter_killed_while_it_forks_leaves_nothing(place: Place, wait_s: fl
         time.sleep(wait_s)
         found._process.kill()
         assert [one.trace for one in found.draw(place.run)] == [""]
-    assert not painting()
+    assert_all_end()
 
 
 def test_no_shared_memory_no_copies(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -450,10 +458,7 @@ def test_nothing_stays_behind_of_a_killed_run(place: Place) -> None:
             time.sleep(0.01)
         assert len(painting()) == 3
         process.kill()
-    deadline = time.monotonic() + 10
-    while painting() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert not painting()
+    assert_all_end()
 
 
 def test_nothing_in_the_working_directory_is_run(place: Place) -> None:
