@@ -29,8 +29,13 @@ from stages import ORDER
 RECORDINGS = "recordings"
 PATIENCE_S, ENDING_S = 600, 10
 PREPARE, DRAW = "prepare", "draw"
-READING = ORDER[:1]
+TOO_EARLY = ORDER[:1]  # what follows the first stage needs every processor as well
 BESIDE_THE_PAGE = ORDER[-2:]  # recordings for which the page would have to wait
+ALLOCATION = {  # one thread, for the process is to fork; one allocator, and large pages where the system has them
+    "OPENBLAS_NUM_THREADS": "1",
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
+    "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",
+}
 
 
 @dataclass(frozen=True)
@@ -61,10 +66,10 @@ class Painters:
     def begin(self, run: Path, stage: str) -> None:
         """Have a finished stage's recording prepared while others run. If that fails, :meth:`draw` does it again.
 
-        The process is started when the files have been read: that needs every processor, what follows does not.
+        The process is started when the files have been read and placed: that needs every processor, what follows less.
         """
         self._finished.append(stage)
-        if not self._beside or stage in READING:
+        if not self._beside or stage in TOO_EARLY:
             return
         if self._process is None:
             try:
@@ -114,13 +119,6 @@ def _start(wanted: Sequence[str]) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, text=True, env=_environment()
     )
-
-
-ALLOCATION = {  # no threads, for the process is to fork; memory kept, and in large pages where the system has them
-    "OPENBLAS_NUM_THREADS": "1",
-    "ARROW_DEFAULT_MEMORY_POOL": "system",
-    "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",
-}
 
 
 def _environment() -> dict[str, str]:

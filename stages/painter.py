@@ -96,7 +96,7 @@ def _ready(parent: int) -> None:
     from pipeline.pages import prepare
 
     _end_with(parent)
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     prepare()
 
 

@@ -1,11 +1,14 @@
 """One small session, simulated and calibrated once a worker process; copies of it to spoil."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from stages import ORDER
+from stages.drawing import Painters
 from tests.end_to_end.places import Place, Told, digests, poolcal, simulate
 
 
@@ -41,3 +44,13 @@ def place(small: Path, tmp_path: Path) -> Place:
     made = Place(small, tmp_path)
     made.mend()
     return made
+
+
+@pytest.fixture(scope="session")
+def drawn(undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The undisturbed run with its page and recordings. Nobody changes it."""
+    run = tmp_path_factory.mktemp("drawn") / "水池 <b>1</b>"
+    shutil.copytree(undisturbed[0], run)
+    assert Painters(report=True, recordings=True).draw(run) == []
+    assert sorted(path.stem for path in run.glob("*/*.rrd")) == sorted(ORDER)
+    return run

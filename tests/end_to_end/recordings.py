@@ -1,0 +1,27 @@
+"""What is in a recording, read back with the SDK."""
+
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from rerun.chunk import RrdReader
+
+Chunks = dict[str, list[Any]]
+
+
+def read(run: Path, stage: str) -> Chunks:
+    found: Chunks = defaultdict(list)
+    for chunk in RrdReader(run / stage / f"{stage}.rrd").stream():
+        found[str(chunk.entity_path)].append(chunk.to_record_batch())
+    return found
+
+
+def rows_in(path: Path) -> int:
+    return sum(len(pd.read_parquet(part)) for part in path.glob("part-*.parquet"))
+
+
+def points(chunks: list[Any]) -> np.ndarray:
+    lists = [row for chunk in chunks for row in chunk.column("Points3D:positions").to_pylist()]
+    return np.array([point for row in lists for point in row])
