@@ -20,7 +20,7 @@ from stages import ORDER, load
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from stages.drawing import Failure
+    from stages.drawing import Failure, Painters
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 STOPPED = "poolcal: interrupted; what was complete is kept"
@@ -97,7 +97,7 @@ def run(
     from stages.drawing import painters
 
     with workers(jobs, executor) as pool, painters(report, recordings, pool.jobs > 1) as drawing:
-        finished = partial(drawing.begin, run_folder)
+        finished = partial(_go_on, drawing, run_folder)
         runner.run(load(), session, config, run_folder, pool, Progress(), finished)
         status = _answer(run_folder)
         _say_failures(drawing.draw(run_folder), "; the calibration is complete")
@@ -352,6 +352,13 @@ def _interrupted(number: int, _: object) -> None:
     raise KeyboardInterrupt
 
 
+def _go_on(drawing: "Painters", run_folder: Path, stage: str) -> None:
+    """After a stage; not where somebody interrupted it in a place in which Python ignores that."""
+    if _interrupts:
+        raise KeyboardInterrupt
+    drawing.begin(run_folder, stage)
+
+
 def main() -> None:
     """The console script."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -368,6 +375,9 @@ def main() -> None:
         sys.stdout.flush()
     except BrokenPipeError:  # nobody listens any more: leave without Python's own complaint
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if status == INTERRUPTED:
+        sys.stderr.flush()
+        os._exit(status)  # a library left in the middle of its work would end with a status of its own
     sys.exit(status)
 
 

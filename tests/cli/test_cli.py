@@ -13,7 +13,8 @@ import pytest
 
 import pipeline
 from stages import ORDER
-from stages.cli import call
+from stages.cli import _go_on, call
+from stages.drawing import Painters
 from tests.runner.conftest import Pool
 
 TOY = [sys.executable, str(Path(__file__).with_name("toy_poolcal.py"))]
@@ -239,3 +240,15 @@ def test_an_interrupt_that_a_library_made_an_error_of(
     capsys.readouterr()
     assert call(["run"]) == 130
     assert capsys.readouterr().err == "poolcal: interrupted; what was complete is kept\n"
+
+
+def test_an_interrupt_that_python_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the clean-up after a lock, say: nothing comes of it there, so the run ends after the stage."""
+    drawn: list[str] = []
+    drawing = Painters(report=False, recordings=False)
+    monkeypatch.setattr(drawing, "begin", lambda _, stage: drawn.append(stage))
+    _go_on(drawing, Path("run"), "ingest")
+    monkeypatch.setattr("stages.cli._interrupts", [2])
+    with pytest.raises(KeyboardInterrupt):
+        _go_on(drawing, Path("run"), "georeference")
+    assert drawn == ["ingest"]
