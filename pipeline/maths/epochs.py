@@ -1,0 +1,111 @@
+"""Sums over the observations of one moment on one surface: all that a solution with corrected poses needs.
+
+Between two records of the INS the body moves along one straight step, and what one sensor sees of one surface within it
+(a *group*: a ping's beams on the wall, some hundred laser points on a block) is seen from one pose p, T =
+R_target_from_body. With r = X - p the vector from the body to a point and α = t1 · r, β = t2 · r along the surface's
+tangents, the observation v = n · (X - c) - shift changes
+
+    with a pose error (δ, ω), X -> X + δ + ω × r:    n · δ + ω · (r × n),        r × n = β t1 - α t2
+    with the mount (ε, λ), body axes:                ε · Tᵀ((r - T l) × n) + λ · Tᵀ n
+    with the surface's turns and shift:              (α + t1 · (p - c), β + t2 · (p - c), -1)
+
+all linear in q = (1, α, β) with coefficients that are the same for the whole group (t1 × t2 = n; a part of r along n
+does not count). So Σ w q qᵀ (3, 3), Σ w q v (3,) and Σ w v² hold the normal equations of every unknown, whatever the
+number of points: a stream is read once for each linearisation.
+
+The design must be taken at the adjusted point, not at the measured one. Noise along the ray moves the point along the
+surface as well, so v and α, β are correlated, and Σ w α v would be off by σ² (n · d)(t1 · d) a point (errors in
+variables): where the points of a moment spread over decimetres, that turns the heading by hundredths of a degree. The
+least squares correction of a point with covariance Σ is -Σ n v / (nᵀ Σ n) (Gauss-Helmert), after which α and β carry
+no noise that v knows of.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+FEATURES = 3  # 1, α, β
+
+
+@dataclass(frozen=True)
+class EpochSums:
+    """Groups of one sensor, ascending by record and surface.
+
+    record (g,): the last record of the INS before them; surface (g,); normal (g, 3, 3) = Σ w q qᵀ; right (g, 3) =
+    Σ w q v; squares (g,) = Σ w v²; share (g,): their mean place between this record and the next, 0 to 1; count (g,):
+    observations with a weight.
+    """
+
+    record: Integers
+    surface: Integers
+    normal: Array
+    right: Array
+    squares: Array
+    share: Array
+    count: Array
+
+    @property
+    def weight(self) -> Array:
+        """Σ w of each group (g,)."""
+        return self.normal[:, 0, 0]
+
+    def __len__(self) -> int:
+        return len(self.record)
+
+
+def epoch_sums(
+    record: Integers, share: Array, surface: Integers, surfaces: int, q: Array, weight: Array, v_m: Array
+) -> EpochSums:
+    """Of one batch: record, share, surface, weight and v (n,), q (3, n)."""
+    first = int(record.min()) if len(record) else 0
+    key = (record - first) * surfaces + surface
+    size = int(key.max()) + 1 if len(key) else 0
+
+    def total(values: Array | None) -> Array:
+        return np.bincount(key, weights=values, minlength=size)[found]
+
+    found = np.flatnonzero(np.bincount(key, weights=weight, minlength=size) > 0)
+    normal, right = np.empty((len(found), FEATURES, FEATURES)), np.empty((len(found), FEATURES))
+    for row in range(FEATURES):
+        weighted = weight * q[row]
+        right[:, row] = total(weighted * v_m)
+        for column in range(row + 1):
+            normal[:, row, column] = normal[:, column, row] = total(weighted * q[column])
+    return EpochSums(
+        first + found // surfaces,
+        found % surfaces,
+        normal,
+        right,
+        total(weight * v_m**2),
+        total(weight * share) / normal[:, 0, 0],
+        total((weight > 0).astype(np.float64)),
+    )
+
+
+def merged(pieces: Iterable[EpochSums]) -> EpochSums:
+    """All batches together, in order; a group may be spread over several."""
+    parts = list(pieces)
+    keys = np.concatenate([np.column_stack([one.record, one.surface]) for one in parts])
+    groups, inverse = np.unique(keys, axis=0, return_inverse=True)
+    inverse = inverse.ravel()
+
+    def added(name: str) -> Array:
+        values = np.concatenate([getattr(one, name) for one in parts])
+        total = np.zeros((len(groups), *values.shape[1:]))
+        np.add.at(total, inverse, values)
+        return total
+
+    sums = {name: added(name) for name in ("normal", "right", "squares", "count")}
+    moment = np.concatenate([one.share * one.weight for one in parts])
+    share = np.bincount(inverse, weights=moment, minlength=len(groups)) / sums["normal"][:, 0, 0]
+    return EpochSums(groups[:, 0], groups[:, 1], share=share, **sums)
+
+
+def adjusted(r_m: Array, normal: Array, v_m: Array, spread: Array) -> Array:
+    """Vectors r (n, 3) to points moved by their least squares correction; ``spread`` = Σ n (n, 3) m², normal (n, 3)."""
+    variance = np.einsum("ni,ni->n", spread, normal)
+    return np.asarray(r_m - spread * (v_m / variance)[:, None])
