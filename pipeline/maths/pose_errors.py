@@ -9,7 +9,7 @@ Both sensors hang on one body, so that at a moment they share the error e = (δ,
 * ξ: drift, a first-order Gauss-Markov process of standard deviations σ (6,) and time constant τ, through all passes and
   the time between them (Gelb 1974, 3.8), given at *knots* and linear between them. Of two knots d apart,
   ξ_{j+1} = φ ξ_j + N(0, (1 - φ²) σ²), φ = exp(-d / τ). Linear interpolation leaves out what the process does between
-  knots, up to σ √(d / 2τ): d must be about a second (at 15 mm and 200 s 0.75 mm; at 5 s 1.7 mm).
+  knots, up to σ √(d / 2τ): at 15 mm, 200 s and d = 0.5 s 0.5 mm, at 5 s 1.7 mm, which is too much.
 
 Knots lie at records. Within an interval between two knots the w form a chain: each group of observations touches two
 neighbours. They are eliminated one after the other (block Thomas), all intervals side by side; what is left, the
@@ -20,11 +20,14 @@ What is left is an arrow: knots banded, x its border. Banded Cholesky (LAPACK pb
 complement on x is its inverse covariance with all pose errors unknown, and the knots follow from x.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from pipeline.maths.epochs import EpochSums
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -52,7 +55,7 @@ class Knots:
 
     def interval_of(self, record: Integers) -> Integers:
         """The interval, by its first knot, in which the step from each record to the next lies; (n,)."""
-        return np.clip(np.searchsorted(self.record, record, side="right") - 1, 0, len(self.record) - 2)
+        return np.asarray(np.clip(np.searchsorted(self.record, record, side="right") - 1, 0, len(self.record) - 2))
 
 
 def knots_of(record: Integers, seconds: Array, spacing_s: float, gap_s: float) -> Knots:
@@ -77,9 +80,9 @@ def knots_of(record: Integers, seconds: Array, spacing_s: float, gap_s: float) -
 class Blocks:
     """Normal equations of groups of observations before any pose error is eliminated, group by group.
 
-    record, share (g,): where between records. With design C (3, u) of the common unknowns and K (3, 6) of the pose
-    error, and the group's sums N, b: common (g, u, u) = CᵀNC, mixed (g, 6, u) = KᵀNC, pose (g, 6, 6) = KᵀNK,
-    right (g, u) = Cᵀb, right_pose (g, 6) = Kᵀb.
+    record, share (g,): where between records, on average. With design C (3, u) of the common unknowns and K (3, 6) of
+    the pose error, and the group's sums N_k = Σ w sᵏ q qᵀ, b_k = Σ w sᵏ q v: common (g, u, u) = CᵀN₀C, mixed
+    (g, 2, 6, u) = KᵀN_kC, pose (g, 3, 6, 6) = KᵀN_kK, right (g, u) = Cᵀb₀, right_pose (g, 2, 6) = Kᵀb_k.
     """
 
     record: Integers
@@ -89,6 +92,25 @@ class Blocks:
     pose: Array
     right: Array
     right_pose: Array
+
+
+def blocks_of(sums: EpochSums, common: Array, pose: Array) -> Blocks:
+    """From the sums and the design: C (g, 3, u), K (g, 3, 6)."""
+    turned = np.swapaxes(pose, 1, 2)
+    return Blocks(
+        sums.record,
+        sums.share,
+        np.swapaxes(common, 1, 2) @ sums.normal[:, 0] @ common,
+        turned[:, None] @ sums.normal[:, :2] @ common[:, None],
+        turned[:, None] @ sums.normal @ pose[:, None],
+        np.einsum("gqu,gq->gu", common, sums.right[:, 0]),
+        np.einsum("gqe,gkq->gke", pose, sums.right),
+    )
+
+
+def joined(parts: Sequence[Blocks]) -> Blocks:
+    """The blocks of several sensors."""
+    return Blocks(*(np.concatenate([getattr(one, name) for one in parts]) for name in Blocks.__dataclass_fields__))
 
 
 @dataclass(frozen=True)
@@ -103,7 +125,7 @@ class Reduced:
 
     @property
     def unknowns(self) -> int:
-        return self.normal.shape[1] - 2 * SIX
+        return int(self.normal.shape[1] - 2 * SIX)
 
 
 def reduce_white(blocks: Blocks, knots: Knots, seconds: Array, white: Array) -> Reduced:
@@ -118,7 +140,8 @@ def reduce_white(blocks: Blocks, knots: Knots, seconds: Array, white: Array) -> 
         last = min(first + INTERVALS, intervals)
         rows = order[ends[first] : ends[last]]
         part = _chain(blocks, rows, interval[rows] - first, last - first, knots, first, seconds)
-        normal[first:last], right[first:last] = part.eliminated(white) if np.any(white > 0) else (part.normal, part.right)
+        whole = not np.any(white > 0)
+        normal[first:last], right[first:last] = (part.normal, part.right) if whole else part.eliminated(white)
     return Reduced(normal, right)
 
 
@@ -173,24 +196,25 @@ def _chain(
     t = seconds[blocks.record[rows]] + share * (seconds[blocks.record[rows] + 1] - seconds[blocks.record[rows]])
     begin, end = knots.seconds[first + place], knots.seconds[first + place + 1]
     after = ((t - begin) / (end - begin))[:, None, None]
-    pose, mixed = blocks.pose[rows], blocks.mixed[rows]
-    # of y = (x, knot before, knot after): KᵀN (C, K (1 - a), K a)
-    wide = np.concatenate([mixed, pose * (1 - after), pose * after], axis=2)
-    normal, right = np.zeros((count, width, width)), np.zeros((count, width))
-    tied = np.swapaxes(mixed, 1, 2)
+    pose, mixed, pull = blocks.pose[rows], blocks.mixed[rows], blocks.right_pose[rows]
+    # of y = (x, knot before, knot after): KᵀN_k (C, K (1 - a), K a)
+    wide = np.concatenate([mixed, pose[:, :2] * (1 - after[:, None]), pose[:, :2] * after[:, None]], axis=3)
+    tied = np.swapaxes(mixed[:, 0], 1, 2)
     top = np.concatenate([blocks.common[rows], tied * (1 - after), tied * after], axis=2)
-    full = np.concatenate([top, wide * (1 - after), wide * after], axis=1)
-    pull = blocks.right_pose[rows]
+    full = np.concatenate([top, wide[:, 0] * (1 - after), wide[:, 0] * after], axis=1)
+    pulls = (blocks.right[rows], pull[:, 0] * (1 - after[:, 0]), pull[:, 0] * after[:, 0])
+    normal, right = np.zeros((count, width, width)), np.zeros((count, width))
     np.add.at(normal, place, full)
-    np.add.at(right, place, np.concatenate([blocks.right[rows], pull * (1 - after[:, 0]), pull * after[:, 0]], axis=1))
+    np.add.at(right, place, np.concatenate(pulls, axis=1))
     inner, ahead = np.zeros((count, length, SIX, SIX)), np.zeros((count, length - 1, SIX, SIX))
     border, right_inner = np.zeros((count, length, SIX, width)), np.zeros((count, length, SIX))
-    for offset, part in ((0, 1 - share), (1, share)):
+    squared = (pose[:, 0] - 2 * pose[:, 1] + pose[:, 2], pose[:, 2])  # of (1 - s)² and s²
+    for offset in (0, 1):
         at = (place, since + offset)
-        np.add.at(inner, at, pose * (part**2)[:, None, None])
-        np.add.at(border, at, wide * part[:, None, None])
-        np.add.at(right_inner, at, pull * part[:, None])
-    np.add.at(ahead, (place, since), pose * (share * (1 - share))[:, None, None])
+        np.add.at(inner, at, squared[offset])
+        np.add.at(border, at, wide[:, 1] if offset else wide[:, 0] - wide[:, 1])
+        np.add.at(right_inner, at, pull[:, 1] if offset else pull[:, 0] - pull[:, 1])
+    np.add.at(ahead, (place, since), pose[:, 1] - pose[:, 2])  # of (1 - s) s
     return _Chain(normal, right, inner, ahead, border, right_inner)
 
 

@@ -1,5 +1,7 @@
 """Pose errors eliminated group by group against one dense least squares with every unknown written out."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,8 +11,8 @@ from pipeline.maths.planes import tangents_of
 from pipeline.maths.pose_errors import (
     SIX,
     Blocks,
-    Knots,
     PoseNoise,
+    blocks_of,
     drift_at,
     eliminate_drift,
     knots_of,
@@ -21,24 +23,17 @@ RATE_HZ = 10.0
 COMMON = 5
 
 
-def groups(rng: np.random.Generator, records: np.ndarray) -> tuple[np.ndarray, np.ndarray, list, Blocks]:
-    """Random groups, two a record at most, each with a design of its own; and their blocks."""
-    record = np.sort(rng.choice(records, 40))
-    share = rng.uniform(0, 1, len(record))
-    rows = []
-    for _ in record:
-        C, K = rng.normal(size=(4, COMMON)), rng.normal(size=(4, SIX))
-        rows.append((C, K, rng.normal(size=4)))  # four observations of weight one
-    stack = lambda of: np.array([of(*row) for row in rows])  # noqa: E731
-    return record, share, rows, Blocks(
-        record,
-        share,
-        stack(lambda C, K, v: C.T @ C),
-        stack(lambda C, K, v: K.T @ C),
-        stack(lambda C, K, v: K.T @ K),
-        stack(lambda C, K, v: C.T @ v),
-        stack(lambda C, K, v: K.T @ v),
-    )
+def groups(rng: np.random.Generator, records: np.ndarray) -> tuple[Any, list[Any], Blocks]:
+    """Random groups of observations of weight one, two a record at most, each with a design of its own."""
+    record = np.unique(rng.choice(records, 40))
+    surface = rng.integers(0, 3, len(record))
+    rows, pieces = [], []
+    for one, face in zip(record, surface, strict=True):
+        q, s, v = np.vstack([np.ones(7), rng.normal(size=(2, 7))]), rng.uniform(0, 1, 7), rng.normal(size=7)
+        rows.append((rng.normal(size=(3, COMMON)), rng.normal(size=(3, SIX)), q, s, v))
+        pieces.append(epoch_sums(np.full(7, one), s, np.full(7, face), 3, q, np.ones(7), v))
+    sums = merged(pieces)
+    return record, rows, blocks_of(sums, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
 
 
 @pytest.mark.parametrize("white", [0.0, 0.7])
@@ -46,7 +41,7 @@ def test_elimination_is_the_dense_solution(white: float) -> None:
     rng = np.random.default_rng(3)
     seconds = np.r_[np.arange(31), 90 + np.arange(31)] / RATE_HZ
     records = np.r_[np.arange(30), 31 + np.arange(30)]
-    record, share, rows, blocks = groups(rng, records)
+    record, rows, blocks = groups(rng, records)
     knots = knots_of(np.unique(record), seconds, 1.0, 2.0)
     noise = PoseNoise(white * np.array([1, 1, 1, 0.5, 0.5, 0]), np.array([0.3, 0.3, 0.2, 0.1, 0.1, 0]), 4.0)
     current = rng.normal(size=(len(knots.record), SIX)) * noise.drift
@@ -66,16 +61,16 @@ def test_elimination_is_the_dense_solution(white: float) -> None:
     white0 = drift0 + SIX * count
     size = white0 + SIX * len(whites)
     design, value = [], []
-    for one, s, j, (C, K, v) in zip(record, share, interval, rows, strict=True):
-        t = seconds[one] + s * (seconds[one + 1] - seconds[one])
+    for one, j, (C, K, q, s, v) in zip(record, interval, rows, strict=True):
+        t = seconds[one] + s.mean() * (seconds[one + 1] - seconds[one])  # the drift of a group is that of its middle
         a = (t - knots.seconds[j]) / (knots.seconds[j + 1] - knots.seconds[j])
-        row = np.zeros((4, size))
-        row[:, :COMMON] = C
+        row = np.zeros((len(v), size))
+        row[:, :COMMON] = q.T @ C
         for knot, part in ((j, 1 - a), (j + 1, a)):
-            row[:, drift0 + SIX * knot : drift0 + SIX * knot + SIX] = K * noise.drift * part
-        for offset, part in ((0, 1 - s), (1, s)):
+            row[:, drift0 + SIX * knot : drift0 + SIX * knot + SIX] = q.T @ K * noise.drift * part
+        for offset, parts in ((0, 1 - s), (1, s)):
             at = white0 + SIX * whites[(j, one + offset)]
-            row[:, at : at + SIX] += K * noise.white * part
+            row[:, at : at + SIX] += parts[:, None] * (q.T @ K) * noise.white
         design.append(row)
         value.append(v)
     z = np.divide(current, noise.drift, out=np.zeros_like(current), where=noise.drift > 0)
@@ -126,12 +121,15 @@ def test_sums_of_batches_are_the_sums() -> None:
     whole = epoch_sums(record, share, surface, 4, q, weight, v)
     cuts = [slice(0, 123), slice(123, 124), slice(124, 124), slice(124, n)]
     parts = merged(epoch_sums(record[c], share[c], surface[c], 4, q[:, c], weight[c], v[c]) for c in cuts)
-    for name in ("record", "surface", "normal", "right", "squares", "share", "count"):
+    for name in ("record", "surface", "normal", "right", "squares", "count", "share"):
         np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-12, atol=1e-14)
     k = int(np.flatnonzero((whole.record == 1007) & (whole.surface == 2))[0])
     rows = (record == 1007) & (surface == 2)
-    np.testing.assert_allclose(whole.normal[k], (q[:, rows] * weight[rows]) @ q[:, rows].T)
-    np.testing.assert_allclose(whole.right[k], (q[:, rows] * weight[rows]) @ v[rows])
+    for power in range(3):
+        times = weight[rows] * share[rows] ** power
+        np.testing.assert_allclose(whole.normal[k, power], (q[:, rows] * times) @ q[:, rows].T)
+        if power < 2:
+            np.testing.assert_allclose(whole.right[k, power], (q[:, rows] * times) @ v[rows])
     np.testing.assert_allclose(whole.share[k], np.average(share[rows], weights=weight[rows]))
 
 
