@@ -26,7 +26,7 @@ no noise that v knows of.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,15 @@ class EpochSums:
 
     def __len__(self) -> int:
         return len(self.record)
+
+    def moved(self, change: Array) -> "EpochSums":
+        """The same observations after v has changed by q · ``change`` (g, 3): no need to read the points again.
+
+        Exact but for the turn of q itself, which is of second order: 1e-3 rad of 10 m are 5 µm.
+        """
+        pulled = np.einsum("gkqr,gr->gkq", self.normal[:, :2], change)
+        squares = np.einsum("gq,gq->g", change, 2 * self.right[:, 0] + pulled[:, 0])
+        return replace(self, right=self.right + pulled, squares=self.squares + squares)
 
 
 def epoch_sums(

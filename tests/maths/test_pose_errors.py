@@ -133,6 +133,20 @@ def test_sums_of_batches_are_the_sums() -> None:
     np.testing.assert_allclose(whole.share[k], np.average(share[rows], weights=weight[rows]))
 
 
+def test_sums_moved_are_those_of_moved_observations() -> None:
+    rng = np.random.default_rng(6)
+    n = 60
+    record, surface, share = np.sort(rng.integers(0, 4, n)), rng.integers(0, 2, n), rng.uniform(size=n)
+    weight, v, q = rng.uniform(0.1, 2, n), rng.normal(size=n), np.vstack([np.ones(n), rng.normal(size=(2, n))])
+    sums = epoch_sums(record, share, surface, 2, q, weight, v)
+    change = rng.normal(size=(len(sums), 3))
+    by_group = {key: change[k] for k, key in enumerate(zip(sums.record, sums.surface, strict=True))}
+    shift = np.array([q[:, k] @ by_group[record[k], surface[k]] for k in range(n)])
+    again = epoch_sums(record, share, surface, 2, q, weight, v + shift)
+    np.testing.assert_allclose(sums.moved(change).right, again.right)
+    np.testing.assert_allclose(sums.moved(change).squares, again.squares)
+
+
 def test_at_the_adjusted_point_noise_does_not_turn_the_surface() -> None:
     """Rays from one place onto a slanted wall, noise along the ray: v against the place along the wall has no slope."""
     rng = np.random.default_rng(8)
