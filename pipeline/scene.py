@@ -13,8 +13,21 @@ from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of
 from pipeline.poses import trajectory_in_target
 from pipeline.streams import Batch, xyz
+from pipeline.times import NS
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Observed:
+    """rows; record, share (n,): where between the INS's records; r (n, 3) from the body to the point; spread (n, 3) =
+    Σ n, Σ the point's covariance, m²."""
+
+    rows: Rows
+    record: NDArray[np.int64]
+    share: Array
+    r_m: Array
+    spread: Array
 
 
 @dataclass(frozen=True)
@@ -54,6 +67,37 @@ class Scene:
         """What brings the points on all horizontal faces into one plane, (n, 3) m."""
         (normal,) = (surface.normal for surface in state.surfaces if surface.family == "H")
         return self.height_of_face[face][:, None] * normal
+
+    @property
+    def seconds(self) -> Array:
+        """Times of the INS's records since the first (n,)."""
+        return np.asarray((self.trajectory.t_ns - self.trajectory.t_ns[0]) / NS)
+
+    def observed(self, sensor: str, batch: Batch, state: State) -> "Observed":
+        """The observations of a batch with where they were seen from."""
+        rows = self.rows(sensor, batch, state)
+        t_ns, normal = batch["t_ns"], np.array([s.normal for s in state.surfaces])[rows.surface]
+        record, share = self.trajectory.located(t_ns)
+        own = xyz(batch, f"{sensor}_m")
+        ranges = np.linalg.norm(own, axis=1)
+        if sensor == "laser":
+            lever = mount_of(self.laser.mount).lever_arm_body_m
+            position = self.trajectory.carried(t_ns, np.zeros(3))
+            r = xyz(batch, "target_m") - position
+            ray = (r - (self.trajectory.carried(t_ns, lever) - position)) / ranges[:, None]
+            along = np.einsum("ni,ni->n", ray, normal)[:, None]
+            across_m = ranges * np.radians(self.laser.angle_sigma_deg)
+            spread = self.laser.range_sigma_m**2 * along * ray + across_m[:, None] ** 2 * (normal - along * ray)
+        else:
+            _, R_target_from_body = self.trajectory.poses_at(t_ns)
+            R = R_target_from_body @ state.R_body_from_mbes
+            r = np.einsum("nij,nj->ni", R, own) + R_target_from_body @ state.lever_arm_m
+            ray = np.einsum("nij,nj->ni", R, own) / ranges[:, None]
+            side = np.einsum("nij,nj->ni", R, np.column_stack([-own[:, 2], np.zeros(len(own)), own[:, 0]]))
+            along, aside = (np.einsum("ni,ni->n", one, normal)[:, None] for one in (ray, side))
+            spread = self.mbes.range_sigma_m**2 * along * ray
+            spread = spread + np.radians(self.mbes.angle_sigma_deg) ** 2 * aside * side
+        return Observed(rows, record, share, r, spread)
 
     # --- to be looked at ---------------------------------------------------------------------------------------------
     def sample(self, sensor: str, batch: Batch, state: State, rows: Rows, step: int) -> Batch:

@@ -2,6 +2,8 @@
 
 import functools
 import operator
+import os
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -30,6 +32,7 @@ from pipeline.maths.consistency import (
     merge_scores,
     scores_of,
 )
+from pipeline.corrected import corrected, noise_of
 from pipeline.maths.robust import scale_of
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.solution import Solution, redundancies, solve, variance_factors, weakest_direction
@@ -50,6 +53,7 @@ RESCALINGS = 2  # how often the groups' robust scales are then taken anew
 @dataclass(frozen=True)
 class Config:
     adjust: config.Adjust
+    ins: config.Ins
     laser: config.Laser
     mbes: config.Mbes
 
@@ -115,6 +119,12 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             scales = {name: scale_of(group.histogram) for name, group in sums.groups.items()}
             state = replace(state, robust=(settings.robust_k0, settings.robust_k1), scales={**state.scales, **scales})
             laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
+    if os.environ.get("WITH_POSES"):
+        streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
+        state, drift, equations, step = corrected(streams, scene, state, noise_of(config.ins), settings, 5.0)
+        print("step" if False else "", end="") if True else print("step", np.abs(step[:6]).max(), state.factors, file=sys.stderr)
+        covariance = np.linalg.inv(equations.normal)
+        solution = replace(solution, inverse=covariance)
     seen = {"laser": sums.groups["laser"].count}
     seen["mbes"] = sum(group.count for group in sums.groups.values()) - seen["laser"]
     taken: list[Batch] = []
@@ -166,7 +176,7 @@ def _tables(
     )
     formal = solution.inverse
     clustered = clustered_covariance(formal, scores)
-    covariance = formal if clustered is None else clustered
+    covariance = formal if clustered is None or os.environ.get("WITH_POSES") else clustered
     if solution.deficiency:
         six, covariance, formal = np.full(6, np.nan), np.full_like(formal, np.nan), np.full_like(formal, np.nan)
     names = list(NAMES) + [f"{s.family}_{name}" for s in state.surfaces for name in ("turn_1", "turn_2", "shift")]

@@ -99,7 +99,7 @@ CAMPAIGNS = (
     Campaign("finite beams and INS white noise", 32, 7000, {}),
     Campaign(
         "finite beams and INS drift",
-        32,
+        96,
         8000,
         {"ins": DRIFT},
     ),

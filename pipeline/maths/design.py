@@ -45,7 +45,7 @@ def of_poses(surfaces: Sequence[Surface], surface: Integers) -> Array:
 
 
 def of_common(state: State, surface: Integers, positions_m: Array, R_target_from_body: Array, mount: bool) -> Array:
-    """C (g, 3, u): of the six, if the groups are the sonar's (``mount``), and of the surfaces; poses (g, 3), (g, 3, 3)."""
+    """C (g, 3, u): of the six, if the groups are the sonar's (``mount``), and of the surfaces; their poses (g, ...)."""
     found = np.zeros((len(surface), FEATURES, state.size))
     for number, one in enumerate(state.surfaces):
         rows = np.flatnonzero(surface == number)

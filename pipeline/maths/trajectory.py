@@ -48,7 +48,8 @@ class Trajectory:
             self.steps_rad,
         )
 
-    def _locate(self, t_ns: Times) -> tuple[NDArray[np.int64], Array]:
+    def located(self, t_ns: Times) -> tuple[NDArray[np.int64], Array]:
+        """The last record before each moment, and the moment's place between it and the next, 0 to 1; (n,) each."""
         index = np.clip(np.searchsorted(self.t_ns, t_ns, side="right") - 1, 0, len(self.t_ns) - 2)
         start = self.t_ns[index]
         return index, (t_ns - start) / (self.t_ns[index + 1] - start)
@@ -66,7 +67,7 @@ class Trajectory:
 
     def poses_at(self, t_ns: Times) -> tuple[Array, Array]:
         """Positions (n, 3) and rotations R_frame_from_body (n, 3, 3) at ``t_ns`` (n,)."""
-        index, share = self._locate(t_ns)
+        index, share = self.located(t_ns)
         positions = self.positions_m[index] + share[:, None] * (self.positions_m[index + 1] - self.positions_m[index])
         return positions, self.R_frame_from_body[index] @ exp_so3(self.steps_rad[index] * share[:, None])
 
@@ -79,7 +80,7 @@ class Trajectory:
         placed = np.empty((3, len(points_body_m)))
         for start in range(0, len(t_ns), BLOCK):
             rows = slice(start, start + BLOCK)
-            index, share = self._locate(t_ns[rows])
+            index, share = self.located(t_ns[rows])
             x = points_body_m[rows].T
             v = self.steps_rad[index].T * share
             first, second = exp_coefficients(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
