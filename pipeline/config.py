@@ -37,6 +37,13 @@ class Origin(Model):
     height_m: Annotated[float, Field(ge=-1000, le=10000, description="ellipsoidal")]
 
 
+class AsBuilt(Model):
+    """How far the wet faces of a family may stand off from where the dry ones and the design put them."""
+
+    offset_sigma_m: NotNegative = 0.001
+    angle_sigma_deg: NotNegative = 0.005
+
+
 class Target(Model):
     """The target by design: CONVENTIONS.md, "The target"."""
 
@@ -109,7 +116,11 @@ class Offsets(Model):
     apply_x_first: bool = True  # Y is taken after X has been applied (an X error shows fully in Y on a 45° face)
 
 
+Freeable = Literal["mbes_latency", "laser_latency", "sound_speed"]
+
+
 class Adjust(Model):
+    free: tuple[Freeable, ...] = ()  # estimated besides the mount and the surfaces
     max_iterations: Annotated[int, Field(ge=1, le=100)] = 20
     robust_k0: Positive = 3.0  # IGG III: full weight below, in sigmas
     robust_k1: Positive = 6.0  # no weight above
@@ -136,6 +147,7 @@ class PoolConfig(Model):
     """configs/<pool>.yaml"""
 
     target: Target
+    as_built: AsBuilt = AsBuilt()
     ingest: Ingest = Ingest()
     georeference: Georeference = Georeference()
     segment: Segment = Segment()
@@ -202,15 +214,25 @@ class Ins(Model):
     white: White = White()
 
 
+class MountSigma(Model):
+    """Of each of the three angles and of each component of the lever arm."""
+
+    angle_deg: NotNegative = 0.005
+    lever_arm_m: NotNegative = 0.0015
+
+
 class Laser(Model):
     files: Files
     format: Literal["las", "table"]
     gps_week: Week = None
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
     mount: Mount
+    mount_sigma: MountSigma = MountSigma()  # of the fine calibration
     range_sigma_m: Positive = 0.005
+    range_bias_sigma_m: NotNegative = 0.002  # common to all ranges
     angle_sigma_deg: NotNegative = 0.003
     latency_s: Latency = 0.0
+    latency_sigma_s: NotNegative = 0.0002
 
 
 class Mbes(Model):
@@ -218,11 +240,15 @@ class Mbes(Model):
     format: Literal["r2sonic", "table"]
     mount: Mount
     sound_speed_m_s: Annotated[float, Field(ge=1300, le=1700)] | None = None
+    sound_speed_sigma_m_s: NotNegative = 0.2
+    sound_speed_gradient_sigma_1_s: NotNegative = 0.1  # (m/s)/m: 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
     range_sigma_m: Positive = 0.008
+    range_bias_sigma_m: NotNegative = 0.002  # common to all detections
     angle_sigma_deg: NotNegative = 0.06
     beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # width across track, along track
     latency_s: Latency = 0.0
+    latency_sigma_s: NotNegative = 0.0005
 
 
 class Recording(Model):

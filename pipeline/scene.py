@@ -1,6 +1,7 @@
 """From labelled points to observations: poses, each face's surface and design height, sigmas."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -8,124 +9,175 @@ from numpy.typing import NDArray
 
 from pipeline import config
 from pipeline.fitted import ALL_PASSES, laser_planes
-from pipeline.maths.adjustment import Rows, State, Surface, laser_rows, sounding_rows, weights_of
-from pipeline.maths.trajectory import Trajectory
+from pipeline.maths.adjustment import Body, pull_of
+from pipeline.maths.epochs import MOVING
+from pipeline.maths.knots import Knots, drift_at
+from pipeline.maths.observations import Sigmas, laser_observations, sonar_observations
+from pipeline.maths.robust import igg3_weights
+from pipeline.maths.unknowns import SIX, State, Surface
 from pipeline.mounts import mount_of
 from pipeline.poses import trajectory_in_target
 from pipeline.streams import Batch, xyz
-from pipeline.times import NS
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+GROUPS = ("laser", "mbes_vertical", "mbes_horizontal")
+FEATURES = {"laser": MOVING + 1, "mbes": MOVING + 3}
 
 
 @dataclass(frozen=True)
-class Observed:
-    """rows; record, share (n,): where between the INS's records; r (n, 3) from the body to the point; spread (n, 3) =
-    Σ n, Σ the point's covariance, m²."""
+class Weighting:
+    """Variance factors f and robust scales by group, and IGG III's bounds (None: nothing is reduced)."""
 
-    rows: Rows
-    record: NDArray[np.int64]
+    factors: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 1.0))
+    scales: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 1.0))
+    robust: tuple[float, float] | None = None
+
+    def weights(self, group: Integers, v_m: Array, sigma_m: Array) -> tuple[Array, Array]:
+        """Robust weights w (n,) and full weights w / (σ² f) (n,)."""
+        scales = np.array([self.scales[name] for name in GROUPS])[group]
+        robust = np.ones(len(v_m)) if self.robust is None else igg3_weights(v_m / (sigma_m * scales), *self.robust)
+        return robust, robust / (sigma_m**2 * self.factor(group))
+
+    def factor(self, group: Integers) -> Array:
+        """Variance factors (n,) by group."""
+        return np.array([self.factors[name] for name in GROUPS])[group]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Of a batch (n,): the record of the INS before each, the share of the step to the next, surface, group of
+    observations, v (m), its sigma (m), features (F, n)."""
+
+    record: Integers
     share: Array
-    r_m: Array
-    spread: Array
+    surface: Integers
+    group: Integers
+    v_m: Array
+    sigma_m: Array
+    features: Array
+
+
+@dataclass(frozen=True)
+class Drift:
+    """The drift found so far: (k, 6) m and rad at its knots, target frame."""
+
+    knots: Knots
+    values: Array
 
 
 @dataclass(frozen=True)
 class Scene:
     """What turns a batch into observations; ``coarse``: the state that the adjustment starts from."""
 
-    trajectory: Trajectory
-    surface_of_face: NDArray[np.int64]
+    body: Body
+    surface_of_face: Integers
     height_of_face: Array
     coarse: State
-    adjust: config.Adjust
     laser: config.Laser
     mbes: config.Mbes
 
-    def rows(self, sensor: str, batch: Batch, state: State) -> Rows:
-        """The observations of a batch of labelled points of either sensor."""
-        return self.laser_rows(batch, state)[0] if sensor == "laser" else self.sounding_rows(batch, state)
+    def observe(self, sensor: str, batch: Batch, state: State, drift: Drift | None = None) -> Observations:
+        """The observations of a batch of labelled points; of known drift v is free."""
+        record, share = self.body.trajectory.located(batch["t_ns"])
+        surface = self.surface_of_face[batch["face"]]
+        horizontal = np.array([one.family == "H" for one in state.surfaces])[surface]
+        group = np.where(horizontal, 2, 1) if sensor == "mbes" else np.zeros(len(surface), dtype=np.int64)
+        see = self._see_laser if sensor == "laser" else self._see_sonar
+        v, sigma, features = np.empty(len(surface)), np.empty(len(surface)), np.empty((FEATURES[sensor], len(surface)))
+        pull = self._pull(sensor, state, drift, record)
+        for number in range(len(state.surfaces)):
+            rows = np.flatnonzero(surface == number)
+            if len(rows):
+                found = see(batch, rows, state, number, record[rows], share[rows], pull)
+                v[rows], sigma[rows], features[:, rows] = found
+        return Observations(record, share, surface, group, v, sigma, features)
 
-    def laser_rows(self, batch: Batch, state: State) -> tuple[Rows, Array]:
-        """And the points, reduced."""
-        face, laser = batch["face"], self.laser
-        points = xyz(batch, "target_m")
-        points -= self._heights(face, state)
-        ranges = np.sqrt(batch["x_laser_m"] ** 2 + batch["y_laser_m"] ** 2 + batch["z_laser_m"] ** 2)
-        sigmas = (laser.range_sigma_m, np.radians(laser.angle_sigma_deg))
-        return laser_rows(state, self.surface_of_face[face], points, ranges, batch["cos_incidence"], *sigmas), points
+    def _pull(self, sensor: str, state: State, drift: Drift | None, record: Integers) -> "_Pull":
+        first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
+        records = np.arange(first, last)
+        seconds = self.body.seconds[first : last + 1]
+        error = np.zeros((len(records), SIX))
+        if drift is not None:
+            error = drift_at(drift.knots, drift.values, (seconds[:-1] + seconds[1:]) / 2)
+        return _Pull(first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor]))
 
-    def sounding_rows(self, batch: Batch, state: State) -> Rows:
-        face, mbes = batch["face"], self.mbes
-        positions, R_target_from_body = self.trajectory.poses_at(batch["t_ns"])
-        positions -= self._heights(face, state)
-        points = xyz(batch, "mbes_m")
-        sigmas = (mbes.range_sigma_m, np.radians(mbes.angle_sigma_deg))
-        return sounding_rows(state, self.surface_of_face[face], points, positions, R_target_from_body, *sigmas)
+    def _see_laser(
+        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array, pull: "_Pull"
+    ) -> tuple[Array, Array, Array]:
+        surface, trajectory = state.surfaces[number], self.body.trajectory
+        axes = np.vstack([surface.tangents, surface.normal])
+        own = xyz(batch, "laser_m", rows)
+        range_m = np.sqrt(np.einsum("ni,ni->n", own, own))
+        first, last = int(record.min()), int(record.max()) + 2
+        where = axes @ trajectory.positions_m[first:last].T
+        lever = axes @ (trajectory.R_frame_from_body[first:last] @ self.body.laser_lever_arm_m).T
+        start = where[:, record - first]
+        points = axes @ xyz(batch, "target_m", rows).T
+        r = points - start - share * (where[:, record - first + 1] - start)
+        lever = lever[:, record - first]
+        v = points[2] - surface.distance_m - self.height_of_face[batch["face"][rows]]
+        sigmas = Sigmas(self.laser.range_sigma_m, float(np.radians(self.laser.angle_sigma_deg)))
+        v = v + pull.of(number, record, np.stack([np.ones_like(v), r[0], r[1], (r[2] - lever[2]) / range_m]))
+        return v, *laser_observations(r, lever, range_m, v, sigmas)
 
-    def _heights(self, face: NDArray[np.int16], state: State) -> Array:
-        """What brings the points on all horizontal faces into one plane, (n, 3) m."""
-        (normal,) = (surface.normal for surface in state.surfaces if surface.family == "H")
-        return self.height_of_face[face][:, None] * normal
-
-    @property
-    def seconds(self) -> Array:
-        """Times of the INS's records since the first (n,)."""
-        return np.asarray((self.trajectory.t_ns - self.trajectory.t_ns[0]) / NS)
-
-    def observed(self, sensor: str, batch: Batch, state: State) -> "Observed":
-        """The observations of a batch with where they were seen from."""
-        rows = self.rows(sensor, batch, state)
-        t_ns, normal = batch["t_ns"], np.array([s.normal for s in state.surfaces])[rows.surface]
-        record, share = self.trajectory.located(t_ns)
-        own = xyz(batch, f"{sensor}_m")
-        ranges = np.linalg.norm(own, axis=1)
-        if sensor == "laser":
-            lever = mount_of(self.laser.mount).lever_arm_body_m
-            position = self.trajectory.carried(t_ns, np.zeros(3))
-            r = xyz(batch, "target_m") - position
-            ray = (r - (self.trajectory.carried(t_ns, lever) - position)) / ranges[:, None]
-            along = np.einsum("ni,ni->n", ray, normal)[:, None]
-            across_m = ranges * np.radians(self.laser.angle_sigma_deg)
-            spread = self.laser.range_sigma_m**2 * along * ray + across_m[:, None] ** 2 * (normal - along * ray)
-        else:
-            _, R_target_from_body = self.trajectory.poses_at(t_ns)
-            R = R_target_from_body @ state.R_body_from_mbes
-            r = np.einsum("nij,nj->ni", R, own) + R_target_from_body @ state.lever_arm_m
-            ray = np.einsum("nij,nj->ni", R, own) / ranges[:, None]
-            side = np.einsum("nij,nj->ni", R, np.column_stack([-own[:, 2], np.zeros(len(own)), own[:, 0]]))
-            along, aside = (np.einsum("ni,ni->n", one, normal)[:, None] for one in (ray, side))
-            spread = self.mbes.range_sigma_m**2 * along * ray
-            spread = spread + np.radians(self.mbes.angle_sigma_deg) ** 2 * aside * side
-        return Observed(rows, record, share, r, spread)
+    def _see_sonar(
+        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array, pull: "_Pull"
+    ) -> tuple[Array, Array, Array]:
+        surface = state.surfaces[number]
+        axes = np.vstack([surface.tangents, surface.normal])
+        points = xyz(batch, "mbes_m", rows).T
+        moments, back = np.unique(batch["t_ns"][rows], return_inverse=True)  # beams of a ping share their pose
+        where, R_target_from_body = self.body.trajectory.poses_at(moments)
+        R = R_target_from_body @ state.R_body_from_mbes
+        in_mbes = np.einsum("kj,gji->kig", axes, R)[:, :, back]
+        up = R[:, 2, :].T[:, back]
+        lever = (axes @ (R_target_from_body @ state.lever_arm_m).T)[:, back]
+        r = np.einsum("kin,in->kn", in_mbes, points) + lever
+        v = r[2] + (where @ surface.normal)[back] - surface.distance_m - self.height_of_face[batch["face"][rows]]
+        sigmas = Sigmas(self.mbes.range_sigma_m, float(np.radians(self.mbes.angle_sigma_deg)))
+        v = v + pull.of(number, record, sonar_observations(points, in_mbes, up, r, np.zeros_like(v), sigmas)[1])
+        return v, *sonar_observations(points, in_mbes, up, r, v, sigmas)
 
     # --- to be looked at ---------------------------------------------------------------------------------------------
-    def sample(self, sensor: str, batch: Batch, state: State, rows: Rows, step: int) -> Batch:
-        """One point in ``step``: where it lies and its residual, calibrated and coarse, as columns of ``residuals``."""
-        taken = {name: values[::step] for name, values in batch.items()}
-        own = xyz(taken, f"{sensor}_m")
+    def sample(self, sensor: str, batch: Batch, state: State, drift: Drift | None, weighting: Weighting) -> Batch:
+        """Where points lie and their residuals, calibrated and coarse, as columns of the table ``residuals``."""
+        own = xyz(batch, f"{sensor}_m")
         ranges = np.linalg.norm(own, axis=1)
-        residual = rows.residual_m[::step]
+        seen = self.observe(sensor, batch, state, drift)
         if sensor == "laser":
-            points = coarse_points = xyz(taken, "target_m")
-            coarse_residual, angle = residual, np.arcsin(own[:, 2] / ranges)
+            points = coarse_points = xyz(batch, "target_m")
+            coarse_residual, angle = seen.v_m, np.arcsin(own[:, 2] / ranges)
         else:
             coarse = replace(self.coarse, surfaces=state.surfaces)
-            points, coarse_points = self._placed(taken, state), self._placed(taken, coarse)
-            coarse_residual, angle = self.sounding_rows(taken, coarse).residual_m, np.arctan2(own[:, 0], -own[:, 2])
+            points, coarse_points = self._placed(batch, state), self._placed(batch, coarse)
+            coarse_residual, angle = self.observe(sensor, batch, coarse).v_m, np.arctan2(own[:, 0], -own[:, 2])
         columns = {f"{axis}_target_m": points[:, k] for k, axis in enumerate("xyz")}
         columns |= {f"coarse_{axis}_target_m": coarse_points[:, k] for k, axis in enumerate("xyz")}
-        columns |= {"range_m": ranges, "angle_deg": np.degrees(angle), "residual_m": residual}
-        columns |= {"coarse_residual_m": coarse_residual, "weight": weights_of(state, rows)[0][::step]}
+        columns |= {"range_m": ranges, "angle_deg": np.degrees(angle), "residual_m": seen.v_m}
+        weight = weighting.weights(seen.group, seen.v_m, seen.sigma_m)[0]
+        columns |= {"coarse_residual_m": coarse_residual, "weight": weight}
         single = {name: values.astype(np.float32) for name, values in columns.items()}
-        words = np.full(len(residual), sensor, dtype=object)
-        return {"sensor": words} | {name: taken[name] for name in ("t_ns", "pass", "face")} | single
+        words = np.full(len(seen.v_m), sensor, dtype=object)
+        return {"sensor": words} | {name: batch[name] for name in ("t_ns", "pass", "face")} | single
 
     def _placed(self, batch: Batch, state: State) -> Array:
         """Soundings in the target frame with the state's mount, (n, 3) m."""
-        positions, R_target_from_body = self.trajectory.poses_at(batch["t_ns"])
+        positions, R_target_from_body = self.body.trajectory.poses_at(batch["t_ns"])
         body = xyz(batch, "mbes_m") @ state.R_body_from_mbes.T + state.lever_arm_m
         return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, body))
+
+
+@dataclass(frozen=True)
+class _Pull:
+    """By how much v is moved, by feature: table (r, s, F) of the records from ``first`` on and the surfaces."""
+
+    first: int
+    table: Array
+
+    def of(self, surface: int, record: Integers, features: Array) -> Array:
+        taken = self.table[record - self.first, surface]
+        return np.asarray(np.einsum("nf,fn->n", taken, features))
 
 
 def scene_of(
@@ -133,7 +185,6 @@ def scene_of(
     poses: pd.DataFrame,
     target_pose: pd.DataFrame,
     planes: pd.DataFrame,
-    adjust: config.Adjust,
     laser: config.Laser,
     mbes: config.Mbes,
 ) -> Scene:
@@ -156,11 +207,10 @@ def scene_of(
     number = {surface.family: k for k, surface in enumerate(surfaces)}
     heights = np.where(faces["family"] == "H", faces["distance_m"] * faces["normal_z_target_1"], 0.0)
     return Scene(
-        trajectory_in_target(poses, target_pose),
+        Body(trajectory_in_target(poses, target_pose), mount_of(laser.mount).lever_arm_body_m),
         np.array([number[family] for family in faces["family"]]),
         heights,
-        State(mount.R_body_from_sensor, mount.lever_arm_body_m, tuple(surfaces)),
-        adjust,
+        State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces),
         laser,
         mbes,
     )

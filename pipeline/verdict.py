@@ -54,7 +54,7 @@ def reasons(
         )
     if not summary["test_passed"]:
         found.append(_inconsistency(summary, cells))
-    found += _wide_sigmas(methods["adjustment"]["sigma_mount"], limits)
+    found += _wide_sigmas(methods["adjustment"]["sigma_mount_total"], limits)
     if chosen != "adjustment":
         found += _patent(chosen, evidence.corrections.set_index("method").loc[chosen], methods, limits)
     return found
@@ -148,7 +148,7 @@ def warnings(groups: pd.DataFrame, target: Mapping[str, Any]) -> list[str]:
     for row in groups.to_dict("records"):
         factor, cut = row["variance_factor"], row["cut"] / max(row["count"], 1)
         name = WORDS_OF_GROUP[row["group"]]
-        if (factor > ODD_FACTOR or factor < 1 / ODD_FACTOR) and row["redundancy"] > 1:
+        if (factor > ODD_FACTOR or factor < 1 / ODD_FACTOR):
             how = "more" if factor > 1 else "less"
             found.append(
                 f"{name} scatter {np.sqrt(factor):.1f} times as much as the session's sigmas say: {how} noise, or a "

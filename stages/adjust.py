@@ -1,12 +1,6 @@
-"""The rigorous solution: both sensors observe shared surfaces; six unknowns and the surfaces, with their covariance."""
+"""The rigorous solution: both sensors observe shared surfaces from one moving body; unknowns and their covariance."""
 
-import functools
-import operator
-import os
-import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from itertools import chain
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,45 +8,27 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline import artefacts, config
-from pipeline.maths.adjustment import (
-    COMMON,
-    GROUPS,
-    NAMES,
-    LaserMoments,
-    State,
-    Sums,
-    accumulate,
-    laser_moments,
-)
-from pipeline.maths.consistency import (
-    Scores,
-    cells_of,
-    clustered_covariance,
-    consistency_limit,
-    merge_scores,
-    scores_of,
-)
-from pipeline.corrected import corrected, noise_of
-from pipeline.maths.robust import scale_of
+from pipeline.adjusting import Adjusted, adjust, noise_of
+from pipeline.considered import considered_of
+from pipeline.looking import Cells, look
+from pipeline.maths.consistency import consistency_limit
 from pipeline.maths.rotations import log_so3
-from pipeline.maths.solution import Solution, redundancies, solve, variance_factors, weakest_direction
+from pipeline.maths.solution import Freed, freed, weakest_direction
+from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import mount_of
-from pipeline.residuals import bins_table, map_table, residuals_table, step_for
-from pipeline.scene import Scene, scene_of
-from pipeline.streams import Batch, Stream
-from pipeline.times import NS
+from pipeline.residuals import bins_table, map_table
+from pipeline.scene import scene_of
+from pipeline.streams import Stream
 
 Array = NDArray[np.float64]
-STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
-STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
-ROUGH_STEP = 1e-3  # weights become robust when the step is smaller (rad, m)
 SHOWN = 100_000  # points of a sensor in the table residuals, at most
-RESCALINGS = 2  # how often the groups' robust scales are then taken anew
 
 
 @dataclass(frozen=True)
 class Config:
     adjust: config.Adjust
+    ingest: config.Ingest
+    as_built: config.AsBuilt
     ins: config.Ins
     laser: config.Laser
     mbes: config.Mbes
@@ -73,6 +49,8 @@ class Outputs:
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
     surfaces: Annotated[pd.DataFrame, artefacts.SURFACES]
+    drift: Annotated[pd.DataFrame, artefacts.DRIFT]
+    freed: Annotated[pd.DataFrame, artefacts.FREED]
     groups: Annotated[pd.DataFrame, artefacts.GROUPS]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
     summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
@@ -81,195 +59,153 @@ class Outputs:
     residual_map: Annotated[pd.DataFrame, artefacts.RESIDUAL_MAP]
 
 
-def _laser_moments(batch: Batch, scene: Scene, state: State) -> LaserMoments:
-    rows, points = scene.laser_rows(batch, state)
-    return laser_moments(state, rows, points)
-
-
-def _sounding_sums(batch: Batch, scene: Scene, state: State) -> Sums:
-    return accumulate(state, scene.sounding_rows(batch, state))
-
-
-def _scores(batch: Batch, scene: Scene, state: State, sensor: str, step: int) -> tuple[Scores, Batch]:
-    rows = scene.rows(sensor, batch, state)
-    moment = batch["t_ns"] // round(scene.adjust.moment_s * NS)
-    scores = scores_of(state, rows, sensor, batch["pass"].astype(np.int64), moment)
-    return scores, scene.sample(sensor, batch, state, rows, step)
-
-
 def run(inputs: Inputs, config: Config) -> Outputs:
     settings = config.adjust
-    given = (inputs.faces, inputs.poses, inputs.target_pose, inputs.planes)
-    scene = scene_of(*given, settings, config.laser, config.mbes)
-    state = scene.coarse
-    laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
-    converged, iterations, rescaled = False, 0, 0
-    while True:
-        sums = laser.sums(state) + _sum(inputs.soundings_labelled.fold(_sounding_sums, scene, state))
-        solution = solve(sums)
-        if converged or solution.deficiency or iterations == settings.max_iterations:
-            break
-        factors = variance_factors(sums, solution.inverse, state.factors)
-        settled = all(abs(factors[name] / state.factors[name] - 1) < 1e-3 for name in GROUPS)
-        converged = rescaled == RESCALINGS and settled and _negligible(solution)
-        state = replace(state.moved(solution.step), factors=factors if rescaled else state.factors)
-        iterations += 1
-        if rescaled < RESCALINGS and np.max(np.abs(solution.step[:COMMON])) < ROUGH_STEP:
-            rescaled += 1  # then the scales stay: weights that follow them for ever need not come to rest
-            scales = {name: scale_of(group.histogram) for name, group in sums.groups.items()}
-            state = replace(state, robust=(settings.robust_k0, settings.robust_k1), scales={**state.scales, **scales})
-            laser = _sum(inputs.laser_labelled.fold(_laser_moments, scene, state))
-    if os.environ.get("WITH_POSES"):
-        streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
-        state, drift, equations, step = corrected(streams, scene, state, noise_of(config.ins), settings, 5.0)
-        print("step" if False else "", end="") if True else print("step", np.abs(step[:6]).max(), state.factors, file=sys.stderr)
-        covariance = np.linalg.inv(equations.normal)
-        solution = replace(solution, inverse=covariance)
-    seen = {"laser": sums.groups["laser"].count}
-    seen["mbes"] = sum(group.count for group in sums.groups.values()) - seen["laser"]
-    taken: list[Batch] = []
-    scores = merge_scores(
-        _without(
-            chain.from_iterable(
-                stream.fold(_scores, scene, state, sensor, step_for(seen[sensor], SHOWN))
-                for sensor, stream in (("laser", inputs.laser_labelled), ("mbes", inputs.soundings_labelled))
-            ),
-            taken,
-        )
-    )
-    residuals = residuals_table(taken)
+    scene = scene_of(inputs.faces, inputs.poses, inputs.target_pose, inputs.planes, config.laser, config.mbes)
+    streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
+    found = adjust(streams, scene, noise_of(config.ins), settings, config.ingest.max_gap_s)
+    seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
+    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
     return Outputs(
-        **_tables(state, sums, solution, scores, converged, iterations, config),
-        residuals=residuals,
-        residual_bins=bins_table(residuals, inputs.faces),
-        residual_map=map_table(residuals, inputs.faces),
+        **_tables(found, seen.cells, sigmas, config),
+        drift=_drift_table(found, inputs.poses),
+        cells=_cells_table(found, seen.cells),
+        surfaces=_surfaces_table(found, seen.cells),
+        residuals=seen.residuals,
+        residual_bins=bins_table(seen.residuals, inputs.faces),
+        residual_map=map_table(seen.residuals, inputs.faces),
     )
 
 
-def _without(pieces: Iterator[tuple[Scores, Batch]], taken: list[Batch]) -> Iterator[Scores]:
-    """The scores one by one; the points to be looked at are put by."""
-    for scores, points in pieces:
-        taken.append(points)
-        yield scores
-
-
-def _negligible(solution: Solution) -> bool:
-    """Whether the six's step is far below their sigmas, or below anything that matters."""
-    sigma = np.sqrt(np.diag(solution.inverse))[:COMMON]
-    floor = np.repeat([STEP_RAD, STEP_M], 3)
-    return bool(np.all(np.abs(solution.step[:COMMON]) <= np.maximum(STEP_SIGMAS * sigma, floor)))
-
-
-def _sum(pieces: Iterator[Any]) -> Any:
-    return functools.reduce(operator.add, pieces)
-
-
-def _tables(
-    state: State, sums: Sums, solution: Solution, scores: Scores, converged: bool, iterations: int, config: Config
-) -> dict[str, pd.DataFrame]:
-    coarse = mount_of(config.mbes.mount)
+def _tables(found: Adjusted, cells: Cells, considered: Array, config: Config) -> dict[str, pd.DataFrame]:
+    coarse, state, solution = mount_of(config.mbes.mount), found.state, found.solution
     six = np.concatenate(
         [
             log_so3(state.R_body_from_mbes @ coarse.R_body_from_sensor.T),
             state.lever_arm_m - coarse.lever_arm_body_m,
         ]
     )
-    formal = solution.inverse
-    clustered = clustered_covariance(formal, scores)
-    covariance = formal if clustered is None or os.environ.get("WITH_POSES") else clustered
+    shared = [value for surface in state.surfaces for value in (0.0, 0.0, surface.shift_m)]
+    values = state.values_of_other()
+    values[:SIX], values[state.shared] = six, shared
+    random, total = solution.covariance, solution.total(considered)
+    values = values[solution.free]
     if solution.deficiency:
-        six, covariance, formal = np.full(6, np.nan), np.full_like(formal, np.nan), np.full_like(formal, np.nan)
-    names = list(NAMES) + [f"{s.family}_{name}" for s in state.surfaces for name in ("turn_1", "turn_2", "shift")]
+        values[:SIX], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
     estimate = pd.DataFrame(
         {
-            "unknown": names,
-            "value": np.concatenate([six, [v for s in state.surfaces for v in (0.0, 0.0, s.shift_m)]]),
-            "sigma": np.sqrt(np.diag(covariance)),
-            "sigma_formal": np.sqrt(np.diag(formal)),
+            "unknown": [state.names[k] for k in solution.free],
+            "value": values,
+            "sigma": np.sqrt(np.diag(random)),
+            "sigma_total": np.sqrt(np.diag(total)),
         }
     )
-    free = redundancies(sums, solution.inverse)
-    cells = cells_of(scores, config.adjust.test_tolerance_m)
+    return {
+        "estimate": estimate,
+        "covariance": _covariance_table(random[:SIX, :SIX], total[:SIX, :SIX]),
+        "freed": _freed_table(found, considered),
+        "groups": _groups_table(found),
+        "summary": _summary_table(found, cells, config.adjust),
+    }
+
+
+def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd.DataFrame:
+    solution = found.solution
     statistic = float(sum(cell.normalised**2 for cell in cells.values()))
-    limit = consistency_limit(len(cells), config.adjust.test_level)
-    observations = sum(group.count for group in sums.groups.values())
+    limit = consistency_limit(len(cells), settings.test_level)
     reason = f"the data leave {solution.deficiency} direction(s) of the unknowns open" if solution.deficiency else ""
+    counts = found.reading.counts.values()
     summary = {
-        "converged": converged,
-        "iterations": iterations,
-        "observations": observations,
-        "redundancy": sum(free.values()),
-        "sigma0": float(np.sqrt(sum(group.squares for group in sums.groups.values()) / max(sum(free.values()), 1.0))),
+        "converged": found.converged,
+        "iterations": found.iterations,
+        "observations": sum(one.count for one in counts),
+        "redundancy": found.redundancy,
+        "sigma0": float(np.sqrt(found.equations.squares / max(found.redundancy, 1.0))),
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
-        "weakest": "" if solution.deficiency else weakest_direction(covariance[:COMMON, :COMMON]),
+        "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:SIX, :SIX]),
         "test_statistic": statistic,
         "test_dof": len(cells),
         "test_limit": limit,
         "test_passed": statistic <= limit,
         "reason": reason,
     }
-    return {
-        "estimate": estimate,
-        "covariance": _covariance_table(covariance[:COMMON, :COMMON]),
-        "surfaces": _surfaces_table(state, cells),
-        "groups": _groups_table(sums, free),
-        "cells": _cells_table(state, cells),
-        "summary": pd.DataFrame([summary]),
-    }
+    return pd.DataFrame([summary])
 
 
-def _covariance_table(covariance: Array) -> pd.DataFrame:
-    sigma = np.sqrt(np.diag(covariance))
+def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
+    sigma = np.sqrt(np.diag(random))
     return pd.DataFrame(
         {
-            "row": np.repeat(NAMES, COMMON),
-            "column": np.tile(NAMES, COMMON),
-            "covariance": covariance.ravel(),
-            "correlation": (covariance / np.outer(sigma, sigma)).ravel(),
+            "row": np.repeat(NAMES, SIX),
+            "column": np.tile(NAMES, SIX),
+            "covariance": random.ravel(),
+            "correlation": (random / np.outer(sigma, sigma)).ravel(),
+            "covariance_total": total.ravel(),
         }
     )
 
 
-def _surfaces_table(state: State, cells: dict[Any, Any]) -> pd.DataFrame:
+def _freed_table(found: Adjusted, considered: Array) -> pd.DataFrame:
+    """What is held, and what each of the six owes to it."""
+    tests = {one.unknown: one for one in freed(found.equations.normal, found.equations.right, found.solution)}
     rows = []
-    for k, surface in enumerate(state.surfaces):
+    for place, number in enumerate(found.solution.held.tolist()):
+        test = tests.get(number, Freed(number, np.nan, np.nan))
+        effect = found.solution.sensitivity[:SIX, place] * considered[number]
+        row: dict[str, Any] = {"unknown": found.state.names[number], "considered": considered[number]}
+        row |= {"value": test.value, "sigma": test.sigma}
+        rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(NAMES)})
+    return pd.DataFrame(rows)
+
+
+def _surfaces_table(found: Adjusted, cells: Cells) -> pd.DataFrame:
+    rows = []
+    for k, surface in enumerate(found.state.surfaces):
         row: dict[str, Any] = {f"normal_{axis}_target_1": surface.normal[i] for i, axis in enumerate("xyz")}
-        row |= {"family": surface.family, "distance_m": float(surface.normal @ surface.centre_m + surface.shift_m)}
+        row |= {"family": surface.family, "distance_m": surface.distance_m}
         for sensor, name in (("laser", "laser_points"), ("mbes", "soundings")):
             row[name] = sum(cell.count for (s, number, _), cell in cells.items() if s == sensor and number == k)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _groups_table(sums: Sums, free: dict[str, float]) -> pd.DataFrame:
+def _drift_table(found: Adjusted, poses: pd.DataFrame) -> pd.DataFrame:
+    knots, values = found.drift.knots, found.drift.values
+    columns: dict[str, Any] = {"t_ns": poses["t_ns"].to_numpy()[knots.record]}
+    columns |= {f"{axis}_target_m": values[:, k] for k, axis in enumerate("xyz")}
+    turns = np.degrees(values[:, 3:])
+    return pd.DataFrame(columns | {f"turn_{axis}_target_deg": turns[:, k] for k, axis in enumerate("xyz")})
+
+
+def _groups_table(found: Adjusted) -> pd.DataFrame:
     rows = [
         {
             "group": name,
-            "count": group.count,
-            "redundancy": free[name],
-            "variance_factor": group.squares / max(free[name], 1.0),
-            "rms_normalised": float(np.sqrt(group.squares / max(group.weights, 1.0))),
-            "cut": group.cut,
-            "reduced": group.reduced,
+            "count": one.count,
+            "variance_factor": found.weighting.factors[name],
+            "scale": found.weighting.scales[name],
+            "cut": one.cut,
+            "reduced": one.reduced,
         }
-        for name, group in sums.groups.items()
+        for name, one in found.reading.counts.items()
     ]
     return pd.DataFrame(rows)
 
 
-def _cells_table(state: State, cells: dict[Any, Any]) -> pd.DataFrame:
+def _cells_table(found: Adjusted, cells: Cells) -> pd.DataFrame:
     rows = [
         {
             "sensor": sensor,
-            "family": state.surfaces[surface].family,
+            "family": found.state.surfaces[surface].family,
             "pass": number,
             "count": cell.count,
             "mean_m": cell.mean_m,
             "rms_m": cell.rms_m,
             "sigma_mean_m": cell.sigma_mean_m,
             "normalised": cell.normalised,
+            "largest": cell.largest,
         }
-        for (sensor, surface, number), cell in cells.items()
+        for (sensor, surface, number), cell in sorted(cells.items())
     ]
     return pd.DataFrame(rows, columns=[column.name for column in artefacts.CELLS.columns])

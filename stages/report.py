@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from pipeline import artefacts, config
 from pipeline.closing import closing_table
-from pipeline.maths.adjustment import COMMON, NAMES
 from pipeline.maths.rotations import exp_so3
+from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
 from pipeline.verdict import Evidence, distance_advice, reasons, warnings
@@ -153,33 +153,46 @@ def _range_note(mbes: config.Mbes) -> str:
 
 
 def _method(
-    vector_rad: Array, lever_m: Array, coarse: Mounted, covariance: Array | None, outcome: Mapping[Any, Any]
+    vector_rad: Array,
+    lever_m: Array,
+    coarse: Mounted,
+    outcome: Mapping[Any, Any],
+    random: Array | None = None,
+    total: Array | None = None,
 ) -> dict[str, Any]:
-    """One method's block of the contract, null where there is no result; ``outcome``: converged, iterations, reason."""
+    """One method's block of the contract, null where there is no result; ``outcome``: converged, iterations, reason;
+    covariances ``random`` (of the noise) and ``total`` (with what is considered, not estimated)."""
     good = bool(np.all(np.isfinite(vector_rad)) and np.all(np.isfinite(lever_m)))
-    known = good and covariance is not None and bool(np.all(np.isfinite(covariance)))
-    sigma = np.sqrt(np.diag(covariance)) if known and covariance is not None else None
-    total = (
+    mounted = (
         Mounted(exp_so3(vector_rad) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + lever_m) if good else None
     )
     block: dict[str, Any] = {
-        "R_body_from_mbes": total.R_body_from_sensor.tolist() if total else None,
-        "lever_arm_m": total.lever_arm_body_m.tolist() if total else None,
-        "mount": total.settings() if total else None,
+        "R_body_from_mbes": mounted.R_body_from_sensor.tolist() if mounted else None,
+        "lever_arm_m": mounted.lever_arm_body_m.tolist() if mounted else None,
+        "mount": mounted.settings() if mounted else None,
         "correction": {
             "rotation_vector_deg": np.degrees(vector_rad).tolist() if good else None,
             "lever_arm_m": lever_m.tolist() if good else None,
         },
-        "sigma": None
-        if sigma is None
-        else {"rotation_vector_deg": np.degrees(sigma[:3]).tolist(), "lever_arm_m": sigma[3:].tolist()},
-        "covariance": covariance.tolist() if known and covariance is not None else None,
-        "sigma_mount": None if total is None or covariance is None or not known else total.sigmas(covariance),
     }
+    for suffix, covariance in (("", random), ("_total", total)):
+        known = mounted is not None and covariance is not None and bool(np.all(np.isfinite(covariance)))
+        block |= _uncertainty(mounted, covariance, suffix) if known and mounted and covariance is not None else (
+            dict.fromkeys((f"sigma{suffix}", f"covariance{suffix}", f"sigma_mount{suffix}"))
+        )
     return block | {
         "converged": bool(outcome["converged"]),
         "iterations": int(outcome["iterations"]),
         "no_result": str(outcome["reason"]),
+    }
+
+
+def _uncertainty(mounted: Mounted, covariance: Array, suffix: str) -> dict[str, Any]:
+    sigma = np.sqrt(np.diag(covariance))
+    return {
+        f"sigma{suffix}": {"rotation_vector_deg": np.degrees(sigma[:3]).tolist(), "lever_arm_m": sigma[3:].tolist()},
+        f"covariance{suffix}": covariance.tolist(),
+        f"sigma_mount{suffix}": mounted.sigmas(covariance),
     }
 
 
@@ -192,7 +205,7 @@ def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dic
     for row in corrections.to_dict("records"):
         vector = np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"])
         lever = np.array([row[f"lever_arm_{axis}_m"] for axis in "xyz"])
-        methods[str(row["method"])] = _method(vector, lever, coarse, None, row)
+        methods[str(row["method"])] = _method(vector, lever, coarse, row)
     return methods
 
 
@@ -200,12 +213,12 @@ def _adjustment(
     estimate: pd.DataFrame, covariance: pd.DataFrame, summary: Mapping[Any, Any], coarse: Mounted
 ) -> dict[str, Any]:
     values = estimate.set_index("unknown").loc[list(NAMES), "value"].to_numpy()
-    table = covariance["covariance"].to_numpy().reshape(COMMON, COMMON)
-    return _method(values[:3], values[3:], coarse, table, summary)
+    tables = (covariance[name].to_numpy().reshape(SIX, SIX) for name in ("covariance", "covariance_total"))
+    return _method(values[:3], values[3:], coarse, summary, *tables)
 
 
 def _matrix(table: pd.DataFrame, column: str) -> list[list[float]] | None:
-    values = table[column].to_numpy().reshape(COMMON, COMMON)
+    values = table[column].to_numpy().reshape(SIX, SIX)
     return values.tolist() if np.all(np.isfinite(values)) else None
 
 
@@ -213,7 +226,8 @@ def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.Data
     rows = []
     for method, block in methods.items():
         correction, sigma = (six_of(block[name]) for name in ("correction", "sigma"))
-        total, sigma_mount = (block[name] or dict.fromkeys(SETTINGS, np.nan) for name in ("mount", "sigma_mount"))
+        names = ("mount", "sigma_mount", "sigma_mount_total")
+        total, random, sigma_mount = (block[name] or dict.fromkeys(SETTINGS, np.nan) for name in names)
         for parameter, place, key, unit in PARAMETERS:
             rows.append(
                 {
@@ -225,6 +239,7 @@ def _table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.Data
                     "change": change_of(total, coarse.settings(), key) if block["mount"] else np.nan,
                     "correction": correction[place],
                     "sigma": sigma[place],
+                    "sigma_random": random[key],
                     "sigma_total": sigma_mount[key],
                     "low_95": total[key] - WITHIN_95 * sigma_mount[key],
                     "high_95": total[key] + WITHIN_95 * sigma_mount[key],

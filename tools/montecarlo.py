@@ -95,14 +95,9 @@ CAMPAIGNS = (
         5000,
         WHITE | {"surroundings": {"origin_error_m": [0.3, -0.3, 0.15], "azimuth_error_deg": 1.0}},
     ),
-    Campaign("finite beams, outliers, echoes", 64, 6000, {"ins": WHITE["ins"]}),
-    Campaign("finite beams and INS white noise", 32, 7000, {}),
-    Campaign(
-        "finite beams and INS drift",
-        96,
-        8000,
-        {"ins": DRIFT},
-    ),
+    Campaign("finite beams, outliers, echoes", 600, 6000, {"ins": WHITE["ins"]}),
+    Campaign("finite beams and INS white noise", 600, 7000, {}),
+    Campaign("finite beams and INS drift", 600, 8000, {"ins": DRIFT}),
     Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
 )
 

@@ -8,17 +8,38 @@ from pipeline.columns import Artefact, Column, Document
 ESTIMATE = Artefact(
     "adjust", "estimate", "table", "every unknown of the adjustment",
     (
-        Column("unknown", TEXT, "", "rotation_x … lever_arm_z, then each surface's turn_1, turn_2, shift"),
+        Column("unknown", TEXT, "", "rotation_x … lever_arm_z, each surface's turn_1, turn_2, shift, what is freed"),
         Column("value", F64, "rad or m", "estimate (rotation: vector from coarse; surfaces: from the laser's planes)"),
-        Column("sigma", F64, "rad or m", "standard deviation, noise common to a moment included"),
-        Column("sigma_formal", F64, "rad or m", "standard deviation from independent observations"),
+        Column("sigma", F64, "rad or m", "standard deviation from the sensors' and the INS's noise"),
+        Column("sigma_total", F64, "rad or m", "the same with what is considered, not estimated"),
     ),
 )
 COVARIANCE = Artefact(
     "adjust", "covariance", "table", "covariance and correlation of the six",
     (
         Column("row", TEXT, "", "unknown"), Column("column", TEXT, "", "unknown"),
-        Column("covariance", F64, "rad², rad m, m²", "covariance"), Column("correlation", F64, "1", "correlation"),
+        Column("covariance", F64, "rad², rad m, m²", "from noise"), Column("correlation", F64, "1", "of noise alone"),
+        Column("covariance_total", F64, "rad², rad m, m²", "with what is considered, not estimated"),
+    ),
+)
+DRIFT = Artefact(
+    "adjust", "drift", "table", "slow errors of the recorded poses, at knots: to be added to the recorded ones",
+    (
+        T_NS, *xyz("target"),
+        *(Column(f"turn_{axis}_target_deg", F64, "deg", f"about target {axis}") for axis in "xyz"),
+    ),
+)
+FREED = Artefact(
+    "adjust", "freed", "table", "what is held: its value, were it freed alone, and what an error of it does",
+    (
+        Column("unknown", TEXT, "", "parameter of a sensor, or of a family's wet faces"),
+        Column("considered", F64, "rad, m, s, 1 or 1/s", "sigma with which it may be wrong"),
+        Column("value", F64, "rad, m, s, 1 or 1/s", "its value, had it alone been freed (NaN: nothing tells it)"),
+        Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of that"),
+        *(
+            Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount for an error of one sigma considered")
+            for kind, unit in (("rotation", "rad"), ("lever_arm", "m")) for axis in "xyz"
+        ),
     ),
 )
 SURFACES = Artefact(
@@ -34,9 +55,9 @@ GROUPS = Artefact(
     "adjust", "groups", "table", "variance factors by group of observations",
     (
         Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal"),
-        Column("count", I64, "1", "observations"), Column("redundancy", F64, "1", "their redundancy"),
+        Column("count", I64, "1", "observations"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
-        Column("rms_normalised", F64, "1", "weighted RMS of residual / sigma"),
+        Column("scale", F64, "1", "robust scale of residual / sigma, the INS's white noise in it"),
         Column("cut", I64, "1", "observations whose weight became zero"),
         Column("reduced", I64, "1", "observations whose weight was reduced"),
     ),
@@ -49,6 +70,7 @@ CELLS = Artefact(
         Column("rms_m", F64, "m", "RMS residual"),
         Column("sigma_mean_m", F64, "m", "standard deviation of the mean from the scatter of its moments"),
         Column("normalised", F64, "1", "mean / root(sigma_mean² + tolerance²)"),
+        Column("largest", F64, "1", "largest |residual| / sigma of those with a weight"),
     ),
 )
 RESIDUALS = Artefact(
@@ -116,8 +138,9 @@ CALIBRATION = Artefact(
         Column("change", F64, "deg or m", "total - coarse: the difference of the mount's settings"),
         Column("correction", F64, "deg or m", "rotation vector (about the same body axis) or lever arm correction"),
         Column("sigma", F64, "deg or m", "standard deviation of the correction"),
-        Column("sigma_total", F64, "deg or m", "standard deviation of the calibrated mount's setting (total)"),
-        Column("low_95", F64, "deg or m", "lower end of the 95 % interval of the total"),
+        Column("sigma_random", F64, "deg or m", "standard deviation of the calibrated mount's setting, from noise"),
+        Column("sigma_total", F64, "deg or m", "the same with errors that do not average: considered, not estimated"),
+        Column("low_95", F64, "deg or m", "lower end of the 95 % interval by sigma_total"),
         Column("high_95", F64, "deg or m", "upper end of it"),
     ),
 )

@@ -1,114 +1,85 @@
-"""What the residuals say together: noise common to a moment, and means by surface and pass.
+"""What the residuals say together: their means by surface and pass, which must be zero but for noise.
 
-Observations of one moment share the INS's white noise and the timing; treating them as independent makes the sigmas too
-small by half (2 mm and 0.002° common to a ping against 27 000 soundings). So the covariance is the sandwich
-
-    N⁻¹ (Σ_m g_m g_mᵀ) N⁻¹,      g_m = Σ over the observations of moment m of p a v,
-
-which needs no model of what is common (White 1980; Arellano 1987 for clusters), corrected by m / (m - u).
+Observations of one moment share the INS's white noise and the timing, so that a mean's sigma comes from the scatter of
+the moments, not of the points.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from pipeline.maths.adjustment import COMMON, Rows, State, weights_of
-
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-CellKey = tuple[str, int, int]  # sensor, surface, pass
+CellKey = tuple[int, int]  # surface, pass
 
 
 @dataclass(frozen=True)
-class Scores:
-    """For the covariance and the consistency test: sums over moments of time.
+class Moments:
+    """One sensor's observations by surface, pass and slot of time: key (m, 3) ascending; sums (m, 4): Σ p, Σ p v, how
+    many, Σ v²; largest (m,): |v| / σ of those that the weights did not cut."""
 
-    moment (m,) numbers ascending; scores (m, k): Σ p v a over the observations of that moment;
-    cells: by (sensor, surface, pass) arrays over the same moments of Σ p and Σ p v, and totals count, Σ v².
-    """
-
-    scores: Mapping[int, Array]
-    cells: Mapping[tuple[str, int, int], Mapping[int, Array]]  # moment -> (Σ p, Σ p v, count, Σ v²)
+    key: Integers
+    sums: Array
+    largest: Array
 
 
-def scores_of(state: State, rows: Rows, sensor: str, number: Integers, moment: Integers) -> Scores:
-    """One chunk's scores by moment and its cells; ``number``: pass, ``moment``: index of the time slot, (n,) each."""
-    _, full = weights_of(state, rows)
-    _, plain = weights_of(replace(state, robust=None), rows)  # a whole cell off must show, not be cut away
-    pull = full * rows.residual_m
-    found, inverse = np.unique(moment, return_inverse=True)
-    scores = np.zeros((len(found), state.size))
-    cells: dict[tuple[str, int, int], dict[int, Array]] = {}
-    for surface in np.unique(rows.surface).tolist():
-        inside = rows.surface == surface
-        slot, columns, design = inverse[inside], state.columns(surface), rows.local[inside]
-        if rows.common is not None:
-            design, columns = np.hstack([rows.common[inside], design]), [*range(COMMON), *columns]
-        for column, values in zip(columns, design.T, strict=True):
-            scores[:, column] += np.bincount(slot, weights=values * pull[inside], minlength=len(found))
-        for one in np.unique(number[inside]).tolist():
-            use = inside & (number == one)
-            slots, where = np.unique(inverse[use], return_inverse=True)
-            residual = rows.residual_m[use]
-            parts = (plain[use], plain[use] * residual, np.ones(len(residual)), residual**2)
-            sums = np.column_stack([np.bincount(where, weights=part, minlength=len(slots)) for part in parts])
-            cells[(sensor, surface, one)] = dict(zip(found[slots].tolist(), sums, strict=True))
-    return Scores(dict(zip(found.tolist(), scores, strict=True)), cells)
+def moments_of(key: Integers, weight: Array, v_m: Array, normalised: Array) -> Moments:
+    """Of one batch: key (n, 3), plain weight p = 1 / σ², v and |v| / σ, zero for what was cut; (n,) each."""
+    found, inverse = np.unique(key, axis=0, return_inverse=True)
+    place = inverse.ravel()
+    parts = (weight, weight * v_m, np.ones(len(v_m)), v_m**2)
+    sums = [np.bincount(place, weights=part, minlength=len(found)) for part in parts]
+    largest = np.zeros(len(found))
+    np.maximum.at(largest, place, normalised)
+    return Moments(found.reshape(-1, 3), np.column_stack(sums), largest)
 
 
-def merge_scores(pieces: Iterable[Scores]) -> Scores:
-    """All chunks together, in order."""
-    scores: dict[int, Array] = {}
-    cells: dict[tuple[str, int, int], dict[int, Array]] = {}
-    for piece in pieces:
-        for moment, values in piece.scores.items():
-            scores[moment] = scores[moment] + values if moment in scores else values
-        for key, moments in piece.cells.items():
-            cell = cells.setdefault(key, {})
-            for moment, values in moments.items():
-                cell[moment] = cell[moment] + values if moment in cell else values
-    return Scores(dict(sorted(scores.items())), dict(sorted(cells.items())))
-
-
-def clustered_covariance(inverse: Array, scores: Scores) -> Array | None:
-    """The sandwich from N⁻¹ (k, k); None with fewer than ten moments an unknown, where it would be noise itself."""
-    table = np.array(list(scores.scores.values())).reshape(-1, len(inverse))
-    moments = len(table)
-    if moments < 10 * len(inverse):
-        return None
-    pulled = table @ inverse
-    return np.asarray(pulled.T @ pulled * (moments / (moments - len(inverse))))
+def merged_moments(pieces: Iterable[Moments]) -> Moments:
+    """All batches together, in order."""
+    parts = list(pieces)
+    found, inverse = np.unique(np.concatenate([one.key for one in parts]), axis=0, return_inverse=True)
+    sums, largest = np.zeros((len(found), 4)), np.zeros(len(found))
+    np.add.at(sums, inverse.ravel(), np.concatenate([one.sums for one in parts]))
+    np.maximum.at(largest, inverse.ravel(), np.concatenate([one.largest for one in parts]))
+    return Moments(found.reshape(-1, 3), sums, largest)
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Mean residual of one sensor on one surface in one pass, and how far it lies from zero."""
+    """Mean residual of one sensor on one surface in one pass, how far it lies from zero, and the largest residual."""
 
     count: int
     mean_m: float
     rms_m: float
     sigma_mean_m: float
     normalised: float
+    largest: float
 
 
-def cells_of(scores: Scores, tolerance_m: float) -> dict[CellKey, Cell]:
+def cells_of(moments: Moments, tolerance_m: float) -> dict[CellKey, Cell]:
     """Weighted means Σ p v / Σ p; their sigma from the scatter of the moments, Σ (S_m - P_m mean)² / P².
 
     Normalised by root(sigma² + tolerance²): with a million points a systematic error far below what matters is
     significant; one below ``tolerance_m`` is not held against a session.
     """
-    found = {}
-    for key, moments in scores.cells.items():
-        table = np.array(list(moments.values()))
+    found: dict[CellKey, Cell] = {}
+    for surface, number in np.unique(moments.key[:, :2], axis=0).tolist():
+        rows = (moments.key[:, 0] == surface) & (moments.key[:, 1] == number)
+        table = moments.sums[rows]
         p, pull, count, squares = table.sum(axis=0)
         mean = pull / p
         variance = float(np.sum((table[:, 1] - table[:, 0] * mean) ** 2)) / p**2
         normalised = mean / np.sqrt(variance + tolerance_m**2) if variance + tolerance_m > 0 else 0.0
-        found[key] = Cell(
-            int(count), float(mean), float(np.sqrt(squares / count)), float(np.sqrt(variance)), normalised
+        found[(surface, number)] = Cell(
+            int(count),
+            float(mean),
+            float(np.sqrt(squares / count)),
+            float(np.sqrt(variance)),
+            float(normalised),
+            float(moments.largest[rows].max()),
         )
     return found
 

@@ -1,28 +1,22 @@
-"""Sums over the observations of one moment on one surface: all that a solution with corrected poses needs.
+"""Sums over what one sensor sees of one surface between two records of the INS (an *epoch*): all that a solution needs.
 
-Between two records of the INS the body moves along one straight step, and what one sensor sees of one surface within it
-(a *group*: a ping's beams on the wall, some hundred laser points on a block) is seen from one pose p, T =
-R_target_from_body. With r = X - p the vector from the body to a point and α = t1 · r, β = t2 · r along the surface's
-tangents, the observation v = n · (X - c) - shift changes
+Between two records the body moves along one straight step, and all points of an epoch (a ping's beams on the wall, some
+hundred laser points on a block) are seen from one pose p, T = R_target_from_body. With r = X - p the vector from the
+body to a point and α = t1 · r, β = t2 · r along the surface's tangents, the observation v = n · (X - c) - shift changes
 
     with a pose error (δ, ω), X -> X + δ + ω × r:    n · δ + ω · (r × n),        r × n = β t1 - α t2
     with the mount (ε, λ), body axes:                ε · Tᵀ((r - T l) × n) + λ · Tᵀ n
     with the surface's turns and shift:              (α + t1 · (p - c), β + t2 · (p - c), -1)
 
-all linear in q = (1, α, β) with coefficients that are the same for the whole group (t1 × t2 = n; a part of r along n
-does not count). So Σ w q qᵀ (3, 3), Σ w q v (3,) and Σ w v² hold the normal equations of every unknown, whatever the
-number of points: a stream is read once for each linearisation.
+all linear in q = (1, α, β) with coefficients that are the same for the whole epoch (t1 × t2 = n; a part of r along n
+does not count). What does not follow from these (an error of the ranges, of the sound speed) brings a feature of its
+own: q = (1, α, β, …), F in all. So Σ w q qᵀ (F, F), Σ w q v (F,) and Σ w v² hold the normal equations of every unknown,
+whatever the number of points: a stream is read once for each linearisation.
 
 Within the step the error of the pose goes from that of one record to that of the next, (1 - s) e_k + s e_{k+1}. A
 scanner's line meets a wall from top to bottom in that time, so that s goes with β, and 2 mm of white noise between two
-records turn the wall by 0.02° in this group: Σ w s q qᵀ, Σ w s² q qᵀ and Σ w s q v are needed as well. (With the mean
-of s in their stead the mean normalised squared error of the six rose from 6-7 to 8.3.)
-
-The design must be taken at the adjusted point, not at the measured one. Noise along the ray moves the point along the
-surface as well, so v and α, β are correlated, and Σ w α v would be off by σ² (n · d)(t1 · d) a point (errors in
-variables): where the points of a moment spread over decimetres, that turns the heading by hundredths of a degree. The
-least squares correction of a point with covariance Σ is -Σ n v / (nᵀ Σ n) (Gauss-Helmert), after which α and β carry
-no noise that v knows of.
+records turn the wall by 0.02° in this epoch: sums with s and s² are needed as well, of the three features that a pose
+error moves. (With the mean of s in their stead the mean normalised squared error of the six rose from 6-7 to 8.3.)
 """
 
 from collections.abc import Iterable
@@ -33,90 +27,105 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-FEATURES = 3  # 1, α, β
-POWERS = 3  # of s
+MOVING = 3  # 1, α, β: the features that a pose error moves
 
 
 @dataclass(frozen=True)
 class EpochSums:
-    """Groups of one sensor, ascending by record and surface.
+    """Epochs of one sensor, ascending by record and surface.
 
-    record (g,): the last record of the INS before them; surface (g,); normal (g, 3, 3, 3) = Σ w sᵏ q qᵀ, k = 0, 1, 2;
-    right (g, 2, 3) = Σ w sᵏ q v, k = 0, 1; squares (g,) = Σ w v²; count (g,): observations with a weight.
+    record (g,): the last record of the INS before them; surface (g,); with q₃ the first three features, s the place
+    between two records:
+
+    normal (g, F, F) = Σ w q qᵀ, swept (g, 3, F) = Σ w s q₃ qᵀ, swept_twice (g, 3, 3) = Σ w s² q₃ q₃ᵀ,
+    right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,): those with a weight.
     """
 
     record: Integers
     surface: Integers
     normal: Array
+    swept: Array
+    swept_twice: Array
     right: Array
+    right_swept: Array
     squares: Array
     count: Array
-
-    @property
-    def weight(self) -> Array:
-        """Σ w of each group (g,)."""
-        return self.normal[:, 0, 0, 0]
-
-    @property
-    def share(self) -> Array:
-        """The weighted mean of s of each group (g,)."""
-        return np.asarray(self.normal[:, 1, 0, 0] / self.normal[:, 0, 0, 0])
 
     def __len__(self) -> int:
         return len(self.record)
 
+    @property
+    def share(self) -> Array:
+        """The weighted mean of s of each epoch (g,)."""
+        return np.asarray(self.swept[:, 0, 0] / self.normal[:, 0, 0])
+
+    def taken(self, rows: Integers) -> "EpochSums":
+        """Some of the epochs."""
+        return EpochSums(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
     def moved(self, change: Array) -> "EpochSums":
-        """The same observations after v has changed by q · ``change`` (g, 3): no need to read the points again.
+        """The same observations after v has changed by q · ``change`` (g, F): no need to read the points again.
 
         Exact but for the turn of q itself, which is of second order: 1e-3 rad of 10 m are 5 µm.
         """
-        pulled = np.einsum("gkqr,gr->gkq", self.normal[:, :2], change)
-        squares = np.einsum("gq,gq->g", change, 2 * self.right[:, 0] + pulled[:, 0])
-        return replace(self, right=self.right + pulled, squares=self.squares + squares)
+        pulled = np.einsum("gij,gj->gi", self.normal, change)
+        return replace(
+            self,
+            right=self.right + pulled,
+            right_swept=self.right_swept + np.einsum("gij,gj->gi", self.swept, change),
+            squares=self.squares + np.einsum("gi,gi->g", change, 2 * self.right + pulled),
+        )
 
 
 def epoch_sums(
     record: Integers, share: Array, surface: Integers, surfaces: int, q: Array, weight: Array, v_m: Array
 ) -> EpochSums:
-    """Of one batch: record, share s, surface, weight and v (n,), q (3, n)."""
+    """Of one batch: record, share s, surface, weight and v (n,), q (F, n)."""
     first = int(record.min()) if len(record) else 0
     key = (record - first) * surfaces + surface
     size = int(key.max()) + 1 if len(key) else 0
     found = np.flatnonzero(np.bincount(key, weights=weight, minlength=size) > 0)
+    features = len(q)
 
     def total(values: Array) -> Array:
         return np.asarray(np.bincount(key, weights=values, minlength=size)[found])
 
-    normal, right = np.empty((len(found), POWERS, FEATURES, FEATURES)), np.empty((len(found), POWERS - 1, FEATURES))
-    weighted = weight
-    for power in range(POWERS):
-        for row in range(FEATURES):
-            product = weighted * q[row]
-            if power < POWERS - 1:
-                right[:, power, row] = total(product * v_m)
-            for column in range(row + 1):
-                normal[:, power, row, column] = normal[:, power, column, row] = total(product * q[column])
-        weighted = weighted * share
-    squares, count = total(weight * v_m**2), total((weight > 0).astype(np.float64))
-    return EpochSums(first + found // surfaces, found % surfaces, normal, right, squares, count)
+    normal, swept = np.empty((len(found), features, features)), np.empty((len(found), MOVING, features))
+    twice, right = np.empty((len(found), MOVING, MOVING)), np.empty((len(found), features))
+    right_swept = np.empty((len(found), MOVING))
+    for row in range(features):
+        weighted = weight * q[row] if row else weight
+        right[:, row] = total(weighted * v_m)
+        for column in range(row + 1):
+            normal[:, row, column] = normal[:, column, row] = total(weighted * q[column] if column else weighted)
+    weighted = weight * share
+    for row in range(MOVING):
+        once = weighted * q[row] if row else weighted
+        right_swept[:, row] = total(once * v_m)
+        for column in range(row, features):
+            swept[:, row, column] = total(once * q[column] if column else once)
+            if column < MOVING:
+                swept[:, column, row] = swept[:, row, column]
+                again = once * share
+                twice[:, row, column] = twice[:, column, row] = total(again * q[column] if column else again)
+    count = np.bincount(key[weight > 0], minlength=size)[found].astype(np.float64)
+    squares = total(weight * v_m**2)
+    return EpochSums(
+        first + found // surfaces, found % surfaces, normal, swept, twice, right, right_swept, squares, count
+    )
 
 
 def merged(pieces: Iterable[EpochSums]) -> EpochSums:
-    """All batches together, in order; a group may be spread over several."""
+    """All batches together, in order; an epoch may be spread over several."""
     parts = list(pieces)
     keys = np.concatenate([np.column_stack([one.record, one.surface]) for one in parts])
-    groups, inverse = np.unique(keys, axis=0, return_inverse=True)
+    epochs, inverse = np.unique(keys, axis=0, return_inverse=True)
 
     def added(name: str) -> Array:
         values = np.concatenate([getattr(one, name) for one in parts])
-        total = np.zeros((len(groups), *values.shape[1:]))
+        total = np.zeros((len(epochs), *values.shape[1:]))
         np.add.at(total, inverse.ravel(), values)
         return total
 
-    return EpochSums(groups[:, 0], groups[:, 1], *(added(name) for name in ("normal", "right", "squares", "count")))
-
-
-def adjusted(r_m: Array, normal: Array, v_m: Array, spread: Array) -> Array:
-    """Vectors r (n, 3) to points moved by their least squares correction; ``spread`` = Σ n (n, 3) m², normal (n, 3)."""
-    variance = np.einsum("ni,ni->n", spread, normal)
-    return np.asarray(r_m - spread * (v_m / variance)[:, None])
+    names = [name for name in EpochSums.__dataclass_fields__ if name not in ("record", "surface")]
+    return EpochSums(epochs[:, 0], epochs[:, 1], *map(added, names))

@@ -1,58 +1,90 @@
-"""Solving the normal equations: step, rank, covariance, variance components, the weakest direction in words."""
+"""Solving the normal equations N x + b = 0: step, rank, covariance; what held unknowns do to it, and tests of them.
 
-from collections.abc import Mapping
+Of all unknowns some are *free* (f), the others held (h) at their values. With S = -N_ff⁻¹ N_fh,
+
+    x_f = -N_ff⁻¹ b_f,     C = N_ff⁻¹,     dx_f = S x_h for an error x_h of what is held,
+    C_total = C + S Q Sᵀ,  Q the covariance of what is considered (Gelb 1974, 7.5 "consider" filter).
+
+A held unknown's own value, were it freed alone: -(b_h + Sᵀ b_f) / M with M = N_hh + N_hf S, its sigma M^(-1/2).
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment import COMMON, Sums
-from pipeline.maths.robust import LEAST_SCALE
+from pipeline.maths.unknowns import SIX
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
 
 
 @dataclass(frozen=True)
 class Solution:
-    """step (k,), inverse (k, k) of the normal matrix, condition number of the scaled one, directions left open."""
+    """Of the unknowns ``free`` (f,): step (u,) with zeros for those held, covariance (f, f), sensitivity S (f, u - f);
+    condition number of the scaled normal matrix; directions left open."""
 
+    free: Integers
+    held: Integers
     step: Array
-    inverse: Array
+    covariance: Array
+    sensitivity: Array
     condition: float
     deficiency: int
 
+    def total(self, sigmas: Array, *blocks: tuple[Integers, Array]) -> Array:
+        """Covariance with considered errors: sigmas (u,) of the held ones, independent; ``blocks`` of them (numbers
+        among all unknowns, covariance) that are not."""
+        Q = np.diag(sigmas[self.held] ** 2)
+        for numbers, covariance in blocks:
+            place = np.searchsorted(self.held, numbers)
+            Q[np.ix_(place, place)] = covariance
+        return np.asarray(self.covariance + self.sensitivity @ Q @ self.sensitivity.T)
 
-def solve(sums: Sums) -> Solution:
-    """Least squares step of Σ_g N_g x = Σ_g b_g, through the eigenvalues of D N D, D = diag(N)^(-1/2).
+
+def solve(normal: Array, right: Array, free: Sequence[int]) -> Solution:
+    """Least squares step of the free unknowns, through the eigenvalues of D N D, D = diag(N)^(-1/2).
 
     Directions with an eigenvalue below rounding get no step; they are counted, not repaired.
     """
-    normal = np.sum([group.normal for group in sums.groups.values()], axis=0)
-    right = np.sum([group.right for group in sums.groups.values()], axis=0)
-    diagonal = np.diag(normal)
+    chosen = np.array(sorted(free), dtype=np.int64)
+    held = np.setdiff1d(np.arange(len(right)), chosen)
+    N, b = normal[np.ix_(chosen, chosen)], right[chosen]
+    diagonal = np.diag(N)
     scale = np.where(diagonal > 0, 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)), 0.0)
-    values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
+    values, vectors = np.linalg.eigh(N * np.outer(scale, scale))
     largest = max(float(values[-1]), 1e-300)
     open_ = values <= RANK_TOLERANCE * largest
     inverted = np.where(open_, 0.0, 1 / np.where(open_, 1.0, values))
-    inverse = (vectors * inverted) @ vectors.T * np.outer(scale, scale)
+    covariance = (vectors * inverted) @ vectors.T * np.outer(scale, scale)
+    step = np.zeros(len(right))
+    step[chosen] = -covariance @ b
     condition = float(largest / values[0]) if values[0] > 0 else np.inf
-    return Solution(inverse @ right, inverse, condition, int(open_.sum()))
+    sensitivity = -covariance @ normal[np.ix_(chosen, held)]
+    return Solution(chosen, held, step, covariance, sensitivity, condition, int(open_.sum()))
 
 
-def redundancies(sums: Sums, inverse: Array) -> dict[str, float]:
-    """Redundancy by group: Σ weights - tr(N⁻¹ N_g) (Förstner 1979)."""
-    return {name: group.weights - float(np.sum(inverse * group.normal)) for name, group in sums.groups.items()}
+@dataclass(frozen=True)
+class Freed:
+    """A held unknown's estimate and sigma, had it alone been freed."""
+
+    unknown: int
+    value: float
+    sigma: float
 
 
-def variance_factors(sums: Sums, inverse: Array, current: Mapping[str, float]) -> dict[str, float]:
-    """Estimated / expected variance by group: Σ w v² / σ² over the redundancy; unchanged where there is none."""
-    free = redundancies(sums, inverse)
-    return {
-        name: max(sums.groups[name].squares / free[name], LEAST_SCALE**2) if name in free and free[name] > 1 else value
-        for name, value in current.items()
-    }
+def freed(normal: Array, right: Array, solution: Solution) -> list[Freed]:
+    """Every held unknown, freed by itself; those on which nothing depends are left out."""
+    found = []
+    for place, number in enumerate(solution.held.tolist()):
+        S = solution.sensitivity[:, place]
+        information = float(normal[number, number] + normal[number, solution.free] @ S)
+        if information > RANK_TOLERANCE * max(float(normal[number, number]), 1e-300):
+            value = -float(right[number] + S @ right[solution.free]) / information
+            found.append(Freed(number, value, information**-0.5))
+    return found
 
 
 TOGETHER = 0.5  # a weaker correlation is not worth a word
@@ -64,7 +96,7 @@ def weakest_direction(covariance: Array) -> str:
     sigma = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sigma, sigma)
     above = np.triu(correlation, 1)
-    row, column = divmod(int(np.argmax(np.abs(above))), COMMON)
+    row, column = divmod(int(np.argmax(np.abs(above))), SIX)
     rho = above[row, column]
     if abs(rho) < TOGETHER:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))

@@ -67,9 +67,13 @@ class Trajectory:
 
     def poses_at(self, t_ns: Times) -> tuple[Array, Array]:
         """Positions (n, 3) and rotations R_frame_from_body (n, 3, 3) at ``t_ns`` (n,)."""
-        index, share = self.located(t_ns)
-        positions = self.positions_m[index] + share[:, None] * (self.positions_m[index + 1] - self.positions_m[index])
-        return positions, self.R_frame_from_body[index] @ exp_so3(self.steps_rad[index] * share[:, None])
+        return self.between(*self.located(t_ns))
+
+    def between(self, record: NDArray[np.int64], share: Array) -> tuple[Array, Array]:
+        """The same at a share of the step from each record (n,) to the next."""
+        step = self.positions_m[record + 1] - self.positions_m[record]
+        positions = self.positions_m[record] + share[:, None] * step
+        return positions, self.R_frame_from_body[record] @ exp_so3(self.steps_rad[record] * share[:, None])
 
     def place(self, t_ns: Times, points_body_m: Array) -> Array:
         """Points in the body's frame, (n, 3) m, into this frame at their moments: p(t) + R(t) x; (n, 3) m.

@@ -4,10 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
-
-from pipeline.maths.epochs import adjusted, epoch_sums, merged
-from pipeline.maths.planes import tangents_of
 from pipeline.maths.pose_errors import (
     SIX,
     Blocks,
@@ -18,6 +14,10 @@ from pipeline.maths.pose_errors import (
     knots_of,
     reduce_white,
 )
+from scipy.spatial.transform import Rotation
+
+from pipeline.maths.epochs import adjusted, epoch_sums, merged
+from pipeline.maths.planes import tangents_of
 
 RATE_HZ = 10.0
 COMMON = 5

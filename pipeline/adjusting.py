@@ -1,0 +1,121 @@
+"""The adjustment's iteration: read all points, solve, move; until neither values nor weights change any more."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.maths.adjustment import moved, normal_equations, settle
+from pipeline.maths.drift import Eliminated
+from pipeline.maths.knots import PoseNoise, knots_of
+from pipeline.maths.solution import Solution, solve
+from pipeline.maths.unknowns import SIX, State
+from pipeline.reading import Reading, read, refactored, scales_of
+from pipeline.scene import Drift, Scene, Weighting
+from pipeline.streams import Stream
+
+Array = NDArray[np.float64]
+STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
+STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
+SETTLED_SIGMAS = 0.05  # after a step as small as this the weights would change too little for another reading
+NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
+SETTLING = 10  # steps, at most, to come there
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """Where the iteration ended."""
+
+    state: State
+    drift: Drift
+    weighting: Weighting
+    reading: Reading
+    equations: Eliminated
+    solution: Solution
+    converged: bool
+    iterations: int
+
+    @property
+    def redundancy(self) -> float:
+        """Observations with their robust weights, less the unknowns; pose errors are no unknowns: they have a prior."""
+        return sum(one.weights for one in self.reading.counts.values()) - len(self.solution.free)
+
+
+def noise_of(ins: config.Ins) -> PoseNoise:
+    """The INS's noise as the session states it, target frame (z up: heading turns about it)."""
+    drift, white = ins.drift, ins.white
+    angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
+    return PoseNoise(
+        np.r_[[white.position_m] * 3, [np.radians(white.attitude_deg)] * 3],
+        np.r_[drift.horizontal_m, drift.horizontal_m, drift.vertical_m, angles],
+        drift.time_constant_s,
+    )
+
+
+def free_unknowns(state: State, further: Sequence[str] = ()) -> list[int]:
+    """The six, the surfaces, and what the config frees besides."""
+    shared = range(state.shared.start, state.shared.stop)
+    return sorted({*range(SIX), *shared, *(state.names.index(name) for name in further)})
+
+
+def adjust(
+    streams: Mapping[str, Stream], scene: Scene, noise: PoseNoise, settings: config.Adjust, gap_s: float
+) -> Adjusted:
+    """From the coarse mount to the solution."""
+    state = _near(streams["mbes"], scene)
+    free = free_unknowns(state, settings.free)
+    weighting, known = Weighting(), None
+    for iteration in range(1, settings.max_iterations + 1):
+        reading, weighting = refactored(read(streams, scene, state, known, weighting), state, weighting)
+        drift = known or _no_drift(reading, scene, noise, gap_s)
+        equations = normal_equations(reading.sums, state, scene.body, drift.knots, noise, drift.values)
+        solution = solve(equations.normal, equations.right, free)
+        if solution.deficiency:
+            return Adjusted(state, drift, weighting, reading, equations, solution, False, iteration)
+        drift_step = equations.knots(solution.step)
+        sums = moved(reading.sums, state, scene.body, drift.knots, solution.step, drift_step)
+        state, drift = state.moved(solution.step), replace(drift, values=drift.values + drift_step)
+        known = drift
+        settled = weighting.robust is not None and _small(solution, SETTLED_SIGMAS)
+        if settled and iteration > 2:
+            break
+        scales = scales_of(reading) if iteration > 1 else {n: f**0.5 for n, f in weighting.factors.items()}
+        weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
+    else:
+        settled = False
+    equations = normal_equations(sums, state, scene.body, drift.knots, noise, drift.values)
+    solution = solve(equations.normal, equations.right, free)
+    converged = settled and _small(solution, STEP_SIGMAS)
+    drift_step = equations.knots(solution.step)
+    reading = replace(
+        reading, sums=moved(sums, state, scene.body, drift.knots, solution.step, drift_step)
+    )
+    state, drift = state.moved(solution.step), replace(drift, values=drift.values + drift_step)
+    return Adjusted(state, drift, weighting, reading, equations, solution, converged, iteration)
+
+
+def _near(soundings: Stream, scene: Scene) -> State:
+    """The coarse mount brought so far that the soundings lie on the laser's planes."""
+    state = scene.coarse
+    for _ in range(SETTLING):
+        sums = read({"mbes": soundings}, scene, state, None, Weighting()).sums["mbes"]
+        step = settle(sums, state, scene.body)
+        state = state.moved(step)
+        if np.max(np.abs(step)) < NEAR_RAD_M:
+            break
+    return state
+
+
+def _no_drift(reading: Reading, scene: Scene, noise: PoseNoise, gap_s: float) -> Drift:
+    record = np.unique(np.concatenate([one.record for one in reading.sums.values()]))
+    knots = knots_of(record, scene.body.seconds, noise.spacing_s, gap_s)
+    return Drift(knots, np.zeros((len(knots.record), SIX)))
+
+
+def _small(solution: Solution, sigmas: float) -> bool:
+    """Whether the six's step is far below their sigmas, or below anything that matters."""
+    sigma = np.sqrt(np.diag(solution.covariance))[:SIX]
+    floor = np.repeat([STEP_RAD, STEP_M], 3)
+    return bool(np.all(np.abs(solution.step[:SIX]) <= np.maximum(sigmas * sigma, floor)))

@@ -1,0 +1,31 @@
+"""Errors that do not average: with which sigma each parameter that is held may be wrong."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.maths.observations import SPEED_M_S
+
+Array = NDArray[np.float64]
+
+
+def considered_of(names: Sequence[str], laser: config.Laser, mbes: config.Mbes, as_built: config.AsBuilt) -> Array:
+    """Sigmas (u,) of the unknowns ``names`` where they are held; zero for the mount and the surfaces."""
+    mount = laser.mount_sigma
+    sigmas = {f"laser_rotation_{axis}": float(np.radians(mount.angle_deg)) for axis in "xyz"}
+    sigmas |= {f"laser_lever_arm_{axis}": mount.lever_arm_m for axis in "xyz"}
+    sigmas |= {
+        "laser_range": laser.range_bias_sigma_m,
+        "laser_latency": laser.latency_sigma_s,
+        "mbes_range": mbes.range_bias_sigma_m,
+        "mbes_latency": mbes.latency_sigma_s,
+        "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
+        "sound_speed_gradient": mbes.sound_speed_gradient_sigma_1_s,
+    }
+    lean = float(np.radians(as_built.angle_sigma_deg))
+    for name in names:
+        if name.startswith("wet_"):
+            sigmas[name] = as_built.offset_sigma_m if name.endswith("_shift") else lean
+    return np.array([sigmas.get(name, 0.0) for name in names])

@@ -1,0 +1,114 @@
+"""What the adjustment can determine, in one order: the six, the sensors' other parameters, the surfaces, wet faces.
+
+* the sonar's: rotation ε and lever arm λ (body axes: the six of the contract), latency τ (s, added to the recorded
+  one), range (m, added to every range), sound speed (share by which it is higher), its gradient ((m/s)/m, downward);
+* the laser's: ε, λ, latency, range, alike;
+* of each surface family two turns of the normal (rad) and a shift (m), shared by both sensors;
+* of each family's wet faces a further two turns and a shift: how they stand off from the dry ones, as built.
+
+The six and the surfaces are estimated. The others are held at zero, estimated where the config frees them, and in any
+case *considered*: an error of theirs within its sigma is carried into the total covariance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.planes import tangents_of
+from pipeline.maths.rotations import exp_so3
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+NAMES = ("rotation_x", "rotation_y", "rotation_z", "lever_arm_x", "lever_arm_y", "lever_arm_z")
+SIX = len(NAMES)
+OF_MBES = (*NAMES, "mbes_latency", "mbes_range", "sound_speed", "sound_speed_gradient")
+OF_LASER = (*(f"laser_{name}" for name in NAMES), "laser_latency", "laser_range")
+OF_SURFACE = ("turn_1", "turn_2", "shift")
+
+
+@dataclass(frozen=True)
+class Surface:
+    """normal (3,), centre c (3,), shift: normal · (X - c) = shift on it."""
+
+    family: str
+    normal: Array
+    centre_m: Array
+    shift_m: float
+
+    @property
+    def tangents(self) -> Array:
+        """t1, t2 (2, 3) with t1 x t2 = normal."""
+        return tangents_of(self.normal)
+
+    @property
+    def distance_m(self) -> float:
+        """normal · X on it."""
+        return float(self.normal @ self.centre_m + self.shift_m)
+
+    def moved(self, turn_1: float, turn_2: float, shift_m: float) -> "Surface":
+        normal = self.normal + turn_1 * self.tangents[0] + turn_2 * self.tangents[1]
+        return replace(self, normal=normal / np.linalg.norm(normal), shift_m=self.shift_m + shift_m)
+
+
+@dataclass(frozen=True)
+class State:
+    """Current values: the mount, the surfaces, and ``other`` (u - 6 - 3 s,), the rest of :meth:`names`, in order."""
+
+    R_body_from_mbes: Array
+    lever_arm_m: Array
+    surfaces: tuple[Surface, ...]
+    other: Array
+
+    @classmethod
+    def at(cls, R_body_from_mbes: Array, lever_arm_m: Array, surfaces: Sequence[Surface]) -> "State":
+        others = len(OF_MBES) - SIX + len(OF_LASER) + len(OF_SURFACE) * len(surfaces)
+        return cls(R_body_from_mbes, lever_arm_m, tuple(surfaces), np.zeros(others))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all unknowns, in their order."""
+        families = [surface.family for surface in self.surfaces]
+        shared = [f"{family}_{name}" for family in families for name in OF_SURFACE]
+        return (*OF_MBES, *OF_LASER, *shared, *(f"wet_{name}" for name in shared))
+
+    @property
+    def size(self) -> int:
+        return len(self.names)
+
+    @property
+    def shared(self) -> slice:
+        """Where the surfaces shared by both sensors stand."""
+        first = len(OF_MBES) + len(OF_LASER)
+        return slice(first, first + len(OF_SURFACE) * len(self.surfaces))
+
+    def columns(self, sensor: str, surface: int) -> Integers:
+        """The unknowns that one sensor's observations of one surface depend on, in the order of the design."""
+        own = len(OF_MBES), len(OF_MBES) + len(OF_LASER)
+        first = own[1] + len(OF_SURFACE) * surface
+        shared = np.arange(first, first + len(OF_SURFACE))
+        if sensor == "laser":
+            return np.concatenate([shared, np.arange(*own)])
+        wet = shared + len(OF_SURFACE) * len(self.surfaces)
+        return np.concatenate([shared, np.arange(own[0]), wet])
+
+    def values_of_other(self) -> Array:
+        """``other`` in the places of all unknowns (u,), zero elsewhere."""
+        return np.concatenate([np.zeros(SIX), self.other[: self.shared.start - SIX], np.zeros(self._shared_size),
+                               self.other[self.shared.start - SIX :]])
+
+    @property
+    def _shared_size(self) -> int:
+        return len(OF_SURFACE) * len(self.surfaces)
+
+    def moved(self, step: Array) -> "State":
+        """By a step of all unknowns (u,)."""
+        shared = step[self.shared].reshape(-1, len(OF_SURFACE))
+        return State(
+            exp_so3(step[:3]) @ self.R_body_from_mbes,
+            self.lever_arm_m + step[3:SIX],
+            tuple(surface.moved(*turns) for surface, turns in zip(self.surfaces, shared, strict=True)),
+            self.other + np.concatenate([step[SIX : self.shared.start], step[self.shared.stop :]]),
+        )

@@ -1,0 +1,51 @@
+"""Variance factors of the sensors' noise, from the scatter of each epoch's points about a plane of its own.
+
+With v fitted by (1, α, β) within an epoch, neither pose nor mount nor surface matters: what is left is the sensor's
+noise alone (pure error, Draper & Smith 1998, 2.1). Its expectation is f times n - rank, the rank being 3 where the
+points spread over the surface and 2 where they lie on a line, as those of one ping do.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.epochs import MOVING, EpochSums
+
+Array = NDArray[np.float64]
+FEWEST = 6  # points of an epoch
+FLAT = 1e-9  # an eigenvalue of the scaled moments below this is none
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Σ w v² about the epochs' own planes, in the sums' weights, and its degrees of freedom."""
+
+    squares: float
+    free: float
+
+    @property
+    def factor(self) -> float:
+        return self.squares / self.free if self.free > 0 else 1.0
+
+
+def scatter(sums: EpochSums, rows: NDArray[np.bool_]) -> Scatter:
+    """Of some epochs together; those of few points are left out."""
+    use = np.flatnonzero(rows & (sums.count >= FEWEST))
+    normal, right = sums.normal[use][:, :MOVING, :MOVING], sums.right[use][:, :MOVING]
+    scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", normal), 1e-300))
+    values, vectors = np.linalg.eigh(normal * scale[:, :, None] * scale[:, None, :])
+    there = values > FLAT
+    along = np.einsum("gik,gi->gk", vectors, right * scale)
+    fitted = np.sum(np.where(there, along**2 / np.where(there, values, 1.0), 0.0), axis=1)
+    return Scatter(float(np.sum(sums.squares[use] - fitted)), float(np.sum(sums.count[use] - there.sum(axis=1))))
+
+
+def rescaled(sums: EpochSums, factor_by_surface: Mapping[int, float]) -> EpochSums:
+    """Weights divided by a factor of each surface."""
+    share = 1 / np.array([factor_by_surface[k] for k in range(len(factor_by_surface))])[sums.surface]
+    names = ("normal", "swept", "swept_twice", "right", "right_swept", "squares")
+    parts = {name: getattr(sums, name) for name in names}
+    scaled = {name: part * share.reshape(-1, *[1] * (part.ndim - 1)) for name, part in parts.items()}
+    return EpochSums(sums.record, sums.surface, **scaled, count=sums.count)
