@@ -21,6 +21,7 @@ STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
 STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
 SETTLED_SIGMAS = 0.05  # after a step as small as this the weights would change too little for another reading
 NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
+CLOSING = 3  # steps, at most, with the last weights
 SETTLING = 10  # steps, at most, to come there
 
 
@@ -85,14 +86,16 @@ def adjust(
         weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
     else:
         settled = False
-    equations = normal_equations(sums, state, scene.body, drift.knots, noise, drift.values)
-    solution = solve(equations.normal, equations.right, free)
-    converged = settled and _small(solution, STEP_SIGMAS)
-    drift_step = equations.knots(solution.step)
-    reading = replace(
-        reading, sums=moved(sums, state, scene.body, drift.knots, solution.step, drift_step)
-    )
-    state, drift = state.moved(solution.step), replace(drift, values=drift.values + drift_step)
+    for _ in range(CLOSING):  # the weights as they are
+        equations = normal_equations(sums, state, scene.body, drift.knots, noise, drift.values)
+        solution = solve(equations.normal, equations.right, free)
+        converged = settled and _small(solution, STEP_SIGMAS)
+        if converged:
+            break
+        drift_step = equations.knots(solution.step)
+        sums = moved(sums, state, scene.body, drift.knots, solution.step, drift_step)
+        state, drift = state.moved(solution.step), replace(drift, values=drift.values + drift_step)
+    reading = replace(reading, sums=sums)
     return Adjusted(state, drift, weighting, reading, equations, solution, converged, iteration)
 
 

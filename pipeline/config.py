@@ -4,16 +4,13 @@ Two files are read: the pool's config (target, thresholds) and the session's (in
 Both keep the units of the contract (degrees, metres); code that computes converts at once to radians.
 """
 
-import json
-import math
-from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.errors import ConfigError
+from pipeline.parsing import parse, read_yaml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -290,111 +287,6 @@ class SessionConfig(Model):
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------
-M = TypeVar("M", bound=BaseModel)
-MAX_YAML_BYTES = 1_000_000
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """Safe YAML that refuses a key given twice (YAML would silently take the last) and aliases (no bombs)."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.events.AliasEvent):
-            raise yaml.YAMLError("aliases (*name) are not accepted")
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        seen: set[Any] = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if isinstance(key, (list, dict)):
-                raise yaml.YAMLError(f"line {key_node.start_mark.line + 1}: a key must be a plain word")
-            if key in seen:
-                raise yaml.YAMLError(f"line {key_node.start_mark.line + 1}: key {key!r} is given twice")
-            seen.add(key)
-        return super().construct_mapping(node, deep)
-
-
-def read_yaml(path: Path) -> dict[str, Any]:
-    """One mapping from a YAML file; every way this can fail is a ConfigError."""
-    try:
-        if path.stat().st_size > MAX_YAML_BYTES:
-            raise ConfigError(f"{path}: {path.stat().st_size} bytes is no config; name the YAML file meant")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
-    try:
-        content = yaml.load(text, Loader=_StrictLoader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
-    if content is None:
-        raise ConfigError(f"{path}: is empty; see README.md for what it must say")
-    if not isinstance(content, dict):
-        raise ConfigError(f"{path}: holds {type(content).__name__}, not a mapping of keys; see README.md")
-    return content
-
-
-def parse(model: type[M], content: dict[str, Any], where: str) -> M:
-    """Check ``content`` against ``model``; the first fault becomes one line that names the key."""
-    try:
-        return model.model_validate_json(_to_json(content, where), strict=True)
-    except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in fault["loc"] if part != "function-after") or "(whole file)"
-        if fault["type"] == "extra_forbidden":
-            known = ", ".join(_known_keys(model, fault["loc"][:-1]))
-            raise ConfigError(f"{where}: {key}: unknown key; known here: {known}") from error
-        if fault["type"] == "missing":
-            raise ConfigError(f"{where}: {key}: is missing; add it") from error
-        message = fault["msg"].removeprefix("Value error, ").replace("a valid array", "a list, in square brackets")
-        shown = repr(fault["input"])
-        shown = shown if len(shown) <= 60 else shown[:57] + "..."
-        raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; mend this value") from error
-
-
-def _to_json(content: dict[str, Any], where: str) -> str:
-    """JSON between YAML and model: strict JSON mode reads lists as tuples and whole numbers as floats, nothing else."""
-
-    def check(value: Any, key: str) -> None:
-        if isinstance(value, dict):
-            for name, item in value.items():
-                if not isinstance(name, str):
-                    raise ConfigError(f"{where}: {key}{name!r}: a key must be a word; write it as text")
-                check(item, f"{key}{name}.")
-        elif isinstance(value, list):
-            for position, item in enumerate(value):
-                check(item, f"{key}{position}.")
-        elif isinstance(value, float) and not math.isfinite(value):
-            raise ConfigError(f"{where}: {key[:-1]} = {value}: is not a finite number; mend this value")
-        elif not isinstance(value, (str, int, float, bool, type(None))):
-            raise ConfigError(f"{where}: {key[:-1]} = {value}: is a {type(value).__name__}; put it in quotes")
-
-    check(content, "")
-    return json.dumps(content)
-
-
-def _known_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    current: Any = model
-    for part in location:
-        field = getattr(current, "model_fields", {}).get(part)
-        if field is None:
-            return ["see README.md"]
-        current = field.annotation
-    return sorted(getattr(current, "model_fields", {"see README.md": None}))
-
-
-def changes(model: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """What was set to something else than its default: key, default (None: it has none), value."""
-    for name, field in type(model).model_fields.items():
-        value = getattr(model, name)
-        default = None if field.is_required() else field.get_default(call_default_factory=True)
-        if isinstance(value, BaseModel):
-            yield from changes(value, f"{prefix}{name}.")
-        elif field.is_required() or value != default:
-            yield f"{prefix}{name}", default, value
-
-
 def load_pool(path: Path) -> PoolConfig:
     """The pool's config, checked."""
     return parse(PoolConfig, read_yaml(path), str(path))

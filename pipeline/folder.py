@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from pipeline import config, manifest
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.files import remove, write_text, writing
+from pipeline.parsing import parse, read_yaml
 
 RUN_YAML = "run.yaml"
 LOCK = ".lock"
@@ -81,12 +82,12 @@ def read_settings(run: Path) -> Settings:
     path = run / RUN_YAML
     if not path.is_file():
         raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
-    content = config.read_yaml(path)
+    content = read_yaml(path)
     folder = content.get("session_folder")
     if set(content) != {"session_folder", "config", "session"} or not isinstance(folder, str):
         raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
-    pool = config.parse(config.PoolConfig, content["config"], f"{path}: config")
-    return Settings(Path(folder), pool, config.parse(config.SessionConfig, content["session"], f"{path}: session"))
+    pool = parse(config.PoolConfig, content["config"], f"{path}: config")
+    return Settings(Path(folder), pool, parse(config.SessionConfig, content["session"], f"{path}: session"))
 
 
 # --- the lock --------------------------------------------------------------------------------------------------------

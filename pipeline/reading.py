@@ -75,17 +75,18 @@ def read(
 
 
 def refactored(reading: Reading, state: State, weighting: Weighting) -> tuple[Reading, Weighting]:
-    """The reading with the variance factors that its own scatter shows."""
+    """The reading with the variance factors that its own scatter shows; a group too small for one takes the sensor's
+    other."""
     surfaces = [surface.family == "H" for surface in state.surfaces]
     flat = np.array(surfaces)
     factors, sums = dict(weighting.factors), {}
     for sensor, one in reading.sums.items():
         names = ["laser"] * len(flat) if sensor == "laser" else [GROUPS[2] if level else GROUPS[1] for level in flat]
-        changes = {}
-        for name in dict.fromkeys(names):
-            found = scatter(one, np.array(names)[one.surface] == name)
-            changes[name] = max(found.factor, LEAST_SCALE**2) if found.free >= LEAST_FREE else 1.0
-            factors[name] *= changes[name]
+        scatters = {name: scatter(one, np.array(names)[one.surface] == name) for name in dict.fromkeys(names)}
+        enough = {name: max(by.factor, LEAST_SCALE**2) for name, by in scatters.items() if by.free >= LEAST_FREE}
+        of_sensor = next(iter(enough.values()), 1.0)
+        changes = {name: enough.get(name, of_sensor) for name in scatters}
+        factors |= {name: factors[name] * change for name, change in changes.items()}
         sums[sensor] = rescaled(one, {number: changes[name] for number, name in enumerate(names)})
     return replace(reading, sums=sums), replace(weighting, factors=factors)
 

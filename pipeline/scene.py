@@ -195,19 +195,19 @@ def scene_of(
         rows = faces[faces["family"] == family]
         plane = found.get((ALL_PASSES, family))
         if plane is not None:
-            surfaces.append(Surface(family, plane.normal, plane.centroid_m, 0.0))
+            surfaces.append(Surface.at(family, plane.normal, plane.centroid_m, 0.0))
         elif len(rows):
             first = rows.iloc[0]
             normal = np.array([first[f"normal_{axis}_target_1"] for axis in "xyz"], dtype=np.float64)
-            surfaces.append(Surface(family, normal, normal * float(first["distance_m"]), 0.0))
+            surfaces.append(Surface.at(family, normal, normal * float(first["distance_m"]), 0.0))
     horizontal = faces[faces["family"] == "H"]
     corners = np.concatenate([np.reshape(corner, (-1, 3)) for corner in horizontal["vertices_target_m"]])
     centre = np.array([corners[:, 0].mean(), 0.0, 0.0])
-    surfaces.append(Surface("H", np.array([0.0, 0.0, 1.0]), centre, 0.0))
+    surfaces.append(Surface.at("H", np.array([0.0, 0.0, 1.0]), centre, 0.0))
     number = {surface.family: k for k, surface in enumerate(surfaces)}
     heights = np.where(faces["family"] == "H", faces["distance_m"] * faces["normal_z_target_1"], 0.0)
     return Scene(
-        Body(trajectory_in_target(poses, target_pose), mount_of(laser.mount).lever_arm_body_m),
+        Body.of(trajectory_in_target(poses, target_pose), mount_of(laser.mount).lever_arm_body_m),
         np.array([number[family] for family in faces["family"]]),
         heights,
         State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces),

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from pipeline.config import PoolConfig, load_pool, parse, read_yaml
+from pipeline.config import PoolConfig, load_pool
+from pipeline.parsing import parse, read_yaml
 from pipeline.simulation.scenario import Scenario
 
 CONFIGS = Path(__file__).parents[1] / "configs"

@@ -11,7 +11,7 @@ ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
 
 
 def methods(**patent):
-    adjustment = {"sigma_mount": SIGMA, "correction": ZERO}
+    adjustment = {"sigma_mount_total": SIGMA, "correction": ZERO}
     return {"adjustment": adjustment, "patent_alternating": {"sigma_mount": None, "correction": ZERO | patent}}
 
 

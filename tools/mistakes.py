@@ -86,8 +86,9 @@ MISTAKES: dict[str, Change] = {
 
 def one(task: tuple[str, int]) -> tuple[bool, float, float, float] | None:
     """Accepted, largest error in degrees, in millimetres, in sigmas; None: refused, or no result."""
-    from pipeline.config import PoolConfig, SessionConfig, parse
+    from pipeline.config import PoolConfig, SessionConfig
     from pipeline.errors import PoolcalError
+    from pipeline.parsing import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate
     from stages.campaign import calibrate_in_memory

@@ -123,7 +123,8 @@ def errors_of(R_body_from_mbes: Array, lever_arm_m: Array, truth: Mapping[str, A
 
 
 def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
-    from pipeline.config import PoolConfig, SessionConfig, parse
+    from pipeline.config import PoolConfig, SessionConfig
+    from pipeline.parsing import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate
     from stages.campaign import calibrate_in_memory

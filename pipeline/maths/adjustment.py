@@ -34,14 +34,21 @@ from pipeline.maths.white_noise import Observed, reduce_white
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 NS = 1e9
+REACH_S = 0.2  # rates are taken over this time on either side: between two records noise of 2 mm is 0.5 m/s
 
 
 @dataclass(frozen=True)
 class Body:
-    """How the body moved: the trajectory in the target frame, its records' times (n,) s, and the laser's lever arm."""
+    """How the body moved: the trajectory in the target frame, its records' velocity and turning (n, 6) m/s and rad/s,
+    and the laser's lever arm."""
 
     trajectory: Trajectory
+    rates: Array
     laser_lever_arm_m: Array
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, laser_lever_arm_m: Array) -> "Body":
+        return cls(trajectory, trajectory.rates(REACH_S), laser_lever_arm_m)
 
     @property
     def seconds(self) -> Array:
@@ -49,12 +56,8 @@ class Body:
         return np.asarray((self.trajectory.t_ns - self.trajectory.t_ns[0]) / NS)
 
     def poses(self, record: Integers, share: Array) -> Poses:
-        """Between each record and the next, at these shares; rates are those of the step."""
-        where, T = self.trajectory.between(record, share)
-        seconds = (self.trajectory.t_ns[record + 1] - self.trajectory.t_ns[record])[:, None] / NS
-        velocity = (self.trajectory.positions_m[record + 1] - self.trajectory.positions_m[record]) / seconds
-        turning = np.einsum("gij,gj->gi", T, self.trajectory.steps_rad[record]) / seconds
-        return Poses(where, T, np.concatenate([velocity, turning], axis=1))
+        """Between each record and the next, at these shares."""
+        return Poses(*self.trajectory.between(record, share), self.rates[record])
 
     def lever_arm(self, sensor: str, state: State) -> Array:
         return state.lever_arm_m if sensor == "mbes" else self.laser_lever_arm_m

@@ -31,17 +31,20 @@ OF_SURFACE = ("turn_1", "turn_2", "shift")
 
 @dataclass(frozen=True)
 class Surface:
-    """normal (3,), centre c (3,), shift: normal · (X - c) = shift on it."""
+    """normal (3,), centre c (3,), shift: normal · (X - c) = shift on it; tangents t1, t2 (2, 3) with t1 x t2 = normal.
+
+    The tangents are carried along as the surface turns: sums are kept in them, and a fresh choice may be another.
+    """
 
     family: str
     normal: Array
+    tangents: Array
     centre_m: Array
     shift_m: float
 
-    @property
-    def tangents(self) -> Array:
-        """t1, t2 (2, 3) with t1 x t2 = normal."""
-        return tangents_of(self.normal)
+    @classmethod
+    def at(cls, family: str, normal: Array, centre_m: Array, shift_m: float = 0.0) -> "Surface":
+        return cls(family, normal, tangents_of(normal), centre_m, shift_m)
 
     @property
     def distance_m(self) -> float:
@@ -50,7 +53,11 @@ class Surface:
 
     def moved(self, turn_1: float, turn_2: float, shift_m: float) -> "Surface":
         normal = self.normal + turn_1 * self.tangents[0] + turn_2 * self.tangents[1]
-        return replace(self, normal=normal / np.linalg.norm(normal), shift_m=self.shift_m + shift_m)
+        normal /= np.linalg.norm(normal)
+        first = self.tangents[0] - (self.tangents[0] @ normal) * normal
+        first /= np.linalg.norm(first)
+        tangents = np.stack([first, np.cross(normal, first)])
+        return replace(self, normal=normal, tangents=tangents, shift_m=self.shift_m + shift_m)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from pipeline.folder import Settings, calibration, read_settings
 from pipeline.mounts import PARAMETERS
 from pipeline.pages import render
 from pipeline.pages.pictures import PICTURES
+from pipeline.parsing import changes
 from pipeline.tables import Tables
 from pipeline.times import utc_text
 
@@ -101,7 +102,7 @@ class _Value:
 def _six(table: pd.DataFrame, method: str, limits: config.Verdict) -> list[dict[str, Any]]:
     rows = table[table["method"] == method].to_dict("records")
     bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
-    values = ("coarse", "total", "change", "correction", "sigma_total", "low_95", "high_95")
+    values = ("coarse", "total", "change", "correction", "sigma_random", "sigma_total", "low_95", "high_95")
     return [
         {"name": row["parameter"], "limit": _Value(bounds[row["unit"]], row["unit"])}
         | {key: _Value(row[key], row["unit"]) for key in values}
@@ -163,6 +164,6 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
     rows = [
         {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
         for where, model in (("pool", settings.pool), ("session", settings.session))
-        for key, default, value in config.changes(model)
+        for key, default, value in changes(model)
     ]
     return sorted(rows, key=lambda row: not row["default"])

@@ -19,9 +19,8 @@ from pipeline.config import (
     Positive,
     Target,
     White,
-    parse,
-    read_yaml,
 )
+from pipeline.parsing import parse, read_yaml
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1, le=20)]

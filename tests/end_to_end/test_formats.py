@@ -56,9 +56,14 @@ def same(one: dict[str, Any], other: dict[str, Any], of_sigma: float) -> None:
 
 @pytest.mark.parametrize("what", FILES)
 def test_files(what: str, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None:
-    """Rounding differs (ASCII to 1e-9 deg, ECEF to 0.1 mm): a hundredth of a sigma."""
+    """Rounding differs (ASCII to 1e-9 deg, ECEF to 0.1 mm): a hundredth of a sigma.
+
+    Week seconds are 30 ns off: points recorded at the very moment of an INS record count to the other step, and the
+    variance factors, which are taken step by step, are those of another partition.
+    """
     session = simulate(tmp_path / "session", **FILES[what])
-    same(result_of(undisturbed[0]), run(session), 0.05 if "ECEF" in what else 0.01)
+    tolerance = 0.05 if "ECEF" in what else 0.03 if "week" in what else 0.01
+    same(result_of(undisturbed[0]), run(session), tolerance)
 
 
 def test_equidistant_beams(tmp_path: Path, truth: dict[str, Any]) -> None:

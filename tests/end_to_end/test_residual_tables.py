@@ -123,7 +123,7 @@ def test_steps_are_odd_and_keep_to_the_limit() -> None:
 def test_intervals_are_those_of_the_sigmas(undisturbed: tuple[Path, Told]) -> None:
     run = undisturbed[0]
     rows = table(run, "report/calibration").query("method == 'adjustment'").set_index("parameter")
-    sigma = result_of(run)["mbes"]["sigma_mount"]
+    sigma = result_of(run)["mbes"]["sigma_mount_total"]
     for name, row in rows.iterrows():
         key = f"{name}_deg" if row["unit"] == "deg" else f"{name}_m"
         assert row["sigma_total"] == sigma[key]

@@ -1,61 +1,91 @@
-"""Every column of the groups' design against differences of the observation itself."""
+"""Every column of the epochs' design against differences of the observation itself."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment import State, Surface
-from pipeline.maths.design import features, of_common, of_poses
+from pipeline.maths.design import Poses, of_poses, of_unknowns
+from pipeline.maths.rotations import exp_so3
+from pipeline.maths.unknowns import OF_LASER, OF_MBES, State, Surface
 
 STEP = 1e-6
 ROOT = np.sqrt(0.5)
 NORMALS = np.array([[-ROOT, -ROOT, 0.05], [-1.0, 0.02, -0.03], [-ROOT, ROOT, 0.0], [0.01, -0.02, 1.0]])
 SURFACES = tuple(
-    Surface(name, normal / np.linalg.norm(normal), np.array([0.3, -2.0 + k, 1.0]), 0.01 * k)
+    Surface.at(name, normal / np.linalg.norm(normal), np.array([0.3, -2.0 + k, 1.0]), 0.01 * k)
     for k, (name, normal) in enumerate(zip(("P1", "P2", "P3", "H"), NORMALS, strict=True))
 )
+P, VELOCITY, TURNING = np.array([-5.0, 1.0, 0.2]), np.array([0.1, 0.5, -0.05]), np.array([0.02, -0.01, 0.03])
+R_LASER, T = Rotation.random(2, random_state=9).as_matrix()
+LASER_LEVER = np.array([0.2, 0.5, 1.1])
 
 
-def observed(state: State, surface: int, x: np.ndarray, p: np.ndarray, T: np.ndarray, pose: np.ndarray) -> Any:
-    """v of points x (n, 3) in the sonar's frame, seen from a pose in error; nothing linear here."""
-    r = (x @ state.R_body_from_mbes.T + state.lever_arm_m) @ T.T
-    X = p + pose[:3] + r + np.cross(pose[3:], r)
+def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.ndarray) -> Any:
+    """v of points x (n, 3) in the sensor's frame, seen from a pose in error; nothing linear here but the pose error."""
+    other = dict(zip(state.names, state.values_of_other(), strict=True))
+    R, lever, prefix = state.R_body_from_mbes, state.lever_arm_m, ""
+    if sensor == "laser":
+        prefix = "laser_"
+        turn = np.array([other[f"laser_rotation_{axis}"] for axis in "xyz"])
+        R, lever = exp_so3(turn) @ R_LASER, LASER_LEVER + [other[f"laser_lever_arm_{axis}"] for axis in "xyz"]
+    latency = other[f"{prefix or 'mbes_'}latency"]
+    turned = exp_so3(-TURNING * latency) @ T
+    longer = 1 + other[f"{prefix or 'mbes_'}range"] / np.linalg.norm(x, axis=1, keepdims=True)
+    r = (x * longer @ R.T + lever) @ turned.T
+    X = P - VELOCITY * latency + pose[:3] + r + np.cross(pose[3:], r)
     one = state.surfaces[surface]
+    if sensor == "mbes":
+        one = one.moved(*(other[f"wet_{one.family}_{name}"] for name in ("turn_1", "turn_2", "shift")))
     return (X - one.centre_m) @ one.normal - one.shift_m
 
 
+@pytest.mark.parametrize("sensor", ["mbes", "laser"])
 @pytest.mark.parametrize("surface", range(4))
-def test_columns_are_derivatives(surface: int) -> None:
+def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     rng = np.random.default_rng(surface)
-    R, T = Rotation.random(2, random_state=surface).as_matrix()
-    state = State(R, np.array([0.3, 0.2, -2.0]), SURFACES)
-    p, x, still = np.array([-5.0, 1.0, 0.2]), 3 * rng.normal(size=(7, 3)), np.zeros(6)
-    r = (x @ R.T + state.lever_arm_m) @ T.T
-    number = np.full(7, surface)
-    q = features(SURFACES, number, r)
-    C = of_common(state, number[:1], p[None], T[None], mount=True)[0]
-    K = of_poses(SURFACES, number[:1])[0]
+    R = Rotation.random(random_state=surface).as_matrix()
+    state = State.at(R, np.array([0.3, 0.2, -2.0]), SURFACES)
+    x, still = 3 * rng.normal(size=(7, 3)), np.zeros(6)
+    mount, lever = (R, state.lever_arm_m) if sensor == "mbes" else (R_LASER, LASER_LEVER)
+    r = (x @ mount.T + lever) @ T.T
+    one = SURFACES[surface]
+    ray = x @ mount.T @ T.T / np.linalg.norm(x, axis=1, keepdims=True)
+    q = np.vstack([np.ones(7), one.tangents @ r.T, ray @ one.normal])
+    features = 4 if sensor == "laser" else 6
+    q = np.vstack([q, np.zeros((features - 4, 7))])  # sound speed is tested where its features are made
+    poses = Poses(P[None], T[None], np.concatenate([VELOCITY, TURNING])[None])
+    C = of_unknowns(state, sensor, lever, surface, poses, features)[0]
+    K = of_poses(SURFACES, np.array([surface]))[0]
+    columns = state.columns(sensor, surface)
 
     def slope(change: Any) -> np.ndarray:
         """Columns of derivatives; ``change(h)`` gives state and pose."""
-        ends = [observed(moved, surface, x, p, T, pose) for moved, pose in (change(STEP), change(-STEP))]
+        ends = [observed(sensor, moved, surface, x, pose) for moved, pose in (change(STEP), change(-STEP))]
         return (ends[0] - ends[1]) / (2 * STEP)
 
+    whole = np.zeros((7, state.size))
+    whole[:, columns] = q.T @ C
     for k in range(state.size):
         unit = np.eye(state.size)[k]
         numeric = slope(lambda h, unit=unit: (state.moved(h * unit), still))
-        np.testing.assert_allclose(q.T @ C[:, k], numeric, atol=2e-8)
+        np.testing.assert_allclose(whole[:, k], numeric, atol=3e-8, err_msg=state.names[k])
     for k in range(6):
         unit = np.eye(6)[k]
-        np.testing.assert_allclose(q.T @ K[:, k], slope(lambda h, unit=unit: (state, h * unit)), atol=2e-8)
+        np.testing.assert_allclose(q[:3].T @ K[:, k], slope(lambda h, unit=unit: (state, h * unit)), atol=2e-8)
 
 
-def test_the_laser_does_not_see_the_mount() -> None:
-    state = State(np.eye(3), np.array([0.3, 0.2, -2.0]), SURFACES)
-    surface = np.arange(4)
-    poses = (np.tile([-5.0, 1.0, 0.2], (4, 1)), np.tile(np.eye(3), (4, 1, 1)))
-    laser, sonar = (of_common(state, surface, *poses, mount=mount) for mount in (False, True))
-    assert not laser[:, :, :6].any()
-    np.testing.assert_array_equal(laser[:, :, 6:], sonar[:, :, 6:])
+def test_a_state_moves_each_unknown_by_its_name() -> None:
+    state = State.at(np.eye(3), np.zeros(3), SURFACES)
+    assert len(set(state.names)) == state.size == len(OF_MBES) + len(OF_LASER) + 6 * len(SURFACES)
+    step = np.arange(1, state.size + 1) * 1e-4
+    moved = state.moved(step)
+    values = dict(zip(state.names, moved.values_of_other(), strict=True))
+    for k, name in enumerate(state.names):
+        own = name in ("rotation_x", "rotation_y", "rotation_z") or name.startswith("lever_arm") or name[0] in "PH"
+        assert values[name] == pytest.approx(0.0 if own else step[k])
+    np.testing.assert_allclose(moved.lever_arm_m, step[3:6])
+    assert moved.surfaces[3].shift_m - SURFACES[3].shift_m == pytest.approx(step[state.names.index("H_shift")])
+    assert replace(moved, other=state.other).values_of_other().any() == np.False_

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.config import PoolConfig, SessionConfig, parse
+from pipeline.config import PoolConfig, SessionConfig
+from pipeline.parsing import parse
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
 from stages.campaign import calibrate_in_memory

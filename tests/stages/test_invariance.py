@@ -4,8 +4,9 @@ import json
 
 import numpy as np
 
-from pipeline.config import FitPlanes, Mbes, parse
+from pipeline.config import FitPlanes, Mbes
 from pipeline.evaluate import run_in_memory
+from pipeline.parsing import parse
 from pipeline.streams import MemoryPart, Stream
 from stages import fit_planes
 from tests.stages.conftest import QUIET, calibrated, made

@@ -146,9 +146,15 @@ def test_latency_is_subtracted(errors_of):
     assert error[3:].max() < 0.02
 
 
-def test_drift_is_not_accepted_as_truth():
-    """Until the adjustment knows drift, passes that disagree by more than the tolerance are a reason to reject."""
+def test_drift_is_estimated_and_its_uncertainty_true(errors_of):
+    """What took the yaw 0.1° and the offsets centimetres away, while the sigmas said nothing of it."""
     drift = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
-    result = blocks(calibrated(made({"ins": {"drift": {**drift, "time_constant_s": 200.0}}}, seed=3)))
-    assert result["verdict"] == "rejected"
-    assert any("passes do not agree" in reason for reason in result["reasons"])
+    session = made({"ins": {"drift": {**drift, "time_constant_s": 200.0}}}, seed=3)
+    result = blocks(calibrated(session))
+    assert result["verdict"] == "accepted", result["reasons"]
+    block = result["methods"]["adjustment"]
+    error = errors_of(block, session.truth)
+    scaled = np.concatenate([np.radians(error[:3]), error[3:] / 1000])
+    assert scaled @ np.linalg.solve(np.array(block["covariance"]), scaled) < 22.5  # 99.9 % of six
+    assert max(block["sigma"]["rotation_vector_deg"]) < 0.015
+    assert max(block["sigma"]["lever_arm_m"]) < 0.002

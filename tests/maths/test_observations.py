@@ -1,0 +1,105 @@
+"""What a point's noise and a wrong sound speed do to it, against models of their own."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from pipeline.maths.observations import Sigmas, laser_observations, sonar_observations
+from pipeline.maths.planes import tangents_of
+
+NORMAL = np.array([-np.sqrt(0.5), -np.sqrt(0.4), np.sqrt(0.1)])
+AXES = np.vstack([tangents_of(NORMAL), NORMAL])
+R_TARGET_FROM_MBES = Rotation.from_euler("ZXY", np.radians([12.0, 2.0, -48.0])).as_matrix()
+LEVER = np.array([0.4, -0.3, -1.9])
+SIGMAS = Sigmas(0.02, 0.002)
+
+
+def beams(angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Points (3, n) in the sonar's frame."""
+    return np.array([ranges * np.sin(angles), np.zeros(len(angles)), -ranges * np.cos(angles)])
+
+
+def seen(points: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    n = points.shape[1]
+    in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
+    up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
+    r = AXES @ (R_TARGET_FROM_MBES @ points + LEVER[:, None])
+    return sonar_observations(points, in_mbes, up, r, v, SIGMAS)
+
+
+ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0, 4.0, 6.0, 9.0])
+
+
+def test_sonar_sigma_is_the_scatter_of_noisy_beams() -> None:
+    rng = np.random.default_rng(1)
+    sigma, _ = seen(beams(ANGLES, RANGES), np.zeros(5))
+    many = [
+        NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES + 0.002 * rng.normal(size=5), RANGES + 0.02 * rng.normal(size=5))
+        for _ in range(20_000)
+    ]
+    np.testing.assert_allclose(sigma, np.std(many, axis=0), rtol=0.02)
+
+
+def test_laser_sigma_is_the_scatter_of_noisy_rays() -> None:
+    rng = np.random.default_rng(2)
+    ray, range_m = np.array([0.8, 0.5, -0.33]), 6.0
+    ray /= np.linalg.norm(ray)
+    sides = tangents_of(ray)
+    noise = 0.02 * rng.normal(size=(40_000, 1)) * ray + 6.0 * 0.002 * rng.normal(size=(40_000, 2)) @ sides
+    lever = AXES @ LEVER
+    sigma, q = laser_observations(
+        (AXES @ (ray * range_m) + lever)[:, None], lever[:, None], np.array([range_m]), np.zeros(1), SIGMAS
+    )
+    assert sigma[0] == pytest.approx(np.std(noise @ NORMAL), rel=0.02)
+    assert q[3, 0] == pytest.approx(NORMAL @ ray)  # a longer range
+
+
+def test_the_features_are_what_errors_do_to_the_point() -> None:
+    """Range and sound speed by moving the measurements: travel time and steering are what was recorded."""
+    _, q = seen(beams(ANGLES, RANGES), np.zeros(5))
+    step = 1e-6
+    longer = [beams(ANGLES, RANGES + h) for h in (step, -step)]
+    faster = [beams(np.arcsin((1 + h) * np.sin(ANGLES)), RANGES * (1 + h)) for h in (step, -step)]
+    for number, (ahead, behind) in ((3, longer), (4, faster)):
+        slope = NORMAL @ R_TARGET_FROM_MBES @ (ahead - behind) / (2 * step)
+        np.testing.assert_allclose(q[number], slope, atol=1e-8)
+
+
+def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
+    """Integrated: dX/dt = c d, dd/dt = -(grad c - d (d · grad c)), c = c0 - g z, for the travel time at c0."""
+    c0, g = 1480.0, 0.3
+    points = beams(ANGLES, RANGES)
+    _, q = seen(points, np.zeros(5))
+    for k in range(5):
+        start = R_TARGET_FROM_MBES @ points[:, k]
+        ray = start / np.linalg.norm(start)
+
+        def rate(_: float, y: np.ndarray) -> np.ndarray:
+            grad, d = np.array([0, 0, -g]), y[3:]
+            return np.concatenate([(c0 - g * y[2]) * d, -(grad - d * (d @ grad))])
+
+        end = solve_ivp(rate, (0, RANGES[k] / c0), np.concatenate([np.zeros(3), ray]), rtol=1e-11, atol=1e-13).y[:3, -1]
+        moved = NORMAL @ (end - start)
+        assert q[5, k] * g == pytest.approx(moved, abs=2e-6 + 0.003 * abs(moved))
+    assert np.ptp(np.sign(q[5])) == 2  # both signs were tried
+
+
+def test_at_the_adjusted_point_noise_does_not_turn_the_surface() -> None:
+    """Rays from one place onto a slanted wall, noise along the ray: v against the place along the wall has no slope."""
+    rng = np.random.default_rng(8)
+    n = 400_000
+    rays = Rotation.from_euler("z", rng.uniform(-0.02, 0.02, (n, 1))).apply(np.array([1.0, 0.2, 0.05]))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    true = rays * (-3.0 / (rays @ NORMAL))[:, None]
+    r = true + rays * 0.05 * rng.normal(size=n)[:, None]
+    v = r @ NORMAL + 3.0
+    ranges = np.linalg.norm(r, axis=1)
+    _, q = laser_observations(AXES @ r.T, np.zeros((3, n)), ranges, v, Sigmas(0.05, 0.0))
+    slopes = []
+    for along in (AXES[0] @ r.T, q[1]):
+        centred = along - along.mean()
+        slopes.append(float(centred @ v / (centred @ centred)))
+    sigma = 0.05 * abs(NORMAL @ rays[0]) / np.std(true @ AXES[0]) / np.sqrt(n)
+    assert abs(slopes[0]) > 20 * sigma  # what a design at the measured points would do
+    assert abs(slopes[1]) < 4 * sigma

@@ -1,0 +1,161 @@
+"""Pose errors eliminated epoch by epoch against one dense least squares with every unknown written out."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.maths.drift import eliminate_drift
+from pipeline.maths.epochs import EpochSums, epoch_sums, merged
+from pipeline.maths.knots import Knots, PoseNoise, drift_at, knots_of
+from pipeline.maths.white_noise import Observed, reduce_white
+
+RATE_HZ = 10.0
+UNKNOWNS, SIX, FEATURES, POINTS = 7, 6, 4, 9
+
+
+@dataclass(frozen=True)
+class Source:
+    """Random epochs of one sensor on one surface, on some of the unknowns."""
+
+    sums: EpochSums
+    design: np.ndarray
+    columns: np.ndarray
+    pose: np.ndarray
+
+    @property
+    def record(self) -> np.ndarray:
+        return self.sums.record
+
+    def observed(self, rows: slice) -> Observed:
+        some = np.arange(len(self.record))[rows]
+        return Observed(self.sums.taken(some), self.design[some], self.columns, self.pose)
+
+
+def sources(rng: np.random.Generator, records: np.ndarray) -> tuple[list[Source], list[Any]]:
+    found, rows = [], []
+    for columns in (np.array([0, 2, 3, 6]), np.array([1, 2, 4, 5, 6])):
+        record = np.unique(rng.choice(records, 25))
+        design, pose = rng.normal(size=(len(record), FEATURES, len(columns))), rng.normal(size=(3, SIX))
+        pieces = []
+        for k, one in enumerate(record):
+            q, s = np.vstack([np.ones(POINTS), rng.normal(size=(FEATURES - 1, POINTS))]), rng.uniform(0, 1, POINTS)
+            v, w = rng.normal(size=POINTS), rng.uniform(0.5, 2, POINTS)
+            pieces.append(epoch_sums(np.full(POINTS, one), s, np.zeros(POINTS, dtype=int), 1, q, w, v))
+            whole = np.zeros((FEATURES, UNKNOWNS))
+            whole[:, columns] = design[k]
+            rows.append((one, whole, np.vstack([pose, np.zeros((FEATURES - 3, SIX))]), q, s, v, w))
+        found.append(Source(merged(pieces), design, columns, pose))
+    return found, rows
+
+
+def dense(rows: list[Any], knots: Knots, seconds: np.ndarray, noise: PoseNoise, current: np.ndarray) -> Any:
+    """Rows, values and size of the whole problem: x, every knot, white noise of every record by interval, in sigmas."""
+    count = len(knots.record)
+    whites: dict[Any, int] = {}
+    placed = []
+    for one, C, K, q, s, v, w in rows:
+        j = int(knots.interval_of(np.array([one]))[0])
+        for offset in (0, 1):
+            whites.setdefault((j, one + offset), len(whites))
+        placed.append((one, j, C, K, q, s, v, w))
+    white0 = UNKNOWNS + SIX * count
+    size = white0 + SIX * len(whites)
+    design, value = [], []
+    for one, j, C, K, q, s, v, w in placed:
+        middle = np.average(s, weights=w)  # the drift of an epoch is that of its middle
+        t = seconds[one] + middle * (seconds[one + 1] - seconds[one])
+        a = (t - knots.seconds[j]) / (knots.seconds[j + 1] - knots.seconds[j])
+        row = np.zeros((len(v), size))
+        row[:, :UNKNOWNS] = q.T @ C
+        for knot, part in ((j, 1 - a), (j + 1, a)):
+            row[:, UNKNOWNS + SIX * knot : UNKNOWNS + SIX * knot + SIX] = q.T @ K * noise.drift * part
+        for offset, parts in ((0, 1 - s), (1, s)):
+            at = white0 + SIX * whites[(j, one + offset)]
+            row[:, at : at + SIX] += parts[:, None] * (q.T @ K) * noise.white
+        design.append(row * np.sqrt(w)[:, None])
+        value.append(v * np.sqrt(w))
+    z = np.divide(current, noise.drift, out=np.zeros_like(current), where=noise.drift > 0)
+    for j in range(count):  # prior of the drift, its values being z
+        for k in range(SIX):
+            row, v = np.zeros((1, size)), z[0, k]
+            row[0, UNKNOWNS + SIX * j + k] = 1.0
+            if j:
+                phi = np.exp(-(knots.seconds[j] - knots.seconds[j - 1]) / noise.time_constant_s)
+                row[0, UNKNOWNS + SIX * (j - 1) + k] = -phi
+                row, v = row / np.sqrt(1 - phi**2), (z[j, k] - phi * z[j - 1, k]) / np.sqrt(1 - phi**2)
+            design.append(row)
+            value.append(np.atleast_1d(v))
+    design.append(np.eye(size)[white0:])
+    value.append(np.zeros(size - white0))
+    return np.concatenate(design), np.concatenate(value), white0
+
+
+@pytest.mark.parametrize("white", [0.0, 0.7])
+def test_elimination_is_the_dense_solution(white: float) -> None:
+    rng = np.random.default_rng(3)
+    seconds = np.r_[np.arange(31), 90 + np.arange(31)] / RATE_HZ
+    records = np.r_[np.arange(30), 31 + np.arange(30)]
+    found, rows = sources(rng, records)
+    knots = knots_of(np.unique(np.concatenate([one.record for one in found])), seconds, 1.0, 2.0)
+    noise = PoseNoise(white * np.array([1, 1, 1, 0.5, 0.5, 0]), np.array([0.3, 0.3, 0.2, 0.1, 0.1, 0]), 4.0)
+    current = rng.normal(size=(len(knots.record), SIX)) * noise.drift
+    ours = eliminate_drift(reduce_white(found, UNKNOWNS, knots, seconds, noise.white), knots, noise, current)
+    step = -np.linalg.solve(ours.normal, ours.right)
+
+    A, v, white0 = dense(rows, knots, seconds, noise, current)
+    theirs = -np.linalg.lstsq(A, v, rcond=None)[0]
+    covariance = np.linalg.inv(A.T @ A)
+    np.testing.assert_allclose(step, theirs[:UNKNOWNS], rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(np.linalg.inv(ours.normal), covariance[:UNKNOWNS, :UNKNOWNS], rtol=1e-8, atol=1e-12)
+    of_knots = theirs[UNKNOWNS:white0].reshape(-1, SIX) * noise.drift
+    np.testing.assert_allclose(ours.knots(step), of_knots, rtol=1e-8, atol=1e-10)
+    # what is left of the squares: at x = 0, and at the solution
+    others = A[:, UNKNOWNS:]
+    left = v - others @ np.linalg.lstsq(others, v, rcond=None)[0]
+    assert ours.squares == pytest.approx(left @ left)
+    residual = v + A @ theirs
+    assert ours.squares + ours.right @ step == pytest.approx(residual @ residual)
+    assert ours.right @ step == pytest.approx(-step @ ours.normal @ step)
+    # log det of what went, against log det of the others' normal matrix, relative to their prior
+    prior = sum(np.log(1 - np.exp(-2 * d / noise.time_constant_s)) for d in np.diff(knots.seconds))
+    expected = np.linalg.slogdet(others.T @ others)[1] + SIX * prior
+    assert ours.log_determinant == pytest.approx(expected)
+
+
+def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    seconds = np.arange(200) / RATE_HZ
+    found, _ = sources(rng, np.arange(199))
+    knots = knots_of(np.unique(np.concatenate([one.record for one in found])), seconds, 0.5, 2.0)
+    white = np.full(SIX, 0.4)
+    whole = reduce_white(found, UNKNOWNS, knots, seconds, white)
+    monkeypatch.setattr("pipeline.maths.white_noise.SIDE_BY_SIDE", 3)
+    parts = reduce_white(found, UNKNOWNS, knots, seconds, white)
+    np.testing.assert_allclose(parts.normal, whole.normal, rtol=1e-12, atol=1e-12)
+    assert parts.log_determinant == pytest.approx(whole.log_determinant)
+
+
+def test_knots_keep_to_the_passes() -> None:
+    seconds = np.r_[np.arange(0, 10, 0.1), np.arange(60, 65.25, 0.1)]
+    used = np.r_[np.arange(5, 80), np.arange(100, 140)]
+    knots = knots_of(used, seconds, 1.0, 5.0)
+    np.testing.assert_array_equal(np.flatnonzero(~knots.inner), [8])
+    assert knots.record[0] == 5
+    assert knots.record[8] == 80  # the step from record 79 on ends there
+    assert knots.record[9] == 100
+    assert np.diff(knots.seconds)[knots.inner].max() <= 1.0 + 0.1
+    interval = knots.interval_of(used)
+    assert knots.inner[interval].all()
+    assert (knots.record[interval] <= used).all()
+    assert (knots.record[interval + 1] > used).all()
+    assert np.allclose(drift_at(knots, np.ones((len(knots.record), SIX)), np.array([0.0, 30.0, 99.0])), 1.0)
+
+
+def test_scaled_noise_has_scaled_variances() -> None:
+    noise = PoseNoise(np.full(SIX, 2.0), np.full(SIX, 3.0), 200.0)
+    assert noise.spacing_s == 0.5
+    assert replace(noise, time_constant_s=20.0).spacing_s == 0.05
+    scaled = noise.scaled(4.0, 9.0)
+    assert (scaled.white[0], scaled.drift[0]) == (4.0, 9.0)
