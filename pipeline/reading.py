@@ -47,7 +47,9 @@ def _read(
 ) -> tuple[EpochSums, dict[str, Counts]]:
     seen = scene.observe(sensor, batch, state, drift)
     robust, weight = weighting.weights(seen.group, seen.v_m, seen.sigma_m)
-    sums = epoch_sums(seen.record, seen.share, seen.surface, len(state.surfaces), seen.features, weight, seen.v_m)
+    surfaces = len(state.surfaces)
+    features = seen.adjusted(weight, surfaces, scene.white_m)
+    sums = epoch_sums(seen.record, seen.share, seen.surface, surfaces, features, weight, seen.v_m)
     counts = {}
     for number in np.unique(seen.group).tolist():
         rows = seen.group == number

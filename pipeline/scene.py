@@ -12,7 +12,7 @@ from pipeline.fitted import ALL_PASSES, laser_planes
 from pipeline.maths.adjustment import Body, pull_of
 from pipeline.maths.epochs import MOVING
 from pipeline.maths.knots import Knots, drift_at
-from pipeline.maths.observations import Sigmas, laser_observations, sonar_observations
+from pipeline.maths.observations import Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.robust import igg3_weights
 from pipeline.maths.unknowns import SIX, State, Surface
 from pipeline.mounts import mount_of
@@ -47,7 +47,7 @@ class Weighting:
 @dataclass(frozen=True)
 class Observations:
     """Of a batch (n,): the record of the INS before each, the share of the step to the next, surface, group of
-    observations, v (m), its sigma (m), features (F, n)."""
+    observations, v (m), its sigma (m), features (F, n) and slopes (2, n) of :mod:`pipeline.maths.observations`."""
 
     record: Integers
     share: Array
@@ -56,6 +56,20 @@ class Observations:
     v_m: Array
     sigma_m: Array
     features: Array
+    slopes: Array
+
+    def epochs(self, surfaces: int) -> Integers:
+        """A number for what one sensor sees of one surface between two records, from 0; (n,)."""
+        first = int(self.record.min()) if len(self.record) else 0
+        return np.asarray((self.record - first) * surfaces + self.surface)
+
+    def adjusted(self, weight: Array, surfaces: int, white_m: float) -> Array:
+        """Features at the adjusted points: α and β free of the noise that is in v."""
+        common = white_m * np.sqrt((1 - self.share) ** 2 + self.share**2)
+        own = sensor_part(self.v_m, weight, self.epochs(surfaces), common)
+        features = self.features.copy()
+        features[1:MOVING] -= self.slopes * own
+        return features
 
 
 @dataclass(frozen=True)
@@ -68,12 +82,14 @@ class Drift:
 
 @dataclass(frozen=True)
 class Scene:
-    """What turns a batch into observations; ``coarse``: the state that the adjustment starts from."""
+    """What turns a batch into observations; ``coarse``: the state that the adjustment starts from; ``white_m``: the
+    white noise of the INS's positions, which all points of an epoch share."""
 
     body: Body
     surface_of_face: Integers
     height_of_face: Array
     coarse: State
+    white_m: float
     laser: config.Laser
     mbes: config.Mbes
 
@@ -84,14 +100,16 @@ class Scene:
         horizontal = np.array([one.family == "H" for one in state.surfaces])[surface]
         group = np.where(horizontal, 2, 1) if sensor == "mbes" else np.zeros(len(surface), dtype=np.int64)
         see = self._see_laser if sensor == "laser" else self._see_sonar
-        v, sigma, features = np.empty(len(surface)), np.empty(len(surface)), np.empty((FEATURES[sensor], len(surface)))
+        v, sigma, slopes = np.empty(len(surface)), np.empty(len(surface)), np.empty((MOVING - 1, len(surface)))
+        features = np.empty((FEATURES[sensor], len(surface)))
         pull = self._pull(sensor, state, drift, record)
         for number in range(len(state.surfaces)):
             rows = np.flatnonzero(surface == number)
             if len(rows):
-                found = see(batch, rows, state, number, record[rows], share[rows], pull)
-                v[rows], sigma[rows], features[:, rows] = found
-        return Observations(record, share, surface, group, v, sigma, features)
+                v[rows], found = see(batch, rows, state, number, record[rows], share[rows])
+                sigma[rows], features[:, rows], slopes[:, rows] = found
+                v[rows] += pull.of(number, record[rows], found[1])
+        return Observations(record, share, surface, group, v, sigma, features, slopes)
 
     def _pull(self, sensor: str, state: State, drift: Drift | None, record: Integers) -> "_Pull":
         first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
@@ -103,8 +121,8 @@ class Scene:
         return _Pull(first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor]))
 
     def _see_laser(
-        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array, pull: "_Pull"
-    ) -> tuple[Array, Array, Array]:
+        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array
+    ) -> tuple[Array, tuple[Array, Array, Array]]:
         surface, trajectory = state.surfaces[number], self.body.trajectory
         axes = np.vstack([surface.tangents, surface.normal])
         own = xyz(batch, "laser_m", rows)
@@ -118,12 +136,11 @@ class Scene:
         lever = lever[:, record - first]
         v = points[2] - surface.distance_m - self.height_of_face[batch["face"][rows]]
         sigmas = Sigmas(self.laser.range_sigma_m, float(np.radians(self.laser.angle_sigma_deg)))
-        v = v + pull.of(number, record, np.stack([np.ones_like(v), r[0], r[1], (r[2] - lever[2]) / range_m]))
-        return v, *laser_observations(r, lever, range_m, v, sigmas)
+        return v, laser_observations(r, lever, range_m, sigmas)
 
     def _see_sonar(
-        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array, pull: "_Pull"
-    ) -> tuple[Array, Array, Array]:
+        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array
+    ) -> tuple[Array, tuple[Array, Array, Array]]:
         surface = state.surfaces[number]
         axes = np.vstack([surface.tangents, surface.normal])
         points = xyz(batch, "mbes_m", rows).T
@@ -136,8 +153,7 @@ class Scene:
         r = np.einsum("kin,in->kn", in_mbes, points) + lever
         v = r[2] + (where @ surface.normal)[back] - surface.distance_m - self.height_of_face[batch["face"][rows]]
         sigmas = Sigmas(self.mbes.range_sigma_m, float(np.radians(self.mbes.angle_sigma_deg)))
-        v = v + pull.of(number, record, sonar_observations(points, in_mbes, up, r, np.zeros_like(v), sigmas)[1])
-        return v, *sonar_observations(points, in_mbes, up, r, v, sigmas)
+        return v, sonar_observations(points, in_mbes, up, r, sigmas)
 
     # --- to be looked at ---------------------------------------------------------------------------------------------
     def sample(self, sensor: str, batch: Batch, state: State, drift: Drift | None, weighting: Weighting) -> Batch:
@@ -185,6 +201,7 @@ def scene_of(
     poses: pd.DataFrame,
     target_pose: pd.DataFrame,
     planes: pd.DataFrame,
+    ins: config.Ins,
     laser: config.Laser,
     mbes: config.Mbes,
 ) -> Scene:
@@ -211,6 +228,7 @@ def scene_of(
         np.array([number[family] for family in faces["family"]]),
         heights,
         State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces),
+        ins.white.position_m,
         laser,
         mbes,
     )

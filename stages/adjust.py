@@ -61,7 +61,8 @@ class Outputs:
 
 def run(inputs: Inputs, config: Config) -> Outputs:
     settings = config.adjust
-    scene = scene_of(inputs.faces, inputs.poses, inputs.target_pose, inputs.planes, config.laser, config.mbes)
+    given = (inputs.faces, inputs.poses, inputs.target_pose, inputs.planes)
+    scene = scene_of(*given, config.ins, config.laser, config.mbes)
     streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
     found = adjust(streams, scene, noise_of(config.ins), settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)

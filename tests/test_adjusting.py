@@ -124,6 +124,7 @@ def made(
         np.array([numbers[family] for family, *_ in FACES]),
         np.array([height for *_, height in FACES]),
         State.at(coarse @ R_TRUE, LEVER_TRUE + np.array([0.2, -0.25, 0.22]), surfaces),
+        ins.white.position_m,
         LASER,
         MBES,
     )
@@ -226,7 +227,7 @@ def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:
     loose = config.Ins(
         files=["x"],
         format="table",
-        drift=config.Drift(horizontal_m=1.0, vertical_m=1.0, roll_pitch_deg=6.0, heading_deg=6.0),
+        drift=config.Drift(horizontal_m=0.5, vertical_m=0.5, roll_pitch_deg=3.0, heading_deg=3.0),
     )
     found = solved(6, loose)
     names, held = found.state.names, found.solution.held.tolist()
@@ -235,7 +236,8 @@ def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:
         mine = [f"laser_rotation_{'xyz'[axis]}", *(f"laser_lever_arm_{one}" for one in "xyz")]
         S = found.solution.sensitivity[:6, [held.index(names.index(name)) for name in mine]]
         effect = S @ np.concatenate([[1.0], np.cross(turn, LASER_LEVER)])
-        np.testing.assert_allclose(effect, np.concatenate([turn, np.cross(turn, LEVER_TRUE)]), atol=0.05)
+        np.testing.assert_allclose(effect[:3], turn, atol=2e-3)
+        np.testing.assert_allclose(effect[3:], np.cross(turn, LEVER_TRUE), atol=0.1)  # y is weak: the INS pulls
 
 
 def test_the_wall_alone_leaves_directions_open() -> None:

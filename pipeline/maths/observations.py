@@ -12,8 +12,8 @@ within it) and through the variance factor: on one plane the phase detection tak
 The design is taken at the adjusted point, not at the measured one. Noise along the ray moves the point along the
 surface as well, so v and α, β are correlated, and Σ w α v would be off by σ_ρ² (n · d)(t1 · d) a point (errors in
 variables): where the points of a moment spread over decimetres, that turns the heading by hundredths of a degree. The
-least squares correction of a point is -Σ n v / (nᵀ Σ n) (Gauss-Helmert), after which α and β carry no noise that v
-knows of.
+least squares correction of a point is -Σ n e / (nᵀ Σ n) (Gauss-Helmert), e the sensor's part in v, after which α and β
+carry no noise that v knows of. The *slopes* t_k · Σ n / (nᵀ Σ n) are given back; what e is see :func:`sensor_part`.
 
 Further features: range b added to every range: n · d. Sonar, sound speed higher by the share k: ranges grow by k, and
 so does sin θ, for the receive beams of a flat array are steered with the recorded speed; with x = ρ (sin θ, 0, -cos θ)
@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 SPEED_M_S = 1480.0  # of sound, where only the size of a small effect depends on it
 STEEPEST = 0.02  # cos θ: flatter beams are not steered by sin θ
 
@@ -40,20 +41,20 @@ class Sigmas:
     angle_rad: float
 
 
-def laser_observations(r: Array, lever_arm: Array, range_m: Array, v_m: Array, sigmas: Sigmas) -> tuple[Array, Array]:
-    """sigma (n,) m and features (4, n); r (3, n) from the body to the point, lever_arm (3, n), in surface axes."""
+def laser_observations(r: Array, lever_arm: Array, range_m: Array, sigmas: Sigmas) -> tuple[Array, Array, Array]:
+    """sigma (n,) m, features (4, n), slopes (2, n); r (3, n) from the body to the point, lever_arm (3, n), in surface
+    axes."""
     ray = (r - lever_arm) / range_m
     across = (range_m * sigmas.angle_rad) ** 2
     along = ray[2] * (sigmas.range_m**2 - across)
     variance = along * ray[2] + across
-    share = v_m * along / variance
-    return np.sqrt(variance), np.stack([np.ones_like(v_m), r[0] - share * ray[0], r[1] - share * ray[1], ray[2]])
+    return np.sqrt(variance), np.stack([np.ones_like(range_m), r[0], r[1], ray[2]]), along * ray[:2] / variance
 
 
 def sonar_observations(
-    points_m: Array, axes: Array, up: Array, r: Array, v_m: Array, sigmas: Sigmas
-) -> tuple[Array, Array]:
-    """sigma (n,) m and features (6, n).
+    points_m: Array, axes: Array, up: Array, r: Array, sigmas: Sigmas
+) -> tuple[Array, Array, Array]:
+    """sigma (n,) m, features (6, n), slopes (2, n).
 
     points (3, n), axes (3, 3, n) the surface's t1, t2, n, up (3, n): all in the sonar's frame; r (3, n) from the body,
     in surface axes; all (k, i, n): axis k, component i.
@@ -64,10 +65,23 @@ def sonar_observations(
     side = axes[:, 2] * x - axes[:, 0] * z  # ρ a = (-z, 0, x)
     along, aside = sigmas.range_m**2 * ray[2], sigmas.angle_rad**2 * side[2]
     variance = along * ray[2] + aside * side[2]
-    first, second = (r[k] - v_m * (along * ray[k] + aside * side[k]) / variance for k in (0, 1))
     down = np.maximum(-z, STEEPEST * range_m)
     speed = 2 * axes[2, 0] * x + axes[2, 2] * (z + x * x / down)
     up_of_ray = np.einsum("in,in->n", up, points_m) / range_m
     up_of_normal = np.einsum("in,in->n", up, axes[2])
     gradient = (up_of_normal - 2 * up_of_ray * ray[2]) * range_m**2 / (2 * SPEED_M_S)
-    return np.sqrt(variance), np.stack([np.ones_like(v_m), first, second, ray[2], speed, gradient])
+    features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2], speed, gradient])
+    return np.sqrt(variance), features, (along * ray[:2] + aside * side[:2]) / variance
+
+
+def sensor_part(v_m: Array, weight: Array, epoch: Integers, common_m: Array) -> Array:
+    """e (n,): what of v is the sensor's own noise, the rest being common to an epoch (numbers (n,) from 0).
+
+    With v = e + w, w ~ N(0, s²) common to the epoch (``common_m`` (n,): s, from the INS's white noise), the best linear
+    estimate of w is λ v̄ with v̄ = Σ p v / Σ p and λ = s² / (s² + 1 / Σ p). Taking all of v for the sensor's would move
+    α with w and turn the heading again, the other way: by 0.4 sigma at 2 mm.
+    """
+    p = np.bincount(epoch, weights=weight)
+    mean = np.divide(np.bincount(epoch, weights=weight * v_m), p, out=np.zeros_like(p), where=p > 0)
+    information = common_m**2 * p[epoch]
+    return np.asarray(v_m - information / (1 + information) * mean[epoch])

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.observations import Sigmas, laser_observations, sonar_observations
+from pipeline.maths.observations import Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.planes import tangents_of
 
 NORMAL = np.array([-np.sqrt(0.5), -np.sqrt(0.4), np.sqrt(0.1)])
@@ -20,12 +20,12 @@ def beams(angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     return np.array([ranges * np.sin(angles), np.zeros(len(angles)), -ranges * np.cos(angles)])
 
 
-def seen(points: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def seen(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     n = points.shape[1]
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
     r = AXES @ (R_TARGET_FROM_MBES @ points + LEVER[:, None])
-    return sonar_observations(points, in_mbes, up, r, v, SIGMAS)
+    return sonar_observations(points, in_mbes, up, r, SIGMAS)
 
 
 ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0, 4.0, 6.0, 9.0])
@@ -33,7 +33,7 @@ ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0
 
 def test_sonar_sigma_is_the_scatter_of_noisy_beams() -> None:
     rng = np.random.default_rng(1)
-    sigma, _ = seen(beams(ANGLES, RANGES), np.zeros(5))
+    sigma, _, _ = seen(beams(ANGLES, RANGES))
     many = [
         NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES + 0.002 * rng.normal(size=5), RANGES + 0.02 * rng.normal(size=5))
         for _ in range(20_000)
@@ -48,16 +48,15 @@ def test_laser_sigma_is_the_scatter_of_noisy_rays() -> None:
     sides = tangents_of(ray)
     noise = 0.02 * rng.normal(size=(40_000, 1)) * ray + 6.0 * 0.002 * rng.normal(size=(40_000, 2)) @ sides
     lever = AXES @ LEVER
-    sigma, q = laser_observations(
-        (AXES @ (ray * range_m) + lever)[:, None], lever[:, None], np.array([range_m]), np.zeros(1), SIGMAS
-    )
+    point = (AXES @ (ray * range_m) + lever)[:, None]
+    sigma, q, _ = laser_observations(point, lever[:, None], np.array([range_m]), SIGMAS)
     assert sigma[0] == pytest.approx(np.std(noise @ NORMAL), rel=0.02)
     assert q[3, 0] == pytest.approx(NORMAL @ ray)  # a longer range
 
 
 def test_the_features_are_what_errors_do_to_the_point() -> None:
     """Range and sound speed by moving the measurements: travel time and steering are what was recorded."""
-    _, q = seen(beams(ANGLES, RANGES), np.zeros(5))
+    _, q, _ = seen(beams(ANGLES, RANGES))
     step = 1e-6
     longer = [beams(ANGLES, RANGES + h) for h in (step, -step)]
     faster = [beams(np.arcsin((1 + h) * np.sin(ANGLES)), RANGES * (1 + h)) for h in (step, -step)]
@@ -70,7 +69,7 @@ def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
     """Integrated: dX/dt = c d, dd/dt = -(grad c - d (d · grad c)), c = c0 - g z, for the travel time at c0."""
     c0, g = 1480.0, 0.3
     points = beams(ANGLES, RANGES)
-    _, q = seen(points, np.zeros(5))
+    _, q, _ = seen(points)
     for k in range(5):
         start = R_TARGET_FROM_MBES @ points[:, k]
         ray = start / np.linalg.norm(start)
@@ -85,21 +84,35 @@ def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
     assert np.ptp(np.sign(q[5])) == 2  # both signs were tried
 
 
-def test_at_the_adjusted_point_noise_does_not_turn_the_surface() -> None:
-    """Rays from one place onto a slanted wall, noise along the ray: v against the place along the wall has no slope."""
+@pytest.mark.parametrize("common_m", [0.0, 0.03])
+def test_at_the_adjusted_point_noise_does_not_turn_the_surface(common_m: float) -> None:
+    """Rays from one place onto a slanted wall, noise along the ray, and noise common to an epoch: v, weighted as the
+    common noise demands, has no slope along the wall."""
     rng = np.random.default_rng(8)
-    n = 400_000
+    n, each = 400_000, 20
     rays = Rotation.from_euler("z", rng.uniform(-0.02, 0.02, (n, 1))).apply(np.array([1.0, 0.2, 0.05]))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     true = rays * (-3.0 / (rays @ NORMAL))[:, None]
+    epoch = np.repeat(np.arange(n // each), each)
     r = true + rays * 0.05 * rng.normal(size=n)[:, None]
-    v = r @ NORMAL + 3.0
+    v = r @ NORMAL + 3.0 + common_m * rng.normal(size=n // each)[epoch]
     ranges = np.linalg.norm(r, axis=1)
-    _, q = laser_observations(AXES @ r.T, np.zeros((3, n)), ranges, v, Sigmas(0.05, 0.0))
-    slopes = []
-    for along in (AXES[0] @ r.T, q[1]):
-        centred = along - along.mean()
-        slopes.append(float(centred @ v / (centred @ centred)))
-    sigma = 0.05 * abs(NORMAL @ rays[0]) / np.std(true @ AXES[0]) / np.sqrt(n)
-    assert abs(slopes[0]) > 20 * sigma  # what a design at the measured points would do
-    assert abs(slopes[1]) < 4 * sigma
+    sigma, q, slopes = laser_observations(AXES @ r.T, np.zeros((3, n)), ranges, Sigmas(0.05, 0.0))
+    own = sensor_part(v, sigma**-2, epoch, np.full(n, common_m))
+    shrink = (common_m**2 / (common_m**2 + sigma**2 / each)).reshape(-1, each)
+
+    def white(values: np.ndarray) -> np.ndarray:
+        """Times the inverse covariance of an epoch, sigma² I + common² 1 1ᵀ (sigma nearly the same in one)."""
+        by_epoch = values.reshape(-1, each)
+        return np.asarray((by_epoch - shrink * by_epoch.mean(axis=1, keepdims=True)).ravel() / sigma**2)
+
+    def slope(along: np.ndarray) -> float:
+        centred = along - np.sum(white(along)) / np.sum(white(np.ones(n)))
+        return float(white(centred) @ v / (white(centred) @ centred))
+
+    exact = AXES[0] @ true.T
+    spread = 1 / np.sqrt(white(exact - exact.mean()) @ (exact - exact.mean()))
+    assert abs(slope(q[1])) > 8 * spread  # what a design at the measured points would do
+    assert abs(slope(q[1] - slopes[0] * own)) < 4 * spread
+    if common_m:
+        assert abs(slope(q[1] - slopes[0] * v)) > 4 * spread  # and what taking all of v for the sensor's would do
