@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 
 from pipeline import config
 from pipeline.maths.adjustment import moved, normal_equations, settle
+from pipeline.maths.design import of_poses
 from pipeline.maths.drift import Eliminated
-from pipeline.maths.knots import PoseNoise, knots_of
+from pipeline.maths.knots import Drift, PoseNoise, knots_of
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX, State
+from pipeline.maths.variance import Common, common
 from pipeline.reading import Reading, read, refactored, scales_of
-from pipeline.scene import Drift, Scene, Weighting
+from pipeline.scene import Scene, Weighting
 from pipeline.streams import Stream
 
 Array = NDArray[np.float64]
@@ -21,18 +23,21 @@ STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
 STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
 SETTLED_SIGMAS = 0.05  # after a step as small as this the weights would change too little for another reading
 NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
+SURE, UNLIKELY = 0.1, 100.0  # the white noise's factor is applied if its sigma is below, within these bounds
 CLOSING = 3  # steps, at most, with the last weights
 SETTLING = 10  # steps, at most, to come there
 
 
 @dataclass(frozen=True)
 class Adjusted:
-    """Where the iteration ended."""
+    """Where the iteration ended; ``shared``: by sensor the variance factor of what an epoch's points have in common,
+    of which the laser's has been applied to the INS's white noise."""
 
     state: State
     drift: Drift
     weighting: Weighting
     reading: Reading
+    shared: Mapping[str, Common]
     equations: Eliminated
     solution: Solution
     converged: bool
@@ -71,13 +76,13 @@ def adjust(
     for iteration in range(1, settings.max_iterations + 1):
         reading, weighting = refactored(read(streams, scene, state, known, weighting), state, weighting)
         drift = known or _no_drift(reading, scene, noise, gap_s)
-        equations = normal_equations(reading.sums, state, scene.body, drift.knots, noise, drift.values)
+        equations = normal_equations(reading.sums, state, scene.body, noise, drift)
         solution = solve(equations.normal, equations.right, free)
         if solution.deficiency:
-            return Adjusted(state, drift, weighting, reading, equations, solution, False, iteration)
+            return Adjusted(state, drift, weighting, reading, {}, equations, solution, False, iteration)
         drift_step = equations.knots(solution.step)
-        sums = moved(reading.sums, state, scene.body, drift.knots, solution.step, drift_step)
-        state, drift = state.moved(solution.step), replace(drift, values=drift.values + drift_step)
+        sums = moved(reading.sums, state, scene.body, drift, solution.step, drift_step)
+        state, drift = state.moved(solution.step), drift.moved(drift_step)
         known = drift
         settled = weighting.robust is not None and _small(solution, SETTLED_SIGMAS)
         if settled and iteration > 2:
@@ -86,17 +91,21 @@ def adjust(
         weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
     else:
         settled = False
+    poses = of_poses(state.surfaces, np.arange(len(state.surfaces)))
+    shared = {sensor: common(one, poses, noise.white) for sensor, one in sums.items()}
+    if shared["laser"].sigma < SURE:
+        noise = noise.scaled(min(max(shared["laser"].factor, 1 / UNLIKELY), UNLIKELY), 1.0)
     for _ in range(CLOSING):  # the weights as they are
-        equations = normal_equations(sums, state, scene.body, drift.knots, noise, drift.values)
+        equations = normal_equations(sums, state, scene.body, noise, drift)
         solution = solve(equations.normal, equations.right, free)
         converged = settled and _small(solution, STEP_SIGMAS)
         if converged:
             break
         drift_step = equations.knots(solution.step)
-        sums = moved(sums, state, scene.body, drift.knots, solution.step, drift_step)
-        state, drift = state.moved(solution.step), replace(drift, values=drift.values + drift_step)
+        sums = moved(sums, state, scene.body, drift, solution.step, drift_step)
+        state, drift = state.moved(solution.step), drift.moved(drift_step)
     reading = replace(reading, sums=sums)
-    return Adjusted(state, drift, weighting, reading, equations, solution, converged, iteration)
+    return Adjusted(state, drift, weighting, reading, shared, equations, solution, converged, iteration)
 
 
 def _near(soundings: Stream, scene: Scene) -> State:

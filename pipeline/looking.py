@@ -8,9 +8,10 @@ import pandas as pd
 
 from pipeline.adjusting import Adjusted
 from pipeline.maths.consistency import Cell, Moments, cells_of, merged_moments, moments_of
+from pipeline.maths.knots import Drift
 from pipeline.maths.unknowns import State
 from pipeline.residuals import residuals_table, step_for
-from pipeline.scene import Drift, Scene, Weighting
+from pipeline.scene import Scene, Weighting
 from pipeline.streams import Batch, Stream
 from pipeline.times import NS
 

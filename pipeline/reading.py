@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.epochs import EpochSums, epoch_sums, merged
+from pipeline.maths.knots import Drift
 from pipeline.maths.robust import LEAST_SCALE, histogram, scale_of
 from pipeline.maths.unknowns import State
 from pipeline.maths.variance import rescaled, scatter
-from pipeline.scene import GROUPS, Drift, Scene, Weighting
+from pipeline.scene import GROUPS, Scene, Weighting
 from pipeline.streams import Batch, Stream
 
 Array = NDArray[np.float64]

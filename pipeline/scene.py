@@ -11,7 +11,7 @@ from pipeline import config
 from pipeline.fitted import ALL_PASSES, laser_planes
 from pipeline.maths.adjustment import Body, pull_of
 from pipeline.maths.epochs import MOVING
-from pipeline.maths.knots import Knots, drift_at
+from pipeline.maths.knots import Drift
 from pipeline.maths.observations import Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.robust import igg3_weights
 from pipeline.maths.unknowns import SIX, State, Surface
@@ -73,14 +73,6 @@ class Observations:
 
 
 @dataclass(frozen=True)
-class Drift:
-    """The drift found so far: (k, 6) m and rad at its knots, target frame."""
-
-    knots: Knots
-    values: Array
-
-
-@dataclass(frozen=True)
 class Scene:
     """What turns a batch into observations; ``coarse``: the state that the adjustment starts from; ``white_m``: the
     white noise of the INS's positions, which all points of an epoch share."""
@@ -102,29 +94,34 @@ class Scene:
         see = self._see_laser if sensor == "laser" else self._see_sonar
         v, sigma, slopes = np.empty(len(surface)), np.empty(len(surface)), np.empty((MOVING - 1, len(surface)))
         features = np.empty((FEATURES[sensor], len(surface)))
-        pull = self._pull(sensor, state, drift, record)
+        pull, turns = self._pull(sensor, state, drift, record)
         for number in range(len(state.surfaces)):
             rows = np.flatnonzero(surface == number)
             if len(rows):
-                v[rows], found = see(batch, rows, state, number, record[rows], share[rows])
-                sigma[rows], features[:, rows], slopes[:, rows] = found
+                axes = np.vstack([state.surfaces[number].tangents, state.surfaces[number].normal])
+                v[rows], r, found = see(batch, rows, state, number, axes, record[rows], share[rows])
                 v[rows] += pull.of(number, record[rows], found[1])
+                sigma[rows], features[:, rows], slopes[:, rows] = found
+                features[1:MOVING, rows] += np.cross(axes @ turns[:, record[rows] - pull.first], r, axis=0)[:2]
         return Observations(record, share, surface, group, v, sigma, features, slopes)
 
-    def _pull(self, sensor: str, state: State, drift: Drift | None, record: Integers) -> "_Pull":
+    def _pull(
+        self, sensor: str, state: State, drift: Drift | None, record: Integers
+    ) -> tuple["_Pull", Array]:
+        """What moves v, and how the drift turns the body (3, r), of the records from the batch's first to its last."""
         first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
         records = np.arange(first, last)
         seconds = self.body.seconds[first : last + 1]
         error = np.zeros((len(records), SIX))
         if drift is not None:
-            error = drift_at(drift.knots, drift.values, (seconds[:-1] + seconds[1:]) / 2)
-        return _Pull(first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor]))
+            error = drift.at((seconds[:-1] + seconds[1:]) / 2)
+        return _Pull(first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor])), error[:, 3:].T
 
     def _see_laser(
-        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array
-    ) -> tuple[Array, tuple[Array, Array, Array]]:
+        self, batch: Batch, rows: Integers, state: State, number: int, axes: Array, record: Integers, share: Array
+    ) -> tuple[Array, Array, tuple[Array, Array, Array]]:
+        """v, r in surface axes, and what the observations' module makes of them."""
         surface, trajectory = state.surfaces[number], self.body.trajectory
-        axes = np.vstack([surface.tangents, surface.normal])
         own = xyz(batch, "laser_m", rows)
         range_m = np.sqrt(np.einsum("ni,ni->n", own, own))
         first, last = int(record.min()), int(record.max()) + 2
@@ -136,13 +133,12 @@ class Scene:
         lever = lever[:, record - first]
         v = points[2] - surface.distance_m - self.height_of_face[batch["face"][rows]]
         sigmas = Sigmas(self.laser.range_sigma_m, float(np.radians(self.laser.angle_sigma_deg)))
-        return v, laser_observations(r, lever, range_m, sigmas)
+        return v, r, laser_observations(r, lever, range_m, sigmas)
 
     def _see_sonar(
-        self, batch: Batch, rows: Integers, state: State, number: int, record: Integers, share: Array
-    ) -> tuple[Array, tuple[Array, Array, Array]]:
+        self, batch: Batch, rows: Integers, state: State, number: int, axes: Array, _: Integers, __: Array
+    ) -> tuple[Array, Array, tuple[Array, Array, Array]]:
         surface = state.surfaces[number]
-        axes = np.vstack([surface.tangents, surface.normal])
         points = xyz(batch, "mbes_m", rows).T
         moments, back = np.unique(batch["t_ns"][rows], return_inverse=True)  # beams of a ping share their pose
         where, R_target_from_body = self.body.trajectory.poses_at(moments)
@@ -153,7 +149,7 @@ class Scene:
         r = np.einsum("kin,in->kn", in_mbes, points) + lever
         v = r[2] + (where @ surface.normal)[back] - surface.distance_m - self.height_of_face[batch["face"][rows]]
         sigmas = Sigmas(self.mbes.range_sigma_m, float(np.radians(self.mbes.angle_sigma_deg)))
-        return v, sonar_observations(points, in_mbes, up, r, sigmas)
+        return v, r, sonar_observations(points, in_mbes, up, r, sigmas)
 
     # --- to be looked at ---------------------------------------------------------------------------------------------
     def sample(self, sensor: str, batch: Batch, state: State, drift: Drift | None, weighting: Weighting) -> Batch:

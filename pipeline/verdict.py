@@ -17,7 +17,13 @@ WORDS_OF_GROUP = {
     "mbes_vertical": "soundings on vertical faces",
     "mbes_horizontal": "soundings on horizontal faces",
 }
+SHARED = {
+    "ins_white": "the INS's poses scatter from record to record {:.1f} times as much as ins.white says: its filter, or "
+    "the laser's clock",
+    "ping": "whole pings scatter {:.1f} times as much as ins.white says: the sonar's clock, or stabilised beams",
+}
 ODD_FACTOR = 2.0  # a variance factor above this, or below its inverse, is worth a look
+ODD_COMMON = 4.0  # the same of what an epoch's points share: less is a good INS
 ODD_CUT = 0.01  # and so is a share of cut observations above this
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # and a target found so far off
 NEAR_M = 1.5  # passes whose distances differ by less tell yaw from lever arm y badly
@@ -47,11 +53,6 @@ def reasons(
         return [f"the adjustment has no result: {summary['reason']}; sail more passes, at different distances"]
     if not summary["converged"]:
         found.append(f"the adjustment did not converge in {summary['iterations']} steps")
-    if cells.loc[cells["sensor"] == "mbes", "pass"].nunique() < 2:
-        found.append(
-            "only one pass has soundings on the target, so that drift of the INS or a clock cannot show: sail at least "
-            "two, at different distances"
-        )
     if not summary["test_passed"]:
         found.append(_inconsistency(summary, cells))
     found += _wide_sigmas(methods["adjustment"]["sigma_mount_total"], limits)
@@ -147,6 +148,10 @@ def warnings(groups: pd.DataFrame, target: Mapping[str, Any]) -> list[str]:
     found = []
     for row in groups.to_dict("records"):
         factor, cut = row["variance_factor"], row["cut"] / max(row["count"], 1)
+        if row["group"] in SHARED:
+            if factor > ODD_COMMON:
+                found.append(SHARED[row["group"]].format(np.sqrt(factor)))
+            continue
         name = WORDS_OF_GROUP[row["group"]]
         if (factor > ODD_FACTOR or factor < 1 / ODD_FACTOR):
             how = "more" if factor > 1 else "less"

@@ -21,6 +21,7 @@ from pipeline.scene import scene_of
 from pipeline.streams import Stream
 
 Array = NDArray[np.float64]
+COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common
 SHOWN = 100_000  # points of a sensor in the table residuals, at most
 
 
@@ -180,7 +181,7 @@ def _drift_table(found: Adjusted, poses: pd.DataFrame) -> pd.DataFrame:
 
 
 def _groups_table(found: Adjusted) -> pd.DataFrame:
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "group": name,
             "count": one.count,
@@ -191,6 +192,9 @@ def _groups_table(found: Adjusted) -> pd.DataFrame:
         }
         for name, one in found.reading.counts.items()
     ]
+    for sensor, one in found.shared.items():
+        row = {"group": COMMON_TO[sensor], "count": len(found.reading.sums[sensor])}
+        rows.append(row | {"variance_factor": one.factor, "scale": np.nan, "cut": 0, "reduced": 0})
     return pd.DataFrame(rows)
 
 

@@ -15,7 +15,7 @@ def methods(**patent):
     return {"adjustment": adjustment, "patent_alternating": {"sigma_mount": None, "correction": ZERO | patent}}
 
 
-def evidence(pose=None, mount=None, summary=None, alternating=None, one_pass=False):
+def evidence(pose=None, mount=None, summary=None, alternating=None):
     pose_row = {
         "ambiguous": False,
         "rival": "one block higher",
@@ -42,8 +42,6 @@ def evidence(pose=None, mount=None, summary=None, alternating=None, one_pass=Fal
             "normalised": [0.3, -4.0, 0.2],
         }
     )
-    if one_pass:
-        cells = cells[cells["pass"] != 4]
     return Evidence(
         pd.DataFrame([pose_row | (pose or {})]),
         pd.DataFrame([mount_row | (mount or {})]),
@@ -75,7 +73,6 @@ def test_a_good_session_has_no_reason():
         ({"summary": {"reason": "the data leave 2 directions open"}}, "no result: the data leave 2 directions open"),
         ({"summary": {"converged": False}}, "did not converge in 6 steps"),
         ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),
-        ({"one_pass": True}, "only one pass has soundings on the target"),
     ],
 )
 def test_each_evidence_is_one_reason(change, words):
@@ -132,7 +129,7 @@ def test_both_sensors_off_together_is_the_ins():
 
 
 def groups(**changes):
-    row = {"group": "mbes_horizontal", "count": 1000, "redundancy": 990.0, "variance_factor": 1.0, "cut": 0}
+    row = {"group": "mbes_horizontal", "count": 1000, "variance_factor": 1.0, "cut": 0}
     return pd.DataFrame([row | changes])
 
 
@@ -146,7 +143,10 @@ FOUND = {"offset_m": [0.0, 0.05, -0.09], "tilt_deg": [0.05, -0.05]}
         ({"variance_factor": 1.99}, {}, None),
         ({"variance_factor": 2.01}, {}, "soundings on horizontal faces scatter 1.4 times as much"),
         ({"variance_factor": 0.49}, {}, "less noise"),
-        ({"variance_factor": 9.0, "redundancy": 0.0}, {}, None),
+        ({"group": "ins_white", "variance_factor": 0.01}, {}, None),
+        ({"group": "ins_white", "variance_factor": 4.1}, {}, "from record to record 2.0 times as much"),
+        ({"group": "ping", "variance_factor": 3.9}, {}, None),
+        ({"group": "ping", "variance_factor": 9.0}, {}, "whole pings scatter 3.0 times"),
         ({"cut": 10}, {}, None),
         ({"cut": 11}, {}, "1.1 % of soundings on horizontal faces were cut"),
         ({}, {"offset_m": [0.0, -0.11, 0.0]}, "check laser.mount"),

@@ -54,8 +54,8 @@ SURFACES = Artefact(
 GROUPS = Artefact(
     "adjust", "groups", "table", "variance factors by group of observations",
     (
-        Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal"),
-        Column("count", I64, "1", "observations"),
+        Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping"),
+        Column("count", I64, "1", "observations; of the last two: epochs"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
         Column("scale", F64, "1", "robust scale of residual / sigma, the INS's white noise in it"),
         Column("cut", I64, "1", "observations whose weight became zero"),

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from pipeline.maths.design import Poses, of_poses, of_unknowns
 from pipeline.maths.drift import Eliminated, eliminate_drift
 from pipeline.maths.epochs import EpochSums
-from pipeline.maths.knots import Knots, PoseNoise, drift_at
+from pipeline.maths.knots import Drift, PoseNoise
+from pipeline.maths.rotations import exp_so3
 from pipeline.maths.trajectory import Trajectory
 from pipeline.maths.unknowns import SIX, State
 from pipeline.maths.white_noise import Observed, reduce_white
@@ -55,9 +56,18 @@ class Body:
         """Times of the records since the first (n,)."""
         return np.asarray((self.trajectory.t_ns - self.trajectory.t_ns[0]) / NS)
 
-    def poses(self, record: Integers, share: Array) -> Poses:
-        """Between each record and the next, at these shares."""
-        return Poses(*self.trajectory.between(record, share), self.rates[record])
+    def moments(self, record: Integers, share: Array) -> Array:
+        """Times at these shares of the step from each record to the next, (g,) s."""
+        seconds = self.seconds
+        return np.asarray(seconds[record] + share * (seconds[record + 1] - seconds[record]))
+
+    def poses(self, record: Integers, share: Array, drift: Drift | None) -> Poses:
+        """At these moments, corrected by the drift found so far: the design is wanted where the body is."""
+        positions, T = self.trajectory.between(record, share)
+        if drift is not None:
+            error = drift.at(self.moments(record, share))
+            positions, T = positions + error[:, :3], exp_so3(error[:, 3:]) @ T
+        return Poses(positions, T, self.rates[record])
 
     def lever_arm(self, sensor: str, state: State) -> Array:
         return state.lever_arm_m if sensor == "mbes" else self.laser_lever_arm_m
@@ -73,6 +83,7 @@ class OnSurface:
     rows: Integers
     state: State
     body: Body
+    drift: Drift | None
 
     @property
     def record(self) -> Integers:
@@ -81,46 +92,48 @@ class OnSurface:
     def observed(self, rows: slice) -> Observed:
         sums = self.sums.taken(self.rows[rows])
         lever = self.body.lever_arm(self.sensor, self.state)
-        poses = self.body.poses(sums.record, sums.share)
+        poses = self.body.poses(sums.record, sums.share, self.drift)
         design = of_unknowns(self.state, self.sensor, lever, self.surface, poses, sums.normal.shape[1])
         pose = of_poses(self.state.surfaces, np.array([self.surface]))[0]
         return Observed(sums, design, self.state.columns(self.sensor, self.surface), pose)
 
 
-def by_surface(sums: Mapping[str, EpochSums], state: State, body: Body) -> list[OnSurface]:
+def by_surface(
+    sums: Mapping[str, EpochSums], state: State, body: Body, drift: Drift | None = None
+) -> list[OnSurface]:
     """Each sensor's epochs, surface by surface."""
     return [
-        OnSurface(sensor, surface, one, np.flatnonzero(one.surface == surface), state, body)
+        OnSurface(sensor, surface, one, np.flatnonzero(one.surface == surface), state, body, drift)
         for sensor, one in sums.items()
         for surface in range(len(state.surfaces))
     ]
 
 
 def normal_equations(
-    sums: Mapping[str, EpochSums], state: State, body: Body, knots: Knots, noise: PoseNoise, drift: Array
+    sums: Mapping[str, EpochSums], state: State, body: Body, noise: PoseNoise, drift: Drift
 ) -> Eliminated:
-    """Of all unknowns; ``drift`` (k, 6): its values at the knots, with which v was taken."""
-    reduced = reduce_white(by_surface(sums, state, body), state.size, knots, body.seconds, noise.white)
-    return eliminate_drift(reduced, knots, noise, drift)
+    """Of all unknowns; ``drift``: that with which v was taken."""
+    sources = by_surface(sums, state, body, drift)
+    reduced = reduce_white(sources, state.size, drift.knots, body.seconds, noise.white)
+    return eliminate_drift(reduced, noise, drift)
 
 
 BLOCK = 50_000  # epochs whose designs are made at a time
 
 
 def moved(
-    sums: Mapping[str, EpochSums], state: State, body: Body, knots: Knots, step: Array, drift_step: Array
+    sums: Mapping[str, EpochSums], state: State, body: Body, drift: Drift, step: Array, drift_step: Array
 ) -> dict[str, EpochSums]:
     """The sums after a step of the unknowns (u,) and of the drift (k, 6), without reading the points again."""
-    seconds = body.seconds
+    changed = Drift(drift.knots, drift_step)
     changes = {sensor: np.zeros_like(one.right) for sensor, one in sums.items()}
-    for source in by_surface(sums, state, body):
+    for source in by_surface(sums, state, body, drift):
         for start in range(0, len(source.rows), BLOCK):
             part = slice(start, start + BLOCK)
             seen = source.observed(part)
             change = seen.design @ step[seen.columns]
-            record, share = seen.sums.record, seen.sums.share
-            t = seconds[record] + share * (seconds[record + 1] - seconds[record])
-            change[:, : len(seen.pose)] += drift_at(knots, drift_step, t) @ seen.pose.T
+            moments = body.moments(seen.sums.record, seen.sums.share)
+            change[:, : len(seen.pose)] += changed.at(moments) @ seen.pose.T
             changes[source.sensor][source.rows[part]] = change
     return {sensor: one.moved(changes[sensor]) for sensor, one in sums.items()}
 
@@ -153,7 +166,7 @@ def pull_of(state: State, sensor: str, body: Body, record: Integers, drift: Arra
         found[:, surface, : len(pose)] = drift @ pose.T
         mine = values[state.columns(sensor, surface)]
         if np.any(mine):
-            poses = body.poses(record, np.full(len(record), 0.5))
+            poses = body.poses(record, np.full(len(record), 0.5), None)
             lever = body.lever_arm(sensor, state)
             found[:, surface] += of_unknowns(state, sensor, lever, surface, poses, features) @ mine
     return found

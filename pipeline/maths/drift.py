@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from pipeline.maths.knots import Knots, PoseNoise
+from pipeline.maths.knots import Drift, PoseNoise
 from pipeline.maths.unknowns import SIX
 from pipeline.maths.white_noise import Reduced
 
@@ -36,11 +36,12 @@ class Eliminated:
         return np.asarray(self.free - self.tied @ step)
 
 
-def eliminate_drift(reduced: Reduced, knots: Knots, noise: PoseNoise, current: Array) -> Eliminated:
-    """The knots eliminated under their prior; ``current`` (k, 6): their values, at which the equations were made.
+def eliminate_drift(reduced: Reduced, noise: PoseNoise, drift: Drift) -> Eliminated:
+    """The knots eliminated under their prior; ``drift``: that at which the equations were made.
 
     In units of σ: Σ_j |ξ_{j+1} - φ ξ_j|² / (1 - φ²) + |ξ_0|². Components without drift (σ = 0) stay as they are.
     """
+    knots, current = drift.knots, drift.values
     u, count = reduced.unknowns, len(knots.record)
     scale = noise.drift
     before, after = slice(u, u + SIX), slice(u + SIX, u + 2 * SIX)

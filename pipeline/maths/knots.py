@@ -71,6 +71,17 @@ def knots_of(record: Integers, seconds: Array, spacing_s: float, gap_s: float) -
     return Knots(knots, seconds[knots], np.concatenate(inner)[:-1])
 
 
-def drift_at(knots: Knots, values: Array, seconds: Array) -> Array:
-    """ξ (n, 6) at moments (n,), linear between the knots' values (k, 6)."""
-    return np.array([np.interp(seconds, knots.seconds, column) for column in values.T]).T
+@dataclass(frozen=True)
+class Drift:
+    """The drift ξ found so far: values (k, 6) m and rad at its knots, target frame."""
+
+    knots: Knots
+    values: Array
+
+    def at(self, seconds: Array) -> Array:
+        """ξ (n, 6) at moments (n,), linear between the knots."""
+        return np.array([np.interp(seconds, self.knots.seconds, column) for column in self.values.T]).T
+
+    def moved(self, step: Array) -> "Drift":
+        """After a step (k, 6)."""
+        return Drift(self.knots, self.values + step)

@@ -49,7 +49,9 @@ def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
     """One in how many observations of each sensor is in the table residuals."""
     total = dict.fromkeys(SENSORS, 0)
     for row in tables.table(artefacts.GROUPS).to_dict("records"):
-        total["laser" if row["group"] == "laser" else "mbes"] += row["count"]
+        sensor = str(row["group"]).partition("_")[0]
+        if sensor in total:
+            total[sensor] += row["count"]
     return {s: round(total[s] / max(1, int((residuals["sensor"] == s).sum()))) for s in SENSORS}
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.maths.drift import eliminate_drift
 from pipeline.maths.epochs import EpochSums, epoch_sums, merged
-from pipeline.maths.knots import Knots, PoseNoise, drift_at, knots_of
+from pipeline.maths.knots import Drift, Knots, PoseNoise, knots_of
 from pipeline.maths.white_noise import Observed, reduce_white
 
 RATE_HZ = 10.0
@@ -101,7 +101,7 @@ def test_elimination_is_the_dense_solution(white: float) -> None:
     knots = knots_of(np.unique(np.concatenate([one.record for one in found])), seconds, 1.0, 2.0)
     noise = PoseNoise(white * np.array([1, 1, 1, 0.5, 0.5, 0]), np.array([0.3, 0.3, 0.2, 0.1, 0.1, 0]), 4.0)
     current = rng.normal(size=(len(knots.record), SIX)) * noise.drift
-    ours = eliminate_drift(reduce_white(found, UNKNOWNS, knots, seconds, noise.white), knots, noise, current)
+    ours = eliminate_drift(reduce_white(found, UNKNOWNS, knots, seconds, noise.white), noise, Drift(knots, current))
     step = -np.linalg.solve(ours.normal, ours.right)
 
     A, v, white0 = dense(rows, knots, seconds, noise, current)
@@ -150,7 +150,8 @@ def test_knots_keep_to_the_passes() -> None:
     assert knots.inner[interval].all()
     assert (knots.record[interval] <= used).all()
     assert (knots.record[interval + 1] > used).all()
-    assert np.allclose(drift_at(knots, np.ones((len(knots.record), SIX)), np.array([0.0, 30.0, 99.0])), 1.0)
+    drift = Drift(knots, np.ones((len(knots.record), SIX)))
+    assert np.allclose(drift.moved(drift.values).at(np.array([0.0, 30.0, 99.0])), 2.0)
 
 
 def test_scaled_noise_has_scaled_variances() -> None:
