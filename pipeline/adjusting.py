@@ -13,7 +13,7 @@ from pipeline.maths.drift import Eliminated
 from pipeline.maths.knots import Drift, PoseNoise, knots_of
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX, State
-from pipeline.maths.variance import Common, common
+from pipeline.maths.variance import Common, Scatter, common, scatter
 from pipeline.reading import Reading, read, refactored, scales_of
 from pipeline.scene import Scene, Weighting
 from pipeline.streams import Stream
@@ -47,6 +47,13 @@ class Adjusted:
     def redundancy(self) -> float:
         """Observations with their robust weights, less the unknowns; pose errors are no unknowns: they have a prior."""
         return sum(one.weights for one in self.reading.counts.values()) - len(self.solution.free)
+
+    @property
+    def between(self) -> Scatter:
+        """What the sums of squares hold beyond the scatter within epochs: how well epochs, passes and sensors agree."""
+        everywhere = [scatter(one, np.ones(len(one), dtype=bool)) for one in self.reading.sums.values()]
+        within = sum(one.squares for one in everywhere), sum(one.free for one in everywhere)
+        return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
 
 def noise_of(ins: config.Ins) -> PoseNoise:

@@ -1,28 +1,35 @@
 """The last reading: what the residuals of every point say, and some of the points to be looked at."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from pipeline import artefacts
 from pipeline.adjusting import Adjusted
 from pipeline.maths.consistency import Cell, Moments, cells_of, merged_moments, moments_of
 from pipeline.maths.knots import Drift
 from pipeline.maths.unknowns import State
 from pipeline.residuals import residuals_table, step_for
-from pipeline.scene import Scene, Weighting
-from pipeline.streams import Batch, Stream
+from pipeline.scene import Observations, Scene, Weighting
+from pipeline.streams import Batch, Stream, xyz
 from pipeline.times import NS
 
+Integers = NDArray[np.int64]
+ANGLE_DEG, DISTANCE_M, TIME_S = 5.0, 1.0, 10.0
+FEWEST, FEWEST_MOMENTS = 30, 5  # points and moments of a bin that is judged
 Cells = Mapping[tuple[str, int, int], Cell]  # by sensor, surface, pass
 
 
 @dataclass(frozen=True)
 class Look:
-    """Cells, and the table ``residuals``."""
+    """By sensor, surface and pass; by all the bins of the table ``patterns``; the table ``residuals``."""
 
     cells: Cells
+    patterns: pd.DataFrame
     residuals: pd.DataFrame
 
 
@@ -31,17 +38,45 @@ def look(
 ) -> Look:
     """``at_most`` points of a sensor in the table."""
     cells: dict[tuple[str, int, int], Cell] = {}
+    patterns: list[dict[str, Any]] = []
     taken: list[Batch] = []
+    families = [surface.family for surface in adjusted.state.surfaces]
     for sensor, stream in streams.items():
         step = step_for(adjusted.reading.observations(sensor), at_most)
         arguments = (scene, sensor, adjusted.state, adjusted.drift, adjusted.weighting, round(slot_s * NS), step)
-        moments = []
-        for found, points in stream.fold(_look, *arguments):
-            moments.append(found)
+        found: dict[str, list[Moments]] = {}
+        for moments, points in stream.fold(_look, *arguments):
             taken.append(points)
-        of_sensor = cells_of(merged_moments(moments), tolerance_m)
-        cells |= {(sensor, *key): cell for key, cell in of_sensor.items()}
-    return Look(cells, residuals_table(taken))
+            for name, one in moments.items():
+                found.setdefault(name, []).append(one)
+        for name, pieces in found.items():
+            binned = cells_of(merged_moments(pieces), tolerance_m)
+            if name == "pass":
+                cells |= {(sensor, *cell.key): cell for cell in binned}
+            else:
+                patterns += [_row(name, sensor, families, cell) for cell in binned if _judged(cell)]
+    columns = [column.name for column in artefacts.PATTERNS.columns]
+    return Look(cells, pd.DataFrame(patterns, columns=columns), residuals_table(taken))
+
+
+def _judged(cell: Cell) -> bool:
+    return cell.count >= FEWEST and cell.moments >= FEWEST_MOMENTS
+
+
+def _row(name: str, sensor: str, families: list[str], cell: Cell) -> dict[str, Any]:
+    first, second = cell.key
+    width = {"face": 1.0, "angle": ANGLE_DEG, "distance": DISTANCE_M, "time": TIME_S}[name]
+    return {
+        "by": name,
+        "sensor": sensor,
+        "family": families[first],
+        "low": second * width,
+        "width": width,
+        "count": cell.count,
+        "mean_m": cell.mean_m,
+        "sigma_mean_m": cell.sigma_mean_m,
+        "normalised": cell.normalised,
+    }
 
 
 def _look(
@@ -53,14 +88,28 @@ def _look(
     weighting: Weighting,
     slot_ns: int,
     step: int,
-) -> tuple[Moments, Batch]:
+) -> tuple[dict[str, Moments], Batch]:
     seen = scene.observe(sensor, batch, state, drift)
     robust, _ = weighting.weights(seen.group, seen.v_m, seen.sigma_m)
     plain = seen.sigma_m * np.sqrt(weighting.factor(seen.group))
-    key = np.column_stack([seen.surface, batch["pass"].astype(np.int64), batch["t_ns"] // slot_ns])
+    size = np.where(robust > 0, np.abs(seen.v_m) / plain, 0.0)
+    slot = batch["t_ns"] // slot_ns
     # a whole cell off must show, not be cut away: plain weights
-    moments = moments_of(key, 1 / plain**2, seen.v_m, np.where(robust > 0, np.abs(seen.v_m) / plain, 0.0))
+    moments = {
+        name: moments_of(first, second, slot, 1 / plain**2, seen.v_m, size)
+        for name, first, second in _bins(sensor, batch, seen)
+    }
     some = {name: values[::step] for name, values in batch.items()}
     return moments, scene.sample(sensor, some, state, drift, weighting)
 
 
+def _bins(sensor: str, batch: Batch, seen: Observations) -> Iterator[tuple[str, Integers, Integers]]:
+    """Name, and two numbers of each point's bin."""
+    own = xyz(batch, f"{sensor}_m").T
+    range_m = np.sqrt(np.einsum("in,in->n", own, own))
+    angle = np.arcsin(own[2] / range_m) if sensor == "laser" else np.arctan2(own[0], -own[2])
+    yield "pass", seen.surface, batch["pass"].astype(np.int64)
+    yield "face", seen.surface, batch["face"].astype(np.int64)
+    yield "angle", seen.surface, np.floor(np.degrees(angle) / ANGLE_DEG).astype(np.int64)
+    yield "distance", seen.surface, np.floor(range_m / DISTANCE_M).astype(np.int64)
+    yield "time", seen.surface, batch["t_ns"] // round(TIME_S * NS)

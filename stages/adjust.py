@@ -55,6 +55,7 @@ class Outputs:
     groups: Annotated[pd.DataFrame, artefacts.GROUPS]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
     summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
+    patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
     residuals: Annotated[pd.DataFrame, artefacts.RESIDUALS]
     residual_bins: Annotated[pd.DataFrame, artefacts.RESIDUAL_BINS]
     residual_map: Annotated[pd.DataFrame, artefacts.RESIDUAL_MAP]
@@ -73,6 +74,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         drift=_drift_table(found, inputs.poses),
         cells=_cells_table(found, seen.cells),
         surfaces=_surfaces_table(found, seen.cells),
+        patterns=seen.patterns,
         residuals=seen.residuals,
         residual_bins=bins_table(seen.residuals, inputs.faces),
         residual_map=map_table(seen.residuals, inputs.faces),
@@ -123,6 +125,8 @@ def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd
         "observations": sum(one.count for one in counts),
         "redundancy": found.redundancy,
         "sigma0": float(np.sqrt(found.equations.squares / max(found.redundancy, 1.0))),
+        "between": found.between.factor,
+        "between_dof": found.between.free,
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
         "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:SIX, :SIX]),

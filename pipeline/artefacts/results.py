@@ -73,6 +73,18 @@ CELLS = Artefact(
         Column("largest", F64, "1", "largest |residual| / sigma of those with a weight"),
     ),
 )
+PATTERNS = Artefact(
+    "adjust", "patterns", "table", "mean residuals of all points along one variable at a time, bins of enough points",
+    (
+        Column("by", TEXT, "", "face, angle (5 degrees), distance (1 m) or time (10 s)"),
+        Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H"),
+        Column("low", F64, "1, deg, m or s", "the face's number, or the lower edge of the bin (time: GPS seconds)"),
+        Column("width", F64, "1, deg, m or s", "of the bin"),
+        Column("count", I64, "1", "observations"), Column("mean_m", F64, "m", "weighted mean residual"),
+        Column("sigma_mean_m", F64, "m", "standard deviation of the mean from the scatter of its moments"),
+        Column("normalised", F64, "1", "mean / root(sigma_mean² + tolerance²)"),
+    ),
+)
 RESIDUALS = Artefact(
     "adjust", "residuals", "table", "residuals of all points, or of evenly taken ones in a long session",
     (
@@ -117,6 +129,8 @@ ADJUST_SUMMARY = Artefact(
         Column("converged", BOOL, "", "the step became negligible"), Column("iterations", I32, "1", "steps"),
         Column("observations", I64, "1", "observations"), Column("redundancy", F64, "1", "observations - unknowns"),
         Column("sigma0", F64, "1", "root of the variance factor over all groups, session sigmas"),
+        Column("between", F64, "1", "variance between epochs / expected from all noise: 1 if epochs and sensors agree"),
+        Column("between_dof", F64, "1", "its degrees of freedom"),
         Column("condition", F64, "1", "condition number of the scaled normal matrix"),
         Column("rank_deficiency", I32, "1", "unknown directions that the data leave open"),
         Column("weakest", TEXT, "", "the weakest direction in words"),

@@ -1,4 +1,4 @@
-"""What the residuals say together: their means by surface and pass, which must be zero but for noise.
+"""What the residuals say together: their means by any bin, which must be zero but for noise.
 
 Observations of one moment share the INS's white noise and the timing, so that a mean's sigma comes from the scatter of
 the moments, not of the points.
@@ -13,28 +13,35 @@ from scipy.special import chdtri
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-CellKey = tuple[int, int]  # surface, pass
 
 
 @dataclass(frozen=True)
 class Moments:
-    """One sensor's observations by surface, pass and slot of time: key (m, 3) ascending; sums (m, 4): Σ p, Σ p v, how
-    many, Σ v²; largest (m,): |v| / σ of those that the weights did not cut."""
+    """One sensor's observations by bin (two numbers) and slot of time: key (m, 3) ascending; sums (m, 4): Σ p, Σ p v,
+    how many, Σ v²; largest (m,): |v| / σ of those that the weights did not cut."""
 
     key: Integers
     sums: Array
     largest: Array
 
 
-def moments_of(key: Integers, weight: Array, v_m: Array, normalised: Array) -> Moments:
-    """Of one batch: key (n, 3), plain weight p = 1 / σ², v and |v| / σ, zero for what was cut; (n,) each."""
-    found, inverse = np.unique(key, axis=0, return_inverse=True)
-    place = inverse.ravel()
-    parts = (weight, weight * v_m, np.ones(len(v_m)), v_m**2)
-    sums = [np.bincount(place, weights=part, minlength=len(found)) for part in parts]
-    largest = np.zeros(len(found))
-    np.maximum.at(largest, place, normalised)
-    return Moments(found.reshape(-1, 3), np.column_stack(sums), largest)
+def moments_of(first: Integers, second: Integers, slot: Integers, weight: Array, v_m: Array, size: Array) -> Moments:
+    """Of one batch: bin and slot, plain weight p = 1 / σ², v, and |v| / σ, zero for what was cut; (n,) each."""
+    if not len(v_m):
+        return Moments(np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), np.empty(0))
+    columns = (first, second, slot)
+    lows = [int(column.min()) for column in columns]
+    spans = [int(column.max()) - low + 1 for column, low in zip(columns, lows, strict=True)]
+    code = np.ravel_multi_index([column - low for column, low in zip(columns, lows, strict=True)], spans)
+    length = int(np.prod(spans))
+    count = np.bincount(code, minlength=length)
+    found = np.flatnonzero(count)
+    parts = (np.bincount(code, weights=part, minlength=length)[found] for part in (weight, weight * v_m, v_m**2))
+    p, pv, squares = parts
+    largest = np.zeros(length)
+    np.maximum.at(largest, code, size)
+    key = np.column_stack(np.unravel_index(found, spans)) + lows
+    return Moments(key, np.column_stack([p, pv, count[found], squares]), largest[found])
 
 
 def merged_moments(pieces: Iterable[Moments]) -> Moments:
@@ -49,9 +56,11 @@ def merged_moments(pieces: Iterable[Moments]) -> Moments:
 
 @dataclass(frozen=True)
 class Cell:
-    """Mean residual of one sensor on one surface in one pass, how far it lies from zero, and the largest residual."""
+    """Mean residual of one sensor in one bin, how far it lies from zero, and the largest residual."""
 
+    key: tuple[int, int]
     count: int
+    moments: int
     mean_m: float
     rms_m: float
     sigma_mean_m: float
@@ -59,27 +68,32 @@ class Cell:
     largest: float
 
 
-def cells_of(moments: Moments, tolerance_m: float) -> dict[CellKey, Cell]:
+def cells_of(moments: Moments, tolerance_m: float) -> list[Cell]:
     """Weighted means Σ p v / Σ p; their sigma from the scatter of the moments, Σ (S_m - P_m mean)² / P².
 
     Normalised by root(sigma² + tolerance²): with a million points a systematic error far below what matters is
     significant; one below ``tolerance_m`` is not held against a session.
     """
-    found: dict[CellKey, Cell] = {}
-    for surface, number in np.unique(moments.key[:, :2], axis=0).tolist():
-        rows = (moments.key[:, 0] == surface) & (moments.key[:, 1] == number)
-        table = moments.sums[rows]
+    found = []
+    bins, starts = np.unique(moments.key[:, :2], axis=0, return_index=True)
+    ends = np.append(starts[1:], len(moments.key))
+    for (first, second), start, end in zip(bins.tolist(), starts, ends, strict=True):
+        table = moments.sums[start:end]
         p, pull, count, squares = table.sum(axis=0)
         mean = pull / p
         variance = float(np.sum((table[:, 1] - table[:, 0] * mean) ** 2)) / p**2
         normalised = mean / np.sqrt(variance + tolerance_m**2) if variance + tolerance_m > 0 else 0.0
-        found[(surface, number)] = Cell(
-            int(count),
-            float(mean),
-            float(np.sqrt(squares / count)),
-            float(np.sqrt(variance)),
-            float(normalised),
-            float(moments.largest[rows].max()),
+        found.append(
+            Cell(
+                (first, second),
+                int(count),
+                end - start,
+                float(mean),
+                float(np.sqrt(squares / count)),
+                float(np.sqrt(variance)),
+                float(normalised),
+                float(moments.largest[start:end].max()),
+            )
         )
     return found
 
