@@ -32,9 +32,18 @@ class ClosestSurface:
         triangles = answer["primitive_ids"].numpy().astype(np.int64)
         return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]
 
+    def ranges(self, origins_m: Array, directions: Array) -> Array:
+        """How far along unit rays (n, 3) the surface is, (n,) m; infinite where they miss it."""
+        rays = np.hstack([origins_m, directions]).astype(np.float32)
+        return np.asarray(self._cast(rays), dtype=np.float64)
+
     def hides(self, origins_m: Array, points_m: Array, spare_m: float) -> NDArray[np.bool_]:
         """Points (n,) that lie more than ``spare_m`` behind the surface, as seen from their origins (n, 3) m."""
         away = points_m - origins_m
         rays = np.hstack([origins_m, away]).astype(np.float32)
-        share = self._scene.cast_rays(self._tensor(rays), nthreads=THREADS)["t_hit"].numpy().astype(np.float64)
+        share = self._cast(rays).astype(np.float64)
         return np.asarray((1 - share) * np.linalg.norm(away, axis=1) > spare_m)
+
+    def _cast(self, rays: NDArray[np.float32]) -> NDArray[np.float32]:
+        found: NDArray[np.float32] = self._scene.cast_rays(self._tensor(rays), nthreads=THREADS)["t_hit"].numpy()
+        return found

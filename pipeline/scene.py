@@ -47,7 +47,7 @@ class Weighting:
 @dataclass(frozen=True)
 class Observations:
     """Of a batch (n,): the record of the INS before each, the share of the step to the next, surface, group of
-    observations, v (m), its sigma (m), features (F, n) and slopes (2, n) of :mod:`pipeline.maths.observations`."""
+    observations, v (m), its sigma (m), features (F, n) and slopes (F - 1, n) of :mod:`pipeline.maths.observations`."""
 
     record: Integers
     share: Array
@@ -64,11 +64,11 @@ class Observations:
         return np.asarray((self.record - first) * surfaces + self.surface)
 
     def adjusted(self, weight: Array, surfaces: int, white_m: float) -> Array:
-        """Features at the adjusted points: α and β free of the noise that is in v."""
+        """Features at the adjusted points: free of the noise that is in v."""
         common = white_m * np.sqrt((1 - self.share) ** 2 + self.share**2)
         own = sensor_part(self.v_m, weight, self.epochs(surfaces), common)
         features = self.features.copy()
-        features[1:MOVING] -= self.slopes * own
+        features[1:] -= self.slopes * own
         return features
 
 
@@ -92,8 +92,8 @@ class Scene:
         horizontal = np.array([one.family == "H" for one in state.surfaces])[surface]
         group = np.where(horizontal, 2, 1) if sensor == "mbes" else np.zeros(len(surface), dtype=np.int64)
         see = self._see_laser if sensor == "laser" else self._see_sonar
-        v, sigma, slopes = np.empty(len(surface)), np.empty(len(surface)), np.empty((MOVING - 1, len(surface)))
-        features = np.empty((FEATURES[sensor], len(surface)))
+        v, sigma, features = np.empty(len(surface)), np.empty(len(surface)), np.empty((FEATURES[sensor], len(surface)))
+        slopes = np.empty((FEATURES[sensor] - 1, len(surface)))
         pull, turns = self._pull(sensor, state, drift, record)
         for number in range(len(state.surfaces)):
             rows = np.flatnonzero(surface == number)

@@ -1,6 +1,6 @@
 """Accepted or rejected, and why: each reason names its evidence."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline import config
+from pipeline.causes import causes
+from pipeline.maths.consistency import consistency_limit
 from pipeline.mounts import PARAMETERS
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
@@ -26,7 +28,13 @@ ODD_FACTOR = 2.0  # a variance factor above this, or below its inverse, is worth
 ODD_COMMON = 4.0  # the same of what an epoch's points share: less is a good INS
 ODD_CUT = 0.01  # and so is a share of cut observations above this
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # and a target found so far off
-NEAR_M = 1.5  # passes whose distances differ by less tell yaw from lever arm y badly
+FEWEST = 30  # soundings on a family of faces
+PLACES = {
+    "face": "on face {low:.0f}",
+    "angle": "from {low:.0f}° to {high:.0f}°",
+    "distance": "from {low:.0f} to {high:.0f} m",
+    "time": "for ten seconds (GPS {low:.0f})",
+}
 
 
 @dataclass(frozen=True)
@@ -38,10 +46,17 @@ class Evidence:
     corrections: pd.DataFrame
     summary: pd.DataFrame
     cells: pd.DataFrame
+    geometry: pd.DataFrame
+    freed: pd.DataFrame
+    patterns: pd.DataFrame
 
 
 def reasons(
-    evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], limits: config.Verdict, chosen: config.Method
+    evidence: Evidence,
+    methods: Mapping[str, Mapping[str, Any]],
+    limits: config.Verdict,
+    test_level: float,
+    chosen: config.Method,
 ) -> list[str]:
     """Why the calibration is rejected; empty: accepted. Where labels are in doubt, nothing else is judged."""
     doubts = _ambiguities(evidence)
@@ -50,11 +65,14 @@ def reasons(
     found = []
     summary, cells = evidence.summary.iloc[0], evidence.cells
     if summary["reason"]:
-        return [f"the adjustment has no result: {summary['reason']}; sail more passes, at different distances"]
+        return [f"the adjustment has no result: {'; '.join([summary['reason'], *evidence.geometry['words']])}"]
     if not summary["converged"]:
         found.append(f"the adjustment did not converge in {summary['iterations']} steps")
+    found += _few(cells)
     if not summary["test_passed"]:
         found.append(_inconsistency(summary, cells))
+    found += _patterns(evidence.patterns, test_level)
+    found += _causes(evidence.freed)
     found += _wide_sigmas(methods["adjustment"]["sigma_mount_total"], limits)
     if chosen != "adjustment":
         found += _patent(chosen, evidence.corrections.set_index("method").loc[chosen], methods, limits)
@@ -115,12 +133,57 @@ def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
     )
 
 
+def _few(cells: pd.DataFrame) -> list[str]:
+    """Families with so few soundings that their labels cannot be trusted; with none at all they are not used."""
+    count = cells[cells["sensor"] == "mbes"].groupby("family")["count"].sum()
+    return [
+        f"only {number} soundings lie on {family}: too few to trust; sail so that the fan covers it"
+        for family, number in count.items()
+        if number < FEWEST
+    ]
+
+
+def tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
+    """By what the residuals were binned: statistic Σ normalised², its degrees of freedom and its limit."""
+    found = []
+    for by, rows in patterns.groupby("by", sort=True):
+        statistic, dof = float((rows["normalised"] ** 2).sum()), len(rows)
+        limit = consistency_limit(dof, level)
+        found.append({"by": str(by), "statistic": statistic, "dof": dof, "limit": limit, "passed": statistic <= limit})
+    return found
+
+
+def _patterns(patterns: pd.DataFrame, level: float) -> list[str]:
+    """The bin that lies off most, of each variable along which the residuals are not what noise leaves."""
+    found = []
+    for test in tests(patterns, level):
+        if not test["passed"]:
+            rows = patterns[patterns["by"] == test["by"]]
+            worst = rows.iloc[int(rows["normalised"].abs().argmax())]
+            sensor = {"laser": "the laser", "mbes": "the sonar"}[worst["sensor"]]
+            place = PLACES[test["by"]].format(low=worst["low"], high=worst["low"] + worst["width"])
+            found.append(
+                f"residuals go with {test['by']}: {place} {sensor} lies {1000 * worst['mean_m']:+.1f} mm off "
+                f"{worst['family']} (statistic {test['statistic']:.0f}, limit {test['limit']:.0f})"
+            )
+    return found
+
+
+def _causes(freed: pd.DataFrame) -> list[str]:
+    """The parameter that the residuals ask to be another, and how many more they would ask for instead."""
+    found = causes(freed)
+    if not found:
+        return []
+    others = f"; {len(found) - 1} other parameter(s) would explain it less well" if len(found) > 1 else ""
+    return [f"likely cause of residuals ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
+
+
 def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict) -> list[str]:
     if sigma is None:
         return ["the adjustment has no covariance"]
     bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
     return [
-        f"sigma of {SIX[place]} is {sigma[key]:.4g}{bounds[unit][1]}, above the limit of "
+        f"total sigma of {SIX[place]} is {sigma[key]:.4g}{bounds[unit][1]}, above the limit of "
         f"{bounds[unit][0]:g}{bounds[unit][1]}"
         for _, place, key, unit in PARAMETERS
         if sigma[key] > bounds[unit][0]
@@ -143,9 +206,13 @@ def _patent(chosen: str, row: Any, methods: Mapping[str, Mapping[str, Any]], lim
     ]
 
 
-def warnings(groups: pd.DataFrame, target: Mapping[str, Any]) -> list[str]:
+def warnings(
+    groups: pd.DataFrame, target: Mapping[str, Any], geometry: pd.DataFrame, sigma: Mapping[str, float] | None
+) -> list[str]:
     """What does not reject a session, and still wants to be looked at before anyone leaves."""
     found = []
+    for words in geometry.loc[geometry["kind"] == "gap", "words"]:
+        found.append(f"{words}{_so(sigma)}")
     for row in groups.to_dict("records"):
         factor, cut = row["variance_factor"], row["cut"] / max(row["count"], 1)
         if row["group"] in SHARED:
@@ -171,14 +238,11 @@ def warnings(groups: pd.DataFrame, target: Mapping[str, Any]) -> list[str]:
     return found
 
 
-def distance_advice(distances_m: Sequence[float]) -> str:
-    """What to sail when all passes lie at about one distance; empty otherwise."""
-    if not distances_m or np.ptp(distances_m) >= NEAR_M:
+def _so(sigma: Mapping[str, float] | None) -> str:
+    """What a gap in the geometry comes to."""
+    if sigma is None:
         return ""
-    low, high = min(distances_m), max(distances_m)
-    if len(distances_m) == 1:
-        return f"one pass alone has soundings, at {low:.1f} m: sail passes at different distances, such as 4 m and 8 m"
-    return (
-        f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart: sail passes "
-        "at different distances, such as 4 m and 8 m"
+    angle, arm = (
+        max((sigma[key], SIX[place]) for _, place, key, unit in PARAMETERS if unit == wanted) for wanted in ("deg", "m")
     )
+    return f"; total sigmas are up to {angle[0]:.3f}° ({angle[1]}) and {1000 * arm[0]:.1f} mm ({arm[1]})"

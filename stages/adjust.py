@@ -15,7 +15,10 @@ from pipeline.maths.consistency import consistency_limit
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.solution import Freed, freed, weakest_direction
 from pipeline.maths.unknowns import NAMES, SIX
-from pipeline.mounts import mount_of
+from pipeline.mounts import mount_of, target_of
+from pipeline.observability import Seen, geometry_of
+from pipeline.plan_settings import LaserFigures, MbesFigures, Pass, Plan
+from pipeline.planning import Setting
 from pipeline.residuals import bins_table, map_table
 from pipeline.scene import scene_of
 from pipeline.streams import Stream
@@ -27,6 +30,9 @@ SHOWN = 100_000  # points of a sensor in the table residuals, at most
 
 @dataclass(frozen=True)
 class Config:
+    target: config.Target
+    segment: config.Segment
+    verdict: config.Verdict
     adjust: config.Adjust
     ingest: config.Ingest
     as_built: config.AsBuilt
@@ -37,6 +43,8 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    files: Annotated[pd.DataFrame, artefacts.FILES]
+    passes: Annotated[pd.DataFrame, artefacts.PASSES]
     faces: Annotated[pd.DataFrame, artefacts.FACES]
     poses: Annotated[pd.DataFrame, artefacts.POSES]
     target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
@@ -49,6 +57,7 @@ class Inputs:
 class Outputs:
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
+    geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
     surfaces: Annotated[pd.DataFrame, artefacts.SURFACES]
     drift: Annotated[pd.DataFrame, artefacts.DRIFT]
     freed: Annotated[pd.DataFrame, artefacts.FREED]
@@ -71,6 +80,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
     return Outputs(
         **_tables(found, seen.cells, sigmas, config),
+        geometry=_geometry_table(found, seen.cells, inputs, config),
         drift=_drift_table(found, inputs.poses),
         cells=_cells_table(found, seen.cells),
         surfaces=_surfaces_table(found, seen.cells),
@@ -150,6 +160,33 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
             "covariance_total": total.ravel(),
         }
     )
+
+
+def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Config) -> pd.DataFrame:
+    """What the passes lack, and what would cure it."""
+    passes = inputs.passes.set_index("pass").loc[sorted({number for sensor, _, number in cells if sensor == "mbes"})]
+    rates = inputs.files.groupby("sensor")["rate_hz"].median()
+    plan = Plan(
+        ins_rate_hz=min(max(float(rates["ins"]), 10.0), 1000.0),
+        laser=LaserFigures(point_rate_hz=float(rates["laser"])),
+        mbes=MbesFigures(ping_rate_hz=float(rates["mbes"])),
+        passes=(Pass(distance_m=1.0),),
+    )
+    setting = Setting(
+        target_of(config.target), found.state, plan, config.segment, config.ins, config.laser, config.mbes
+    )
+    families = [surface.family for surface in found.state.surfaces]
+    soundings = dict.fromkeys(families, 0)
+    for (sensor, surface, _), cell in cells.items():
+        soundings[families[surface]] += cell.count if sensor == "mbes" else 0
+    distances = [float(one) for one in passes["distance_m"] if np.isfinite(one)]
+    speed = float(np.nanmedian(np.abs(passes["speed_m_s"]))) if len(passes) else 0.4
+    swing = float(np.nanmedian(passes["heading_swing_deg"])) * np.sqrt(2) if len(passes) else 0.0
+    seen = Seen(distances, soundings, max(speed, 0.05), min(swing, 45.0))
+    bounds = np.array([np.radians(config.verdict.max_sigma_deg)] * 3 + [config.verdict.max_sigma_m] * 3)
+    geometry = geometry_of(setting, seen, found.equations.normal, found.solution, bounds)
+    rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
+    return pd.DataFrame(rows, columns=["kind", "words"])
 
 
 def _freed_table(found: Adjusted, considered: Array) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
-from pipeline.verdict import Evidence, distance_advice, reasons, warnings
+from pipeline.verdict import Evidence, reasons, tests, warnings
 
 Array = NDArray[np.float64]
 SCHEMA = 1
@@ -26,6 +26,7 @@ SCHEMA = 1
 class Config:
     name: str
     mbes: config.Mbes
+    adjust: config.Adjust
     verdict: config.Verdict
     result: config.Method
 
@@ -41,6 +42,9 @@ class Inputs:
     corrections: Annotated[pd.DataFrame, artefacts.CORRECTIONS]
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
+    geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
+    freed: Annotated[pd.DataFrame, artefacts.FREED]
+    patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
     groups: Annotated[pd.DataFrame, artefacts.GROUPS]
     summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
@@ -69,19 +73,26 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.estimate, inputs.covariance, inputs.summary.to_dict("records")[0], coarse
     )
     passes = _passes(inputs.passes, inputs.cells)
-    found = reasons(
-        Evidence(inputs.target_pose, inputs.provisional_mount, inputs.corrections, inputs.summary, inputs.cells),
-        methods,
-        config.verdict,
-        config.result,
+    evidence = Evidence(
+        inputs.target_pose,
+        inputs.provisional_mount,
+        inputs.corrections,
+        inputs.summary,
+        inputs.cells,
+        inputs.geometry,
+        inputs.freed,
+        inputs.patterns,
     )
+    found = reasons(evidence, methods, config.verdict, config.adjust.test_level, config.result)
     summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0])
     result = {
         "schema": SCHEMA,
         "session": config.name,
         "verdict": "rejected" if found else "accepted",
         "reasons": found,
-        "warnings": warnings(inputs.groups, target),
+        "warnings": warnings(
+            inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
+        ),
         "result": config.result,
         "mbes": methods[config.result],
         "methods": methods,
@@ -89,8 +100,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "geometry": {
             "correlation": _matrix(inputs.covariance, "correlation"),
             "weakest": str(summary["weakest"]),
-            "advice": distance_advice([one["distance_m"] for one in passes if one["soundings"]]),
+            "advice": "; ".join(inputs.geometry["words"]),
             "test": {name: _plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
+            "patterns": tests(inputs.patterns, config.adjust.test_level),
         },
         "target": target,
         "passes": passes,

@@ -22,6 +22,10 @@ COVARIANCE = Artefact(
         Column("covariance_total", F64, "rad², rad m, m²", "with what is considered, not estimated"),
     ),
 )
+GEOMETRY = Artefact(
+    "adjust", "geometry", "table", "what the passes cannot tell, and what would cure it",
+    (Column("kind", TEXT, "", "gap or remedy"), Column("words", TEXT, "", "in words")),
+)
 DRIFT = Artefact(
     "adjust", "drift", "table", "slow errors of the recorded poses, at knots: to be added to the recorded ones",
     (

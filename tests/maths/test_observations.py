@@ -84,6 +84,21 @@ def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
     assert np.ptp(np.sign(q[5])) == 2  # both signs were tried
 
 
+def test_slopes_are_the_derivatives_along_the_least_squares_correction() -> None:
+    """The correction -Σ n e / (nᵀ Σ n) of the measured range and angle, applied to them; features taken again."""
+    points = beams(ANGLES, RANGES)
+    _, _, slopes = seen(points)
+    step = 1e-6
+    ahead = np.stack([NORMAL @ R_TARGET_FROM_MBES @ (beams(ANGLES, RANGES + step) - beams(ANGLES, RANGES - step))])
+    turned = NORMAL @ R_TARGET_FROM_MBES @ (beams(ANGLES + step, RANGES) - beams(ANGLES - step, RANGES))
+    by_range, by_angle = ahead[0] / (2 * step), turned / (2 * step)
+    variance = (SIGMAS.range_m * by_range) ** 2 + (SIGMAS.angle_rad * by_angle) ** 2
+    to_range, to_angle = SIGMAS.range_m**2 * by_range / variance, SIGMAS.angle_rad**2 * by_angle / variance
+    e = 1e-4
+    features = [seen(beams(ANGLES + h * e * to_angle, RANGES + h * e * to_range))[1] for h in (1, -1)]
+    np.testing.assert_allclose(slopes, (features[0] - features[1])[1:] / (2 * e), rtol=1e-5, atol=1e-7)
+
+
 @pytest.mark.parametrize("common_m", [0.0, 0.03])
 def test_at_the_adjusted_point_noise_does_not_turn_the_surface(common_m: float) -> None:
     """Rays from one place onto a slanted wall, noise along the ray, and noise common to an epoch: v, weighted as the

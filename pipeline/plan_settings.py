@@ -1,0 +1,65 @@
+"""PLAN.yaml: passes that are to be sailed, and of the instruments what a session's settings do not tell."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from pipeline.config import Angle, Length, Lever, Model, NotNegative, Positive
+
+Rate = Annotated[float, Field(gt=0, le=1e6)]
+
+
+class LaserFigures(Model):
+    """Lines athwart, by an angle from the scanner's z axis towards its x axis."""
+
+    point_rate_hz: Rate = 20_000.0
+    line_rate_hz: Rate = 50.0
+    field_deg: tuple[Angle, Angle] = (30.0, 130.0)
+    max_range_m: Length = 40.0
+
+
+class MbesFigures(Model):
+    ping_rate_hz: Rate = 20.0
+    beams: Annotated[int, Field(ge=2, le=2048)] = 256
+    sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
+    max_range_m: Length = 15.0
+
+
+class Unrest(Model):
+    """Amplitude and period of what the boat does about its track."""
+
+    roll_deg: NotNegative = 1.0
+    pitch_deg: NotNegative = 0.6
+    sway_m: NotNegative = 0.06
+    heave_m: NotNegative = 0.02
+    period_s: Positive = 4.5
+
+
+class Pass(Model):
+    """One pass along the wall."""
+
+    distance_m: Annotated[float, Field(gt=0, le=100)]  # of the INS from the wall
+    speed_m_s: Annotated[float, Field(gt=0, le=10)] = 0.4
+    heading_swing_deg: Annotated[float, Field(ge=0, le=45)] = 1.5  # amplitude
+    half_length_m: Annotated[float, Field(gt=0, le=100)] | None = None  # null: to 2 m beyond the blocks
+
+    def seconds(self, half_length_m: float) -> float:
+        return 2 * (self.half_length_m or half_length_m) / self.speed_m_s
+
+
+class Budget(Model):
+    """Time for all passes; between two passes the boat has to turn."""
+
+    seconds: Positive
+    turn_s: NotNegative = 60.0
+
+
+class Plan(Model):
+    ins_height_m: Lever = 1.3  # of the INS above the water
+    ins_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
+    laser: LaserFigures = LaserFigures()
+    mbes: MbesFigures = MbesFigures()
+    unrest: Unrest = Unrest()
+    passes: Annotated[tuple[Pass, ...], Field(min_length=1, max_length=100)]
+    candidates: Annotated[tuple[Pass, ...], Field(max_length=30)] = ()  # to choose from within the budget
+    budget: Budget | None = None

@@ -1,0 +1,193 @@
+"""What passes will tell, before they are sailed: the same sums and equations as of a session, of points without noise.
+
+The normal equations of passes add up (their errors of the INS are taken as independent of each other), so that passes
+can be tried together without computing them anew. Rays are thinned and weighted with how many they stand for; the INS
+is not, for its white noise is a record's own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.adjusting import noise_of
+from pipeline.clouds import ClosestSurface
+from pipeline.maths.adjustment import Body, normal_equations
+from pipeline.maths.epochs import EpochSums, epoch_sums
+from pipeline.maths.knots import Drift, knots_of
+from pipeline.maths.labelling import Beams, label_points
+from pipeline.maths.rotations import rotation_from_attitude
+from pipeline.maths.soundings import beam_half_widths
+from pipeline.maths.targets import TargetModel
+from pipeline.maths.trajectory import Trajectory
+from pipeline.maths.unknowns import SIX, State, Surface
+from pipeline.mounts import mount_of
+from pipeline.plan_settings import Pass, Plan
+from pipeline.scene import Scene
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+NS = 1_000_000_000
+RAYS = 24  # of the laser between two records of the INS: stand for all
+BEYOND_M = 2.0  # a pass runs on beyond the last block
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Target and instruments: the same for all passes."""
+
+    model: TargetModel
+    state: State
+    plan: Plan
+    segment: config.Segment
+    ins: config.Ins
+    laser: config.Laser
+    mbes: config.Mbes
+
+    @property
+    def half_length_m(self) -> float:
+        low, high = self.model.bounds()
+        return float(max(-low[1], high[1])) + BEYOND_M
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """One pass: normal equations of all unknowns (u, u), and how many points by sensor on each face (f,)."""
+
+    normal: Array
+    points: dict[str, Array]
+    seconds: float
+
+
+def state_by_design(model: TargetModel, mbes: config.Mbes) -> State:
+    """The mount as configured; surfaces where the design has them, their centres among the faces' corners."""
+    surfaces = []
+    for family in dict.fromkeys(face.family for face in model.faces):
+        faces = [model.faces[number] for number in model.family_faces(family)]
+        centre = np.concatenate([face.vertices_m for face in faces]).mean(axis=0)
+        if family == "H":
+            surfaces.append(Surface.at(family, np.array([0.0, 0.0, 1.0]), centre * [1.0, 1.0, 0.0]))
+        else:
+            normal = faces[0].normal
+            surfaces.append(Surface.at(family, normal, centre - (centre @ normal - faces[0].distance_m) * normal))
+    mount = mount_of(mbes.mount)
+    return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces)
+
+
+def predict(setting: Setting, one: Pass, number: int) -> Predicted:
+    """What a pass will tell; ``number`` sets the phases of the boat's unrest, so that no two passes are alike."""
+    seconds = one.seconds(setting.half_length_m)
+    trajectory = _trajectory(setting, one, seconds, number)
+    laser_mount = mount_of(setting.laser.mount)
+    families = {surface.family: k for k, surface in enumerate(setting.state.surfaces)}
+    faces = setting.model.faces
+    scene = Scene(
+        Body.of(trajectory, laser_mount.lever_arm_body_m),
+        np.array([families[face.family] for face in faces]),
+        np.array([face.distance_m * face.normal[2] if face.family == "H" else 0.0 for face in faces]),
+        setting.state,
+        setting.ins.white.position_m,
+        setting.laser,
+        setting.mbes,
+    )
+    caster = ClosestSurface(setting.model)
+    points = {"laser": _laser_rays(setting, seconds), "mbes": _beams(setting, seconds)}
+    sums: dict[str, EpochSums] = {}
+    counts: dict[str, Array] = {}
+    for sensor, (t_ns, rays, each) in points.items():
+        batch = _labelled(setting, caster, trajectory, sensor, t_ns, rays)
+        seen = scene.observe(sensor, batch, setting.state)
+        weight, v = each / seen.sigma_m**2, np.zeros(len(seen.v_m))
+        shape = (len(setting.state.surfaces), seen.features, weight, v)
+        sums[sensor] = epoch_sums(seen.record, seen.share, seen.surface, *shape)
+        on_face = np.bincount(batch["face"].astype(np.int64), minlength=len(faces))
+        counts[sensor] = each * on_face.astype(np.float64)
+    record = np.unique(np.concatenate([found.record for found in sums.values()]))
+    size = setting.state.size
+    if not len(record):
+        return Predicted(np.zeros((size, size)), counts, seconds)
+    noise = noise_of(setting.ins)
+    knots = knots_of(record, scene.body.seconds, noise.spacing_s, seconds)
+    drift = Drift(knots, np.zeros((len(knots.record), SIX)))
+    return Predicted(normal_equations(sums, setting.state, scene.body, noise, drift).normal, counts, seconds)
+
+
+def _trajectory(setting: Setting, one: Pass, seconds: float, number: int) -> Trajectory:
+    """Along +y past the target, x = -distance, with waves of golden-ratio phases on every coordinate."""
+    plan, unrest = setting.plan, setting.plan.unrest
+    t = np.arange(0.0, seconds + 1 / plan.ins_rate_hz, 1 / plan.ins_rate_hz)
+    half = one.half_length_m or setting.half_length_m
+
+    def wave(amplitude: float, period_s: float, which: int) -> Array:
+        phase = 2 * np.pi * ((number * 5 + which) * 0.618034 % 1.0)
+        return np.asarray(amplitude * np.sin(2 * np.pi * t / period_s + phase))
+
+    period = unrest.period_s
+    x = wave(unrest.sway_m, 2 * period, 0) - one.distance_m
+    y = one.speed_m_s * t - half
+    z = wave(unrest.heave_m, 0.9 * period, 1) + setting.model.water_level_m + plan.ins_height_m
+    roll = wave(np.radians(unrest.roll_deg), period, 2)
+    pitch = wave(np.radians(unrest.pitch_deg), 0.85 * period, 3)
+    heading = wave(np.radians(one.heading_swing_deg), 2.7 * period, 4)
+    attitude = rotation_from_attitude(roll, pitch, heading)
+    return Trajectory.build(np.round(t * NS).astype(np.int64), np.column_stack([x, y, z]), attitude)
+
+
+def _laser_rays(setting: Setting, seconds: float) -> tuple[Integers, Array, float]:
+    """Times (n,), unit rays (n, 3) in the scanner's frame, and how many points each stands for."""
+    figures = setting.plan.laser
+    each = max(1, int(figures.point_rate_hz / (setting.plan.ins_rate_hz * RAYS)))
+    number = np.arange(0, int(seconds * figures.point_rate_hz), each)
+    low, high = np.radians(figures.field_deg)
+    angle = low + (high - low) * (number * figures.line_rate_hz / figures.point_rate_hz % 1.0)
+    rays = np.column_stack([np.sin(angle), np.zeros(len(angle)), np.cos(angle)])
+    return np.round(number / figures.point_rate_hz * NS).astype(np.int64), rays, float(each)
+
+
+def _beams(setting: Setting, seconds: float) -> tuple[Integers, Array, float]:
+    """The same of the sonar: every beam of every ping."""
+    figures = setting.plan.mbes
+    half = np.radians(figures.sector_deg) / 2
+    angle = np.linspace(-half, half, figures.beams)
+    pings = np.arange(0.5 / figures.ping_rate_hz, seconds, 1 / figures.ping_rate_hz)
+    fan = np.column_stack([np.sin(angle), np.zeros(len(angle)), -np.cos(angle)])
+    return np.repeat(np.round(pings * NS).astype(np.int64), len(fan)), np.tile(fan, (len(pings), 1)), 1.0
+
+
+def _labelled(
+    setting: Setting, caster: ClosestSurface, trajectory: Trajectory, sensor: str, t_ns: Integers, rays: Array
+) -> dict[str, Array]:
+    """Where rays meet the target, with the labels that stage segment would give; columns as of a labelled stream."""
+    mount = mount_of(setting.laser.mount) if sensor == "laser" else None
+    R = setting.state.R_body_from_mbes if mount is None else mount.R_body_from_sensor
+    lever = setting.state.lever_arm_m if mount is None else mount.lever_arm_body_m
+    figures = setting.plan.laser if sensor == "laser" else setting.plan.mbes
+    origins = trajectory.place(t_ns, np.broadcast_to(lever, rays.shape))
+    directions = trajectory.place(t_ns, rays @ R.T + lever) - origins
+    range_m = caster.ranges(origins, directions)
+    met = np.flatnonzero(range_m < figures.max_range_m)
+    own, range_m, directions = rays[met] * range_m[met, None], range_m[met], directions[met]
+    points = origins[met] + directions * range_m[:, None]
+    segment, level = setting.segment, setting.model.water_level_m
+    if sensor == "mbes":
+        across, along = np.radians(setting.mbes.beam_deg)
+        widths = beam_half_widths(own, across, along)
+        turned = tuple(trajectory.place(t_ns[met], width @ R.T + lever) - origins[met] for width in widths)
+        beams, right_side = Beams(directions, turned), points[:, 2] < level - segment.water_margin_m
+    else:
+        beams, right_side = Beams(directions), points[:, 2] > level + segment.water_margin_m
+    grazing = float(np.radians(segment.min_grazing_deg))
+    labels = label_points(setting.model, points, beams, segment.gate_m, segment.margin_m, grazing)
+    on = np.flatnonzero((labels.face >= 0) & right_side)
+    columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}
+    columns |= {f"{axis}_target_m": points[on, k] for k, axis in enumerate("xyz")}
+    return columns | {"t_ns": t_ns[met][on], "face": labels.face[on]}
+
+
+def together(predicted: Sequence[Predicted]) -> Array:
+    """Normal equations of several passes."""
+    return np.asarray(np.sum([one.normal for one in predicted], axis=0))
+
+
