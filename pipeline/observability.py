@@ -14,6 +14,7 @@ from pipeline.planning import Setting, predict
 Array = NDArray[np.float64]
 STRONG = 0.95  # a correlation above this leaves two unknowns hardly apart
 NEAR_M = 1.5  # passes whose distances differ by less are at one distance
+WANTED_DEG, WANTED_M = 0.025, 0.0025  # larger random sigmas are worth another pass
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
 TWICE = 2  # passes there
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
@@ -37,8 +38,9 @@ class Geometry:
     remedy: str
 
 
-def geometry_of(setting: Setting, seen: Seen, normal: Array, solution: Solution, bounds: Array) -> Geometry:
-    """``normal`` (u, u): the session's; ``bounds`` (6,): largest sigma wanted of each of the six (rad, m)."""
+def geometry_of(setting: Setting, seen: Seen, normal: Array, solution: Solution) -> Geometry:
+    """``normal`` (u, u): the session's."""
+    bounds = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
     gaps = _gaps(seen)
     covariance = solution.covariance[:SIX, :SIX]
     sigma = np.sqrt(np.diag(covariance))

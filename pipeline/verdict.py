@@ -143,7 +143,7 @@ def _few(cells: pd.DataFrame) -> list[str]:
     ]
 
 
-def tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
+def pattern_tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
     """By what the residuals were binned: statistic Σ normalised², its degrees of freedom and its limit."""
     found = []
     for by, rows in patterns.groupby("by", sort=True):
@@ -156,7 +156,7 @@ def tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
 def _patterns(patterns: pd.DataFrame, level: float) -> list[str]:
     """The bin that lies off most, of each variable along which the residuals are not what noise leaves."""
     found = []
-    for test in tests(patterns, level):
+    for test in pattern_tests(patterns, level):
         if not test["passed"]:
             rows = patterns[patterns["by"] == test["by"]]
             worst = rows.iloc[int(rows["normalised"].abs().argmax())]

@@ -32,7 +32,6 @@ SHOWN = 100_000  # points of a sensor in the table residuals, at most
 class Config:
     target: config.Target
     segment: config.Segment
-    verdict: config.Verdict
     adjust: config.Adjust
     ingest: config.Ingest
     as_built: config.AsBuilt
@@ -183,8 +182,7 @@ def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Confi
     speed = float(np.nanmedian(np.abs(passes["speed_m_s"]))) if len(passes) else 0.4
     swing = float(np.nanmedian(passes["heading_swing_deg"])) * np.sqrt(2) if len(passes) else 0.0
     seen = Seen(distances, soundings, max(speed, 0.05), min(swing, 45.0))
-    bounds = np.array([np.radians(config.verdict.max_sigma_deg)] * 3 + [config.verdict.max_sigma_m] * 3)
-    geometry = geometry_of(setting, seen, found.equations.normal, found.solution, bounds)
+    geometry = geometry_of(setting, seen, found.equations.normal, found.solution)
     rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
     return pd.DataFrame(rows, columns=["kind", "words"])
 

@@ -16,7 +16,7 @@ from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
-from pipeline.verdict import Evidence, reasons, tests, warnings
+from pipeline.verdict import Evidence, pattern_tests, reasons, warnings
 
 Array = NDArray[np.float64]
 SCHEMA = 1
@@ -102,7 +102,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             "weakest": str(summary["weakest"]),
             "advice": "; ".join(inputs.geometry["words"]),
             "test": {name: _plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
-            "patterns": tests(inputs.patterns, config.adjust.test_level),
+            "patterns": pattern_tests(inputs.patterns, config.adjust.test_level),
         },
         "target": target,
         "passes": passes,

@@ -1,12 +1,15 @@
 """Each reason to reject, and nothing else."""
 
+from dataclasses import replace
+
 import pandas as pd
 import pytest
 
 from pipeline.config import Verdict
-from pipeline.verdict import Evidence, distance_advice, reasons, warnings
+from pipeline.verdict import Evidence, pattern_tests, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
+LEVEL = 0.001
 ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
 
 
@@ -15,7 +18,7 @@ def methods(**patent):
     return {"adjustment": adjustment, "patent_alternating": {"sigma_mount": None, "correction": ZERO | patent}}
 
 
-def evidence(pose=None, mount=None, summary=None, alternating=None):
+def evidence(pose=None, mount=None, summary=None, alternating=None, held=None, bin_=None, count=500):
     pose_row = {
         "ambiguous": False,
         "rival": "one block higher",
@@ -40,20 +43,30 @@ def evidence(pose=None, mount=None, summary=None, alternating=None):
             "pass": [0, 3, 4],
             "mean_m": [0.001, -0.012, 0.001],
             "normalised": [0.3, -4.0, 0.2],
+            "count": [5000, 400, count],
         }
     )
+    nothing = {"unknown": "sound_speed", "considered": 1e-4, "value": 2e-4, "sigma": 1e-4}
+    bins = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 5.0, "mean_m": 0.001}
     return Evidence(
         pd.DataFrame([pose_row | (pose or {})]),
         pd.DataFrame([mount_row | (mount or {})]),
         pd.DataFrame([row | (alternating or {})]),
         pd.DataFrame([summary_row | (summary or {})]),
         cells,
+        pd.DataFrame([("remedy", "two more passes at 3 m would do")], columns=["kind", "words"]),
+        pd.DataFrame([nothing | (held or {})]),
+        pd.DataFrame([bins | {"normalised": 0.3} | (bin_ or {})]),
     )
 
 
+def judged(found):
+    return reasons(found, methods(), Verdict(), LEVEL, "adjustment")
+
+
 def test_a_good_session_has_no_reason():
-    assert reasons(evidence(), methods(), Verdict(), "adjustment") == []
-    assert reasons(evidence(), methods(), Verdict(), "patent_alternating") == []
+    assert judged(evidence()) == []
+    assert reasons(evidence(), methods(), Verdict(), LEVEL, "patent_alternating") == []
 
 
 @pytest.mark.parametrize(
@@ -70,26 +83,36 @@ def test_a_good_session_has_no_reason():
         ({"mount": {"ambiguous": True}}, "the soundings fit two ways"),
         ({"mount": {"within": False}}, "the coarse mbes.mount is farther"),
         ({"pose": {"within": False}}, "target.origin or target.azimuth_deg is farther off"),
-        ({"summary": {"reason": "the data leave 2 directions open"}}, "no result: the data leave 2 directions open"),
+        (
+            {"summary": {"reason": "the data leave 2 directions open"}},
+            "no result: the data leave 2 directions open; two more passes at 3 m would do",
+        ),
+        ({"count": -371}, "only 29 soundings lie on P2"),
+        ({"bin_": {"normalised": 3.5}}, "residuals go with angle: from 20° to 25° the sonar lies +1.0 mm off P2"),
+        ({"bin_": {"by": "distance", "normalised": -3.5}}, "from 20 to 25 m the sonar lies"),
+        ({"held": {"value": 6e-4}}, "the sound speed: it is +0.06 ± 0.01 % above the recorded one"),
+        ({"held": {"unknown": "mbes_latency", "value": 0.02}}, "the sonar's clock: its latency is +20.0 ± 0.1 ms more"),
+        ({"held": {"unknown": "laser_rotation_y", "value": -0.01}}, "laser.mount: turned by -0.573 ± 0.006° about"),
+        ({"held": {"unknown": "wet_H_shift", "value": 0.02}}, "that are horizontal stand off by +20.0 ± 0.1 mm"),
         ({"summary": {"converged": False}}, "did not converge in 6 steps"),
         ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),
     ],
 )
 def test_each_evidence_is_one_reason(change, words):
-    found = reasons(evidence(**change), methods(), Verdict(), "adjustment")
+    found = reasons(evidence(**change), methods(), Verdict(), LEVEL, "adjustment")
     assert len(found) == 1
     assert words in found[0]
 
 
 def test_where_labels_are_in_doubt_nothing_else_is_judged():
     doubtful = evidence(pose={"ambiguous": True}, summary={"converged": False, "test_passed": False})
-    assert len(reasons(doubtful, methods(), Verdict(max_sigma_deg=1e-6), "adjustment")) == 1
+    assert len(reasons(doubtful, methods(), Verdict(max_sigma_deg=1e-6), LEVEL, "adjustment")) == 1
 
 
 def test_sigmas_are_held_to_both_limits():
-    assert reasons(evidence(), methods(), Verdict(max_sigma_deg=0.006, max_sigma_m=6e-4), "adjustment") == []
-    found = reasons(evidence(), methods(), Verdict(max_sigma_deg=0.0059, max_sigma_m=5.9e-4), "adjustment")
-    assert [reason.split(" is ")[0] for reason in found] == ["sigma of yaw", "sigma of lever arm y"]
+    assert reasons(evidence(), methods(), Verdict(max_sigma_deg=0.006, max_sigma_m=6e-4), LEVEL, "adjustment") == []
+    found = reasons(evidence(), methods(), Verdict(max_sigma_deg=0.0059, max_sigma_m=5.9e-4), LEVEL, "adjustment")
+    assert [reason.split(" is ")[0] for reason in found] == ["total sigma of yaw", "total sigma of lever arm y"]
 
 
 @pytest.mark.parametrize(
@@ -103,26 +126,20 @@ def test_sigmas_are_held_to_both_limits():
 )
 def test_a_patent_form_as_the_result_is_held_to_the_adjustment(alternating, patent, words):
     one = evidence(alternating=alternating)
-    assert reasons(one, methods(**patent), Verdict(), "adjustment") == []
-    found = reasons(one, methods(**patent), Verdict(), "patent_alternating")
+    assert reasons(one, methods(**patent), Verdict(), LEVEL, "adjustment") == []
+    found = reasons(one, methods(**patent), Verdict(), LEVEL, "patent_alternating")
     assert len(found) == 1
     assert words in found[0]
-
-
-def test_advice_on_distances():
-    assert "all passes lie at 5.9 to 6.1 m" in distance_advice([5.9, 6.1, 6.0])
-    assert distance_advice([4.0, 8.0]) == ""
-    assert distance_advice([]) == ""
 
 
 def test_both_sensors_off_together_is_the_ins():
     found = evidence(summary={"test_passed": False})
     for laser, expected in ((-0.011, "and the laser -11.0 mm off P2"), (0.011, "sonar lies -12.0 mm off P2")):
         cells = found.cells.copy()
-        cells.loc[len(cells)] = ["laser", "P2", 3, laser, -2.0]
+        cells.loc[len(cells)] = ["laser", "P2", 3, laser, -2.0, 900]
         (reason,) = reasons(
-            Evidence(found.target_pose, found.provisional_mount, found.corrections, found.summary, cells),
-            methods(), Verdict(), "adjustment",
+            replace(found, cells=cells),
+            methods(), Verdict(), LEVEL, "adjustment",
         )  # fmt: skip
         assert expected in reason
         assert ("drift of the INS" in reason) == (laser < 0)
@@ -154,6 +171,36 @@ FOUND = {"offset_m": [0.0, 0.05, -0.09], "tilt_deg": [0.05, -0.05]}
     ],
 )
 def test_what_wants_to_be_looked_at(change, pose, words):
-    found = warnings(groups(**change), FOUND | pose)
+    none = pd.DataFrame([], columns=["kind", "words"])
+    found = warnings(groups(**change), FOUND | pose, none, SIGMA)
     assert len(found) == (0 if words is None else 1)
     assert words is None or words in found[0]
+
+
+def test_a_gap_in_the_geometry_is_said_with_what_it_comes_to():
+    gaps = pd.DataFrame([("gap", "one pass alone"), ("remedy", "two more")], columns=["kind", "words"])
+    (words,) = warnings(groups(), FOUND, gaps, SIGMA)
+    assert words == "one pass alone; total sigmas are up to 0.006° (yaw) and 0.6 mm (lever arm y)"
+    assert warnings(groups(), FOUND, gaps, None) == ["one pass alone"]
+
+
+def test_both_sides_of_four_sigmas():
+    """Noise and what is considered count together."""
+    near, far = ({"value": value, "sigma": 3e-4, "considered": 4e-4} for value in (1.99e-3, 2.01e-3))
+    assert judged(evidence(held=near)) == []
+    assert len(judged(evidence(held=far))) == 1
+
+
+def test_of_several_causes_the_most_telling_is_named():
+    sigmas = (("mbes_range", 1e-3), ("laser_range", 1e-4))
+    one, other = ({"unknown": name, "considered": 0.0, "sigma": sigma} for name, sigma in sigmas)
+    both = replace(evidence(), freed=pd.DataFrame([one | {"value": 0.01}, other | {"value": 0.002}]))
+    (reason,) = judged(both)
+    assert "20 sigma): a bias of +2.0 ± 0.1 mm in the laser's ranges; 1 other" in reason
+
+
+def test_each_variable_has_its_own_test():
+    rows = [{"by": by, "normalised": n} for by, n in (("angle", 3.0), ("angle", 0.0), ("face", 3.5))]
+    angle, face = pattern_tests(pd.DataFrame(rows), LEVEL)
+    assert (angle["by"], angle["statistic"], angle["dof"], angle["passed"]) == ("angle", 9.0, 2, True)
+    assert (face["passed"], face["limit"]) == (False, pytest.approx(10.83, abs=0.01))

@@ -41,7 +41,8 @@ class Solution:
         for numbers, covariance in blocks:
             place = np.searchsorted(self.held, numbers)
             Q[np.ix_(place, place)] = covariance
-        return np.asarray(self.covariance + self.sensitivity @ Q @ self.sensitivity.T)
+        found = self.covariance + self.sensitivity @ Q @ self.sensitivity.T
+        return np.asarray((found + found.T) / 2)
 
 
 def solve(normal: Array, right: Array, free: Sequence[int]) -> Solution:
@@ -58,7 +59,9 @@ def solve(normal: Array, right: Array, free: Sequence[int]) -> Solution:
     largest = max(float(values[-1]), 1e-300)
     open_ = values <= RANK_TOLERANCE * largest
     inverted = np.where(open_, 0.0, 1 / np.where(open_, 1.0, values))
-    covariance = (vectors * inverted) @ vectors.T * np.outer(scale, scale)
+    half = vectors * np.sqrt(inverted) * scale[:, None]
+    covariance = half @ half.T
+    covariance = (covariance + covariance.T) / 2  # to the last bit
     step = np.zeros(len(right))
     step[chosen] = -covariance @ b
     condition = float(largest / values[0]) if values[0] > 0 else np.inf

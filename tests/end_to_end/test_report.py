@@ -29,12 +29,12 @@ def test_verdict_first_then_the_runs_numbers(undisturbed: tuple[Path, Told]) -> 
     table = pd.read_parquet(run / "report" / "calibration.parquet").query("method == 'adjustment'")
     assert [row[0] for row in rows] == table["parameter"].tolist()
     for row, values in zip(rows, table.to_dict("records"), strict=True):
-        _, coarse, total, change, sigma, limit, interval = row
+        _, coarse, total, change, random, sigma, limit, interval = row
         low, high = interval.split(" … ")
-        keys = ("coarse", "total", "change", "sigma_total", "low_95", "high_95")
+        keys = ("coarse", "total", "change", "sigma_random", "sigma_total", "low_95", "high_95")
         assert limit == {"deg": "0.0500 °", "m": "0.0050 m"}[values["unit"]]
         assert f"{values['correction']:+.4f}" in page.text
-        for shown, key in zip((coarse, total, change, sigma, low, high), keys, strict=True):
+        for shown, key in zip((coarse, total, change, random, sigma, low, high), keys, strict=True):
             number, unit = shown.split()
             assert float(number) == pytest.approx(values[key], abs=5.1e-5), key
             assert unit == {"deg": "°", "m": "m"}[values["unit"]]
