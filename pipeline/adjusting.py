@@ -94,7 +94,7 @@ def adjust(
         settled = weighting.robust is not None and _small(solution, SETTLED_SIGMAS)
         if settled and iteration > 2:
             break
-        scales = scales_of(reading) if iteration > 1 else {n: f**0.5 for n, f in weighting.factors.items()}
+        scales = scales_of(reading) if iteration > 1 else weighting.scales
         weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
     else:
         settled = False

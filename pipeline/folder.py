@@ -186,3 +186,17 @@ def calibration(run: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("verdict") not in ("accepted", "rejected"):
         raise ArtefactError(f"{path}: holds no verdict; run poolcal run again")
     return content
+
+
+def refuse_output(option: str, file: Path | None, *runs: Path) -> None:
+    """A picture goes to a file of its kind, never over a run's results or anything else."""
+    if file is None:
+        return
+    suffix = option.replace("--", ".")
+    if file.suffix != suffix:
+        raise ConfigError(f"{option} {file}: name a file that ends in {suffix}")
+    if file.exists() and not file.is_file():
+        raise ConfigError(f"{option} {file}: is no file; name another")
+    for run_folder in runs:
+        if file.resolve().is_relative_to(run_folder.resolve()):
+            raise ConfigError(f"{option} {file}: lies in the run folder {run_folder}; name a file elsewhere")

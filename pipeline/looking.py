@@ -90,9 +90,9 @@ def _look(
     step: int,
 ) -> tuple[dict[str, Moments], Batch]:
     seen = scene.observe(sensor, batch, state, drift)
-    robust, _ = weighting.weights(seen.group, seen.v_m, seen.sigma_m)
+    robust, _ = weighting.weights(seen)
     plain = seen.sigma_m * np.sqrt(weighting.factor(seen.group))
-    size = np.where(robust > 0, np.abs(seen.v_m) / plain, 0.0)
+    size = np.where(robust > 0, np.abs(weighting.normalised(seen)), 0.0)
     slot = batch["t_ns"] // slot_ns
     # a whole cell off must show, not be cut away: plain weights
     moments = {

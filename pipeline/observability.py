@@ -104,9 +104,9 @@ def _remedy(
     """The distance at which two more passes would help most, and by how much; empty if none halves the sigma."""
     before = np.sqrt(solution.covariance[target, target]) if not solution.deficiency else np.inf
     best: tuple[float, float, float] | None = None
-    for number, distance in enumerate(TRIED_M):
+    for distance in TRIED_M:
         one = Pass(distance_m=distance, speed_m_s=seen.speed_m_s, heading_swing_deg=seen.heading_swing_deg)
-        further = predict(setting, one, number).normal
+        further = predict(setting, [one], phases=1).normal
         after = solve(normal + TWICE * further, np.zeros(len(normal)), solution.free.tolist())
         if after.deficiency:
             continue

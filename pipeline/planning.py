@@ -1,12 +1,12 @@
 """What passes will tell, before they are sailed: the same sums and equations as of a session, of points without noise.
 
-The normal equations of passes add up (their errors of the INS are taken as independent of each other), so that passes
-can be tried together without computing them anew. Rays are thinned and weighted with how many they stand for; the INS
+Passes of which it is to be seen whether they would help need not be computed together: their normal equations add up,
+but for the drift that goes on from one to the next. Rays are thinned and weighted with how many they stand for; the INS
 is not, for its white noise is a record's own.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from pipeline import config
 from pipeline.adjusting import noise_of
 from pipeline.clouds import ClosestSurface
 from pipeline.maths.adjustment import Body, normal_equations
-from pipeline.maths.epochs import EpochSums, epoch_sums
+from pipeline.maths.epochs import EpochSums, epoch_sums, merged
 from pipeline.maths.knots import Drift, knots_of
 from pipeline.maths.labelling import Beams, label_points
 from pipeline.maths.rotations import rotation_from_attitude
@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 NS = 1_000_000_000
 RAYS = 24  # of the laser between two records of the INS: stand for all
+PHASES, APART = 4, 1000  # of the boat's unrest, over which a prediction is averaged; numbers of passes in between
+PAUSE_S = 5.0  # without points, from which on nothing is interpolated
 BEYOND_M = 2.0  # a pass runs on beyond the last block
 
 
@@ -53,12 +55,22 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Predicted:
-    """One pass: normal equations of all unknowns (u, u), and how many points by sensor on each face (f,)."""
+class Sighted:
+    """What both sensors will see in one pass: sums by epoch, the body's track, points by sensor on each face (f,)."""
 
-    normal: Array
+    sums: dict[str, EpochSums]
+    trajectory: Trajectory
     points: dict[str, Array]
     seconds: float
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Of some passes: normal equations of all unknowns (u, u); of each pass points by sensor on each face, and time."""
+
+    normal: Array
+    points: list[dict[str, Array]]
+    seconds: list[float]
 
 
 def state_by_design(model: TargetModel, mbes: config.Mbes) -> State:
@@ -76,15 +88,29 @@ def state_by_design(model: TargetModel, mbes: config.Mbes) -> State:
     return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces)
 
 
-def predict(setting: Setting, one: Pass, number: int) -> Predicted:
-    """What a pass will tell; ``number`` sets the phases of the boat's unrest, so that no two passes are alike."""
+def predict(setting: Setting, passes: Sequence[Pass], turn_s: float = 0.0, phases: int = PHASES) -> Predicted:
+    """What passes will tell, sailed one after the other, on the average over ``phases`` of the boat's unrest: how it
+    heads while the fan passes a block is chance."""
+    found = []
+    for phase in range(phases):
+        sighted = [_sighted(setting, one, phase * APART + number) for number, one in enumerate(passes)]
+        found.append((_normal(setting, sighted, turn_s), sighted))
+    points = [
+        {sensor: np.mean([each[1][k].points[sensor] for each in found], axis=0) for sensor in found[0][1][k].points}
+        for k in range(len(passes))
+    ]
+    normal = np.asarray(np.mean([normal for normal, _ in found], axis=0))
+    return Predicted(normal, points, [one.seconds for one in found[0][1]])
+
+
+def _sighted(setting: Setting, one: Pass, number: int) -> Sighted:
+    """One pass; ``number`` sets the phases of the boat's unrest."""
     seconds = one.seconds(setting.half_length_m)
     trajectory = _trajectory(setting, one, seconds, number)
-    laser_mount = mount_of(setting.laser.mount)
     families = {surface.family: k for k, surface in enumerate(setting.state.surfaces)}
     faces = setting.model.faces
     scene = Scene(
-        Body.of(trajectory, laser_mount.lever_arm_body_m),
+        _body(setting, trajectory),
         np.array([families[face.family] for face in faces]),
         np.array([face.distance_m * face.normal[2] if face.family == "H" else 0.0 for face in faces]),
         setting.state,
@@ -93,10 +119,12 @@ def predict(setting: Setting, one: Pass, number: int) -> Predicted:
         setting.mbes,
     )
     caster = ClosestSurface(setting.model)
-    points = {"laser": _laser_rays(setting, seconds), "mbes": _beams(setting, seconds)}
     sums: dict[str, EpochSums] = {}
     counts: dict[str, Array] = {}
-    for sensor, (t_ns, rays, each) in points.items():
+    for sensor, (t_ns, rays, each) in {
+        "laser": _laser_rays(setting, seconds),
+        "mbes": _beams(setting, seconds),
+    }.items():
         batch = _labelled(setting, caster, trajectory, sensor, t_ns, rays)
         seen = scene.observe(sensor, batch, setting.state)
         weight, v = each / seen.sigma_m**2, np.zeros(len(seen.v_m))
@@ -104,14 +132,41 @@ def predict(setting: Setting, one: Pass, number: int) -> Predicted:
         sums[sensor] = epoch_sums(seen.record, seen.share, seen.surface, *shape)
         on_face = np.bincount(batch["face"].astype(np.int64), minlength=len(faces))
         counts[sensor] = each * on_face.astype(np.float64)
+    return Sighted(sums, trajectory, counts, seconds)
+
+
+def _body(setting: Setting, trajectory: Trajectory) -> Body:
+    return Body.of(trajectory, mount_of(setting.laser.mount).lever_arm_body_m)
+
+
+def _normal(setting: Setting, sighted: Sequence[Sighted], turn_s: float) -> Array:
+    """Normal equations (u, u) of passes sailed one after the other: the drift goes on between them."""
+    starts = np.cumsum([0.0, *(one.seconds + turn_s for one in sighted[:-1])])
+    lengths = [len(one.trajectory.t_ns) for one in sighted]
+    firsts = np.cumsum([0, *lengths[:-1]])
+    t_ns = [one.trajectory.t_ns + round(start * NS) for one, start in zip(sighted, starts, strict=True)]
+    names = ("positions_m", "R_frame_from_body")
+    positions, R = (np.concatenate([getattr(one.trajectory, name) for one in sighted]) for name in names)
+    body = _body(setting, Trajectory.build(np.concatenate(t_ns), positions, R))
+    sums = {
+        sensor: merged(
+            replace(one.sums[sensor], record=one.sums[sensor].record + first)
+            for one, first in zip(sighted, firsts, strict=True)
+        )
+        for sensor in sighted[0].sums
+    }
     record = np.unique(np.concatenate([found.record for found in sums.values()]))
-    size = setting.state.size
     if not len(record):
-        return Predicted(np.zeros((size, size)), counts, seconds)
+        return np.zeros((setting.state.size, setting.state.size))
     noise = noise_of(setting.ins)
-    knots = knots_of(record, scene.body.seconds, noise.spacing_s, seconds)
+    knots = knots_of(record, body.seconds, noise.spacing_s, PAUSE_S)
     drift = Drift(knots, np.zeros((len(knots.record), SIX)))
-    return Predicted(normal_equations(sums, setting.state, scene.body, noise, drift).normal, counts, seconds)
+    return normal_equations(sums, setting.state, body, noise, drift).normal
+
+
+def track(setting: Setting, one: Pass, number: int) -> Array:
+    """Where the INS will be, (n, 3) m in the target frame."""
+    return _trajectory(setting, one, one.seconds(setting.half_length_m), number).positions_m
 
 
 def _trajectory(setting: Setting, one: Pass, seconds: float, number: int) -> Trajectory:
@@ -184,10 +239,3 @@ def _labelled(
     columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}
     columns |= {f"{axis}_target_m": points[on, k] for k, axis in enumerate("xyz")}
     return columns | {"t_ns": t_ns[met][on], "face": labels.face[on]}
-
-
-def together(predicted: Sequence[Predicted]) -> Array:
-    """Normal equations of several passes."""
-    return np.asarray(np.sum([one.normal for one in predicted], axis=0))
-
-

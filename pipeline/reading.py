@@ -20,7 +20,8 @@ LEAST_FREE = 30  # degrees of freedom for a variance factor
 
 @dataclass(frozen=True)
 class Counts:
-    """Of a group of observations: how many, Σ of robust weights, how many were cut, reduced; |v| / σ (histogram)."""
+    """Of a group of observations: how many, Σ of robust weights, how many were cut, reduced; |v| against what is
+    expected of it (histogram)."""
 
     count: int
     weights: float
@@ -47,9 +48,10 @@ def _read(
     batch: Batch, scene: Scene, sensor: str, state: State, drift: Drift | None, weighting: Weighting
 ) -> tuple[EpochSums, dict[str, Counts]]:
     seen = scene.observe(sensor, batch, state, drift)
-    robust, weight = weighting.weights(seen.group, seen.v_m, seen.sigma_m)
+    robust, weight = weighting.weights(seen)
+    normalised = weighting.normalised(seen)
     surfaces = len(state.surfaces)
-    features = seen.adjusted(weight, surfaces, scene.white_m)
+    features = seen.adjusted(weight, surfaces)
     sums = epoch_sums(seen.record, seen.share, seen.surface, surfaces, features, weight, seen.v_m)
     counts = {}
     for number in np.unique(seen.group).tolist():
@@ -57,8 +59,7 @@ def _read(
         w = robust[rows]
         cut = int(np.sum(w == 0))
         reduced = int(np.sum(w < 1)) - cut
-        normalised = seen.v_m[rows] / seen.sigma_m[rows]
-        counts[GROUPS[number]] = Counts(len(w), float(w.sum()), cut, reduced, histogram(normalised))
+        counts[GROUPS[number]] = Counts(len(w), float(w.sum()), cut, reduced, histogram(normalised[rows]))
     return sums, counts
 
 
@@ -95,5 +96,5 @@ def refactored(reading: Reading, state: State, weighting: Weighting) -> tuple[Re
 
 
 def scales_of(reading: Reading) -> dict[str, float]:
-    """Robust scales of |v| / σ by group."""
+    """Robust scales of |v| against what is expected of it, by group."""
     return {name: scale_of(one.histogram) for name, one in reading.counts.items()}

@@ -205,10 +205,11 @@ def diff(
 
     from pipeline import diff as comparing
     from pipeline.files import write_text
+    from pipeline.folder import refuse_output
 
     found = _comparison(first, second, tolerance_deg, tolerance_mm)
     for option, file in (("--html", html), ("--rrd", rrd)):
-        _refuse_output(option, file, first, second)
+        refuse_output(option, file, first, second)
     if html is not None:
         from pipeline.pages.comparison import page
 
@@ -217,20 +218,6 @@ def diff(
         _save_pair(first, second, found, rrd)
     say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else comparing.text(found), sys.stdout)
     return 1 if comparing.is_moved(found) else 0
-
-
-def _refuse_output(option: str, file: Path | None, *runs: Path) -> None:
-    """A picture goes to a file of its kind, never over a run's results or anything else."""
-    if file is None:
-        return
-    suffix = option.replace("--", ".")
-    if file.suffix != suffix:
-        raise ConfigError(f"{option} {file}: name a file that ends in {suffix}")
-    if file.exists() and not file.is_file():
-        raise ConfigError(f"{option} {file}: is no file; name another")
-    for run_folder in runs:
-        if file.resolve().is_relative_to(run_folder.resolve()):
-            raise ConfigError(f"{option} {file}: lies in the run folder {run_folder}; name a file elsewhere")
 
 
 def _comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
@@ -269,6 +256,25 @@ def history(
         say(f"left out: {problem}", sys.stderr)
     say(f"{len(found.table)} sessions: {target / 'history.html'}", sys.stdout)
     return 0
+
+
+@app.command()
+def plan(
+    file: Annotated[Path, typer.Argument(metavar="PLAN", help="YAML file: passes, and what else README.md says")],
+    session: Annotated[Path, typer.Option("--session", metavar="SESSION", help="folder with session.yaml")],
+    config: Annotated[Path, typer.Option("--config", metavar="CONFIG", help="the pool's YAML file")],
+    out: Annotated[Path | None, typer.Option("--yaml", metavar="FILE", help="write the prediction as YAML")] = None,
+    rrd: Annotated[Path | None, typer.Option("--rrd", metavar="FILE", help="write a recording of it")] = None,
+) -> int:
+    """Predict what passes will give, before any data, and choose better ones. Status 1 if they will not do."""
+    from pipeline.folder import refuse_output
+    from stages.plan import plan as plan_of
+
+    for option, path in (("--yaml", out), ("--rrd", rrd)):
+        refuse_output(option, path)
+    said, enough = plan_of(file, session, config, out, rrd)
+    say(said, sys.stdout)
+    return 0 if enough else 1
 
 
 @app.command()

@@ -61,7 +61,7 @@ GROUPS = Artefact(
         Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping"),
         Column("count", I64, "1", "observations; of the last two: epochs"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
-        Column("scale", F64, "1", "robust scale of residual / sigma, the INS's white noise in it"),
+        Column("scale", F64, "1", "robust scale of residual / what is expected of it, INS's noise included"),
         Column("cut", I64, "1", "observations whose weight became zero"),
         Column("reduced", I64, "1", "observations whose weight was reduced"),
     ),
@@ -74,7 +74,7 @@ CELLS = Artefact(
         Column("rms_m", F64, "m", "RMS residual"),
         Column("sigma_mean_m", F64, "m", "standard deviation of the mean from the scatter of its moments"),
         Column("normalised", F64, "1", "mean / root(sigma_mean² + tolerance²)"),
-        Column("largest", F64, "1", "largest |residual| / sigma of those with a weight"),
+        Column("largest", F64, "1", "largest |residual| / what is expected, of those with a weight"),
     ),
 )
 PATTERNS = Artefact(

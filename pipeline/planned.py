@@ -1,0 +1,218 @@
+"""A plan judged: predicted sigmas, usable points, what is lacking; and within a budget the better list of passes."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.adjusting import free_unknowns
+from pipeline.considered import considered_of
+from pipeline.maths.solution import Solution, solve
+from pipeline.maths.unknowns import SIX
+from pipeline.mounts import PARAMETERS, mount_of, target_of
+from pipeline.observability import Seen, geometry_of
+from pipeline.parsing import parse, read_yaml
+from pipeline.plan_settings import Budget, Pass, Plan
+from pipeline.planning import Predicted, Setting, predict, state_by_design
+
+Array = NDArray[np.float64]
+VAGUE = np.repeat([1.0, 1.0], 3)  # rad, m: what is known of the six before any pass, to compare short lists by
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What a list of passes will give; covariances (6, 6), NaN where a direction is left open."""
+
+    passes: tuple[Pass, ...]
+    predicted: Predicted
+    random: Array
+    total: Array
+    solution: Solution
+
+    @property
+    def seconds(self) -> float:
+        return sum(self.predicted.seconds)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The list as given; gaps and remedy; and the better list, where candidates and a budget are given."""
+
+    setting: Setting
+    given: Outlook
+    gaps: list[str]
+    remedy: str
+    better: Outlook | None
+
+
+def setting_of(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Setting:
+    model = target_of(pool.target)
+    state = state_by_design(model, session.mbes)
+    return Setting(model, state, plan, pool.segment, session.ins, session.laser, session.mbes)
+
+
+def load_plan(path: Path) -> Plan:
+    return parse(Plan, read_yaml(path), str(path))
+
+
+def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Answer:
+    setting = setting_of(plan, pool, session)
+    considered = considered_of(setting.state.names, session.laser, session.mbes, pool.as_built)
+    turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
+    given = _outlook(setting, plan.passes, turn_s, considered)
+    speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
+    seen = Seen([one.distance_m for one in plan.passes], soundings(setting, given), float(speeds), float(swings))
+    geometry = geometry_of(setting, seen, given.predicted.normal, given.solution)
+    better = None
+    if plan.candidates and plan.budget is not None:
+        better = _better(setting, plan.candidates, plan.budget.seconds, plan.budget.turn_s, considered)
+    return Answer(setting, given, geometry.gaps, geometry.remedy, better)
+
+
+def _outlook(setting: Setting, passes: Sequence[Pass], turn_s: float, considered: Array) -> Outlook:
+    predicted = predict(setting, passes, turn_s)
+    normal = predicted.normal
+    solution = solve(normal, np.zeros(len(normal)), free_unknowns(setting.state))
+    random, total = solution.covariance[:SIX, :SIX], solution.total(considered)[:SIX, :SIX]
+    if solution.deficiency:
+        random, total = np.full((SIX, SIX), np.nan), np.full((SIX, SIX), np.nan)
+    return Outlook(tuple(passes), predicted, random, total, solution)
+
+
+def soundings(setting: Setting, outlook: Outlook) -> dict[str, int]:
+    """By family, over all passes."""
+    families = [face.family for face in setting.model.faces]
+    total = dict.fromkeys(families, 0.0)
+    for points in outlook.predicted.points:
+        for family, count in zip(families, points["mbes"], strict=True):
+            total[family] += float(count)
+    return {family: round(count) for family, count in total.items()}
+
+
+def _better(
+    setting: Setting, candidates: Sequence[Pass], seconds: float, turn_s: float, considered: Array
+) -> Outlook | None:
+    """Pass after pass the candidate that brings most for its time, as long as there is time; None: not even for one.
+
+    A candidate may be taken more than once. What is brought down is the mean square of the six sigmas, angles against
+    lengths as the verdict's usual limits.
+    """
+    predicted = [predict(setting, [one], phases=1) for one in candidates]
+    usual = config.Verdict()
+    bounds = np.repeat([np.radians(usual.max_sigma_deg), usual.max_sigma_m], 3)
+    vague = np.zeros((setting.state.size, setting.state.size))
+    vague[:SIX, :SIX] = np.diag(VAGUE**-2)
+    vague[setting.state.shared, setting.state.shared] += np.eye(setting.state.shared.stop - setting.state.shared.start)
+
+    def cost(normal: Array) -> float:
+        free = free_unknowns(setting.state)
+        covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:SIX, :SIX]
+        return float(np.mean(np.diag(covariance) / bounds**2))
+
+    chosen: list[int] = []
+    normal, left = np.zeros_like(vague), seconds
+    while True:
+        now = cost(normal)
+        gains = []
+        for number, one in enumerate(predicted):
+            needed = one.seconds[0] + (turn_s if chosen else 0.0)
+            if needed <= left:
+                gains.append((np.log(now / cost(normal + one.normal)) / needed, -number))
+        if not gains or max(gains)[0] <= 0:
+            break
+        number = -max(gains)[1]
+        left -= predicted[number].seconds[0] + (turn_s if chosen else 0.0)
+        normal = normal + predicted[number].normal
+        chosen.append(number)
+    if not chosen:
+        return None
+    return _outlook(setting, [candidates[k] for k in chosen], turn_s, considered)
+
+
+# --- in words --------------------------------------------------------------------------------------------------------
+def as_plain(answer: Answer) -> dict[str, Any]:
+    """All of it as plain values, for YAML."""
+    found: dict[str, Any] = {"given": _plain_outlook(answer.setting, answer.given)}
+    found |= {"gaps": answer.gaps, "remedy": answer.remedy}
+    if answer.better is not None:
+        found["better"] = _plain_outlook(answer.setting, answer.better)
+    return found
+
+
+def _plain_outlook(setting: Setting, outlook: Outlook) -> dict[str, Any]:
+    mounted = mount_of(setting.mbes.mount)
+    known = not outlook.solution.deficiency
+    sigma = np.sqrt(np.diag(outlook.random))
+    return {
+        "passes": [
+            one.model_dump(mode="json", exclude_none=True)
+            | {"seconds": round(seconds, 1), "points": _faces(setting, points)}
+            for one, seconds, points in _each(outlook)
+        ],
+        "sigma_mount": mounted.sigmas(outlook.random) if known else None,
+        "sigma_mount_total": mounted.sigmas(outlook.total) if known else None,
+        "correlation": (outlook.random / np.outer(sigma, sigma)).tolist() if known else None,
+        "condition": outlook.solution.condition if known else None,
+    }
+
+
+def _each(outlook: Outlook) -> Iterator[tuple[Pass, float, dict[str, Array]]]:
+    return zip(outlook.passes, outlook.predicted.seconds, outlook.predicted.points, strict=True)
+
+
+def _faces(setting: Setting, points: dict[str, Array]) -> dict[str, dict[str, int]]:
+    """Points by sensor and name of face, those with any."""
+    return {
+        sensor: {face.name: round(float(n)) for face, n in zip(setting.model.faces, count, strict=True) if n}
+        for sensor, count in points.items()
+    }
+
+
+def is_enough(answer: Answer, limits: config.Verdict) -> bool:
+    """Whether the list as given will keep the total sigmas below the verdict's limits."""
+    if answer.given.solution.deficiency:
+        return False
+    sigma = mount_of(answer.setting.mbes.mount).sigmas(answer.given.total)
+    bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
+    return all(sigma[key] <= bounds[unit] for _, _, key, unit in PARAMETERS)
+
+
+def table(answer: Answer, limits: config.Verdict) -> str:
+    """For the screen."""
+    lines = ["As given:", *_lines(answer.setting, answer.given, limits)]
+    lines += [f"But: {gap}." for gap in answer.gaps]
+    if answer.remedy:
+        lines.append(f"Cure: {answer.remedy}.")
+    if answer.better is not None:
+        lines += ["", "Better, in the time there is:", *_lines(answer.setting, answer.better, limits)]
+    return "\n".join(lines)
+
+
+def _lines(setting: Setting, outlook: Outlook, limits: config.Verdict) -> list[str]:
+    families = list(dict.fromkeys(face.family for face in setting.model.faces))
+    heads = "".join(f"{family:>9}" for family in families)
+    lines = [f"  distance   speed   swing    time   soundings on{heads}   laser points"]
+    for one, seconds, points in _each(outlook):
+        by_family = dict.fromkeys(families, 0.0)
+        for face, count in zip(setting.model.faces, points["mbes"], strict=True):
+            by_family[face.family] += float(count)
+        counts = "".join(f"{count:>9,.0f}" for count in by_family.values())
+        sailed = f"  {one.distance_m:>6.1f} m {one.speed_m_s:>5.2f} m/s {one.heading_swing_deg:>4.1f}°"
+        lines.append(f"{sailed} {seconds:>6.0f} s               {counts}{points['laser'].sum():>15,.0f}")
+    lines.append(f"  {'sigma':<8}{'random':>12}{'total':>12}{'limit':>12}")
+    if outlook.solution.deficiency:
+        return [*lines, f"  {outlook.solution.deficiency} direction(s) of the unknowns stay open: no result"]
+    mounted = mount_of(setting.mbes.mount)
+    random, total = mounted.sigmas(outlook.random), mounted.sigmas(outlook.total)
+    for name, _, key, unit in PARAMETERS:
+        limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, " m")
+        over = "  above the limit" if total[key] > limit else ""
+        row = "".join(f"{value:>11.4f}{sign.strip()}" for value in (random[key], total[key], limit))
+        lines.append(f"  {name:<8}{row}{over}")
+    return lines
+
+

@@ -1,0 +1,57 @@
+"""A plan to look at: the target's faces by how many soundings they will get, and the tracks."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.files import write_bytes
+from pipeline.planned import Answer, Outlook
+from pipeline.planning import track
+from stages.views import COLOURS, GREY, LASER, SONAR, content, words
+
+PLENTY = 1000  # soundings on a face, from which on it is coloured in full
+
+
+def save_plan(answer: Answer, said: str, path: Path) -> None:
+    """``said``: the table of the screen."""
+    import rerun.blueprint as rrb
+
+    def draw(recording: Any) -> None:
+        _target(recording, answer)
+        _list(recording, answer, "given", answer.given)
+        if answer.better is not None:
+            _list(recording, answer, "better", answer.better)
+        recording.log("tables/plan", words(said), static=True)
+
+    views = [rrb.Spatial3DView(origin="/", name="Target and tracks"), rrb.TextDocumentView(origin="tables/plan")]
+    write_bytes(path, content("plan", rrb.Blueprint(rrb.Horizontal(*views, column_shares=[3, 2])), draw))
+
+
+def _target(recording: Any, answer: Answer) -> None:
+    import rerun as rr
+
+    for face in answer.setting.model.faces:
+        outline = np.vstack([face.vertices_m, face.vertices_m[:1]]).astype(np.float32)
+        strip = rr.LineStrips3D([outline], radii=0.008, colors=COLOURS[face.family])
+        recording.log(f"target/{face.name}", strip, static=True)
+
+
+def _list(recording: Any, answer: Answer, name: str, outlook: Outlook) -> None:
+    """Faces coloured by their soundings over all passes; a track a pass."""
+    import rerun as rr
+
+    total = np.sum([points["mbes"] for points in outlook.predicted.points], axis=0)
+    for face, count in zip(answer.setting.model.faces, total.tolist(), strict=True):
+        if not count:
+            continue
+        share = min(1.0, count / PLENTY)
+        colour = [round(grey + share * (full - grey)) for grey, full in zip(GREY, SONAR, strict=True)]
+        fan = [(0, k, k + 1) for k in range(1, len(face.vertices_m) - 1)]
+        colours = [colour] * len(face.vertices_m)
+        mesh = rr.Mesh3D(vertex_positions=face.vertices_m, triangle_indices=fan, vertex_colors=colours)
+        recording.log(f"{name}/faces/{face.name}", mesh, rr.AnyValues(soundings=round(count)), static=True)
+    for number, one in enumerate(outlook.passes):
+        line = track(answer.setting, one, number)[::10].astype(np.float32)
+        strip = rr.LineStrips3D([line], radii=0.02, colors=LASER, labels=[f"{one.distance_m:g} m"])
+        recording.log(f"{name}/tracks/{number}", strip, static=True)

@@ -1,0 +1,143 @@
+"""A plan's prediction: against the adjustment of a simulated session of the same plan, and what it says and chooses."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline import planned
+from pipeline.config import Drift, PoolConfig, SessionConfig
+from pipeline.parsing import parse
+from pipeline.plan_settings import Plan
+from pipeline.planning import predict
+from tests.end_to_end.places import poolcal
+from tests.stages.conftest import THIN, calibrated, made
+
+SETTINGS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
+FIGURES: dict[str, Any] = {
+    "laser": {"point_rate_hz": THIN["laser"]["point_rate_hz"]},
+    "mbes": {"ping_rate_hz": THIN["mbes"]["ping_rate_hz"]},
+}
+DRIFT = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
+
+
+def plan_of(*distances: float, **more: Any) -> Plan:
+    return parse(Plan, FIGURES | {"passes": [{"distance_m": d} for d in distances]} | more, "plan")
+
+
+@pytest.fixture(scope="module")
+def configs() -> tuple[PoolConfig, SessionConfig]:
+    session = made({"track": {"distances_m": [4.0]}}, seed=2)
+    return parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
+
+
+@pytest.mark.parametrize("drift", [{}, {"ins": {"drift": DRIFT}}], ids=["white noise", "drift"])
+def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift: dict[str, Any]) -> None:
+    distances = (4.0, 8.0, 5.0, 7.0)
+    session = made({"track": {"distances_m": list(distances)}, "mbes": {"coarse_angle_deg": 0.1}}, drift, seed=6)
+    result = json.loads(calibrated(session)["report/calibration.json"])["methods"]["adjustment"]
+    pool, settings = parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
+    answer = planned.judge(plan_of(*distances), pool, settings)
+    found = planned.as_plain(answer)["given"]
+    for key in ("sigma_mount", "sigma_mount_total"):
+        ratio = [found[key][name] / result[key][name] for name in SETTINGS]
+        assert max(abs(np.log(ratio))) < np.log(1.15), (key, dict(zip(SETTINGS, ratio, strict=True)))
+    assert (answer.gaps, answer.remedy, answer.better) == ([], "", None)
+
+
+def test_usable_points_are_those_that_segment_labels(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    session = made({"track": {"distances_m": [4.0]}}, seed=2)
+    found = calibrated(session, "segment")
+    answer = planned.judge(plan_of(4.0), *configs)
+    for sensor, stream in (("laser", "laser_labelled"), ("mbes", "soundings_labelled")):
+        faces = np.concatenate([part.columns["face"] for part in found[f"segment/{stream}"].parts])
+        labelled = np.bincount(faces, minlength=len(answer.setting.model.faces))
+        expected = answer.given.predicted.points[0][sensor]
+        assert np.all((expected > 0) >= (labelled > 60))
+        many = labelled > 400
+        np.testing.assert_allclose(expected[many], labelled[many], rtol=0.25)  # how it heads past a block is chance
+
+
+def test_without_drift_passes_add_up_and_with_it_two_tell_more(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    """The drift goes on from one pass to the next: together they know more of it than each alone."""
+    pool, still = configs
+    drifting = still.model_copy(update={"ins": still.ins.model_copy(update={"drift": Drift()})})
+    for session in (still, drifting):
+        setting = planned.setting_of(plan_of(4.0, 8.0), pool, session)
+        both = predict(setting, setting.plan.passes, 10.0, phases=1).normal
+        first = predict(setting, setting.plan.passes[:1], phases=1).normal
+        second = both - first  # the phases of the second pass are its own
+        assert np.linalg.eigvalsh(second[:6, :6]).min() > 0
+        for normal in (both, first):
+            np.testing.assert_allclose(normal, normal.T, rtol=1e-6, atol=1e-6 * np.abs(normal).max())
+
+
+@pytest.mark.parametrize(
+    ("distances", "gap", "remedy"),
+    [
+        ((5.0,), "one pass alone", "yaw and lever arm y cannot be told apart"),
+        ((6.0, 6.1, 5.9), "all passes lie at 5.9 to 6.1 m", "two more passes at 3 m would bring sigma"),
+    ],
+)
+def test_what_a_plan_lacks_is_said_with_its_cure(
+    distances: tuple[float, ...], gap: str, remedy: str, configs: tuple[PoolConfig, SessionConfig]
+) -> None:
+    answer = planned.judge(plan_of(*distances), *configs)
+    assert gap in answer.gaps[0]
+    assert remedy in answer.remedy
+    assert not planned.is_enough(answer, configs[0].verdict)
+    said = planned.table(answer, configs[0].verdict)
+    assert "above the limit" in said
+
+
+def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    candidates = [{"distance_m": d} for d in (3.0, 5.5, 6.0, 9.0)]
+    budget = {"seconds": 200.0, "turn_s": 60.0}
+    answer = planned.judge(plan_of(6.0, 6.0, candidates=candidates, budget=budget), *configs)
+    assert answer.better is not None
+    assert answer.better.seconds + budget["turn_s"] * (len(answer.better.passes) - 1) <= budget["seconds"]
+    assert {one.distance_m for one in answer.better.passes} >= {3.0}
+    assert len({one.distance_m for one in answer.better.passes}) > 1
+    assert answer.better.random[2, 2] < answer.given.random[2, 2] / 25
+    nothing = planned.judge(plan_of(6.0, candidates=candidates, budget={"seconds": 5.0}), *configs)
+    assert nothing.better is None
+
+
+def test_out_of_sight_there_is_no_result(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    answer = planned.judge(plan_of(60.0, mbes={"max_range_m": 15.0}), *configs)
+    assert answer.given.solution.deficiency > 0
+    assert "stay open" in planned.table(answer, configs[0].verdict)
+    assert planned.as_plain(answer)["given"]["sigma_mount"] is None
+
+
+def test_the_command(tmp_path: Path) -> None:
+    session = made({"track": {"distances_m": [4.0]}}, seed=2)
+    folder = tmp_path / "池 session"
+    folder.mkdir()
+    (folder / "session.yaml").write_text(yaml.safe_dump(session.session))
+    (tmp_path / "pool.yaml").write_text(yaml.safe_dump(session.pool))
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(yaml.safe_dump(FIGURES | {"passes": [{"distance_m": 4.0}, {"distance_m": 8.0}]}))
+    words = ("plan", plan, "--session", folder, "--config", tmp_path / "pool.yaml")
+    told = poolcal(*words, "--yaml", tmp_path / "out.yaml", "--rrd", tmp_path / "out.rrd")
+    assert (told.status, told.err) == (0, "")
+    assert "As given:" in told.out
+    written = yaml.safe_load((tmp_path / "out.yaml").read_text())
+    assert [one["distance_m"] for one in written["given"]["passes"]] == [4.0, 8.0]
+    assert (tmp_path / "out.rrd").stat().st_size > 10_000
+    plan.write_text(yaml.safe_dump(FIGURES | {"passes": [{"distance_m": 8.0}]}))
+    assert poolcal(*words).status == 1
+    for content, word in (
+        ("passes: []", "passes"),
+        ("passes: [{distance_m: -4}]", "passes.0.distance_m = -4"),
+        ("passes: [{distance_m: 4, sped: 1}]", "unknown key"),
+    ):
+        plan.write_text(content)
+        told = poolcal(*words)
+        assert (told.status, len(told.err.splitlines())) == (2, 1)
+        assert word in told.err
+    told = poolcal(*words, "--rrd", tmp_path / "out.png")
+    assert (told.status, "ends in .rrd" in told.err) == (2, True)
