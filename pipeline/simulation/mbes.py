@@ -80,7 +80,7 @@ class _Pass:
         sines = s.sound_speed_true_m_s / s.sound_speed_recorded_m_s * np.sin(steered)
         looks = np.abs(sines) < 1
         physical = np.arcsin(np.where(looks, sines, 0.0))
-        paths, directions = self.beams.paths(origins, R_target_from_mbes, physical)
+        paths, directions = self._bent(origins, R_target_from_mbes, physical)
         paths = self._corners(paths, origins, directions)
         paths = paths + s.range_sigma_m * self.random["range"].standard_normal(shape)
         paths = self._surface(paths, origins, directions)
@@ -96,6 +96,23 @@ class _Pass:
             "angle_rad": self.angles_rad[beam],
             "sound_speed_m_s": np.full(len(ping), float(np.float32(s.sound_speed_recorded_m_s))),
         }
+
+    def _bent(self, origins: Floats, R_target_from_mbes: Floats, angles: Floats) -> tuple[Floats, Floats]:
+        """Paths and directions as of straight beams; where the sound speed changes with depth, of bent ones.
+
+        With dc/d(depth) = g a ray curves upward by g/c per metre across itself, so the chord to where it arrives after
+        r lies r g / 2c nearer to the vertical; and on the way down sound is on the average g · depth / 2 faster.
+        """
+        gradient, speed = self.scenario.sound_speed_gradient_1_s, self.scenario.sound_speed_true_m_s
+        paths, directions = self.beams.paths(origins, R_target_from_mbes, angles)
+        if not gradient:
+            return paths, directions
+        up = R_target_from_mbes[:, 2, :]
+        across = up[:, 0, None] * np.cos(angles) + up[:, 2, None] * np.sin(angles)
+        turned = angles + gradient / (2 * speed) * np.where(np.isfinite(paths), paths, 0.0) * across
+        paths, directions = self.beams.paths(origins, R_target_from_mbes, turned)
+        depths = -directions[..., 2] * np.where(np.isfinite(paths), paths, 0.0)
+        return paths * (1 - gradient * depths / (2 * speed)), directions
 
     def _corners(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
         """Near an inner corner the corner itself answers: the nearest point of its line within the beam."""

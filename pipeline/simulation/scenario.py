@@ -128,6 +128,7 @@ class MbesScenario(Model):
     dropped_ping_share: Share = 0.01
     sound_speed_true_m_s: SoundSpeed = 1500.0
     sound_speed_recorded_m_s: SoundSpeed = 1500.0
+    sound_speed_gradient_1_s: Annotated[float, Field(ge=-2, le=2)] = 0.0  # (m/s)/m downward from the head's true speed
     give_true_sound_speed: bool = False  # session.yaml carries the true one
     projector_offset_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # transmitter in the mbes frame
     give_projector_offset: bool = False

@@ -144,6 +144,27 @@ def test_wrong_sound_speed_scales_ranges_and_sines(changed: Change, noise_free: 
     assert told.session["mbes"]["sound_speed_m_s"] == 1500.0
 
 
+@pytest.mark.parametrize("gradient", [0.5, -0.5])
+def test_where_sound_is_faster_below_beams_bend_upward(
+    changed: Change, noise_free: Scenario, gradient: float
+) -> None:
+    """Exactly, of an arc: sin t = p c, x = (cos t0 - cos t1) / (p g), time = ln(tan(t1 / 2) / tan(t0 / 2)) / g."""
+    scenario = changed(
+        noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL,
+        mbes={"mount": LEVEL, "beams": 131, "sector_deg": 130.0, "sound_speed_gradient_1_s": gradient},
+    )  # fmt: skip
+    session = simulate(scenario, 1)
+    speed = scenario.mbes.sound_speed_true_m_s
+    for angle_deg in (60.0, 64.0):
+        start = np.radians(angle_deg)
+        p = np.sin(start) / speed
+        end = np.arccos(np.cos(start) - 5.0 * p * gradient)
+        time_s = np.log(np.tan(end / 2) / np.tan(start / 2)) / gradient
+        straight = 5.0 / np.sin(start)
+        assert abs(speed * time_s - straight) > 1e-3
+        assert range_m(session, angle_deg, 0.0) == pytest.approx(speed * time_s, abs=2 * LEVEL_CURVES)
+
+
 def test_separate_projector_lengthens_the_path(changed: Change, noise_free: Scenario) -> None:
     mbes = {"mount": LEVEL, "beams": 131, "sector_deg": 130.0, "projector_offset_m": [0.0, 0.3, 0.119]}
     scenario = changed(noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL, mbes=mbes)
