@@ -19,9 +19,8 @@ from pipeline.scene import Scene, Weighting
 from pipeline.streams import Stream
 
 Array = NDArray[np.float64]
-STEP_RAD, STEP_M = 1e-10, 1e-9  # a smaller step is none, whatever the sigma
-STEP_SIGMAS = 1e-3  # nor is one smaller than this share of its sigma
-SETTLED_SIGMAS = 0.05  # after a step as small as this the weights would change too little for another reading
+NONE = (1e-3, 1e-10, 1e-9)  # a step below this share of its sigma, or below so many rad or m, is none
+SETTLED = (0.05, 1e-6, 1e-5)  # after one as small as this the weights would change too little for another reading
 NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
 SURE, UNLIKELY = 0.1, 100.0  # the white noise's factor is applied if its sigma is below, within these bounds
 CLOSING = 3  # steps, at most, with the last weights
@@ -91,7 +90,7 @@ def adjust(
         sums = moved(reading.sums, state, scene.body, drift, solution.step, drift_step)
         state, drift = state.moved(solution.step), drift.moved(drift_step)
         known = drift
-        settled = weighting.robust is not None and _small(solution, SETTLED_SIGMAS)
+        settled = weighting.robust is not None and _small(solution, *SETTLED)
         if settled and iteration > 2:
             break
         scales = scales_of(reading) if iteration > 1 else weighting.scales
@@ -105,7 +104,7 @@ def adjust(
     for _ in range(CLOSING):  # the weights as they are
         equations = normal_equations(sums, state, scene.body, noise, drift)
         solution = solve(equations.normal, equations.right, free)
-        converged = settled and _small(solution, STEP_SIGMAS)
+        converged = settled and _small(solution, *NONE)
         if converged:
             break
         drift_step = equations.knots(solution.step)
@@ -133,8 +132,7 @@ def _no_drift(reading: Reading, scene: Scene, noise: PoseNoise, gap_s: float) ->
     return Drift(knots, np.zeros((len(knots.record), SIX)))
 
 
-def _small(solution: Solution, sigmas: float) -> bool:
-    """Whether the six's step is far below their sigmas, or below anything that matters."""
+def _small(solution: Solution, sigmas: float, rad: float, m: float) -> bool:
+    """Whether the six's step is below this share of their sigmas, or below these values."""
     sigma = np.sqrt(np.diag(solution.covariance))[:SIX]
-    floor = np.repeat([STEP_RAD, STEP_M], 3)
-    return bool(np.all(np.abs(solution.step[:SIX]) <= np.maximum(sigmas * sigma, floor)))
+    return bool(np.all(np.abs(solution.step[:SIX]) <= np.maximum(sigmas * sigma, np.repeat([rad, m], 3))))

@@ -4,6 +4,7 @@ Two files are read: the pool's config (target, thresholds) and the session's (in
 Both keep the units of the contract (degrees, metres); code that computes converts at once to radians.
 """
 
+from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal
 
@@ -18,6 +19,8 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Length = Annotated[float, Field(gt=0, le=100)]
 Lever = Annotated[float, Field(ge=-100, le=100)]
+Depth = Annotated[float, Field(ge=0, le=200)]
+SoundSpeed = Annotated[float, Field(ge=1300, le=1700)]
 Latency = Annotated[float, Field(ge=-10, le=10)]
 
 
@@ -236,7 +239,8 @@ class Mbes(Model):
     files: Files
     format: Literal["r2sonic", "table"]
     mount: Mount
-    sound_speed_m_s: Annotated[float, Field(ge=1300, le=1700)] | None = None
+    sound_speed_m_s: SoundSpeed | None = None
+    svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
     sound_speed_sigma_m_s: NotNegative = 0.2
     sound_speed_gradient_sigma_1_s: NotNegative = 0.1  # (m/s)/m: 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
@@ -246,6 +250,14 @@ class Mbes(Model):
     beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # width across track, along track
     latency_s: Latency = 0.0
     latency_sigma_s: NotNegative = 0.0005
+
+    @model_validator(mode="after")
+    def _deeper_and_deeper(self) -> "Mbes":
+        depths = [depth for depth, _ in self.svp or ()]
+        for number, (one, other) in enumerate(pairwise(depths)):
+            if other <= one:
+                raise ValueError(f"svp has depth {other} after {one}, in row {number + 2}: depths must grow")
+        return self
 
 
 class Recording(Model):

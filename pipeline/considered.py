@@ -22,7 +22,7 @@ def considered_of(names: Sequence[str], laser: config.Laser, mbes: config.Mbes, 
         "mbes_range": mbes.range_bias_sigma_m,
         "mbes_latency": mbes.latency_sigma_s,
         "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
-        "sound_speed_gradient": mbes.sound_speed_gradient_sigma_1_s,
+        "sound_speed_gradient": mbes.sound_speed_gradient_sigma_1_s if mbes.svp is None else 0.0,  # a cast tells it
     }
     lean = float(np.radians(as_built.angle_sigma_deg))
     for name in names:

@@ -23,16 +23,20 @@ def summary(calibration: Mapping[str, Any]) -> str:
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
     lines += [f"  but look: {warning}" for warning in calibration["warnings"]]
     heads = f"{'mbes mount':<12}{'coarse':>12}{'computed' if rejected else 'calibrated':>14}{'change':>14}{'sigma':>12}"
+    heads += f"{'total':>12}"
     lines += ["", f"{heads}   (result: {calibration['result']})"]
     block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
     for parameter, _, key, of_setting in PARAMETERS:
         unit = "°" if of_setting == "deg" else of_setting
         total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
         change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
-        sigma = f"{block['sigma_mount'][key]:.4f} {unit}" if block["sigma_mount"] else "-"
-        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigma:>12}")
+        names = ("sigma_mount", "sigma_mount_total")
+        sigmas = [f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in names]
+        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigmas[0]:>12}{sigmas[1]:>12}")
     use = "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."
     lines += ["", "Do not use these values." if rejected else use]
+    if block["sigma_mount"]:
+        lines.append("sigma: from noise, relative to the laser; total: with what does not average.")
     if not block["sigma_mount"] and calibration["result"] != "adjustment":
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
     lines.append(_target_line(calibration["target"]))

@@ -12,6 +12,7 @@ from pipeline.counting import counts_table
 from pipeline.errors import RawDataError
 from pipeline.maths import soundings
 from pipeline.maths.geodesy import PoolFrame
+from pipeline.maths.ray_tracing import Cast
 from pipeline.maths.rotations import quaternion_from_rotation
 from pipeline.maths.trajectory import Trajectory, poses_in_pool
 from pipeline.mounts import mount_of, target_of
@@ -101,6 +102,8 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
             None if config.mbes.projector_offset_m is None else np.array(config.mbes.projector_offset_m),
         )
         mount = mount_of(config.mbes.mount)
+        if config.mbes.svp is not None:
+            sensor = _traced(t_ns, sensor, columns["sound_speed_m_s"], prepared, config)
         pool = prepared.trajectory.place(t_ns, sensor @ mount.R_body_from_sensor.T + mount.lever_arm_body_m)
         counts["angle impossible with the given sound speed"] = int((~valid).sum())
     inside = valid.copy()
@@ -128,6 +131,19 @@ def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: C
     positions, R_pool_from_body = prepared.trajectory.poses_at(t_ns)
     body = np.einsum("nji,nj->ni", R_pool_from_body, pool - positions)
     return (body - mount.lever_arm_body_m) @ mount.R_body_from_sensor, pool
+
+
+def _traced(
+    t_ns: NDArray[np.int64], points: Array, recorded_m_s: Array, prepared: Prepared, config: Config
+) -> Array:
+    """Soundings in the mbes frame, their rays bent by the cast; its depths are below the water's surface."""
+    mbes, mount = config.mbes, mount_of(config.mbes.mount)
+    cast = Cast(*np.array(mbes.svp, dtype=np.float64).T)
+    positions, R_pool_from_body = prepared.trajectory.poses_at(t_ns)
+    head = positions + R_pool_from_body @ mount.lever_arm_body_m
+    speed = recorded_m_s if mbes.sound_speed_m_s is None else np.full(len(t_ns), mbes.sound_speed_m_s)
+    depth = config.target.water_level_m - head[:, 2]
+    return soundings.traced(points, speed, R_pool_from_body @ mount.R_body_from_sensor, depth, cast)
 
 
 def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:

@@ -159,9 +159,10 @@ def _passes(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _range_note(mbes: config.Mbes) -> str:
-    if mbes.projector_offset_m is None:
-        return "sonar ranges taken as recorded: half the two-way path"
-    return f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
+    said = "sonar ranges taken as recorded: half the two-way path"
+    if mbes.projector_offset_m is not None:
+        said = f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
+    return said if mbes.svp is None else f"{said}; rays traced through a cast of {len(mbes.svp)} depths"
 
 
 def _method(

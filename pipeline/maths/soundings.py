@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.ray_tracing import Cast, trace
+
 Array = NDArray[np.float64]
 
 
@@ -39,6 +41,26 @@ def points_in_mbes(
     else:
         ranges = (path**2 - projector_offset_m @ projector_offset_m) / (2 * (path - direction @ projector_offset_m))
     return direction * ranges[:, None], valid
+
+
+def traced(
+    points_mbes_m: Array, speed_m_s: Array, R_up_from_mbes: Array, depth_m: Array, cast: Cast
+) -> Array:
+    """Points (n, 3) m in the mbes frame, as :func:`points_in_mbes` gives them, where the rays really end.
+
+    ``speed_m_s`` (n,): that at the head, with which they were made; R_up_from_mbes (n, 3, 3) into a frame with z up;
+    the head's depth (n,) m. The ray leaves the head's water with the recorded direction and enters the column by
+    Snell's law, sin θ / c staying what it is; then it is traced for the recorded time.
+    """
+    ranges = np.linalg.norm(points_mbes_m, axis=1)
+    directions = np.einsum("nij,nj->ni", R_up_from_mbes, points_mbes_m) / ranges[:, None]
+    level = np.hypot(directions[:, 0], directions[:, 1])
+    sine = np.minimum(level * cast.speed_at(depth_m) / speed_m_s, 1.0)
+    angle = np.where(directions[:, 2] > 0, np.pi - np.arcsin(sine), np.arcsin(sine))
+    across, reached = trace(cast, depth_m, angle, ranges / speed_m_s)
+    heading = directions[:, :2] / np.maximum(level, 1e-12)[:, None]
+    ended = np.column_stack([heading * across[:, None], depth_m - reached])
+    return np.asarray(np.einsum("nji,nj->ni", R_up_from_mbes, ended))
 
 
 def beam_half_widths(points_mbes_m: Array, across_rad: float, along_rad: float) -> tuple[Array, Array]:

@@ -16,7 +16,9 @@ import pytest
 
 from pipeline.config import Mount
 from pipeline.maths.geodesy import FLATTENING, SEMI_MAJOR_M, PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
+from pipeline.maths.ray_tracing import Cast
 from pipeline.maths.rotations import mount_from_rotation, rotation_from_attitude, rotation_from_mount
+from pipeline.maths.soundings import points_in_mbes, traced
 from pipeline.maths.trajectory import Trajectory, poses_in_pool
 from pipeline.mounts import mount_of
 
@@ -127,6 +129,40 @@ def test_mbes_lib_soundings_in_ecef(case: str) -> None:
     ecef = ecef_from_geodetic(*(np.array([value]) for value in (*place, centroid[2])))
     ecef = ecef + level @ rotation_ecef_from_level(np.array(place[0]), np.array(place[1])).T
     assert frame.points_from_ecef(ecef)[0] == pytest.approx(level, abs=max(tolerance * 1e-3, 5e-9))
+
+
+CAST = """
+    0.03 1448.37 0.16 1446.37 0.23 1449.22 0.37 1446.69 0.43 1445.8 0.58 1448.19 0.63 1448.61 0.8 1449.56 0.87
+    1449.07 1.03 1449.72 1.07 1449.48 1.23 1450.05 1.29 1449.61 1.45 1450.23 1.49 1449.73 1.67 1450.44 1.71
+    1449.78 1.87 1450.63 1.93 1450.38 2.08 1450.81 2.14 1450.72 2.29 1451.24 2.37 1451.19 2.5 1451.49 2.59
+    1451.3 2.71 1451.68 2.8 1451.46 2.91 1451.79 3.01 1451.64 3.1 1451.9 3.23 1451.76 3.32 1452.08 3.45 1451.92
+    3.53 1452.14 3.65 1452 3.73 1452.18 3.87 1452.06 3.93 1452.45 4.08 1452.42 4.14 1452.77 4.29 1452.66 4.35
+    1452.82 4.49 1452.73 4.56 1452.92 4.7 1452.8 4.76 1453.19 4.91 1453.06 4.98 1453.22 5.13 1453.2 5.19 1453.23
+    5.34 1453.24 5.4 1453.33 5.55 1453.26 5.61 1453.4 5.75 1453.31 5.84 1453.44 5.97 1453.37 6.07 1453.57 6.19
+    1453.41 6.28 1453.69 6.4 1453.55 6.52 1453.78 6.61 1453.65 6.72 1453.91 6.83 1453.76 6.94 1454.17 7.03
+    1453.89 7.16 1454.37 7.25 1454.14 7.37 1454.52 7.47 1454.39 7.58 1454.61 7.69 1454.47 7.79 1454.67 7.92
+    1454.53 8 1454.81 8.16 1454.69 8.23 1455.2 8.39 1455.08 8.45 1455.36 8.62 1455.29 8.67 1455.38 8.81 1455.38
+    8.87 1455.38 9.03 1455.4 9.09 1455.39 9.23 1455.42 9.3 1455.41 9.47 1455.42 9.51 1455.43 9.71 1455.43 9.72
+    1455.46 9.92 1455.46 10.14 1455.47 10.15 1455.47 10.36 1455.48
+"""  # depth m, speed m/s: SVP-0.svp of MBES-lib's test (MIT), 96 points
+
+
+def test_mbes_lib_ray_traced_sounding() -> None:
+    """Within 15 mm, which their own layers and ours differ by in this noisy cast; a straight ray is 6 cm off."""
+    place, height = (0.859282504615, -1.189079133235), -25.753195024025
+    frame = PoolFrame.at(0.859286627204, -1.189078930041, -25.711914675768, 0.0)
+    attitude = (0.0273983876, 0.0243184966, 0.1056083942)
+    pose = [np.array([value]) for value in (*place, height, *attitude)]
+    positions, R_pool_from_body = poses_in_pool(frame, *pose)
+    R = R_pool_from_body @ mount_of(_mount((0.62, 0.0, 0.0), (0.0, 0.0, 0.0))).R_body_from_sensor
+    speed, times, angle = np.array([1446.4250488]), np.array([2 * 0.0091418369]), np.array([0.7031931281])
+    straight, _ = points_in_mbes(times, angle, speed)
+    cast = Cast(*np.array(CAST.split(), dtype=float).reshape(-1, 2).T)
+    expected = np.array([-26.8825997032, 7.3549385469, 10.4758625062])
+    ended = traced(straight, speed, R, np.zeros(1), cast)
+    misses = [np.abs(R_OURS_FROM_NED.T @ (positions[0] + R[0] @ points[0]) - expected) for points in (ended, straight)]
+    assert misses[0].max() < 0.015
+    assert misses[1].max() > 0.05
 
 
 def test_mbes_lib_straight_down_is_a_lower_height() -> None:
