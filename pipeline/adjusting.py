@@ -10,6 +10,7 @@ from pipeline import config
 from pipeline.maths.adjustment import moved, normal_equations, settle
 from pipeline.maths.design import of_poses
 from pipeline.maths.drift import Eliminated
+from pipeline.maths.epochs import EpochSums
 from pipeline.maths.knots import Drift, PoseNoise, knots_of
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX, State
@@ -19,10 +20,12 @@ from pipeline.scene import Scene, Weighting
 from pipeline.streams import Stream
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 NONE = (1e-3, 1e-10, 1e-9)  # a step below this share of its sigma, or below so many rad or m, is none
 SETTLED = (0.05, 1e-6, 1e-5)  # after one as small as this the weights would change too little for another reading
 NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
 SURE, UNLIKELY = 0.1, 100.0  # the white noise's factor is applied if its sigma is below, within these bounds
+LEAST_READINGS = 3  # to see the drift, to see outliers against it, and to know their scale
 CLOSING = 3  # steps, at most, with the last weights
 SETTLING = 10  # steps, at most, to come there
 
@@ -77,41 +80,69 @@ def adjust(
 ) -> Adjusted:
     """From the coarse mount to the solution."""
     state = _near(streams["mbes"], scene)
-    free = free_unknowns(state, settings.free)
-    weighting, known = Weighting(), None
+    free = np.array(free_unknowns(state, settings.free))
+    weighting, known, settled = Weighting(), None, False
     for iteration in range(1, settings.max_iterations + 1):
         reading, weighting = refactored(read(streams, scene, state, known, weighting), state, weighting)
         drift = known or _no_drift(reading, scene, noise, gap_s)
-        equations = normal_equations(reading.sums, state, scene.body, noise, drift)
-        solution = solve(equations.normal, equations.right, free)
+        before = _Point(state, drift, reading.sums)
+        now, solution = before.stepped(scene, noise, free)
         if solution.deficiency:
-            return Adjusted(state, drift, weighting, reading, {}, equations, solution, False, iteration)
-        drift_step = equations.knots(solution.step)
-        sums = moved(reading.sums, state, scene.body, drift, solution.step, drift_step)
-        state, drift = state.moved(solution.step), drift.moved(drift_step)
-        known = drift
+            return before.adjusted(scene, noise, free, weighting, reading, {}, False, iteration)
+        state, known = now.state, now.drift
         settled = weighting.robust is not None and _small(solution, *SETTLED)
-        if settled and iteration > 2:
+        if settled and iteration >= LEAST_READINGS:
             break
-        scales = scales_of(reading) if iteration > 1 else weighting.scales
+        known_scales = scales_of(reading) if iteration > 1 else {}  # of the groups that there are
+        scales = {**weighting.scales, **known_scales}
         weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
-    else:
-        settled = False
     poses = of_poses(state.surfaces, np.arange(len(state.surfaces)))
-    shared = {sensor: common(one, poses, noise.white) for sensor, one in sums.items()}
+    shared = {sensor: common(one, poses, noise.white) for sensor, one in now.sums.items()}
     if shared["laser"].sigma < SURE:
         noise = noise.scaled(min(max(shared["laser"].factor, 1 / UNLIKELY), UNLIKELY), 1.0)
+    converged = False
     for _ in range(CLOSING):  # the weights as they are
-        equations = normal_equations(sums, state, scene.body, noise, drift)
-        solution = solve(equations.normal, equations.right, free)
+        now, solution = now.stepped(scene, noise, free)
         converged = settled and _small(solution, *NONE)
         if converged:
             break
-        drift_step = equations.knots(solution.step)
-        sums = moved(sums, state, scene.body, drift, solution.step, drift_step)
-        state, drift = state.moved(solution.step), drift.moved(drift_step)
-    reading = replace(reading, sums=sums)
-    return Adjusted(state, drift, weighting, reading, shared, equations, solution, converged, iteration)
+    return now.adjusted(scene, noise, free, weighting, reading, shared, converged, iteration)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Where the iteration stands: values, and the sums taken there."""
+
+    state: State
+    drift: Drift
+    sums: Mapping[str, EpochSums]
+
+    def stepped(self, scene: Scene, noise: PoseNoise, free: Integers) -> tuple["_Point", Solution]:
+        """After a step of the free unknowns; and their solution, numbered as in ``free``."""
+        equations = normal_equations(self.sums, self.state, scene.body, noise, self.drift, free)
+        solution = solve(equations.normal, equations.right, range(len(free)))
+        step, drift_step = np.zeros(self.state.size), equations.knots(solution.step)
+        step[free] = solution.step
+        sums = moved(self.sums, self.state, scene.body, self.drift, step, drift_step)
+        return _Point(self.state.moved(step), self.drift.moved(drift_step), sums), solution
+
+    def adjusted(
+        self,
+        scene: Scene,
+        noise: PoseNoise,
+        free: Integers,
+        weighting: Weighting,
+        reading: Reading,
+        shared: Mapping[str, Common],
+        converged: bool,
+        iterations: int,
+    ) -> Adjusted:
+        """The end: equations of all unknowns, those held as well."""
+        equations = normal_equations(self.sums, self.state, scene.body, noise, self.drift)
+        solution = solve(equations.normal, equations.right, free.tolist())
+        reading = replace(reading, sums=self.sums)
+        ended = (self.state, self.drift, weighting, reading, shared, equations, solution)
+        return Adjusted(*ended, converged and not solution.deficiency, iterations)
 
 
 def _near(soundings: Stream, scene: Scene) -> State:

@@ -44,12 +44,12 @@ def _words(row: Mapping[Any, Any]) -> str:
     if name == "sound_speed_gradient":
         return f"a sound speed that changes with depth, by {_size(value, sigma, 'm/s')} per metre: take a cast"
     if name.endswith("_range"):
-        return f"a bias of {_size(1e3 * value, 1e3 * sigma, 'mm')} in {whose} ranges"
+        return f"{whose} ranges: they should be {_size(1e3 * value, 1e3 * sigma, 'mm')} longer"
     if name.startswith("laser_rotation"):
         angle = _size(np.degrees(value), np.degrees(sigma), "°")
-        return f"laser.mount: turned by {angle} about body {name[-1]} ({AXES[name[-1]]})"
+        return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]})"
     if name.startswith("laser_lever_arm"):
-        return f"laser.mount: {name[-1]}_m is {_size(1e3 * value, 1e3 * sigma, 'mm')} off"
+        return f"laser.mount: {name[-1]}_m should be {_size(1e3 * value, 1e3 * sigma, 'mm')} more"
     _, family, *what = name.split("_")
     if what[0] == "turn":
         angle = _size(np.degrees(value), np.degrees(sigma), "°")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.solution import WORDS, Solution, solve
+from pipeline.maths.solution import WORDS, Solution, solve, strongest
 from pipeline.maths.unknowns import SIX
 from pipeline.plan_settings import Pass
 from pipeline.planning import Setting, predict
@@ -17,6 +17,7 @@ NEAR_M = 1.5  # passes whose distances differ by less are at one distance
 WANTED_DEG, WANTED_M = 0.025, 0.0025  # larger random sigmas are worth another pass
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
 TWICE = 2  # passes there
+VAGUE = 1.0  # rad or m, of every unknown
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 
 
@@ -40,16 +41,24 @@ class Geometry:
 
 def geometry_of(setting: Setting, seen: Seen, normal: Array, solution: Solution) -> Geometry:
     """``normal`` (u, u): the session's."""
-    bounds = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
-    gaps = _gaps(seen)
-    covariance = solution.covariance[:SIX, :SIX]
-    sigma = np.sqrt(np.diag(covariance))
-    pair = _strongest(covariance) if not solution.deficiency else None
-    weak = bool(solution.deficiency) or bool(np.any(sigma > bounds)) or pair is not None
-    if not (gaps or weak):
+    bounds, gaps = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3), _gaps(seen)
+    sigma = _sigmas(normal, solution)
+    pair = None if solution.deficiency else strongest(solution.covariance[:SIX, :SIX])
+    if pair is not None and abs(pair[2]) <= STRONG:
+        pair = None
+    if not (gaps or pair or np.any(sigma > bounds)):
         return Geometry([], "")
-    target = _worst(sigma, bounds, pair, bool(solution.deficiency))
+    among = range(SIX) if pair is None else pair[:2]
+    target = max(among, key=lambda k: sigma[k] / bounds[k])
     return Geometry(gaps, _remedy(setting, seen, normal, solution, target, bounds, pair))
+
+
+def _sigmas(normal: Array, solution: Solution) -> Array:
+    """Of the six (6,), with :data:`VAGUE` for what is known before any pass: finite where the data leave all open."""
+    prior = np.zeros(len(normal))
+    prior[solution.free] = VAGUE**-2
+    known = solve(normal + np.diag(prior), np.zeros(len(normal)), solution.free.tolist())
+    return np.asarray(np.sqrt(np.diag(known.covariance))[:SIX])
 
 
 def _gaps(seen: Seen) -> list[str]:
@@ -75,23 +84,6 @@ def _gaps(seen: Seen) -> list[str]:
     return found
 
 
-def _strongest(covariance: Array) -> tuple[int, int, float] | None:
-    """The two of the six with the strongest correlation, if that is above :data:`STRONG`."""
-    sigma = np.sqrt(np.diag(covariance))
-    above = np.triu(covariance / np.outer(sigma, sigma), 1)
-    row, column = divmod(int(np.argmax(np.abs(above))), SIX)
-    return (row, column, float(above[row, column])) if abs(above[row, column]) > STRONG else None
-
-
-def _worst(sigma: Array, bounds: Array, pair: tuple[int, int, float] | None, open_: bool) -> int:
-    """Which of the six to bring down: the one that is farthest beyond its bound, of a pair if there is one."""
-    if open_:
-        return int(np.argmax(sigma / bounds))
-    if pair is not None:
-        return max(pair[:2], key=lambda k: sigma[k] / bounds[k])
-    return int(np.argmax(sigma / bounds))
-
-
 def _remedy(
     setting: Setting,
     seen: Seen,
@@ -102,7 +94,7 @@ def _remedy(
     pair: tuple[int, int, float] | None,
 ) -> str:
     """The distance at which two more passes would help most, and by how much; empty if none halves the sigma."""
-    before = np.sqrt(solution.covariance[target, target]) if not solution.deficiency else np.inf
+    before = float(_sigmas(normal, solution)[target])
     best: tuple[float, float, float] | None = None
     for distance in TRIED_M:
         one = Pass(distance_m=distance, speed_m_s=seen.speed_m_s, heading_swing_deg=seen.heading_swing_deg)
@@ -119,7 +111,7 @@ def _remedy(
     )
     if best is None or best[2] > before / 2:
         return apart.removesuffix(": ")
-    was = "open" if not np.isfinite(before) else _sized(before, target)
+    was = "open" if before > VAGUE / 2 else _sized(before, target)
     return (
         f"{apart}two more passes at {best[1]:.0f} m would bring sigma {WORDS[target]} from {was} to "
         f"{_sized(best[2], target)}"

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from pipeline.config import Angle, Length, Lever, Model, NotNegative, Positive
 
-Rate = Annotated[float, Field(gt=0, le=1e6)]
+Rate = Annotated[float, Field(gt=0, le=1e7)]
 
 
 class LaserFigures(Model):

@@ -14,13 +14,12 @@ from pipeline.considered import considered_of
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
-from pipeline.observability import Seen, geometry_of
+from pipeline.observability import VAGUE, Seen, geometry_of
 from pipeline.parsing import parse, read_yaml
 from pipeline.plan_settings import Budget, Pass, Plan
 from pipeline.planning import Predicted, Setting, predict, state_by_design
 
 Array = NDArray[np.float64]
-VAGUE = np.repeat([1.0, 1.0], 3)  # rad, m: what is known of the six before any pass, to compare short lists by
 
 
 @dataclass(frozen=True)
@@ -104,12 +103,11 @@ def _better(
     predicted = [predict(setting, [one], phases=1) for one in candidates]
     usual = config.Verdict()
     bounds = np.repeat([np.radians(usual.max_sigma_deg), usual.max_sigma_m], 3)
+    free = free_unknowns(setting.state)
     vague = np.zeros((setting.state.size, setting.state.size))
-    vague[:SIX, :SIX] = np.diag(VAGUE**-2)
-    vague[setting.state.shared, setting.state.shared] += np.eye(setting.state.shared.stop - setting.state.shared.start)
+    vague[free, free] = VAGUE**-2
 
     def cost(normal: Array) -> float:
-        free = free_unknowns(setting.state)
         covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:SIX, :SIX]
         return float(np.mean(np.diag(covariance) / bounds**2))
 

@@ -165,11 +165,13 @@ def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Confi
     """What the passes lack, and what would cure it."""
     passes = inputs.passes.set_index("pass").loc[sorted({number for sensor, _, number in cells if sensor == "mbes"})]
     rates = inputs.files.groupby("sensor")["rate_hz"].median()
-    plan = Plan(
-        ins_rate_hz=min(max(float(rates["ins"]), 10.0), 1000.0),
-        laser=LaserFigures(point_rate_hz=float(rates["laser"])),
-        mbes=MbesFigures(ping_rate_hz=float(rates["mbes"])),
-        passes=(Pass(distance_m=1.0),),
+    figures = Plan(passes=(Pass(distance_m=1.0),))
+    plan = figures.model_copy(
+        update={
+            "ins_rate_hz": max(10.0, _or(rates["ins"], figures.ins_rate_hz)),
+            "laser": LaserFigures(point_rate_hz=_or(rates["laser"], figures.laser.point_rate_hz)),
+            "mbes": MbesFigures(ping_rate_hz=_or(rates["mbes"], figures.mbes.ping_rate_hz)),
+        }
     )
     setting = Setting(
         target_of(config.target), found.state, plan, config.segment, config.ins, config.laser, config.mbes
@@ -179,12 +181,18 @@ def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Confi
     for (sensor, surface, _), cell in cells.items():
         soundings[families[surface]] += cell.count if sensor == "mbes" else 0
     distances = [float(one) for one in passes["distance_m"] if np.isfinite(one)]
-    speed = float(np.nanmedian(np.abs(passes["speed_m_s"]))) if len(passes) else 0.4
-    swing = float(np.nanmedian(passes["heading_swing_deg"])) * np.sqrt(2) if len(passes) else 0.0
-    seen = Seen(distances, soundings, max(speed, 0.05), min(swing, 45.0))
+    usual = figures.passes[0]
+    speed = _or(passes["speed_m_s"].abs().median(), usual.speed_m_s)
+    swing = _or(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg)  # of a wave: its amplitude
+    seen = Seen(distances, soundings, speed, swing)
     geometry = geometry_of(setting, seen, found.equations.normal, found.solution)
     rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
     return pd.DataFrame(rows, columns=["kind", "words"])
+
+
+def _or(measured: float, otherwise: float) -> float:
+    """What the session had, where it tells; as a plan's figures may have it."""
+    return float(np.clip(measured, 0.05, 1e7)) if np.isfinite(measured) else otherwise
 
 
 def _freed_table(found: Adjusted, considered: Array) -> pd.DataFrame:

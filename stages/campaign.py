@@ -1,6 +1,6 @@
 """Simulated sessions through the stages in memory: for tests and ``make montecarlo``, without any file."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from types import ModuleType
 from typing import Any
@@ -15,9 +15,14 @@ from stages import load
 
 
 def calibrate_in_memory(
-    session: SessionConfig, pool: PoolConfig, raw: Mapping[str, Mapping[str, np.ndarray]], until: str = "report"
+    session: SessionConfig,
+    pool: PoolConfig,
+    raw: Mapping[str, Mapping[str, np.ndarray]],
+    until: str = "report",
+    changed: Callable[[str, Any], Any] = lambda _, value: value,
 ) -> dict[str, Any]:
-    """Every artefact of the stages up to ``until``, by "owner/name"; ``raw``: canonical columns of ins, laser, mbes."""
+    """Every artefact of the stages up to ``until``, by "owner/name"; ``raw``: canonical columns of ins, laser, mbes;
+    ``changed`` gives what the stages that follow get in an artefact's place."""
     found: dict[str, Any] = {}
 
     def given(marker: Any) -> Any:
@@ -32,7 +37,8 @@ def calibrate_in_memory(
         outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
         for name, marker in declared(stage.Outputs).items():
             if isinstance(marker, (Artefact, Document)):
-                found[f"{marker.owner}/{marker.name}"] = getattr(outputs, name)
+                key = f"{marker.owner}/{marker.name}"
+                found[key] = changed(key, getattr(outputs, name))
         if stage.__name__ == f"stages.{until}":
             break
     return found

@@ -92,7 +92,7 @@ def test_a_good_session_has_no_reason():
         ({"bin_": {"by": "distance", "normalised": -3.5}}, "from 20 to 25 m the sonar lies"),
         ({"held": {"value": 6e-4}}, "the sound speed: it is +0.06 ± 0.01 % above the recorded one"),
         ({"held": {"unknown": "mbes_latency", "value": 0.02}}, "the sonar's clock: its latency is +20.0 ± 0.1 ms more"),
-        ({"held": {"unknown": "laser_rotation_y", "value": -0.01}}, "laser.mount: turned by -0.573 ± 0.006° about"),
+        ({"held": {"unknown": "laser_rotation_y", "value": -0.01}}, "it should be turned by -0.573 ± 0.006° about"),
         ({"held": {"unknown": "wet_H_shift", "value": 0.02}}, "that are horizontal stand off by +20.0 ± 0.1 mm"),
         ({"summary": {"converged": False}}, "did not converge in 6 steps"),
         ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),
@@ -196,7 +196,7 @@ def test_of_several_causes_the_most_telling_is_named():
     one, other = ({"unknown": name, "considered": 0.0, "sigma": sigma} for name, sigma in sigmas)
     both = replace(evidence(), freed=pd.DataFrame([one | {"value": 0.01}, other | {"value": 0.002}]))
     (reason,) = judged(both)
-    assert "20 sigma): a bias of +2.0 ± 0.1 mm in the laser's ranges; 1 other" in reason
+    assert "20 sigma): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason
 
 
 def test_each_variable_has_its_own_test():

@@ -84,6 +84,7 @@ class OnSurface:
     state: State
     body: Body
     drift: Drift | None
+    wanted: Integers | None
 
     @property
     def record(self) -> Integers:
@@ -95,26 +96,40 @@ class OnSurface:
         poses = self.body.poses(sums.record, sums.share, self.drift)
         design = of_unknowns(self.state, self.sensor, lever, self.surface, poses, sums.normal.shape[1])
         pose = of_poses(self.state.surfaces, np.array([self.surface]))[0]
-        return Observed(sums, design, self.state.columns(self.sensor, self.surface), pose)
+        columns = self.state.columns(self.sensor, self.surface)
+        if self.wanted is None:
+            return Observed(sums, design, columns, pose)
+        kept = np.isin(columns, self.wanted)
+        return Observed(sums, design[:, :, kept], np.searchsorted(self.wanted, columns[kept]), pose)
 
 
 def by_surface(
-    sums: Mapping[str, EpochSums], state: State, body: Body, drift: Drift | None = None
+    sums: Mapping[str, EpochSums],
+    state: State,
+    body: Body,
+    drift: Drift | None = None,
+    wanted: Integers | None = None,
 ) -> list[OnSurface]:
-    """Each sensor's epochs, surface by surface."""
+    """Each sensor's epochs, surface by surface; ``wanted``: the unknowns (ascending) that they are to speak of."""
     return [
-        OnSurface(sensor, surface, one, np.flatnonzero(one.surface == surface), state, body, drift)
+        OnSurface(sensor, surface, one, np.flatnonzero(one.surface == surface), state, body, drift, wanted)
         for sensor, one in sums.items()
         for surface in range(len(state.surfaces))
     ]
 
 
 def normal_equations(
-    sums: Mapping[str, EpochSums], state: State, body: Body, noise: PoseNoise, drift: Drift
+    sums: Mapping[str, EpochSums],
+    state: State,
+    body: Body,
+    noise: PoseNoise,
+    drift: Drift,
+    wanted: Integers | None = None,
 ) -> Eliminated:
-    """Of all unknowns; ``drift``: that with which v was taken."""
-    sources = by_surface(sums, state, body, drift)
-    reduced = reduce_white(sources, state.size, drift.knots, body.seconds, noise.white)
+    """Of all unknowns, or of those ``wanted`` (ascending); ``drift``: that with which v was taken."""
+    sources = by_surface(sums, state, body, drift, wanted)
+    count = state.size if wanted is None else len(wanted)
+    reduced = reduce_white(sources, count, drift.knots, body.seconds, noise.white)
     return eliminate_drift(reduced, noise, drift)
 
 

@@ -94,13 +94,18 @@ TOGETHER = 0.5  # a weaker correlation is not worth a word
 WORDS = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")
 
 
-def weakest_direction(covariance: Array) -> str:
-    """The two of the six that are hardest to tell apart, in words: the strongest correlation of (6, 6)."""
+def strongest(covariance: Array) -> tuple[int, int, float]:
+    """The two of the six with the strongest correlation in (6, 6), and that correlation."""
     sigma = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(sigma, sigma)
-    above = np.triu(correlation, 1)
+    above = np.triu(covariance / np.outer(sigma, sigma), 1)
     row, column = divmod(int(np.argmax(np.abs(above))), SIX)
-    rho = above[row, column]
+    return row, column, float(above[row, column])
+
+
+def weakest_direction(covariance: Array) -> str:
+    """The two of the six that are hardest to tell apart, in words."""
+    sigma = np.sqrt(np.diag(covariance))
+    row, column, rho = strongest(covariance)
     if abs(rho) < TOGETHER:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))
         return f"no two are hard to tell apart; least sure are {WORDS[worst[0]]} and {WORDS[worst[1]]}"

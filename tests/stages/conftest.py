@@ -47,15 +47,20 @@ def calibrated(
     pool: Mapping[str, Any] | None = None,
     mount: Mapping[str, float] | None = None,
     raw: Mapping[str, Mapping[str, np.ndarray]] | None = None,
+    laser: Mapping[str, float] | None = None,
+    changed: Callable[[str, Any], Any] = lambda _, value: value,
 ) -> dict[str, Any]:
-    """Every artefact; ``pool`` and ``mount`` change the pool's target and the coarse sonar mount."""
+    """Every artefact; ``pool``, ``mount`` and ``laser`` change the pool's target, the coarse sonar mount, and by how
+    much the laser's mount is wrong."""
     settings, design = copy.deepcopy(session.session), copy.deepcopy(session.pool)
     settings["mbes"]["mount"].update(mount or {})
+    for key, value in (laser or {}).items():
+        settings["laser"]["mount"][key] += value
     for key, value in (pool or {}).items():
         design.setdefault(key, {}).update(value) if isinstance(value, dict) else design.update({key: value})
     columns = {"ins": session.ins, "laser": session.laser, "mbes": session.mbes, **(raw or {})}
     return calibrate_in_memory(
-        parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until
+        parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until, changed
     )
 
 

@@ -1,0 +1,94 @@
+"""What a session's geometry cannot tell, through all stages: refused or warned, each with its sentence."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.streams import MemoryPart, Stream
+from tests.stages.conftest import calibrated, made
+
+WAVES = ("surge", "sway", "heave", "roll", "pitch", "heading")
+STILL = {"motion": {name: {"amplitude": 0.0, "period_s": 5.0} for name in WAVES}}
+
+
+def seeing(*families: str) -> Callable[[str, Any], Any]:
+    """The sonar's soundings on these families alone; the table of faces comes before the stream."""
+    family = np.empty(0)
+
+    def changed(key: str, value: Any) -> Any:
+        nonlocal family
+        if key == "segment/faces":
+            family = value["family"].to_numpy()
+        if key != "segment/soundings_labelled":
+            return value
+        parts = []
+        for part in value.parts:
+            rows = np.isin(family[part.columns["face"].astype(int)], families)
+            parts.append(MemoryPart(part.name, {name: column[rows] for name, column in part.columns.items()}))
+        return Stream(tuple(parts))
+
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("scenario", "families", "accepted", "gap"),
+    [
+        ({}, ("P2",), False, "the sonar sees the wall alone"),
+        (STILL, ("P1", "P2", "P3"), False, "the sonar sees no horizontal face"),
+        ({}, ("P1", "P2", "P3"), None, "the sonar sees no horizontal face"),
+        ({}, ("P1", "P2", "H"), None, "the sonar sees nothing of the faces on the +y side (P3)"),
+        ({"track": {"distances_m": [5.0]}}, ("P1", "P2", "P3", "H"), None, "one pass alone has soundings, at 5.0 m"),
+        ({"track": {"distances_m": [6.0, 6.0]}}, ("P1", "P2", "P3", "H"), None, "all passes lie at 6.0 to 6.0 m"),
+    ],
+    ids=["wall alone", "no H, still", "no H, moving", "one side", "one pass", "one distance"],
+)
+def test_gaps(scenario: dict[str, Any], families: tuple[str, ...], accepted: bool | None, gap: str) -> None:
+    """None: whatever the sigmas say, but warned, and with what it comes to."""
+    result = json.loads(calibrated(made(scenario, seed=9), changed=seeing(*families))["report/calibration.json"])
+    if accepted is not None:
+        assert (result["verdict"] == "accepted") == accepted
+    assert gap in result["geometry"]["advice"]
+    assert any(gap in words for words in result["warnings"])
+    if result["mbes"]["sigma_mount_total"] is None:
+        assert any("no result" in reason and gap in reason for reason in result["reasons"])
+    else:
+        assert any("total sigmas are up to" in words for words in result["warnings"])
+        wide = max(result["mbes"]["sigma_total"]["lever_arm_m"]) > 0.005
+        assert not wide or result["verdict"] == "rejected"
+        if families == ("P2",):
+            assert wide
+
+
+def test_without_any_swing_of_the_heading_nothing_is_lacking() -> None:
+    still = {"motion": {"heading": {"amplitude": 0.0, "period_s": 5.0}}}
+    result = json.loads(calibrated(made(still, seed=9))["report/calibration.json"])
+    assert (result["verdict"], result["geometry"]["advice"]) == ("accepted", "")
+
+
+@pytest.mark.parametrize(
+    ("unknown", "scenario", "laser", "value"),
+    [
+        ("mbes_latency", {"mbes": {"latency_s": 0.02}}, {}, 0.02),
+        ("laser_latency", {"laser": {"latency_s": 0.03}}, {}, 0.03),
+        ("sound_speed", {"mbes": {"sound_speed_recorded_m_s": 1504.5}}, {}, 1500 / 1504.5 - 1),
+        ("sound_speed_gradient", {"mbes": {"sound_speed_gradient_1_s": 0.8}}, {}, 0.8),
+        ("laser_rotation_z", {}, {"yaw_deg": 0.2}, -np.radians(0.2)),
+        ("laser_lever_arm_z", {}, {"z_m": 0.05}, -0.05),
+    ],
+)
+def test_what_is_wrong_is_found_by_the_simulators_own_sign(
+    unknown: str, scenario: dict[str, Any], laser: dict[str, float], value: float
+) -> None:
+    """Named first of all causes, and of the size that was put in: within 10 %, for it is first order."""
+    found = calibrated(made(scenario, seed=7), laser=laser)
+    row = found["adjust/freed"].set_index("unknown").loc[unknown]
+    assert abs(row["value"] - value) < 0.1 * abs(value) + 3 * row["sigma"]
+    assert abs(row["value"]) > 10 * row["sigma"]
+    result = json.loads(found["report/calibration.json"])
+    assert result["verdict"] == "rejected"
+    (cause,) = (reason for reason in result["reasons"] if "likely cause" in reason)
+    words = {"mbes_latency": "the sonar's clock", "laser_latency": "the laser's clock", "sound_speed": "sound speed"}
+    assert words.get(unknown, "with depth" if "gradient" in unknown else "laser.mount") in cause
