@@ -17,8 +17,8 @@ apt_install() { # reason, packages...
     else fail "$reason; run: sudo apt-get install -y $*"
     fi
     echo "setup: $reason: installing $*"
-    $as apt-get update -qq </dev/null || true
-    $as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" </dev/null >/dev/null ||
+    $as apt-get -o DPkg::Lock::Timeout=120 update -qq </dev/null || true
+    $as env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 install -y -qq --no-install-recommends "$@" </dev/null >/dev/null ||
         fail "$reason; run: sudo apt-get install -y $*"
 }
 

@@ -9,13 +9,13 @@ command -v pdftotext >/dev/null 2>&1 || packages="$packages poppler-utils"
 ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 || packages="$packages libvulkan1 mesa-vulkan-drivers"
 fc-list :lang=zh family 2>/dev/null | grep -q . || packages="$packages fontconfig fonts-wqy-microhei"
 [ -n "$packages" ] || { echo "setup-visual: everything is there"; exit 0; }
-command="apt-get install -y --no-install-recommends$packages"
+command="apt-get -o DPkg::Lock::Timeout=120 install -y --no-install-recommends$packages"
 command -v apt-get >/dev/null 2>&1 || { echo "setup-visual: install what your system calls:$packages" >&2; exit 2; }
 if [ "$(id -u)" = 0 ]; then as=""
 elif command -v sudo >/dev/null 2>&1 && sudo -n true 2>/dev/null; then as="sudo"
 else echo "setup-visual: run: sudo $command" >&2; exit 2
 fi
 echo "setup-visual: installing$packages"
-$as apt-get update -qq </dev/null || true
+$as apt-get -o DPkg::Lock::Timeout=120 update -qq </dev/null || true
 $as env DEBIAN_FRONTEND=noninteractive $command </dev/null >/dev/null || { echo "setup-visual: run: sudo $command" >&2; exit 2; }
 echo "setup-visual: ready"
