@@ -102,7 +102,8 @@ pictures: $(DEMO)/.simulated ## the README's pictures, anew (after make setup-vi
 
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.montecarlo
-	$(PY) -m tools.mistakes
+	$(PY) -m tools.mistakes --seeds 25
+	$(PY) -m tools.accuracy
 
 clean: ## remove the demo and the tools' caches; results of other runs stay
 	rm -rf runs/demo runs/demo-session runs/demo-session.truth.json

@@ -199,7 +199,7 @@ def find_mount(
     model: TargetModel,
     R_body_from_mbes: Array,
     lever_arm_m: Array,
-    beam_rad: tuple[float, float],
+    mbes: config.Mbes,
     settings: config.Segment,
 ) -> FoundMount:
     """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search
@@ -238,12 +238,10 @@ def find_mount(
 
     def label(parameters: Array, points: Array) -> NDArray[np.int16]:
         R = exp_so3(parameters[:3]) @ R_body_from_mbes
-        beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, beam_rad)
-        wet = points[:, 2] < model.water_level_m - settings.water_margin_m
+        beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, mbes)
+        wet = (-np.inf, model.water_level_m - settings.water_margin_m)
         grazing = np.radians(settings.min_grazing_deg)
-        return np.where(wet, label_points(model, points, beams, WIDE_M, settings.margin_m, grazing).face, -1).astype(
-            np.int16
-        )
+        return label_points(model, points, beams, WIDE_M, settings.margin_m, grazing, heights_m=wet).face
 
     refined = refine(placement, found.parameters, label, normals, distances)
     ambiguous = bool(found.rival_score > found.score * (1 - settings.ambiguity_margin))

@@ -89,7 +89,7 @@ def _look(
     slot_ns: int,
     step: int,
 ) -> tuple[dict[str, Moments], Batch]:
-    seen = scene.observe(sensor, batch, state, drift)
+    seen = scene.observe(sensor, batch, state, drift, weighting)
     robust, _ = weighting.weights(seen)
     plain = seen.sigma_m * np.sqrt(weighting.factor(seen.group))
     size = np.where(robust > 0, np.abs(weighting.normalised(seen)), 0.0)

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from pipeline import config
 from pipeline.adjusting import noise_of
+from pipeline.beams import beams_in_target
 from pipeline.clouds import ClosestSurface
 from pipeline.maths.adjustment import Body, normal_equations
 from pipeline.maths.epochs import EpochSums, epoch_sums, merged
 from pipeline.maths.knots import Drift, knots_of
 from pipeline.maths.labelling import Beams, label_points
 from pipeline.maths.rotations import rotation_from_attitude
-from pipeline.maths.soundings import beam_half_widths
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory
 from pipeline.maths.unknowns import SIX, State, Surface
@@ -227,15 +227,15 @@ def _labelled(
     points = origins[met] + directions * range_m[:, None]
     segment, level = setting.segment, setting.model.water_level_m
     if sensor == "mbes":
-        across, along = np.radians(setting.mbes.beam_deg)
-        widths = beam_half_widths(own, across, along)
-        turned = tuple(trajectory.place(t_ns[met], width @ R.T + lever) - origins[met] for width in widths)
-        beams, right_side = Beams(directions, turned), points[:, 2] < level - segment.water_margin_m
+        _, R_target_from_body = trajectory.poses_at(t_ns[met])
+        beams = beams_in_target(R_target_from_body, R, own, setting.mbes)
+        heights = (-np.inf, level - segment.water_margin_m)
     else:
-        beams, right_side = Beams(directions), points[:, 2] > level + segment.water_margin_m
+        beams, heights = Beams(directions, range_m), (level + segment.water_margin_m, np.inf)
     grazing = float(np.radians(segment.min_grazing_deg))
-    labels = label_points(setting.model, points, beams, segment.gate_m, segment.margin_m, grazing)
-    on = np.flatnonzero((labels.face >= 0) & right_side)
+    margin = segment.margin_m
+    labels = label_points(setting.model, points, beams, segment.gate_m, margin, grazing, heights_m=heights)
+    on = np.flatnonzero(labels.face >= 0)
     columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}
     columns |= {f"{axis}_target_m": points[on, k] for k, axis in enumerate("xyz")}
     return columns | {"t_ns": t_ns[met][on], "face": labels.face[on]}

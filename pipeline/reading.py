@@ -47,7 +47,7 @@ class Reading:
 def _read(
     batch: Batch, scene: Scene, sensor: str, state: State, drift: Drift | None, weighting: Weighting
 ) -> tuple[EpochSums, dict[str, Counts]]:
-    seen = scene.observe(sensor, batch, state, drift)
+    seen = scene.observe(sensor, batch, state, drift, weighting)
     robust, weight = weighting.weights(seen)
     normalised = weighting.normalised(seen)
     surfaces = len(state.surfaces)

@@ -12,7 +12,7 @@ from pipeline.fitted import ALL_PASSES, laser_planes
 from pipeline.maths.adjustment import Body, pull_of
 from pipeline.maths.epochs import MOVING
 from pipeline.maths.knots import Drift
-from pipeline.maths.observations import Sigmas, laser_observations, sensor_part, sonar_observations
+from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.robust import igg3_weights
 from pipeline.maths.unknowns import SIX, State, Surface
 from pipeline.mounts import mount_of
@@ -96,24 +96,27 @@ class Scene:
     laser: config.Laser
     mbes: config.Mbes
 
-    def observe(self, sensor: str, batch: Batch, state: State, drift: Drift | None = None) -> Observations:
-        """The observations of a batch of labelled points; of known drift v is free."""
+    def observe(
+        self, sensor: str, batch: Batch, state: State, drift: Drift | None = None, weighting: Weighting | None = None
+    ) -> Observations:
+        """The observations of a batch of labelled points; of known drift v is free, and of the mean of its noise."""
         record, share = self.body.trajectory.located(batch["t_ns"])
         surface = self.surface_of_face[batch["face"]]
         horizontal = np.array([one.family == "H" for one in state.surfaces])[surface]
         group = np.where(horizontal, 2, 1) if sensor == "mbes" else np.zeros(len(surface), dtype=np.int64)
         see = self._see_laser if sensor == "laser" else self._see_sonar
-        v, sigma, features = np.empty(len(surface)), np.empty(len(surface)), np.empty((FEATURES[sensor], len(surface)))
-        slopes = np.empty((FEATURES[sensor] - 1, len(surface)))
+        v, mean, sigma = np.empty((3, len(surface)))
+        features, slopes = np.empty((FEATURES[sensor], len(surface))), np.empty((FEATURES[sensor] - 1, len(surface)))
         pull, turns = self._pull(sensor, state, drift, record)
         for number in range(len(state.surfaces)):
             rows = np.flatnonzero(surface == number)
             if len(rows):
                 axes = np.vstack([state.surfaces[number].tangents, state.surfaces[number].normal])
                 v[rows], r, found = see(batch, rows, state, number, axes, record[rows], share[rows])
-                v[rows] += pull.of(number, record[rows], found[1])
-                sigma[rows], features[:, rows], slopes[:, rows] = found
+                v[rows] += pull.of(number, record[rows], found.features)
+                mean[rows], sigma[rows], features[:, rows], slopes[:, rows] = found
                 features[1:MOVING, rows] += np.cross(axes @ turns[:, record[rows] - pull.first], r, axis=0)[:2]
+        v -= mean * (weighting or Weighting()).factor(group)
         common = self.white_m * np.sqrt((1 - share) ** 2 + share**2)
         return Observations(record, share, surface, group, v, sigma, common, features, slopes)
 
@@ -131,7 +134,7 @@ class Scene:
 
     def _see_laser(
         self, batch: Batch, rows: Integers, state: State, number: int, axes: Array, record: Integers, share: Array
-    ) -> tuple[Array, Array, tuple[Array, Array, Array]]:
+    ) -> tuple[Array, Array, Seen]:
         """v, r in surface axes, and what the observations' module makes of them."""
         surface, trajectory = state.surfaces[number], self.body.trajectory
         own = xyz(batch, "laser_m", rows)
@@ -149,7 +152,7 @@ class Scene:
 
     def _see_sonar(
         self, batch: Batch, rows: Integers, state: State, number: int, axes: Array, _: Integers, __: Array
-    ) -> tuple[Array, Array, tuple[Array, Array, Array]]:
+    ) -> tuple[Array, Array, Seen]:
         surface = state.surfaces[number]
         points = xyz(batch, "mbes_m", rows).T
         moments, back = np.unique(batch["t_ns"][rows], return_inverse=True)  # beams of a ping share their pose
@@ -161,14 +164,14 @@ class Scene:
         r = np.einsum("kin,in->kn", in_mbes, points) + lever
         v = r[2] + (where @ surface.normal)[back] - surface.distance_m - self.height_of_face[batch["face"][rows]]
         sigmas = Sigmas(self.mbes.range_sigma_m, float(np.radians(self.mbes.angle_sigma_deg)))
-        return v, r, sonar_observations(points, in_mbes, up, r, sigmas)
+        return v, r, sonar_observations(points, in_mbes, up, r, v, sigmas)
 
     # --- to be looked at ---------------------------------------------------------------------------------------------
     def sample(self, sensor: str, batch: Batch, state: State, drift: Drift | None, weighting: Weighting) -> Batch:
         """Where points lie and their residuals, calibrated and coarse, as columns of the table ``residuals``."""
         own = xyz(batch, f"{sensor}_m")
         ranges = np.linalg.norm(own, axis=1)
-        seen = self.observe(sensor, batch, state, drift)
+        seen = self.observe(sensor, batch, state, drift, weighting)
         if sensor == "laser":
             points = coarse_points = xyz(batch, "target_m")
             coarse_residual, angle = seen.v_m, np.arcsin(own[:, 2] / ranges)

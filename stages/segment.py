@@ -81,14 +81,9 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     sample = _sounding_sample(inputs, trajectory)
     coarse = mount_of(config.mbes.mount)
     mount = find_mount(
-        sample, model, coarse.R_body_from_sensor, coarse.lever_arm_body_m, _beam_rad(config), config.segment
+        sample, model, coarse.R_body_from_sensor, coarse.lever_arm_body_m, config.mbes, config.segment
     )
     return Prepared(model, target, mount, trajectory)
-
-
-def _beam_rad(config: Config) -> tuple[float, float]:
-    across, along = np.radians(config.mbes.beam_deg)
-    return float(across), float(along)
 
 
 def _used(inputs: Inputs, source: str) -> float:
@@ -132,12 +127,14 @@ def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     gate, grazing = prepared.target.gate_m, np.radians(segment.min_grazing_deg)
     pool = xyz(batch, "pool_m")
     points = (prepared.target.R_target_from_pool @ (pool - prepared.target.origin_pool_m).T).T
-    dry = points[:, 2] > model.water_level_m + segment.water_margin_m
+    heights = (model.water_level_m + segment.water_margin_m, np.inf)
+    dry = points[:, 2] > model.water_level_m + segment.water_margin_m / 2
     near, planes = near_planes(model, points, gate, dry)
     points, t_ns = points[near], batch["t_ns"][near]
     rays = points - prepared.trajectory.carried(t_ns, mount_of(config.laser.mount).lever_arm_body_m)
-    rays /= np.sqrt(np.sum(rays**2, axis=1, keepdims=True))
-    labels = label_points(model, points, Beams(rays), gate, segment.margin_m, grazing, planes)
+    ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
+    rays /= ranges[:, None]
+    labels = label_points(model, points, Beams(rays, ranges), gate, segment.margin_m, grazing, planes, heights)
     on = np.flatnonzero(labels.face >= 0)
     rows = near[on]
     columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}
@@ -155,12 +152,13 @@ def _label_soundings(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     lever = coarse.lever_arm_body_m + mount.lever_arm_correction_m
     sensor = xyz(batch, "mbes_m")
     points = prepared.trajectory.place(batch["t_ns"], sensor @ R_body_from_mbes.T + lever)
-    wet = points[:, 2] < model.water_level_m - segment.water_margin_m
+    heights = (-np.inf, model.water_level_m - segment.water_margin_m)
+    wet = points[:, 2] < model.water_level_m - segment.water_margin_m / 2
     near, planes = near_planes(model, points, mount.gate_m, wet)
     _, R_target_from_body = prepared.trajectory.poses_at(batch["t_ns"][near])
-    beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[near], _beam_rad(config))
+    beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[near], config.mbes)
     grazing = np.radians(segment.min_grazing_deg)
-    labels = label_points(model, points[near], beams, mount.gate_m, segment.margin_m, grazing, planes)
+    labels = label_points(model, points[near], beams, mount.gate_m, segment.margin_m, grazing, planes, heights)
     on = np.flatnonzero(labels.face >= 0)
     rows = near[on]
     names = ("t_ns", "pass", "ping", "beam", "x_mbes_m", "y_mbes_m", "z_mbes_m")

@@ -81,13 +81,14 @@ def made(
         return np.repeat(np.sort(moment), each)
 
     def met(moment: np.ndarray, face: np.ndarray, rays: np.ndarray, lever: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """Where rays (unit, sensor frame) meet the planes of these faces: points in the sensor's frame, NaN beyond."""
+        """Where rays (unit, sensor frame) meet these faces' planes, in the sensor's frame; NaN: beyond, or grazed."""
         T = place(moment)
         origin = np.array([np.interp(moment, t, column) for column in p.T]).T + T.apply(lever)
         normal = np.array([one[1] for one in FACES])[face]
         distance = np.sum(normal * (np.array([one[2] for one in FACES])[face] - origin), axis=1)
-        ranges = distance / np.sum(normal * T.apply(rays @ R.T), axis=1)
-        return rays * np.where((ranges > 1.5) & (ranges < 14), ranges, np.nan)[:, None]
+        slant = np.sum(normal * T.apply(rays @ R.T), axis=1)
+        ranges = distance / slant
+        return rays * np.where((ranges > 1.5) & (ranges < 14) & (np.abs(slant) > 0.09), ranges, np.nan)[:, None]
 
     moment = moments(40, 250)
     face = np.repeat(rng.choice([0, 1, 2, 4], 250, p=[0.2, 0.5, 0.2, 0.1]), 40)
@@ -106,11 +107,11 @@ def made(
     face = np.repeat(rng.choice([0, 1, 2, 3], 160, p=[0.2, 0.5, 0.2, 0.1]), 30)
     angle = rng.uniform(np.radians(-45), np.radians(40), len(moment))
     rays = np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
-    x = met(moment, face, rays, LEVER_TRUE, R_TRUE)
+    strayed = angle + sensors * np.radians(0.06) * rng.normal(size=len(angle))
+    x = met(moment, face, np.column_stack([np.sin(strayed), 0 * angle, -np.cos(strayed)]), LEVER_TRUE, R_TRUE)
+    x = rays * np.linalg.norm(x, axis=1, keepdims=True)  # recorded at the angle that was meant
     moment, face, x = (values[np.isfinite(x[:, 0])] for values in (moment, face, x))
-    across = np.column_stack([-x[:, 2], np.zeros(len(x)), x[:, 0]])
     x = x + sensors * 0.008 * x / np.linalg.norm(x, axis=1, keepdims=True) * rng.normal(size=(len(x), 1))
-    x = x + sensors * np.radians(0.06) * across * rng.normal(size=(len(x), 1))
     down = -x[:, 2]
     x = x - faster * np.column_stack([2 * x[:, 0], 0 * down, -down + x[:, 0] ** 2 / down])
     mbes = columns(((moment + latency_s) * NS).round().astype(np.int64), face, x, "mbes_m")

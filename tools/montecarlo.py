@@ -3,7 +3,8 @@
 ``make montecarlo`` prints, campaign by campaign, the errors of the adjustment's six values, their mean normalised
 squared error (its expectation is 6 if the covariance is true) with the 99 % band, and how many sessions were
 accepted. Seeds are fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and
-the combination of signs goes through all 64. Results go to runs/montecarlo/ as CSV as well.
+the combination of signs goes through all 64. A row a session goes to runs/montecarlo/, as CSV while it goes on and as
+Parquet in the end; ``tools.accuracy`` makes the README's table and a page of it.
 
     python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2] [--resume]
 """
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about / along body x, y, z
 UNITS = np.array([np.radians(1.0)] * 3 + [1e-3] * 3)  # of errors and sigmas in the tables: degrees, millimetres
 MOVED_DEG, MOVED_MM = 0.05, 2.0
+FOLDER = Path("runs/montecarlo")
 TASKS_OF_A_WORKER = 20  # then a fresh process: hundreds of ray casting scenes in one make it slow and large
 COARSE_DEG, COARSE_M = 2.5, 0.25
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points to leave the sonar's noise in charge
@@ -56,6 +58,9 @@ HALF: dict[str, Any] = {  # half the pings, and passes just long enough
     "mbes": WHITE["mbes"] | {"ping_rate_hz": 10.0},
     "track": {"half_length_m": 3.6},
 }
+
+
+TWELVE: dict[str, Any] = {"distances_m": [3.5, 6.0, 8.5] * 4, "speed_m_s": 0.18, "gap_s": 20.0}  # 50 s each
 
 
 @dataclass(frozen=True)
@@ -98,8 +103,14 @@ CAMPAIGNS = (
     Campaign("finite beams, outliers, echoes", 600, 6000, {"ins": WHITE["ins"]}),
     Campaign("finite beams and INS white noise", 600, 7000, {}),
     Campaign("finite beams and INS drift", 600, 8000, {"ins": DRIFT}),
+    Campaign("twelve passes, INS drift", 64, 9000, {"ins": DRIFT, "track": TWELVE}),
     Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
 )
+
+
+def path_of(campaign: Campaign) -> Path:
+    """Where its rows are kept."""
+    return FOLDER / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.parquet"
 
 
 def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
@@ -237,19 +248,19 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--resume", action="store_true", help="go on where an interrupted campaign of this code ended")
     options = parser.parse_args()
-    folder = Path("runs/montecarlo")
-    folder.mkdir(parents=True, exist_ok=True)
+    FOLDER.mkdir(parents=True, exist_ok=True)
     for campaign in CAMPAIGNS:
         if options.only and not any(campaign.name.startswith(name) for name in options.only):
             continue
         started = time.monotonic()
-        path = folder / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.csv"
+        path = path_of(campaign).with_suffix(".csv")
         done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
         tasks = [(campaign, number) for number in range(done, max(2, round(campaign.sessions * options.share)))]
         with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
             for number, row in enumerate(pool.imap(one, tasks), start=done):  # written as they come: nothing is lost
                 pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
         table = pd.read_csv(path)
+        table.to_parquet(path_of(campaign), index=False)
         words = [report(campaign, table), *([pairs(table)] if campaign.pairs else [])]
         print("\n".join(words), f"\n  ({time.monotonic() - started:.0f} s)\n", flush=True)
 

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 NO_FACE = -1
+LEVEL_M = 1e-6  # rounding, of points on a horizontal face
 
 
 @dataclass(frozen=True)
@@ -29,29 +30,31 @@ class Labels:
 
 @dataclass(frozen=True)
 class Beams:
-    """Rays in the target frame: unit directions (n, 3) and, for finite beams, the half widths' vectors at the range
-    reached, across and along, (n, 3) m each: range · tan(half width) · unit vector normal to the ray."""
+    """Rays in the target frame: unit directions (n, 3), measured ranges (n,) m and, for finite beams, the half widths'
+    vectors across and along, (n, 3) each, for one metre of range: tan(half width) · unit vector normal to the ray; the
+    beam may stray by ``stray`` times the first of them."""
 
     directions: Array
-    half_widths_m: tuple[Array, ...] = ()
+    ranges_m: Array
+    half_widths: tuple[Array, ...] = ()
+    stray: float = 0.0
 
     @classmethod
     def head_on(cls, count: int) -> "Beams":
         """Where rays are unknown (averaged points): every face is taken to be seen from its front."""
-        return cls(np.zeros((count, 3)))
+        return cls(np.zeros((count, 3)), np.zeros(count))
 
-    def rows(self, index: NDArray[np.int64]) -> "Beams":
-        return Beams(self.directions[index], tuple(width[index] for width in self.half_widths_m))
-
-    def spreads(self, normal: Array) -> tuple[Array, ...]:
-        """Half axes of the footprints on a plane, (n, 3) m each.
+    def spreads(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> tuple[Array, ...]:
+        """Half axes of the footprints on a plane that these rays meet at ``reached_m``, (n, 3) m each.
 
         Tilting a ray u by a small angle towards t moves its intersection with the plane by w = h - u (n · h) / (n · u),
         h = range · angle · t: h itself plus what is needed along the ray to come back to the plane (n · w = 0). On a
         face grazed at 10° the axis across the ray is six times longer than the beam is wide.
         """
-        slant = self.directions @ normal
-        return tuple(h - self.directions * ((h @ normal) / slant)[:, None] for h in self.half_widths_m)
+        directions = self.directions[rows]
+        slant, reached = (directions @ normal)[:, None], reached_m[:, None]
+        halves = [width[rows] for width in self.half_widths]
+        return tuple(reached * (h - directions * ((h @ normal)[:, None] / slant)) for h in halves)
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,16 @@ class NearPlane:
     axis: Array
     rows: NDArray[np.int64]
     distance_m: Array
+
+    def met(self, points_m: Array, beams: Beams, sine: float) -> tuple[Array, Array]:
+        """Where the rays of its points meet the plane (m, 3), and at what range (m,); of rays flatter than ``sine`` the
+        feet of the points."""
+        directions = beams.directions[self.rows]
+        slant = directions @ self.axis
+        steep = np.abs(slant) >= max(sine, np.finfo(float).tiny)
+        beyond = np.where(steep, self.distance_m / np.where(steep, slant, 1.0), 0.0)
+        ways = np.where(steep[:, None], beyond[:, None] * directions, self.distance_m[:, None] * self.axis)
+        return points_m[self.rows] - ways, beams.ranges_m[self.rows] - beyond
 
 
 def _planes(model: TargetModel, points_m: Array, reach_m: float, among: Flags | None = None) -> Iterator[NearPlane]:
@@ -112,12 +125,21 @@ def label_points(
     margin_m: float,
     min_grazing_rad: float,
     planes: Iterable[NearPlane] | None = None,
+    heights_m: tuple[float, float] = (-np.inf, np.inf),
 ) -> Labels:
     """Label points (n, 3) in the target frame; ``planes``: from :func:`near_planes`, where they are known already.
 
     A point belongs to a face if it lies within ``gate_m`` of the face's plane, its ray meets the front at no less than
-    ``min_grazing_rad`` and its whole footprint lies within the polygon with ``margin_m`` to spare. Of several faces the
-    nearest plane wins.
+    ``min_grazing_rad`` and its whole footprint, taken where the ray meets the plane, lies within the polygon with
+    ``margin_m`` to spare (or what the beam may stray, where that is more), and between ``heights_m``. Of several faces
+    the nearest plane wins.
+
+    Where the ray meets the plane does not depend on the measured range, nor does the footprint there. Were the point
+    itself taken, a range too long
+    would bring it in at one edge of a grazed face and out at the other, and those that are left would tilt the face:
+    cov(distance from the plane, place) = σ² sin i cos i. (Along the water line alone that was a fifth of the sigma of
+    roll.) The point must lie within the polygon nevertheless, by half the margin, which noise does not cross: a strong
+    echo of a corner stands on the corner wherever its beam points.
     """
     n = len(points_m)
     face_of = np.full(n, NO_FACE, dtype=np.int16)
@@ -126,25 +148,26 @@ def label_points(
     near_plane, seen_flat = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     sine = np.sin(min_grazing_rad) if beams.directions.any() else 0.0
     for plane in _planes(model, points_m, gate_m) if planes is None else planes:
-        z = points_m[plane.rows, 2]
+        met, ranges = plane.met(points_m, beams, sine)
         for number in plane.faces:
             face = model.faces[number]
-            low, high = face.vertices_m[:, 2].min() - gate_m, face.vertices_m[:, 2].max() + gate_m
-            level = np.flatnonzero((z >= low) & (z <= high))
-            rows, away = plane.rows[level], plane.distance_m[level]
-            on_plane = points_m[rows] - away[:, None] * plane.axis
+            low, high = face.vertices_m[:, 2].min() - LEVEL_M, face.vertices_m[:, 2].max() + LEVEL_M
+            level = np.flatnonzero((met[:, 2] >= low) & (met[:, 2] <= high))
+            rows, away, on_plane, reached = plane.rows[level], plane.distance_m[level], met[level], ranges[level]
             clearance = face.clearance(on_plane)
-            inside = clearance >= 0
+            inside = (clearance >= 0) & (on_plane[:, 2] > heights_m[0]) & (on_plane[:, 2] < heights_m[1])
             near_plane[rows[inside]] = True
-            rows, away, on_plane, clearance = rows[inside], away[inside], on_plane[inside], clearance[inside]
+            rows, away, on_plane, reached = rows[inside], away[inside], on_plane[inside], reached[inside]
             cosine = -(beams.directions[rows] @ face.normal)
             steep = cosine >= sine
             seen_flat[rows[~steep]] = True
-            if beams.half_widths_m:
+            steep &= face.clearance(points_m[rows] - away[:, None] * plane.axis) >= margin_m / 2
+            if beams.half_widths:
                 rows, away, on_plane, cosine = rows[steep], away[steep], on_plane[steep], cosine[steep]
-                clear = face.clearance(on_plane, *beams.rows(rows).spreads(face.normal)) >= margin_m
+                spreads = beams.spreads(rows, face.normal, reached[steep])
+                clear = face.clearance(on_plane, *spreads, margin_m=margin_m, stray_m=beams.stray * spreads[0]) >= 0
             else:
-                clear = steep & (clearance >= margin_m)
+                clear = steep & (clearance[inside] >= margin_m)
             better = clear & (np.abs(away) < best[rows])
             rows = rows[better]
             face_of[rows], cosine_of[rows], best[rows] = number, cosine[better], np.abs(away[better])

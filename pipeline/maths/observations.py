@@ -9,14 +9,25 @@ vector and, of the sonar, a = d(r d)/dθ / r the unit vector across the beam, a 
 (along track the sonar does not measure), and that of v is σ² = nᵀ Σ n. The footprint enters through the labels (no edge
 within it) and through the variance factor: on one plane the phase detection takes the beam's axis.
 
-The design is taken at the adjusted point, not at the measured one. Noise along the ray moves the point along the
-surface as well, so v and α, β are correlated, and Σ w α v would be off by σ_ρ² (n · d)(t1 · d) a point (errors in
-variables): where the points of a moment spread over decimetres, that turns the heading by hundredths of a degree. The
-least squares correction of a point is -Σ n e / (nᵀ Σ n) (Gauss-Helmert), e the sensor's part in v, after which no
-feature carries noise that v knows of. The *slopes* given back are by how much each feature changes with e: α and β by
-t_k · Σ n / (nᵀ Σ n), the others by their derivatives along range and angle times those of the correction,
-σ_ρ² (n · d) / σ² and ρ σ_θ² (n · a) / σ². (20 000 soundings at one distance would else find the sound speed wrong by
-0.1 %, at five sigmas.) What e is see :func:`sensor_part`.
+The design is taken at the adjusted point, not at the measured one. Noise moves the point along the surface as well, so
+v and α, β are correlated, and Σ w α v would be off by σ_ρ² (n · d)(t1 · d) a point (errors in variables): where the
+points of a moment spread over decimetres, that turns the heading by hundredths of a degree. The *slopes* given back are
+by how much each feature changes with e, the sensor's part in v (see :func:`sensor_part`); less slope times e it carries
+no noise that v knows of.
+
+* Laser: range and angles are measured, the least squares correction of a point is -Σ n e / (nᵀ Σ n) (Gauss-Helmert):
+  α and β by t_k · Σ n / (nᵀ Σ n).
+* Sonar: the recorded angle is not measured but intended: a beam is formed at it, and its true axis strays (the other
+  model of errors in variables, Berkson's). What is expected of a beam is the point where its *recorded* ray meets the
+  surface; so all of e is taken back along the ray, d e / (n · d). That is also what the labels choose points by; with
+  the other correction points chosen so turn a grazed face by 0.2°. (And 20 000 soundings at one distance, with none,
+  find the sound speed wrong by 0.1 %, at five sigmas.)
+
+Two effects of the sonar's angle are of second order, and yet a fifth of the sigma of roll, for no number of soundings
+averages them away. (1) A stray axis meets the surface further away on average: with t = (n · a) / (n · d) the range of
+an axis off by δ is ρ (1 - t δ + (1/2 + t²) δ²), so that the *mean* is E v = (n · d) ρ σ_θ² (1/2 + t²). (2) ρ in σ must
+not be the measured one: a range too long would get the smaller weight. It is that of the recorded ray to the surface,
+ρ - v / (n · d).
 
 Further features: range b added to every range: n · d. Sonar, sound speed higher by the share k: ranges grow by k, and
 so does sin θ, for the receive beams of a flat array are steered with the recorded speed; with x = ρ (sin θ, 0, -cos θ)
@@ -26,6 +37,7 @@ d(d)/ds = (g / c)(e_z - d_z d), so that the point moves by (g ρ² / 2c)(e_z - 2
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +45,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 SPEED_M_S = 1480.0  # of sound, where only the size of a small effect depends on it
+FLATTEST = 0.05  # n · d: 3°, flatter than any ray that is used, once the mount is nearly right
 STEEPEST = 0.02  # cos θ: flatter beams are not steered by sin θ
 
 
@@ -44,46 +57,46 @@ class Sigmas:
     angle_rad: float
 
 
-def laser_observations(r: Array, lever_arm: Array, range_m: Array, sigmas: Sigmas) -> tuple[Array, Array, Array]:
-    """sigma (n,) m, features (4, n), slopes (3, n) of all but the first; r (3, n) from the body to the point, lever_arm
-    (3, n), in surface axes."""
+class Seen(NamedTuple):
+    """Of n points: mean of v and its sigma (n,) m, features (F, n), slopes (F - 1, n) of all but the first."""
+
+    mean_m: Array
+    sigma_m: Array
+    features: Array
+    slopes: Array
+
+
+def laser_observations(r: Array, lever_arm: Array, range_m: Array, sigmas: Sigmas) -> Seen:
+    """F = 4; r (3, n) from the body to the point, lever_arm (3, n), in surface axes."""
     ray = (r - lever_arm) / range_m
     across = (range_m * sigmas.angle_rad) ** 2
     along = ray[2] * (sigmas.range_m**2 - across)
     variance = along * ray[2] + across
     slopes = np.vstack([along * ray[:2], across / range_m * (1 - ray[2] ** 2)]) / variance
-    return np.sqrt(variance), np.stack([np.ones_like(range_m), r[0], r[1], ray[2]]), slopes
+    features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2]])
+    return Seen(np.zeros_like(range_m), np.sqrt(variance), features, slopes)
 
 
-def sonar_observations(
-    points_m: Array, axes: Array, up: Array, r: Array, sigmas: Sigmas
-) -> tuple[Array, Array, Array]:
-    """sigma (n,) m, features (6, n), slopes (5, n) of all but the first.
-
-    points (3, n), axes (3, 3, n) the surface's t1, t2, n, up (3, n): all in the sonar's frame; r (3, n) from the body,
-    in surface axes; all (k, i, n): axis k, component i.
-    """
+def sonar_observations(points_m: Array, axes: Array, up: Array, r: Array, v_m: Array, sigmas: Sigmas) -> Seen:
+    """F = 6. points (3, n), axes (3, 3, n) the surface's t1, t2, n, up (3, n): all in the sonar's frame; r (3, n) from
+    the body, in surface axes; all (k, i, n): axis k, component i; v (n,) their distances from the surface."""
     x, _, z = points_m
     range_m = np.sqrt(np.einsum("in,in->n", points_m, points_m))
     ray = np.einsum("kin,in->kn", axes, points_m) / range_m
-    side = axes[:, 2] * x - axes[:, 0] * z  # ρ a = (-z, 0, x)
-    along, aside = sigmas.range_m**2 * ray[2], sigmas.angle_rad**2 * side[2]
-    variance = along * ray[2] + aside * side[2]
+    slant = np.minimum(ray[2], -FLATTEST)
+    reached_m = np.clip(range_m - v_m / slant, range_m / 2, 2 * range_m)
+    side = (axes[2, 2] * x - axes[2, 0] * z) / range_m  # n · a, a = (-z, 0, x) / ρ
+    variance = (sigmas.range_m * ray[2]) ** 2 + (reached_m * sigmas.angle_rad * side) ** 2
+    mean = slant * reached_m * sigmas.angle_rad**2 * (0.5 + (side / slant) ** 2)
     down = np.maximum(-z, STEEPEST * range_m)
     steep = x / down  # tan θ
     speed = 2 * axes[2, 0] * x + axes[2, 2] * (z + x * steep)
-    up_of_ray, up_of_side = (up[0] * x + up[2] * z) / range_m, (up[2] * x - up[0] * z) / range_m
+    up_of_ray = (up[0] * x + up[2] * z) / range_m
     up_of_normal = np.einsum("in,in->n", up, axes[2])
-    bend = range_m**2 / (2 * SPEED_M_S)
-    gradient = (up_of_normal - 2 * up_of_ray * ray[2]) * bend
+    gradient = (up_of_normal - 2 * up_of_ray * ray[2]) * range_m**2 / (2 * SPEED_M_S)
     features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2], speed, gradient])
-    # by range (times along) and by angle (times aside, which has the angle's sigma, not the arc's)
-    across = side[2] / range_m
-    speed_by_angle = axes[2, 0] * 2 * down + axes[2, 2] * x * (3 + steep**2)
-    gradient_by_angle = -2 * bend * (up_of_side * ray[2] + up_of_ray * across)
     by_range = np.stack([ray[0], ray[1], np.zeros_like(x), speed / range_m, 2 * gradient / range_m])
-    by_angle = np.stack([side[0], side[1], across, speed_by_angle, gradient_by_angle])
-    return np.sqrt(variance), features, (along * by_range + aside * by_angle) / variance
+    return Seen(mean, np.sqrt(variance), features, by_range / slant)
 
 
 def sensor_part(v_m: Array, weight: Array, epoch: Integers, common_m: Array) -> Array:

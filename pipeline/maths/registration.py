@@ -108,6 +108,7 @@ def settle(
     parameters = start.copy()
     prior = np.diag(0.05**2 / placement.prior_sigmas**2)  # as if one point with 5 cm said the same
     for reach in reaches_m:
+        still = 1e-5 if reach == reaches_m[-1] else reach / 200
         for _ in range(steps):
             points = placement.points(parameters)
             nearest, face = closest(points)
@@ -124,7 +125,7 @@ def settle(
             right = -(rows * weight[:, None]).T @ residual - prior @ parameters
             step = np.linalg.solve(normal, right)
             parameters = parameters + step
-            if np.max(np.abs(step)) < 1e-5:
+            if np.max(np.abs(step)) < still:
                 break
     return parameters
 

@@ -43,11 +43,14 @@ class Face:
         inward /= np.linalg.norm(inward, axis=1, keepdims=True)
         return inward, np.sum(inward * self.vertices_m, axis=1)
 
-    def clearance(self, points_m: Array, *spreads_m: Array) -> Array:
+    def clearance(
+        self, points_m: Array, *spreads_m: Array, margin_m: float = 0.0, stray_m: Array | None = None
+    ) -> Array:
         """Smallest distance (n,) from the polygon's edges, + inside, of points (n, 3) that lie in its plane.
 
         Each spread (n, 3) is a half axis of the footprint in the plane: the point counts with the whole parallelogram
-        point ± spread_1 ± spread_2, so the margin lies along the direction in which the footprint spreads.
+        point ± spread_1 ± spread_2, so the margin lies along the direction in which the footprint spreads. From every
+        edge a margin is kept besides, or what the footprint may stray (n, 3) across it where that is more.
         """
         inward, offsets = self.inward_edges()
         smallest = np.full(len(points_m), np.inf)
@@ -55,6 +58,7 @@ class Face:
             distance = points_m @ normal - offset
             for spread in spreads_m:
                 distance -= np.abs(spread @ normal)
+            distance -= margin_m if stray_m is None else np.maximum(np.abs(stray_m @ normal), margin_m)
             np.minimum(smallest, distance, out=smallest)
         return smallest
 

@@ -3,7 +3,8 @@
 **Sensors**, from the scatter of each epoch's points about a plane of its own. With v fitted by (1, α, β) within an
 epoch, neither pose nor mount nor surface matters: what is left is the sensor's noise alone (pure error, Draper & Smith
 1998, 2.1). Its expectation is f times n - rank, the rank being 3 where the points spread over the surface and 2 where
-they lie on a line, as those of one ping do.
+they lie on a line, as those of one ping do. (But for what the noise moves them aside, and a fit to that direction would
+take the noise away: f came out a third too small.)
 
 **In common**, from the epochs' means m = Σ w v / Σ w. Of an epoch with q̄ = Σ w q / Σ w, K its design of pose errors and
 W the white noise of a record,
@@ -25,7 +26,7 @@ from pipeline.maths.epochs import MOVING, EpochSums
 
 Array = NDArray[np.float64]
 FEWEST = 6  # points of an epoch
-FLAT = 1e-9  # an eigenvalue of the scaled moments below this is none
+FLAT = 1e-5  # an eigenvalue of the scaled moments below this is none: 3 mm aside of a line seen from a metre
 
 
 @dataclass(frozen=True)

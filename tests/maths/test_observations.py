@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.observations import Sigmas, laser_observations, sensor_part, sonar_observations
+from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.planes import tangents_of
 
 NORMAL = np.array([-np.sqrt(0.5), -np.sqrt(0.4), np.sqrt(0.1)])
@@ -20,12 +20,13 @@ def beams(angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     return np.array([ranges * np.sin(angles), np.zeros(len(angles)), -ranges * np.cos(angles)])
 
 
-def seen(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def seen(points: np.ndarray) -> Seen:
+    """Of points on the surface."""
     n = points.shape[1]
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
     r = AXES @ (R_TARGET_FROM_MBES @ points + LEVER[:, None])
-    return sonar_observations(points, in_mbes, up, r, SIGMAS)
+    return sonar_observations(points, in_mbes, up, r, np.zeros(n), SIGMAS)
 
 
 ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0, 4.0, 6.0, 9.0])
@@ -33,7 +34,7 @@ ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0
 
 def test_sonar_sigma_is_the_scatter_of_noisy_beams() -> None:
     rng = np.random.default_rng(1)
-    sigma, _, _ = seen(beams(ANGLES, RANGES))
+    sigma = seen(beams(ANGLES, RANGES)).sigma_m
     many = [
         NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES + 0.002 * rng.normal(size=5), RANGES + 0.02 * rng.normal(size=5))
         for _ in range(20_000)
@@ -49,14 +50,14 @@ def test_laser_sigma_is_the_scatter_of_noisy_rays() -> None:
     noise = 0.02 * rng.normal(size=(40_000, 1)) * ray + 6.0 * 0.002 * rng.normal(size=(40_000, 2)) @ sides
     lever = AXES @ LEVER
     point = (AXES @ (ray * range_m) + lever)[:, None]
-    sigma, q, _ = laser_observations(point, lever[:, None], np.array([range_m]), SIGMAS)
+    _, sigma, q, _ = laser_observations(point, lever[:, None], np.array([range_m]), SIGMAS)
     assert sigma[0] == pytest.approx(np.std(noise @ NORMAL), rel=0.02)
     assert q[3, 0] == pytest.approx(NORMAL @ ray)  # a longer range
 
 
 def test_the_features_are_what_errors_do_to_the_point() -> None:
     """Range and sound speed by moving the measurements: travel time and steering are what was recorded."""
-    _, q, _ = seen(beams(ANGLES, RANGES))
+    _, _, q, _ = seen(beams(ANGLES, RANGES))
     step = 1e-6
     longer = [beams(ANGLES, RANGES + h) for h in (step, -step)]
     faster = [beams(np.arcsin((1 + h) * np.sin(ANGLES)), RANGES * (1 + h)) for h in (step, -step)]
@@ -69,7 +70,7 @@ def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
     """Integrated: dX/dt = c d, dd/dt = -(grad c - d (d · grad c)), c = c0 - g z, for the travel time at c0."""
     c0, g = 1480.0, 0.3
     points = beams(ANGLES, RANGES)
-    _, q, _ = seen(points)
+    _, _, q, _ = seen(points)
     for k in range(5):
         start = R_TARGET_FROM_MBES @ points[:, k]
         ray = start / np.linalg.norm(start)
@@ -84,19 +85,60 @@ def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
     assert np.ptp(np.sign(q[5])) == 2  # both signs were tried
 
 
-def test_slopes_are_the_derivatives_along_the_least_squares_correction() -> None:
-    """The correction -Σ n e / (nᵀ Σ n) of the measured range and angle, applied to them; features taken again."""
+def test_the_sonars_slopes_are_what_a_shift_along_the_recorded_ray_does() -> None:
+    """To the surface: by e / (n · d); features taken again."""
     points = beams(ANGLES, RANGES)
-    _, _, slopes = seen(points)
-    step = 1e-6
-    ahead = np.stack([NORMAL @ R_TARGET_FROM_MBES @ (beams(ANGLES, RANGES + step) - beams(ANGLES, RANGES - step))])
-    turned = NORMAL @ R_TARGET_FROM_MBES @ (beams(ANGLES + step, RANGES) - beams(ANGLES - step, RANGES))
-    by_range, by_angle = ahead[0] / (2 * step), turned / (2 * step)
-    variance = (SIGMAS.range_m * by_range) ** 2 + (SIGMAS.angle_rad * by_angle) ** 2
-    to_range, to_angle = SIGMAS.range_m**2 * by_range / variance, SIGMAS.angle_rad**2 * by_angle / variance
-    e = 1e-4
-    features = [seen(beams(ANGLES + h * e * to_angle, RANGES + h * e * to_range))[1] for h in (1, -1)]
+    _, _, q, slopes = seen(points)
+    e = 1e-5
+    assert np.all(q[3] < -0.1)  # all see the front
+    features = [seen(beams(ANGLES, RANGES + h * e / q[3])).features for h in (1, -1)]
     np.testing.assert_allclose(slopes, (features[0] - features[1])[1:] / (2 * e), rtol=1e-5, atol=1e-7)
+
+
+def test_beams_that_stray_from_their_recorded_angle_do_not_turn_a_grazed_face() -> None:
+    """A floor grazed at 15 to 22 degrees; of beams at fixed angles those are taken whose recorded ray meets it within
+    bounds, whatever their noise: v has no slope along the adjusted points, and has one along the measured ones."""
+    rng = np.random.default_rng(9)
+    n, depth = 400_000, 2.0
+    angles = np.radians(rng.uniform(66.0, 77.0, n))
+    chosen = np.abs(depth * np.tan(angles) - 6.2) < 1.0
+    angles = angles[chosen]
+    ranges = depth / np.cos(angles + 0.002 * rng.normal(size=len(angles))) + 0.01 * rng.normal(size=len(angles))
+    points = beams(angles, ranges)
+    axes = np.repeat(np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])[:, :, None], points.shape[1], axis=2)
+    v = points[2] + depth
+    _, sigma, q, slopes = sonar_observations(points, axes, axes[2], points, v, Sigmas(0.01, 0.002))
+    assert sigma == pytest.approx(np.full(len(v), np.std(v)), rel=0.25)
+
+    def slope(along: np.ndarray) -> float:
+        w = sigma**-2
+        centred = along - w @ along / w.sum()
+        return float((w * centred) @ v / ((w * centred) @ centred) * np.sqrt((w * centred) @ centred))
+
+    assert abs(slope(q[1] - slopes[0] * v)) < 4
+    assert abs(slope(q[1])) > 20
+    side = np.array([np.cos(angles), np.sin(angles)])  # the beam turned: x and z, along t1 and n
+    share = (ranges * 0.002 * side[1]) ** 2 / sigma**2  # of the angle in v
+    least_squares = share * side[0] / side[1] + (1 - share) * slopes[0]
+    assert abs(slope(q[1] - least_squares * v)) > 20  # were the angles measured
+
+
+def test_a_stray_axis_meets_the_surface_further_away_on_average() -> None:
+    """Axes off by one sigma to either side: the mean of v, and the same sigma whatever the range that was measured."""
+    mean, sigma, _, _ = seen(beams(ANGLES, RANGES))
+    found = []
+    for angle in (ANGLES + SIGMAS.angle_rad, ANGLES - SIGMAS.angle_rad):
+        along, strayed = (NORMAL @ R_TARGET_FROM_MBES @ beams(one, np.ones(5)) for one in (ANGLES, angle))
+        found.append(along * RANGES * (along / strayed - 1))
+    np.testing.assert_allclose(mean, np.mean(found, axis=0), rtol=1e-3)
+    assert np.all(mean < 0)
+    points = beams(ANGLES, RANGES + 0.05)
+    n = points.shape[1]
+    in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
+    up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
+    v = 0.05 * NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES, np.ones(5))
+    again = sonar_observations(points, in_mbes, up, AXES @ (R_TARGET_FROM_MBES @ points), v, SIGMAS)
+    np.testing.assert_allclose(again.sigma_m, sigma, rtol=1e-12)
 
 
 @pytest.mark.parametrize("common_m", [0.0, 0.03])
@@ -112,7 +154,7 @@ def test_at_the_adjusted_point_noise_does_not_turn_the_surface(common_m: float) 
     r = true + rays * 0.05 * rng.normal(size=n)[:, None]
     v = r @ NORMAL + 3.0 + common_m * rng.normal(size=n // each)[epoch]
     ranges = np.linalg.norm(r, axis=1)
-    sigma, q, slopes = laser_observations(AXES @ r.T, np.zeros((3, n)), ranges, Sigmas(0.05, 0.0))
+    _, sigma, q, slopes = laser_observations(AXES @ r.T, np.zeros((3, n)), ranges, Sigmas(0.05, 0.0))
     own = sensor_part(v, sigma**-2, epoch, np.full(n, common_m))
     shrink = (common_m**2 / (common_m**2 + sigma**2 / each)).reshape(-1, each)
 

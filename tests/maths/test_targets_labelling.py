@@ -1,5 +1,7 @@
 """The target's faces against coordinates worked out by hand; labels by polygon."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -77,7 +79,7 @@ def beams_from(origin, points, half_width=0.0):
     ranges = np.linalg.norm(rays, axis=1, keepdims=True)
     unit = rays / ranges
     side = np.cross(unit, [0, 1.0, 0])
-    return Beams(unit, (side / np.linalg.norm(side, axis=1, keepdims=True) * ranges * half_width,))
+    return Beams(unit, ranges[:, 0], (side / np.linalg.norm(side, axis=1, keepdims=True) * half_width,))
 
 
 def test_points_are_labelled_by_polygon_gate_and_margin(target):
@@ -121,13 +123,41 @@ def test_a_grazed_face_needs_its_margin_along_the_ray(target):
     assert (wide.face >= 0).tolist() == [True, False]
 
 
+def test_noise_in_the_range_does_not_choose_the_points(target):
+    """Else the edges of a grazed face would cut the noise of one sign off, at its two ends alternately."""
+    random = np.random.default_rng(1)
+    origin = np.array([-5.0, -1.75, -2.9])
+    number = next(k for k, face in enumerate(target.faces) if face.name == "P1-0-top")
+    points = np.column_stack([random.uniform(0, 1, 4000), random.uniform(-2.5, -1.5, 4000), np.full(4000, -3.5)])
+    for half_width, longest_m in ((0.0, 0.014), (np.radians(0.25), 0.05)):
+        beams = beams_from(origin, points, half_width)
+        on_it = label_points(target, points, beams, 0.05, 0.03, np.radians(5)).face == number
+        assert 300 < on_it.sum() < 2500
+        for longer_m in (-longest_m, -longest_m / 3, longest_m / 3, longest_m):
+            noisy = points + longer_m * beams.directions
+            longer = replace(beams, ranges_m=beams.ranges_m + longer_m)
+            again = label_points(target, noisy, longer, 0.05, 0.03, np.radians(5)).face == number
+            np.testing.assert_array_equal(again, on_it, err_msg=str((half_width, longer_m)))
+
+
+def test_an_echo_that_stands_on_the_corner_is_not_taken_wherever_its_beam_points(target):
+    origin = np.array([-5.0, -1.75, -2.9])
+    corner = np.array([1.0, -1.5, -3.5])  # of the lowest southern block's top
+    ray = np.array([[0.85, -1.7, -3.5]]) - origin  # the beam's axis meets the top well inside
+    reach = np.linalg.norm(corner - origin) / np.linalg.norm(ray)
+    assert label_points(target, origin + ray, beams_from(origin, origin + ray), 0.05, 0.03, np.radians(5)).face[0] >= 0
+    echo = origin + reach * ray
+    assert abs(echo[0, 2] + 3.5) < 0.05  # within the gate, and behind the margin
+    assert label_points(target, echo, beams_from(origin, echo), 0.05, 0.03, np.radians(5)).face[0] == -1
+
+
 @pytest.mark.parametrize("e", [0.5, 0.4, 0.3])
 def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
     """-a/2 + e and -a/2 + 2e - e differ in the last bit for e = 0.4: neither side's faces may be lost by that."""
     model = build_target(a=12 * e, b=3.0, c=1.0, e=e)
     for number, face in enumerate(model.faces):
         middle = face.vertices_m.mean(axis=0)[None, :]
-        ahead = Beams(-face.normal[None, :])  # a ray from straight in front
+        ahead = Beams(-face.normal[None, :], np.ones(1))  # a ray from straight in front
         assert label_points(model, middle, ahead, 0.05, 0.01, 0.1).face[0] == number, face.name
 
 

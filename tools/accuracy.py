@@ -1,0 +1,205 @@
+"""What the campaigns say: errors against the bound, in a table, on a page with plots.
+
+Reads runs/montecarlo/*.parquet as ``tools.montecarlo`` and ``tools.mistakes`` leave them, computes the Cramér-Rao bound
+of each kind of noise (``tools.bound``), prints the README's table and writes runs/montecarlo/accuracy.html.
+
+    python -m tools.accuracy [--bounds 24] [--jobs 2]
+"""
+
+import argparse
+import html
+import io
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
+
+from pipeline.parsing import parse
+from pipeline.simulation.scenario import Scenario
+from tools.bound import bound
+from tools.montecarlo import CAMPAIGNS, FOLDER, NAMES, UNITS, Campaign, path_of, scenario_of
+
+Array = NDArray[np.float64]
+BOUNDED = ("finite beams, outliers", "finite beams and INS", "twelve passes")
+LEVEL = 0.95
+PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>poolcal: accuracy</title>
+<style>body{{font:16px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem}}
+table{{border-collapse:collapse}}td,th{{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}}
+td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>
+<h1>Accuracy on simulated sessions</h1>{body}</html>
+"""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A campaign's errors (n, 6) and random sigmas (n, 6), in degrees and millimetres, and the bound's sigmas (6,)."""
+
+    campaign: Campaign
+    errors: Array
+    sigmas: Array
+    nse: Array
+    accepted: int
+    bound: Array
+
+    @property
+    def count(self) -> int:
+        return len(self.errors)
+
+    @property
+    def rms(self) -> Array:
+        return np.asarray(np.sqrt(np.mean(self.errors**2, axis=0)))
+
+    @property
+    def ratio(self) -> Array:
+        """RMS error ÷ bound."""
+        return self.rms / self.bound
+
+    @property
+    def ratio_below(self) -> Array:
+        """Its upper confidence limit: n RMS² / σ² is chi-squared with n degrees of freedom."""
+        return self.ratio * float(np.sqrt(self.count / chi2.ppf(1 - LEVEL, self.count)))
+
+    @property
+    def covered(self) -> Array:
+        """Share of sessions whose 95 % interval holds the truth."""
+        return np.asarray(np.mean(np.abs(self.errors) <= norm.ppf(0.975) * self.sigmas, axis=0))
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """99 % band of the mean normalised squared error."""
+        low, high = chi2.ppf([0.005, 0.995], len(NAMES) * self.count) / self.count
+        return float(low), float(high)
+
+    def rows(self) -> list[list[str]]:
+        """The table's lines: what, and the six."""
+        figures = [4, 4, 4, 3, 3, 3]
+
+        def line(name: str, values: Array, sign: str = "") -> list[str]:
+            return [name, *(f"{value:{sign}.{digits}f}" for value, digits in zip(values, figures, strict=True))]
+
+        spread = self.rms / np.sqrt(self.count)
+        mean = np.mean(self.errors, axis=0)
+        low, high = self.band
+        head = f"**{self.campaign.name}**: {self.count} sessions, {self.accepted} accepted, mean NSE "
+        head += f"{self.nse.mean():.2f} ({low:.2f}–{high:.2f})"
+        both = zip(self.ratio, self.ratio_below, strict=True)
+        return [
+            [head, *[""] * len(NAMES)],
+            line("mean error", mean, "+"),
+            ["the same in its own sigmas", *(f"{value:+.1f}" for value in mean / spread)],
+            line("RMS error", self.rms),
+            line("mean sigma", np.sqrt(np.mean(self.sigmas**2, axis=0))),
+            line("Cramér–Rao bound", self.bound),
+            ["RMS ÷ bound (95 % below)", *(f"{value:.2f} ({below:.2f})" for value, below in both)],
+            ["truth within the 95 % interval", *(f"{100 * value:.1f} %" for value in self.covered)],
+        ]
+
+
+def results(bounds: int, jobs: int) -> list[Result]:
+    found = []
+    with get_context("spawn").Pool(jobs) as pool:
+        for campaign in CAMPAIGNS:
+            if not campaign.name.startswith(BOUNDED) or not path_of(campaign).is_file():
+                continue
+            table = pd.read_parquet(path_of(campaign))
+            tasks = [(campaign, number) for number in range(min(bounds, len(table)))]
+            covariance = np.mean(pool.starmap(_bound, tasks), axis=0)
+            errors, sigmas = (table[[f"{what}_{name}" for name in NAMES]].to_numpy() for what in ("error", "sigma"))
+            of_bound = np.sqrt(np.diag(covariance)) / UNITS
+            accepted = int(table["accepted"].sum())
+            found.append(Result(campaign, errors, sigmas, table["nse"].to_numpy(), accepted, of_bound))
+    return found
+
+
+def _bound(campaign: Campaign, number: int) -> Array:
+    scenario = parse(Scenario, scenario_of(campaign, number), campaign.name)
+    return bound(scenario, campaign.first_seed + number)
+
+
+def markdown(found: list[Result]) -> str:
+    lines = ["| | pitch ° | roll ° | yaw ° | x mm | y mm | z mm |", "|---|---:|---:|---:|---:|---:|---:|"]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for one in found for row in one.rows()])
+
+
+def plots(one: Result) -> str:
+    """Normalised errors of the six against the normal distribution, and the NSE against chi-squared: as SVG."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 7, figsize=(15, 2.4), layout="constrained")
+    x = np.linspace(-4, 4, 161)
+    for k, name in enumerate(NAMES):
+        axes[k].hist(one.errors[:, k] / one.sigmas[:, k], bins=np.arange(-4, 4.1, 0.5), density=True, color="#8fb8de")
+        axes[k].plot(x, norm.pdf(x), color="#333")
+        axes[k].set(title=name, xlabel="error ÷ sigma", yticks=[])
+    squares = np.linspace(0, 30, 151)
+    axes[6].hist(np.minimum(one.nse, 30), bins=np.arange(0, 31, 2), density=True, color="#e3b778")
+    axes[6].plot(squares, chi2.pdf(squares, 6), color="#333")
+    axes[6].set(title="all six", xlabel="normalised squared error", yticks=[])
+    return _svg(figure)
+
+
+def mistakes_plot(table: pd.DataFrame) -> str:
+    """Largest error in total sigmas of each session, by mistake: what was accepted, what was not."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    import matplotlib.pyplot as plt
+
+    names = list(dict.fromkeys(table["mistake"]))
+    figure, axis = plt.subplots(figsize=(11, 0.28 * len(names) + 1), layout="constrained")
+    for accepted, colour, word in ((False, "#b8b8b8", "rejected"), (True, "#1f6fb2", "accepted")):
+        rows = table[(table["accepted"] == accepted) & table["sigmas"].notna()]
+        spread = 0.15 * np.sin(np.arange(len(rows)))
+        height = rows["mistake"].map(names.index).to_numpy(dtype=float) + spread
+        axis.scatter(np.clip(rows["sigmas"], 0.05, 100), height, s=9, color=colour, label=word)
+    axis.axvline(5, color="#c33", linewidth=1)
+    axis.set(xscale="log", xlabel="largest error of the six, in total sigmas", yticks=range(len(names)))
+    axis.set_yticklabels(names)
+    axis.invert_yaxis()
+    axis.legend(loc="lower right")
+    return _svg(figure)
+
+
+def _svg(figure: object) -> str:
+    import matplotlib.pyplot as plt
+
+    plt.rcParams["svg.hashsalt"] = "poolcal"
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})  # type: ignore[attr-defined]
+    plt.close("all")
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def page(found: list[Result], mistakes: pd.DataFrame | None) -> str:
+    parts = []
+    for one in found:
+        head, *rows = one.rows()
+        names = "".join(f"<th>{name} {'°' if k < 3 else 'mm'}</th>" for k, name in enumerate(NAMES))
+        body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+        title = html.escape(head[0].replace("**", ""))
+        parts.append(f"<h2>{title}</h2><table><tr><th></th>{names}</tr>{body}</table>{plots(one)}")
+    if mistakes is not None:
+        parts.append(f"<h2>What mistakes do: {len(mistakes)} sessions</h2>{mistakes_plot(mistakes)}")
+    return PAGE.format(body="".join(parts))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bounds", type=int, default=24, help="sessions over which the bound is averaged")
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    found = results(options.bounds, options.jobs)
+    path = FOLDER / "mistakes.parquet"
+    Path(FOLDER, "accuracy.html").write_text(page(found, pd.read_parquet(path) if path.is_file() else None), "utf-8")
+    print(markdown(found))
+
+
+if __name__ == "__main__":
+    main()
