@@ -38,8 +38,9 @@ class Origin(Model):
 
 
 class AsBuilt(Model):
-    """How far the wet faces of a family may stand off from where the dry ones and the design put them."""
+    """The target as surveyed: faces off their design, and how far the wet ones of a family may stand off besides."""
 
+    faces: dict[str, Annotated[float, Field(ge=-0.05, le=0.05)]] = {}  # m outward of the design, by name: P1-0-top
     offset_sigma_m: NotNegative = 0.001
     angle_sigma_deg: NotNegative = 0.005
 

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from pipeline import config, manifest
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.files import remove, write_text, writing
+from pipeline.mounts import target_of
 from pipeline.parsing import parse, read_yaml
 
 RUN_YAML = "run.yaml"
@@ -51,7 +52,17 @@ class Settings:
 def load_settings(session_folder: Path, config_path: Path) -> Settings:
     """Both YAML files, read and checked."""
     pool = config.load_pool(config_path)
+    refuse_faces(pool, config_path)
     return Settings(session_folder.resolve(), pool, config.load_session(session_folder))
+
+
+def refuse_faces(pool: config.PoolConfig, path: Path) -> None:
+    """Faces as built are faces of the target."""
+    names = [face.name for face in target_of(pool.target).faces]
+    for name in pool.as_built.faces:
+        if name not in names:
+            known = ", ".join(names)
+            raise ConfigError(f"{path}: as_built.faces: {name!r}: no face of this target; its faces are {known}")
 
 
 def refuse_folders(run: Path, session_folder: Path) -> None:

@@ -215,8 +215,10 @@ def scene_of(
     ins: config.Ins,
     laser: config.Laser,
     mbes: config.Mbes,
+    as_built: Mapping[str, float],
 ) -> Scene:
-    """Coarse mount, and the laser's planes as surfaces; the horizontal faces level at their design heights."""
+    """Coarse mount, and the laser's planes as surfaces; the horizontal faces level at their design heights; faces
+    ``as_built`` off their surface by so much outward (m)."""
     mount, found = mount_of(mbes.mount), laser_planes(planes)
     surfaces = []
     for family in ("P1", "P2", "P3"):
@@ -233,7 +235,9 @@ def scene_of(
     centre = np.array([corners[:, 0].mean(), 0.0, 0.0])
     surfaces.append(Surface.at("H", np.array([0.0, 0.0, 1.0]), centre, 0.0))
     number = {surface.family: k for k, surface in enumerate(surfaces)}
-    heights = np.where(faces["family"] == "H", faces["distance_m"] * faces["normal_z_target_1"], 0.0)
+    outward = np.where(faces["family"] == "H", faces["normal_z_target_1"], 1.0)  # as H's surface looks up
+    heights = np.where(faces["family"] == "H", faces["distance_m"] * outward, 0.0)
+    heights = heights + outward * np.array([as_built.get(name, 0.0) for name in faces["name"]])
     return Scene(
         Body.of(trajectory_in_target(poses, target_pose), mount_of(laser.mount).lever_arm_body_m),
         np.array([number[family] for family in faces["family"]]),

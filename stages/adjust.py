@@ -72,7 +72,7 @@ class Outputs:
 def run(inputs: Inputs, config: Config) -> Outputs:
     settings = config.adjust
     given = (inputs.faces, inputs.poses, inputs.target_pose, inputs.planes)
-    scene = scene_of(*given, config.ins, config.laser, config.mbes)
+    scene = scene_of(*given, config.ins, config.laser, config.mbes, config.as_built.faces)
     streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
     found = adjust(streams, scene, noise_of(config.ins), settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)

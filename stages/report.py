@@ -11,6 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from pipeline import artefacts, config
+from pipeline.built import as_found, oddities
 from pipeline.closing import closing_table
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
@@ -25,6 +26,7 @@ SCHEMA = 1
 @dataclass(frozen=True)
 class Config:
     name: str
+    target: config.Target
     mbes: config.Mbes
     adjust: config.Adjust
     verdict: config.Verdict
@@ -43,6 +45,7 @@ class Inputs:
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
     geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
+    surfaces: Annotated[pd.DataFrame, artefacts.SURFACES]
     freed: Annotated[pd.DataFrame, artefacts.FREED]
     patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
@@ -84,7 +87,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.patterns,
     )
     found = reasons(evidence, methods, config.verdict, config.adjust.test_level, config.result)
-    summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0])
+    built = as_found(inputs.surfaces, inputs.patterns, inputs.faces, config.target.e)
+    summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0]) | {"as_found": built}
     result = {
         "schema": SCHEMA,
         "session": config.name,
@@ -92,7 +96,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "reasons": found,
         "warnings": warnings(
             inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
-        ),
+        )
+        + oddities(built, config.target),
         "result": config.result,
         "mbes": methods[config.result],
         "methods": methods,

@@ -2,8 +2,9 @@
 
 ``make bench`` prints, for each size, in one run on this machine: seconds and peak memory of each stage, the whole run
 against bare decoding of the same files (laspy, the INS and BTH0 readers, one after another in one process), the whole
-run with report and recordings (memory: of all its processes together), georeferencing in million points a second, and
-the seconds of a second run, which finds nothing to do. Figures are medians of ``--repeats``; machines differ and are
+run with report and recordings (memory: of all its processes together), georeferencing in million points a second, the
+adjustment's reading of all labelled points into its sums, by one process (observations a second, peak memory), and the
+seconds of a second run, which finds nothing to do. Figures are medians of ``--repeats``; machines differ and are
 busy: trust the ratios.
 
     python -m tools.bench [--sizes small medium large] [--repeats 3] [--jobs 2]
@@ -55,6 +56,27 @@ for sensor, settings in (("ins", session.ins), ("mbes", session.mbes)):
         for chunk in part.chunks():
             pass
 print(time.perf_counter() - start, points)
+"""
+
+ACCUMULATE = """
+import resource, sys, time
+from pathlib import Path
+from pipeline import artefacts
+from pipeline.folder import read_settings
+from pipeline.reading import read
+from pipeline.scene import Weighting, scene_of
+from pipeline.tables import Tables
+run = Path(sys.argv[1]); tables, settings = Tables(run), read_settings(run)
+given = (tables.table(one) for one in (artefacts.FACES, artefacts.POSES, artefacts.TARGET_POSE, artefacts.PLANES))
+session = settings.session
+scene = scene_of(*given, session.ins, session.laser, session.mbes, settings.pool.as_built.faces)
+streams = {"laser": tables.stream(artefacts.LASER_LABELLED), "mbes": tables.stream(artefacts.SOUNDINGS_LABELLED)}
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+start = time.perf_counter()
+reading = read(streams, scene, scene.coarse, None, Weighting(robust=(3.0, 6.0)))
+spent = time.perf_counter() - start
+after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(spent, sum(one.count for one in reading.counts.values()), (after - before) / 1024)
 """
 
 
@@ -128,6 +150,9 @@ def bench(size: str, repeats: int, jobs: int) -> dict[str, float]:
         found["run_s"], found["run_mib"], _ = measured([*whole, *common])
         found["drawing_share"] = found["drawn_s"] / found["run_s"] - 1
         found["again_s"], _, _ = measured([*whole, *common])
+        _, _, text = measured([sys.executable, "-c", ACCUMULATE, str(run)])
+        seconds, found["observations"], found["reading_mib"] = (float(word) for word in text.split())
+        found["reading_rate"] = found["observations"] / seconds
         for stage in STAGES:
             found[f"{stage}_s"] = json.loads((run / stage / "manifest.json").read_text())["wall_s"]
             shutil.rmtree(run / stage)
@@ -153,6 +178,9 @@ def table(results: dict[str, dict[str, float]]) -> str:
     row("bare decoding, s", [f"{v['decode_s']:.1f}" for v in values])
     row("whole run ÷ bare decoding", [f"{v['run_s'] / v['decode_s']:.2f}" for v in values])
     row("georeferencing, million points a second", [f"{v['points'] / v['georeference_s'] / 1e6:.1f}" for v in values])
+    row("observations on the target, million", [f"{v['observations'] / 1e6:.2f}" for v in values])
+    row("reading them, one process: million a second", [f"{v['reading_rate'] / 1e6:.1f}" for v in values])
+    row("the same: memory it adds, MiB", [f"{v['reading_mib']:.0f}" for v in values])
     row("second run, nothing to do, s", [f"{v['again_s']:.1f}" for v in values])
     return "\n".join(lines)
 

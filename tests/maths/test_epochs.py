@@ -62,9 +62,10 @@ def test_sums_moved_are_those_of_moved_observations() -> None:
         np.testing.assert_allclose(getattr(moved, name), getattr(again, name), rtol=1e-9, atol=1e-10)
 
 
-@pytest.mark.parametrize("on_a_line", [False, True])
-def test_the_scatter_is_the_sensors_noise_alone(on_a_line: bool) -> None:
-    """Whatever shift and turn each epoch has; points of a ping lie on a line, which takes but two freedoms."""
+@pytest.mark.parametrize(("on_a_line", "aside"), [(False, 0.0), (True, 0.0), (True, 2e-4)])
+def test_the_scatter_is_the_sensors_noise_alone(on_a_line: bool, aside: float) -> None:
+    """Whatever shift and turn each epoch has; points of a ping lie on a line, which takes but two freedoms, also where
+    noise itself has moved them a little aside."""
     rng = np.random.default_rng(11)
     epochs, each, factor = 400, 12, 2.25
     record = np.repeat(np.arange(epochs), each)
@@ -74,7 +75,9 @@ def test_the_scatter_is_the_sensors_noise_alone(on_a_line: bool) -> None:
     q = np.vstack([np.ones(n), alpha, beta])
     sigma = rng.uniform(0.5, 2.0, n)
     turns = rng.normal(size=(epochs, 3))
-    v = np.einsum("ni,in->n", turns[record], q) + np.sqrt(factor) * sigma * rng.normal(size=n)
+    noise = np.sqrt(factor) * sigma * rng.normal(size=n)
+    v = np.einsum("ni,in->n", turns[record], q) + noise
+    q[2] += aside * noise
     sums = epoch_sums(record, rng.uniform(size=n), np.zeros(n, dtype=int), 1, q, sigma**-2, v)
     found = scatter(sums, np.ones(len(sums), dtype=bool))
     assert found.free == epochs * (each - (2 if on_a_line else 3))

@@ -1,0 +1,67 @@
+"""Faces off their design, as surveyed; and the target as the laser finds it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.errors import ConfigError
+from pipeline.folder import load_settings
+from tests.stages.conftest import QUIET, calibrated, made
+
+
+def result(found):
+    return json.loads(found["report/calibration.json"])
+
+
+def test_tops_and_bottoms_that_are_built_too_high_lift_the_sonar(noisy):
+    faces = calibrated(noisy, until="segment")["segment/faces"]
+    wet = faces[(faces["family"] == "H") & (faces["distance_m"] * faces["normal_z_target_1"] < 0)]
+    higher = {row.name: 0.005 * row.normal_z_target_1 for row in wet.itertuples(index=False)}
+    plain, lifted = (
+        result(calibrated(noisy, pool={"as_built": {"faces": one}}))["methods"]["adjustment"]["lever_arm_m"]
+        for one in ({}, higher)
+    )
+    np.testing.assert_allclose(np.subtract(lifted, plain), [0, 0, 0.005], atol=2e-4)
+
+
+@pytest.mark.parametrize("name", ["P1-6", "P3-6", "P1-4-top"])
+def test_a_face_said_to_stand_out_is_seen_too_far_in(quiet, name):
+    found = calibrated(quiet, pool={"as_built": {"faces": {name: 0.004}}})
+    number = int(found["segment/faces"].set_index("name").loc[name, "face"])
+    rows = found["adjust/patterns"]
+    rows = rows[(rows["by"] == "face") & (rows["sensor"] == "laser") & (rows["family"] == name.split("-")[0])]
+    if name.endswith("top"):
+        rows = found["adjust/patterns"].query("by == 'face' and sensor == 'laser' and family == 'H'")
+    off = rows.set_index("low")["mean_m"]
+    others = off.drop(number).median()
+    assert off[number] - others == pytest.approx(-0.004, abs=0.0012)
+
+
+def test_an_unknown_face_is_refused(tmp_path, quiet):
+    import yaml
+
+    pool = dict(quiet.pool) | {"as_built": {"faces": {"P9-0": 0.001}}}
+    path = tmp_path / "pool.yaml"
+    path.write_text(yaml.safe_dump(pool))
+    with pytest.raises(ConfigError, match=r"as_built.faces: 'P9-0': no face of this target; its faces are .*P1-0-top"):
+        load_settings(tmp_path, path)
+
+
+def test_the_target_is_measured_and_what_differs_is_said():
+    session = made(QUIET, seed=6)
+    right = result(calibrated(session))
+    found = right["target"]["as_found"]
+    assert found["b_m"] == pytest.approx(3.0, abs=1e-4)
+    assert found["e_m"] == pytest.approx(0.5, abs=1e-4)
+    assert found["corner_deg"] == pytest.approx({"P1": 45.0, "P3": 45.0}, abs=1e-3)
+    assert not [words for words in right["warnings"] if "laser finds" in words]
+    wrong = result(calibrated(session, pool={"target": {"b": 3.02}}))
+    assert any("the laser finds b = 3.0000 m where target.b says 3.02 m" in words for words in wrong["warnings"])
+
+
+def test_a_leaning_target_is_said():
+    leaning = result(calibrated(made(QUIET, {"surroundings": {"tilt_deg": [0.0, 0.3]}}, seed=6)))
+    lean = leaning["target"]["as_found"]["lean_deg"]
+    assert abs(lean["P2"]) == pytest.approx(0.3, abs=0.01)
+    assert any("out of plumb" in words for words in leaning["warnings"])
