@@ -57,14 +57,15 @@ class Weighting:
 @dataclass(frozen=True)
 class Observations:
     """Of a batch (n,): the record of the INS before each, the share of the step to the next, surface, group of
-    observations, v (m), its sigma (m), what its epoch shares of the INS's white noise (m), features (F, n) and slopes
-    (F - 1, n) of :mod:`pipeline.maths.observations`."""
+    observations, v (m) less the mean of its noise, that mean (m), sigma (m), what its epoch shares of the INS's white
+    noise (m), features (F, n) and slopes (F - 1, n) of :mod:`pipeline.maths.observations`."""
 
     record: Integers
     share: Array
     surface: Integers
     group: Integers
     v_m: Array
+    mean_m: Array
     sigma_m: Array
     common_m: Array
     features: Array
@@ -116,9 +117,9 @@ class Scene:
                 v[rows] += pull.of(number, record[rows], found.features)
                 mean[rows], sigma[rows], features[:, rows], slopes[:, rows] = found
                 features[1:MOVING, rows] += np.cross(axes @ turns[:, record[rows] - pull.first], r, axis=0)[:2]
-        v -= mean * (weighting or Weighting()).factor(group)
+        mean *= (weighting or Weighting()).factor(group)
         common = self.white_m * np.sqrt((1 - share) ** 2 + share**2)
-        return Observations(record, share, surface, group, v, sigma, common, features, slopes)
+        return Observations(record, share, surface, group, v - mean, mean, sigma, common, features, slopes)
 
     def _pull(
         self, sensor: str, state: State, drift: Drift | None, record: Integers
@@ -178,10 +179,11 @@ class Scene:
         else:
             coarse = replace(self.coarse, surfaces=state.surfaces)
             points, coarse_points = self._placed(batch, state), self._placed(batch, coarse)
-            coarse_residual, angle = self.observe(sensor, batch, coarse).v_m, np.arctan2(own[:, 0], -own[:, 2])
+            before, angle = self.observe(sensor, batch, coarse), np.arctan2(own[:, 0], -own[:, 2])
+            coarse_residual = before.v_m + before.mean_m
         columns = {f"{axis}_target_m": points[:, k] for k, axis in enumerate("xyz")}
         columns |= {f"coarse_{axis}_target_m": coarse_points[:, k] for k, axis in enumerate("xyz")}
-        columns |= {"range_m": ranges, "angle_deg": np.degrees(angle), "residual_m": seen.v_m}
+        columns |= {"range_m": ranges, "angle_deg": np.degrees(angle), "residual_m": seen.v_m + seen.mean_m}
         weight = weighting.weights(seen)[0]
         columns |= {"coarse_residual_m": coarse_residual, "weight": weight}
         single = {name: values.astype(np.float32) for name, values in columns.items()}

@@ -35,7 +35,7 @@ def _at(content: Any, path: tuple[str, ...]) -> Any:
 
 
 def _names(content: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    if not isinstance(content, dict):
+    if not isinstance(content, dict) or not content:
         yield path
         return
     for name, value in content.items():

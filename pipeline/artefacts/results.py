@@ -75,6 +75,8 @@ CELLS = Artefact(
         Column("sigma_mean_m", F64, "m", "standard deviation of the mean from the scatter of its moments"),
         Column("normalised", F64, "1", "mean / root(sigma_mean² + tolerance²)"),
         Column("largest", F64, "1", "largest |residual| / what is expected, of those with a weight"),
+        Column("redundancy", F64, "1", "observations, less a shift and turn of its own of each moment"),
+        Column("variance_factor", F64, "1", "of the scatter about these, against that of its group"),
     ),
 )
 PATTERNS = Artefact(

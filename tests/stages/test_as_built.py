@@ -65,3 +65,15 @@ def test_a_leaning_target_is_said():
     lean = leaning["target"]["as_found"]["lean_deg"]
     assert abs(lean["P2"]) == pytest.approx(0.3, abs=0.01)
     assert any("out of plumb" in words for words in leaning["warnings"])
+
+
+def test_each_surface_and_pass_has_its_redundancy_and_its_scatter(noisy):
+    found = calibrated(noisy, until="adjust")
+    cells = found["adjust/cells"]
+    many = cells[cells["redundancy"] > 300]
+    assert set(many["sensor"]) == {"laser", "mbes"}
+    assert len(set(many["pass"])) == 4
+    assert (many["redundancy"] < many["count"]).all()
+    assert (many["redundancy"] > 0.4 * many["count"]).all()
+    assert np.abs(many["variance_factor"] - 1).max() < 0.3
+    assert cells["redundancy"].sum() < found["adjust/summary"]["redundancy"].iloc[0]

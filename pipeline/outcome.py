@@ -1,0 +1,180 @@
+"""What the adjustment found, as tables."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline import artefacts, config
+from pipeline.adjusting import Adjusted
+from pipeline.looking import Cells
+from pipeline.maths.consistency import consistency_limit
+from pipeline.maths.rotations import log_so3
+from pipeline.maths.solution import Freed, freed, weakest_direction
+from pipeline.maths.unknowns import NAMES, SIX
+from pipeline.maths.variance import scatter
+from pipeline.mounts import Mounted
+
+Array = NDArray[np.float64]
+COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common
+
+
+def tables(
+    found: Adjusted,
+    cells: Cells,
+    considered: Array,
+    coarse: Mounted,
+    settings: config.Adjust,
+    poses: pd.DataFrame,
+    passes: pd.DataFrame,
+) -> dict[str, pd.DataFrame]:
+    """By name; ``considered``: sigmas of all unknowns where they are held."""
+    state, solution = found.state, found.solution
+    six = np.concatenate(
+        [
+            log_so3(state.R_body_from_mbes @ coarse.R_body_from_sensor.T),
+            state.lever_arm_m - coarse.lever_arm_body_m,
+        ]
+    )
+    shared = [value for surface in state.surfaces for value in (0.0, 0.0, surface.shift_m)]
+    values = state.values_of_other()
+    values[:SIX], values[state.shared] = six, shared
+    random, total = solution.covariance, solution.total(considered)
+    values = values[solution.free]
+    if solution.deficiency:
+        values[:SIX], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
+    estimate = pd.DataFrame(
+        {
+            "unknown": [state.names[k] for k in solution.free],
+            "value": values,
+            "sigma": np.sqrt(np.diag(random)),
+            "sigma_total": np.sqrt(np.diag(total)),
+        }
+    )
+    return {
+        "estimate": estimate,
+        "covariance": _covariance_table(random[:SIX, :SIX], total[:SIX, :SIX]),
+        "freed": _freed_table(found, considered),
+        "groups": _groups_table(found),
+        "summary": _summary_table(found, cells, settings),
+        "drift": _drift_table(found, poses),
+        "cells": _cells_table(found, cells, poses, passes),
+        "surfaces": _surfaces_table(found, cells),
+    }
+
+
+def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd.DataFrame:
+    solution = found.solution
+    statistic = float(sum(cell.normalised**2 for cell in cells.values()))
+    limit = consistency_limit(len(cells), settings.test_level)
+    reason = f"the data leave {solution.deficiency} direction(s) of the unknowns open" if solution.deficiency else ""
+    counts = found.reading.counts.values()
+    summary = {
+        "converged": found.converged,
+        "iterations": found.iterations,
+        "observations": sum(one.count for one in counts),
+        "redundancy": found.redundancy,
+        "sigma0": float(np.sqrt(found.equations.squares / max(found.redundancy, 1.0))),
+        "between": found.between.factor,
+        "between_dof": found.between.free,
+        "condition": solution.condition,
+        "rank_deficiency": solution.deficiency,
+        "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:SIX, :SIX]),
+        "test_statistic": statistic,
+        "test_dof": len(cells),
+        "test_limit": limit,
+        "test_passed": statistic <= limit,
+        "reason": reason,
+    }
+    return pd.DataFrame([summary])
+
+
+def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
+    sigma = np.sqrt(np.diag(random))
+    return pd.DataFrame(
+        {
+            "row": np.repeat(NAMES, SIX),
+            "column": np.tile(NAMES, SIX),
+            "covariance": random.ravel(),
+            "correlation": (random / np.outer(sigma, sigma)).ravel(),
+            "covariance_total": total.ravel(),
+        }
+    )
+
+
+def _freed_table(found: Adjusted, considered: Array) -> pd.DataFrame:
+    """What is held, and what each of the six owes to it."""
+    tests = {one.unknown: one for one in freed(found.equations.normal, found.equations.right, found.solution)}
+    rows = []
+    for place, number in enumerate(found.solution.held.tolist()):
+        test = tests.get(number, Freed(number, np.nan, np.nan))
+        effect = found.solution.sensitivity[:SIX, place] * considered[number]
+        row: dict[str, Any] = {"unknown": found.state.names[number], "considered": considered[number]}
+        row |= {"value": test.value, "sigma": test.sigma}
+        rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(NAMES)})
+    return pd.DataFrame(rows)
+
+
+def _surfaces_table(found: Adjusted, cells: Cells) -> pd.DataFrame:
+    rows = []
+    for k, surface in enumerate(found.state.surfaces):
+        row: dict[str, Any] = {f"normal_{axis}_target_1": surface.normal[i] for i, axis in enumerate("xyz")}
+        row |= {"family": surface.family, "distance_m": surface.distance_m}
+        for sensor, name in (("laser", "laser_points"), ("mbes", "soundings")):
+            row[name] = sum(cell.count for (s, number, _), cell in cells.items() if s == sensor and number == k)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _drift_table(found: Adjusted, poses: pd.DataFrame) -> pd.DataFrame:
+    knots, values = found.drift.knots, found.drift.values
+    columns: dict[str, Any] = {"t_ns": poses["t_ns"].to_numpy()[knots.record]}
+    columns |= {f"{axis}_target_m": values[:, k] for k, axis in enumerate("xyz")}
+    turns = np.degrees(values[:, 3:])
+    return pd.DataFrame(columns | {f"turn_{axis}_target_deg": turns[:, k] for k, axis in enumerate("xyz")})
+
+
+def _groups_table(found: Adjusted) -> pd.DataFrame:
+    rows: list[dict[str, Any]] = [
+        {
+            "group": name,
+            "count": one.count,
+            "variance_factor": found.weighting.factors[name],
+            "scale": found.weighting.scales[name],
+            "cut": one.cut,
+            "reduced": one.reduced,
+        }
+        for name, one in found.reading.counts.items()
+    ]
+    for sensor, one in found.shared.items():
+        row = {"group": COMMON_TO[sensor], "count": len(found.reading.sums[sensor])}
+        rows.append(row | {"variance_factor": one.factor, "scale": np.nan, "cut": 0, "reduced": 0})
+    return pd.DataFrame(rows)
+
+
+def _cells_table(found: Adjusted, cells: Cells, poses: pd.DataFrame, passes: pd.DataFrame) -> pd.DataFrame:
+    """Every cell, with the scatter of its epochs about planes of their own."""
+    started, t_ns = passes["start_ns"].to_numpy(), poses["t_ns"].to_numpy()
+    rows = []
+    for (sensor, surface, number), cell in sorted(cells.items()):
+        sums = found.reading.sums[sensor]
+        place = np.searchsorted(started, t_ns[sums.record], side="right") - 1
+        of_pass = passes["pass"].to_numpy()[np.maximum(place, 0)] == number
+        within = scatter(sums, of_pass & (sums.surface == surface))
+        rows.append(
+            {
+                "sensor": sensor,
+                "family": found.state.surfaces[surface].family,
+                "pass": number,
+                "count": cell.count,
+                "mean_m": cell.mean_m,
+                "rms_m": cell.rms_m,
+                "sigma_mean_m": cell.sigma_mean_m,
+                "normalised": cell.normalised,
+                "largest": cell.largest,
+                "redundancy": within.free,
+                "variance_factor": within.factor,
+            }
+        )
+    return pd.DataFrame(rows, columns=[column.name for column in artefacts.CELLS.columns])
