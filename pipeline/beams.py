@@ -19,8 +19,7 @@ def beams_in_target(
 ) -> Beams:
     """Rays and half widths of soundings (n, 3) with attitudes (n, 3, 3); beams stray by three sigmas of their angle.
 
-    A beam at its margin that strays over an edge gives the mean of what its parts meet: a few such echoes on the small
-    horizontal faces raise them by a tenth of a millimetre.
+    A beam at its margin that strays over an edge gives the mean of what its parts meet.
     """
     ranges = np.linalg.norm(points_mbes_m, axis=1)
     unit = points_mbes_m / ranges[:, None]

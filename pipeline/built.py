@@ -60,7 +60,8 @@ def _e(patterns: pd.DataFrame, faces: pd.DataFrame, e_m: float) -> float | None:
 
 
 def oddities(found: dict[str, Any], target: config.Target) -> list[str]:
-    """What differs from the config by more than a target is usually built to; nothing that rejects by itself."""
+    """What differs from the config by more than a target is usually built to; nothing that rejects by itself. (Where
+    it stands, and how far out of plumb, the verdict's warnings have from the target's pose.)"""
     words = []
     for letter, least in (("b", ODD_LENGTH_M), ("e", ODD_HEIGHT_M)):
         value, given = found[f"{letter}_m"], getattr(target, letter)
@@ -69,7 +70,4 @@ def oddities(found: dict[str, Any], target: config.Target) -> list[str]:
     for flank, angle in found["corner_deg"].items():
         if abs(angle - CORNER_DEG) > ODD_ANGLE_DEG:
             words.append(f"the laser finds {angle:.2f}° between wall and {flank}, by design {CORNER_DEG:g}°: measure c")
-    leans = ", ".join(f"{family} {lean:+.2f}°" for family, lean in found["lean_deg"].items())
-    if any(abs(lean) > ODD_ANGLE_DEG for lean in found["lean_deg"].values()):
-        words.append(f"faces are out of plumb ({leans}; + looks up): the wet ones are taken to lean alike")
     return words

@@ -15,6 +15,7 @@ from pipeline.maths.solution import Freed, freed, weakest_direction
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.maths.variance import scatter
 from pipeline.mounts import Mounted
+from pipeline.passes import pass_of
 
 Array = NDArray[np.float64]
 COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common
@@ -155,13 +156,13 @@ def _groups_table(found: Adjusted) -> pd.DataFrame:
 
 def _cells_table(found: Adjusted, cells: Cells, poses: pd.DataFrame, passes: pd.DataFrame) -> pd.DataFrame:
     """Every cell, with the scatter of its epochs about planes of their own."""
-    started, t_ns = passes["start_ns"].to_numpy(), poses["t_ns"].to_numpy()
+    t_ns, starts, ends = poses["t_ns"].to_numpy(), passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
     rows = []
     for (sensor, surface, number), cell in sorted(cells.items()):
         sums = found.reading.sums[sensor]
-        place = np.searchsorted(started, t_ns[sums.record], side="right") - 1
-        of_pass = passes["pass"].to_numpy()[np.maximum(place, 0)] == number
-        within = scatter(sums, of_pass & (sums.surface == surface))
+        beside = sums.record, np.minimum(sums.record + 1, len(t_ns) - 1)  # one of them may lie outside the pass
+        place = np.maximum(*(pass_of(t_ns[record], starts, ends) for record in beside))
+        within = scatter(sums, (place == number) & (sums.surface == surface))
         rows.append(
             {
                 "sensor": sensor,

@@ -7,17 +7,18 @@ of each kind of noise (``tools.bound``), prints the README's table and writes ru
 """
 
 import argparse
-import html
-import io
 from dataclasses import dataclass
 from multiprocessing import get_context
-from pathlib import Path
 
+import jinja2
 import numpy as np
 import pandas as pd
+from markupsafe import Markup
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
+from pipeline.pages import picture, style
 from pipeline.parsing import parse
 from pipeline.simulation.scenario import Scenario
 from tools.bound import bound
@@ -27,10 +28,16 @@ Array = NDArray[np.float64]
 BOUNDED = ("finite beams, outliers", "finite beams and INS", "twelve passes")
 LEVEL = 0.95
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>poolcal: accuracy</title>
-<style>body{{font:16px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem}}
-table{{border-collapse:collapse}}td,th{{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}}
-td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>
-<h1>Accuracy on simulated sessions</h1>{body}</html>
+<style>body{font:16px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem}
+table{border-collapse:collapse}td,th{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
+td:first-child,th:first-child{text-align:left}img{max-width:100%;height:auto}</style>
+<h1>Accuracy on simulated sessions</h1>
+{% for one in found %}<h2>{{ one.rows()[0][0].replace("**", "") }}</h2>
+<table><tr><th></th>{% for name in names %}<th>{{ name }} {{ "°" if loop.index0 < 3 else "mm" }}</th>{% endfor %}</tr>
+{% for row in one.rows()[1:] %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}</table>{{ plots(one) }}{% endfor %}
+{% if mistakes is not none %}<h2>What mistakes do: {{ mistakes | length }} sessions</h2>{{ mistakes_plot(mistakes) }}
+{% endif %}</html>
 """
 
 
@@ -125,14 +132,10 @@ def markdown(found: list[Result]) -> str:
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for one in found for row in one.rows()])
 
 
-def plots(one: Result) -> str:
-    """Normalised errors of the six against the normal distribution, and the NSE against chi-squared: as SVG."""
-    import matplotlib
-
-    matplotlib.use("svg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 7, figsize=(15, 2.4), layout="constrained")
+def plots(one: Result) -> Markup:
+    """Normalised errors of the six against the normal distribution, and the NSE against chi-squared."""
+    figure = Figure(figsize=(15, 2.4), layout="constrained")
+    axes = figure.subplots(1, 7)
     x = np.linspace(-4, 4, 161)
     for k, name in enumerate(NAMES):
         axes[k].hist(one.errors[:, k] / one.sigmas[:, k], bins=np.arange(-4, 4.1, 0.5), density=True, color="#8fb8de")
@@ -142,18 +145,14 @@ def plots(one: Result) -> str:
     axes[6].hist(np.minimum(one.nse, 30), bins=np.arange(0, 31, 2), density=True, color="#e3b778")
     axes[6].plot(squares, chi2.pdf(squares, 6), color="#333")
     axes[6].set(title="all six", xlabel="normalised squared error", yticks=[])
-    return _svg(figure)
+    return picture(figure, "errors in sigmas against what noise leaves")
 
 
-def mistakes_plot(table: pd.DataFrame) -> str:
+def mistakes_plot(table: pd.DataFrame) -> Markup:
     """Largest error in total sigmas of each session, by mistake: what was accepted, what was not."""
-    import matplotlib
-
-    matplotlib.use("svg")
-    import matplotlib.pyplot as plt
-
     names = list(dict.fromkeys(table["mistake"]))
-    figure, axis = plt.subplots(figsize=(11, 0.28 * len(names) + 1), layout="constrained")
+    figure = Figure(figsize=(11, 0.28 * len(names) + 1), layout="constrained")
+    axis = figure.subplots()
     for accepted, colour, word in ((False, "#b8b8b8", "rejected"), (True, "#1f6fb2", "accepted")):
         rows = table[(table["accepted"] == accepted) & table["sigmas"].notna()]
         spread = 0.15 * np.sin(np.arange(len(rows)))
@@ -164,30 +163,13 @@ def mistakes_plot(table: pd.DataFrame) -> str:
     axis.set_yticklabels(names)
     axis.invert_yaxis()
     axis.legend(loc="lower right")
-    return _svg(figure)
-
-
-def _svg(figure: object) -> str:
-    import matplotlib.pyplot as plt
-
-    plt.rcParams["svg.hashsalt"] = "poolcal"
-    text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})  # type: ignore[attr-defined]
-    plt.close("all")
-    return text.getvalue()[text.getvalue().index("<svg") :]
+    return picture(figure, "largest error of each session in total sigmas, by mistake")
 
 
 def page(found: list[Result], mistakes: pd.DataFrame | None) -> str:
-    parts = []
-    for one in found:
-        head, *rows = one.rows()
-        names = "".join(f"<th>{name} {'°' if k < 3 else 'mm'}</th>" for k, name in enumerate(NAMES))
-        body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-        title = html.escape(head[0].replace("**", ""))
-        parts.append(f"<h2>{title}</h2><table><tr><th></th>{names}</tr>{body}</table>{plots(one)}")
-    if mistakes is not None:
-        parts.append(f"<h2>What mistakes do: {len(mistakes)} sessions</h2>{mistakes_plot(mistakes)}")
-    return PAGE.format(body="".join(parts))
+    template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(PAGE)
+    with style():
+        return template.render(found=found, mistakes=mistakes, names=NAMES, plots=plots, mistakes_plot=mistakes_plot)
 
 
 def main() -> None:
@@ -197,7 +179,7 @@ def main() -> None:
     options = parser.parse_args()
     found = results(options.bounds, options.jobs)
     path = FOLDER / "mistakes.parquet"
-    Path(FOLDER, "accuracy.html").write_text(page(found, pd.read_parquet(path) if path.is_file() else None), "utf-8")
+    (FOLDER / "accuracy.html").write_text(page(found, pd.read_parquet(path) if path.is_file() else None), "utf-8")
     print(markdown(found))
 
 

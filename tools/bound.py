@@ -90,7 +90,7 @@ class World:
         """Of bundles of rays (n, m, 3), the axis and, of a beam of some width, one on its rim across and one along:
         range and plane of the point hit, how steeply the axis rises (n,). Plane -1: not on the target as the segment
         stage's settings want it: the whole footprint on one face and a margin more, not grazed, away from the water
-        line."""
+        line. (What a beam may stray is not kept from the edges: a few more rays than the labels take.)"""
         pose, mount = self.movement.pose(k, t_ns), getattr(self.scenario, sensor).mount
         start = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(mount)
         R = pose.R_target_from_body @ R_body_from_sensor(mount).as_matrix()
@@ -251,17 +251,13 @@ def _markov(seconds: Array, constant_s: float) -> csr_matrix:
     return csr_matrix(kron(diags([diagonal, -f * gain, -f * gain], [0, 1, -1]), identity(6)))
 
 
-def mean_bound(scenario: Scenario, seeds: range) -> Array:
-    """(6, 6): the mean over sessions, which differ by the vessel's motion alone."""
-    return np.asarray(np.mean([bound(scenario, seed) for seed in seeds], axis=0))
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenario", nargs="?", type=Path)
     parser.add_argument("--seeds", type=int, default=4)
     options = parser.parse_args()
-    sigma = np.sqrt(np.diag(mean_bound(load_scenario(options.scenario), range(1, options.seeds + 1))))
+    scenario = load_scenario(options.scenario)
+    sigma = np.sqrt(np.diag(np.mean([bound(scenario, seed) for seed in range(1, options.seeds + 1)], axis=0)))
     print("pitch, roll, yaw (about body x, y, z):", np.round(np.degrees(sigma[:3]), 5), "°")
     print("x, y, z:", np.round(1000 * sigma[3:], 4), "mm")
 

@@ -9,14 +9,10 @@ from pipeline.parsing import parse
 from pipeline.simulation.scenario import Scenario
 from tests.stages.conftest import THIN, calibrated, made, merged
 from tools.bound import bound
-
-DRIFT = {
-    "horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03, "time_constant_s": 200.0
-}
-NONE = {"white": {"position_m": 0.0, "attitude_deg": 0.0}}
+from tools.montecarlo import DRIFT, WHITE
 
 
-@pytest.mark.parametrize("ins", [NONE, {}, {"drift": DRIFT}], ids=["no INS noise", "INS white", "INS drift"])
+@pytest.mark.parametrize("ins", [WHITE["ins"], {}, DRIFT], ids=["no INS noise", "INS white", "INS drift"])
 def test_the_random_sigmas_are_those_of_the_best_estimator(ins):
     scenario = {"ins": ins}
     result = json.loads(calibrated(made(scenario, seed=3))["report/calibration.json"])
