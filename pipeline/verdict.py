@@ -28,6 +28,7 @@ ODD_FACTOR = 2.0  # a variance factor above this, or below its inverse, is worth
 ODD_COMMON = 4.0  # the same of what an epoch's points share: less is a good INS
 ODD_CUT = 0.01  # and so is a share of cut observations above this
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # and a target found so far off
+RETRACE_DEG = 1.0  # a coarse mount further off than this wants its rays traced again
 FEWEST = 30  # soundings on a family of faces
 PLACES = {
     "face": "on face {low:.0f}",
@@ -236,6 +237,18 @@ def warnings(
             f"{tilts[0]:+.2f}° and {tilts[1]:+.2f}°: if it was set up and surveyed better than this, check laser.mount"
         )
     return found
+
+
+def bent_elsewhere(mbes: config.Mbes, correction: Mapping[str, Any]) -> list[str]:
+    """Rays are traced through a cast with the coarse mount. A ray at θ from straight down bends by g t sin θ: of that a
+    share of δ / tan θ is wrong where θ is wrong by δ, a sixtieth for a degree at 45°."""
+    turn = correction["rotation_vector_deg"]
+    if mbes.svp is None or turn is None or np.linalg.norm(turn) < RETRACE_DEG:
+        return []
+    return [
+        f"rays were traced through mbes.svp with a coarse mount that is {np.linalg.norm(turn):.1f}° off: enter the "
+        "values found as mbes.mount and run again"
+    ]
 
 
 def _so(sigma: Mapping[str, float] | None) -> str:

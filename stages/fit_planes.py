@@ -1,4 +1,4 @@
-"""Total least squares planes of both sensors, by pass, face and family; and moments from which any mount's follow."""
+"""Planes of both sensors, by pass, face and family; and moments from which any mount's follow."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

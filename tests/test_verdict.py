@@ -5,8 +5,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from pipeline.config import Verdict
-from pipeline.verdict import Evidence, pattern_tests, reasons, warnings
+from pipeline.config import Mbes, Verdict
+from pipeline.verdict import Evidence, bent_elsewhere, pattern_tests, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 LEVEL = 0.001
@@ -204,3 +204,18 @@ def test_each_variable_has_its_own_test():
     angle, face = pattern_tests(pd.DataFrame(rows), LEVEL)
     assert (angle["by"], angle["statistic"], angle["dof"], angle["passed"]) == ("angle", 9.0, 2, True)
     assert (face["passed"], face["limit"]) == (False, pytest.approx(10.83, abs=0.01))
+
+
+@pytest.mark.parametrize(
+    ("cast", "turn_deg", "said"),
+    [
+        ([[0.0, 1500.0], [5.0, 1501.0]], [0.0, 0.8, 0.7], True),
+        ([[0.0, 1500.0], [5.0, 1501.0]], [0.0, 0.7, 0.7], False),
+        ([[0.0, 1500.0], [5.0, 1501.0]], None, False),
+        (None, [0.0, 2.0, 0.7], False),
+    ],
+)
+def test_rays_bent_with_a_wrong_mount_are_to_be_bent_again(cast, turn_deg, said):
+    found = bent_elsewhere(Mbes.model_construct(svp=cast), {"rotation_vector_deg": turn_deg})
+    assert bool(found) == said
+    assert all("1.1° off" in words for words in found)

@@ -88,7 +88,7 @@ SEGMENT_COUNTS = Artefact("segment", "counts", "table", "points labelled and lef
 
 # --- fit_planes ------------------------------------------------------------------------------------------------------
 PLANES = Artefact(
-    "fit_planes", "planes", "table", "total least squares planes (soundings: with the coarse mount)",
+    "fit_planes", "planes", "table", "planes fitted with errors in all coordinates (soundings: with the coarse mount)",
     (
         Column("sensor", TEXT, "", "laser or mbes"),
         PASS,

@@ -38,14 +38,18 @@ def lift(R_target_from_body: Array, positions_m: Array, points_body_m: Array) ->
 
 
 def plane_moments(lifted: Array, correction: Array, lever_arm_m: Array) -> Moments:
-    """Moments of the soundings placed with mount Exp(δ) = ``correction`` (3, 3) times coarse, and this lever arm."""
-    theta = np.concatenate([correction.ravel(), lever_arm_m, [1.0]])
-    place = np.zeros((4, SIZE))
+    """Moments of the soundings placed with mount Exp(δ) = ``correction`` (3, 3) times coarse, and this lever arm.
+
+    Their noise is Σ r rᵀ of the rays r = T E m: a beam that errs by δ meets a face at incidence i by r δ tan i too
+    early or too late, along the ray it is recorded on, which the range's own noise does as well.
+    """
+    place, rays = np.zeros((4, SIZE)), np.zeros((3, SIZE))
     for axis in range(3):
-        place[axis, axis * FEATURES : (axis + 1) * FEATURES] = theta
+        place[axis, axis * FEATURES : (axis + 1) * FEATURES] = np.concatenate([correction.ravel(), lever_arm_m, [1.0]])
+        rays[axis, axis * FEATURES : axis * FEATURES + 9] = correction.ravel()
     place[3, -1] = 1.0
     sums = place @ lifted @ place.T
-    return Moments(round(float(sums[3, 3])), sums[:3, 3], sums[:3, :3])
+    return Moments(round(float(sums[3, 3])), sums[:3, 3], sums[:3, :3], rays @ lifted @ rays.T)
 
 
 def attitude_sum(lifted: Array) -> Array:

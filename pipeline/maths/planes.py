@@ -1,4 +1,4 @@
-"""Total least squares planes from second moments [0051-0088]."""
+"""Planes from second moments, with errors in all three coordinates [0051-0088]."""
 
 from dataclasses import dataclass
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipeline.errors import DegenerateGeometryError
 
 Array = NDArray[np.float64]
+ACROSS = 1e-3  # variance of points across their rays in any one direction, of that along them, at least
 
 
 @dataclass(frozen=True)
@@ -15,23 +16,31 @@ class Moments:
     """Sums over points from which a plane follows; they add, so points are never kept.
 
     count; total (3,) = Σ x; products (3, 3) = Σ x xᵀ, in a frame whose origin is near the points (pool or target: with
-    coordinates of metres the smallest eigenvalue keeps an absolute precision of 1e-14 m²).
+    coordinates of metres the smallest eigenvalue keeps an absolute precision of 1e-14 m²); noise (3, 3) = Σ cov(x) up
+    to a factor: how the points' errors lie in space.
     """
 
     count: int
     total: Array
     products: Array
+    noise: Array
 
     @classmethod
     def of(cls, points_m: Array) -> "Moments":
-        return cls(len(points_m), points_m.sum(axis=0), points_m.T @ points_m)
+        """Of points that err alike in all directions."""
+        return cls(len(points_m), points_m.sum(axis=0), points_m.T @ points_m, len(points_m) * np.eye(3))
 
     @classmethod
     def zero(cls) -> "Moments":
-        return cls(0, np.zeros(3), np.zeros((3, 3)))
+        return cls(0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)))
 
     def __add__(self, other: "Moments") -> "Moments":
-        return Moments(self.count + other.count, self.total + other.total, self.products + other.products)
+        return Moments(
+            self.count + other.count,
+            self.total + other.total,
+            self.products + other.products,
+            self.noise + other.noise,
+        )
 
 
 @dataclass(frozen=True)
@@ -50,12 +59,18 @@ class Plane:
 
 
 def fit_plane(moments: Moments, toward: Array) -> Plane:
-    """Plane that minimises Σ (n · x - d)² with |n| = 1 [0061-0088].
+    """Plane that minimises nᵀ S n / nᵀ N n: mean square of n · x - d over what is expected of it [0061-0088].
 
-    n is the eigenvector of the smallest eigenvalue λ0 of the centred scatter matrix, d = n · mean; the normal is turned
-    so that n · toward > 0. First-order covariance (e.g. Kanatani 1996, ch. 10): turning n along the eigenvector t_k
-    changes the residuals by t_k · (x - mean), so var = σ² / (count λ_k), and var of the distance at the centroid
-    σ² / count, with σ² = count λ0 / (count - 3).
+    S is the centred scatter matrix of the points and d = n · mean. A point x = x0 + e of the plane n · x0 = d with an
+    error of covariance s C gives E[S] = S0 + s N, where N is the mean of C and S0 n = 0: the eigenvector n of
+    S n = λ N n with the smallest λ is the plane's normal in expectation, and λ = s. With errors alike in all
+    directions, N = 1, this is the patent's total least squares. Where they lie along oblique rays that is biased: it
+    turns the normal by -s n · N t / λ_t towards each t in the face (hundredths of a degree, of a pass's slanted faces).
+    N is made definite by ACROSS of its trace.
+
+    The normal is turned so that n · toward > 0; the tangents are the eigenvectors of S across it, eigenvalues λ_k.
+    First-order covariance (e.g. Kanatani 1996, ch. 10): turning n along t_k changes the residuals by t_k · (x - mean),
+    so var = σ² / (count λ_k), and var of the distance at the centroid σ² / count, with σ² = count nᵀ S n / (count - 3).
 
     Raises
     ------
@@ -67,17 +82,19 @@ def fit_plane(moments: Moments, toward: Array) -> Plane:
         raise DegenerateGeometryError(f"a plane needs at least 4 points, not {n}")
     mean = moments.total / n
     scatter = moments.products / n - np.outer(mean, mean)
-    values, vectors = np.linalg.eigh((scatter + scatter.T) / 2)
-    values = np.maximum(values, 0.0)
-    if values[1] <= 1e-12 or values[1] < 2 * values[0]:
-        raise DegenerateGeometryError(
-            f"{n} points do not span a plane (eigenvalues {values[0]:.3g}, {values[1]:.3g} m²)"
-        )
-    normal = vectors[:, 0] * (1.0 if vectors[:, 0] @ toward >= 0 else -1.0)
-    tangents = _signed(vectors[:, [2, 1]].T)
-    variance = values[0] * n / (n - 3)
-    covariance = np.diag([variance / (n * values[2]), variance / (n * values[1]), variance / n])
-    return Plane(normal, float(normal @ mean), mean, n, float(np.sqrt(values[0])), values, tangents, covariance)
+    whitening = np.linalg.inv(np.linalg.cholesky(moments.noise / np.trace(moments.noise) + ACROSS * np.eye(3)))
+    normal = whitening.T @ np.linalg.eigh(whitening @ scatter @ whitening.T)[1][:, 0]
+    normal *= (1.0 if normal @ toward >= 0 else -1.0) / np.linalg.norm(normal)
+    in_face = tangents_of(normal)
+    (less, more), vectors = np.linalg.eigh(in_face @ scatter @ in_face.T)
+    square = max(float(normal @ scatter @ normal), 0.0)
+    if less <= 1e-12 or less < 2 * square:
+        raise DegenerateGeometryError(f"{n} points do not span a plane (eigenvalues {square:.3g}, {less:.3g} m²)")
+    tangents = _signed((in_face.T @ vectors[:, ::-1]).T)
+    variance = square * n / (n - 3)
+    covariance = np.diag([variance / (n * more), variance / (n * less), variance / n])
+    values = np.array([square, less, more])
+    return Plane(normal, float(normal @ mean), mean, n, float(np.sqrt(square)), values, tangents, covariance)
 
 
 def angle_between(one: Array, other: Array) -> float:

@@ -5,7 +5,7 @@ the soundings the mount (rotation, lever arm). A ``Placement`` hides which.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +15,8 @@ from pipeline.maths.rotations import exp_so3, rotation_z
 
 Array = NDArray[np.float64]
 Closest = Callable[[Array], tuple[Array, NDArray[np.int64]]]  # points -> nearest points on the model, face numbers
+ROUGH = 2000  # points with which starts are scored and settle at first
+WIDE_M, FINE_M = (0.4, 0.3, 0.2, 0.15), (0.1, 0.07, 0.05)  # reaches while roughly settling, and then
 
 
 class Placement(Protocol):
@@ -34,6 +36,14 @@ class Placement(Protocol):
         ...
 
 
+class Searched(Placement, Protocol):
+    """A placement that a search can thin."""
+
+    def thinned(self, most: int) -> Placement:
+        """The same of at most so many of its points."""
+        ...
+
+
 @dataclass(frozen=True)
 class TargetPose:
     """Laser points in the pool frame, (n, 3) m; parameters (azimuth correction β rad, origin o of the target in pool).
@@ -44,6 +54,9 @@ class TargetPose:
 
     points_pool_m: Array
     prior_sigmas: Array
+
+    def thinned(self, most: int) -> "TargetPose":
+        return replace(self, points_pool_m=self.points_pool_m[_some(len(self.points_pool_m), most)])
 
     def points(self, parameters: Array) -> Array:
         return (self.points_pool_m - parameters[1:]) @ rotation_z(parameters[0]).T
@@ -69,6 +82,15 @@ class MountCorrection:
     lever_arm_m: Array
     prior_sigmas: Array
 
+    def thinned(self, most: int) -> "MountCorrection":
+        use = _some(len(self.positions_m), most)
+        return replace(
+            self,
+            positions_m=self.positions_m[use],
+            R_target_from_body=self.R_target_from_body[use],
+            points_body_m=self.points_body_m[use],
+        )
+
     def points(self, parameters: Array) -> Array:
         body = self.points_body_m @ exp_so3(parameters[:3]).T + self.lever_arm_m + parameters[3:]
         return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_target_from_body, body))
@@ -81,6 +103,11 @@ class MountCorrection:
         turned = self.points_body_m @ exp_so3(parameters[:3]).T
         g = np.einsum("nij,ni->nj", self.R_target_from_body, directions)
         return np.hstack([np.cross(turned, g), g])
+
+
+def _some(count: int, most: int) -> NDArray[np.int64]:
+    """Which points: by chance, since every so-and-so-many-th of a grid could be one row of it; in their order."""
+    return np.sort(np.random.default_rng(0).permutation(count)[:most])
 
 
 def score(placement: Placement, parameters: Array, closest: Closest, reach_m: float) -> float:
@@ -96,7 +123,7 @@ def settle(
     start: Array,
     closest: Closest,
     normals: Array,
-    reaches_m: Sequence[float] = (0.4, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05),
+    reaches_m: Sequence[float],
     steps: int = 4,
 ) -> Array:
     """Gauss-Newton onto the nearest surface, within a reach that shrinks from step to step; (k,) parameters.
@@ -144,7 +171,7 @@ class Found:
 
 
 def search(
-    placement: Placement,
+    placement: Searched,
     starts: Sequence[Sequence[Array]],
     closest: Closest,
     normals: Array,
@@ -155,14 +182,19 @@ def search(
 ) -> Found:
     """Best pose from many starts: all are scored with a wide reach, the best settle and are judged.
 
+    Scored, and settled within the wide reaches, with ROUGH of the points: more do not tell starts apart any better.
+
     ``starts`` come in groups, of each of which the ``each`` best settle: where blocks repeat, the best of all may lie
     round one wrong height. ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells
     whether two settled poses are the same solution, ``judge`` how good one is.
     """
+    rough = placement.thinned(ROUGH)
     chosen = [
-        start for group in starts for start in sorted(group, key=lambda p: -score(placement, p, closest, 0.25))[:each]
+        start for group in starts for start in sorted(group, key=lambda p: -score(rough, p, closest, 0.25))[:each]
     ]
-    settled = [settle(placement, start, closest, normals) for start in chosen]
+    settled = [
+        settle(placement, settle(rough, start, closest, normals, WIDE_M), closest, normals, FINE_M) for start in chosen
+    ]
     allowed = [p for p in settled if np.all(np.abs(p) <= limits)]
     scored = [(judge(p), p) for p in allowed or settled]
     best_score, best = max(scored, key=lambda one: one[0])

@@ -15,6 +15,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from pipeline import artefacts, config, manifest
+from pipeline.built import CORNER_DEG
 from pipeline.drawn import PAGE, agreeing, drawn_from
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
@@ -61,6 +62,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         methods=METHODS,
         by_method=list(_by_method(calibrations)),
         closing=tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
+        built=_built(result["target"]["as_found"], settings.pool.target),
         names=[name for name, *_ in PARAMETERS],
         correlations=_correlations(result),
         groups=tables.table(artefacts.GROUPS).to_dict("records"),
@@ -107,6 +109,18 @@ def _six(table: pd.DataFrame, method: str, limits: config.Verdict) -> list[dict[
         {"name": row["parameter"], "limit": _Value(bounds[row["unit"]], row["unit"])}
         | {key: _Value(row[key], row["unit"]) for key in values}
         for row in rows
+    ]
+
+
+def _built(found: Row, target: config.Target) -> list[Row]:
+    """What the laser sees of the target, beside the letters of the config."""
+    rows = [(letter, getattr(target, letter), found[f"{letter}_m"], "m") for letter in ("b", "e")]
+    for words, design, angles in (("wall to", CORNER_DEG, found["corner_deg"]), ("leaning of", 0.0, found["lean_deg"])):
+        rows += [(f"{words} {family}", design, angle, "deg") for family, angle in angles.items()]
+    return [
+        {"name": name, "design": _Value(design, unit), "found": _Value(value, unit)}
+        for name, design, value, unit in rows
+        if value is not None
     ]
 
 

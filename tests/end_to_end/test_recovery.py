@@ -9,7 +9,7 @@ import pytest
 
 from tests.end_to_end.places import SCENARIOS, errors, poolcal, result_of, sigmas, simulate
 
-SEEDS = (11, 12, 13)
+SEEDS = (11, 13)  # many more in campaigns
 
 
 def calibrated(folder: Path, seed: int, base: Path, **blocks: Any) -> tuple[dict[str, Any], dict[str, Any]]:

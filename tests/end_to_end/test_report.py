@@ -64,6 +64,17 @@ def test_files_counts_settings_and_origin_are_listed(undisturbed: tuple[Path, To
     assert dict(page.table("raw file", "SHA-256")) == result["inputs"]  # type: ignore[arg-type]
 
 
+def test_the_target_by_design_and_as_found(undisturbed: tuple[Path, Told]) -> None:
+    run = undisturbed[0]
+    found = result_of(run)["target"]["as_found"]
+    rows = {name: (design, value) for name, design, value in page_of(run).table("the target", "by design")}
+    assert list(rows) == ["b", "e", "wall to P1", "wall to P3", *(f"leaning of {one}" for one in ("P1", "P2", "P3"))]
+    assert rows["b"] == ("3.0000 m", f"{found['b_m']:.4f} m")
+    assert rows["e"] == ("0.5000 m", f"{found['e_m']:.4f} m")
+    assert rows["wall to P3"] == ("45.0000 °", f"{found['corner_deg']['P3']:.4f} °")
+    assert float(rows["leaning of P1"][1].split()[0]) == pytest.approx(found["lean_deg"]["P1"], abs=5.1e-5)
+
+
 def test_complete_in_itself_and_not_large(undisturbed: tuple[Path, Told]) -> None:
     run = undisturbed[0]
     page = page_of(run)

@@ -1,4 +1,6 @@
-"""Total least squares planes, and the lifted moments against placing every point."""
+"""Planes with errors in all coordinates, and the lifted moments against placing every point."""
+
+import dataclasses
 
 import numpy as np
 import pytest
@@ -57,6 +59,23 @@ def test_the_covariance_is_that_of_repeats():
     assert (np.abs(ratio - 1) < 0.12).all()
 
 
+def test_errors_along_oblique_rays_do_not_turn_the_plane():
+    """Rays at 45° to a floor, 0.1 m of noise along them: counted along the rays the slope is right, else it is not."""
+    turns = {"along the rays": [], "in all directions": []}
+    ray = np.array([1.0, 0.0, -1.0]) / np.sqrt(2)
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        floor = np.column_stack([rng.uniform(-1, 1, 2000), rng.uniform(-1, 1, 2000), np.zeros(2000)])
+        alike = Moments.of(floor + rng.normal(scale=0.1, size=(2000, 1)) * ray)
+        along = dataclasses.replace(alike, noise=2000 * np.outer(ray, ray))
+        for name, moments in zip(turns, (along, alike), strict=True):
+            turns[name].append(np.degrees(fit_plane(moments, np.array([0, 0, 1.0])).normal[0]))
+    expected = np.degrees(0.1**2 / 2 * 3)  # -s n · N t / λ_t: s = 0.01 m², n · N t = -1/2, λ_t = 1/3 m²
+    noise = np.std(turns["along the rays"]) / np.sqrt(40)
+    assert abs(np.mean(turns["along the rays"])) < 3 * noise < 0.1 * expected
+    assert np.mean(turns["in all directions"]) == pytest.approx(expected, rel=0.1)
+
+
 def test_moments_add_and_rms_is_the_noise():
     points, normal = patch(np.random.default_rng(0), 0.3, n=4000)
     whole, halves = Moments.of(points), Moments.of(points[:1500]) + Moments.of(points[1500:]) + Moments.zero()
@@ -88,4 +107,6 @@ def test_lifted_moments_are_those_of_the_placed_points():
     assert got.count == n
     np.testing.assert_allclose(got.total, expected.total, rtol=1e-11)
     np.testing.assert_allclose(got.products, expected.products, rtol=1e-11)
+    rays = np.einsum("nij,nj->ni", T, m @ E.T)
+    np.testing.assert_allclose(got.noise, rays.T @ rays, rtol=1e-11)
     np.testing.assert_allclose(attitude_sum(features.T @ features), T.sum(axis=0), atol=1e-10)

@@ -1,6 +1,8 @@
 """Simulated sessions in memory, made once a worker."""
 
 import copy
+import functools
+import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -38,7 +40,13 @@ def merged(*parts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def made(*parts: Mapping[str, Any], seed: int = 1) -> SimulatedSession:
-    return simulate(parse(Scenario, merged({"name": "test"}, THIN, *parts), "test"), seed)
+    """A thinned session; tests that ask for the same one get the same, and leave it as it is."""
+    return _made(json.dumps(merged({"name": "test"}, THIN, *parts)), seed)
+
+
+@functools.lru_cache(maxsize=4)
+def _made(scenario: str, seed: int) -> SimulatedSession:
+    return simulate(parse(Scenario, json.loads(scenario), "test"), seed)
 
 
 def calibrated(
@@ -74,6 +82,18 @@ def quiet() -> SimulatedSession:
 def noisy() -> SimulatedSession:
     """The default scenario, thinned."""
     return made()
+
+
+@pytest.fixture(scope="session")
+def quiet_found(quiet: SimulatedSession) -> dict[str, Any]:
+    """Every artefact of it. Nobody changes them."""
+    return calibrated(quiet)
+
+
+@pytest.fixture(scope="session")
+def noisy_found(noisy: SimulatedSession) -> dict[str, Any]:
+    """Every artefact of it. Nobody changes them."""
+    return calibrated(noisy)
 
 
 Errors = Callable[[Mapping[str, Any], Mapping[str, Any]], np.ndarray]

@@ -14,14 +14,12 @@ def result(found):
     return json.loads(found["report/calibration.json"])
 
 
-def test_tops_and_bottoms_that_are_built_too_high_lift_the_sonar(noisy):
-    faces = calibrated(noisy, until="segment")["segment/faces"]
+def test_tops_and_bottoms_that_are_built_too_high_lift_the_sonar(noisy, noisy_found):
+    faces = noisy_found["segment/faces"]
     wet = faces[(faces["family"] == "H") & (faces["distance_m"] * faces["normal_z_target_1"] < 0)]
     higher = {row.name: 0.005 * row.normal_z_target_1 for row in wet.itertuples(index=False)}
-    plain, lifted = (
-        result(calibrated(noisy, pool={"as_built": {"faces": one}}))["mbes"]["lever_arm_m"]
-        for one in ({}, higher)
-    )
+    found = calibrated(noisy, pool={"as_built": {"faces": higher}})
+    plain, lifted = (result(one)["mbes"]["lever_arm_m"] for one in (noisy_found, found))
     np.testing.assert_allclose(np.subtract(lifted, plain), [0, 0, 0.005], atol=2e-4)
 
 
@@ -48,15 +46,14 @@ def test_an_unknown_face_is_refused(tmp_path, quiet):
         load_settings(tmp_path, path)
 
 
-def test_the_target_is_measured_and_what_differs_is_said():
-    session = made(QUIET, seed=6)
-    right = result(calibrated(session))
+def test_the_target_is_measured_and_what_differs_is_said(quiet, quiet_found):
+    right = result(quiet_found)
     found = right["target"]["as_found"]
     assert found["b_m"] == pytest.approx(3.0, abs=1e-4)
     assert found["e_m"] == pytest.approx(0.5, abs=1e-4)
     assert found["corner_deg"] == pytest.approx({"P1": 45.0, "P3": 45.0}, abs=1e-3)
     assert not [words for words in right["warnings"] if "laser finds" in words]
-    wrong = result(calibrated(session, pool={"target": {"b": 3.02}}))
+    wrong = result(calibrated(quiet, pool={"target": {"b": 3.02}}))
     assert any("the laser finds b = 3.0000 m where target.b says 3.02 m" in words for words in wrong["warnings"])
 
 
@@ -67,9 +64,8 @@ def test_a_leaning_target_is_said():
     assert any("out of plumb" in words for words in leaning["warnings"])
 
 
-def test_each_surface_and_pass_has_its_redundancy_and_its_scatter(noisy):
-    found = calibrated(noisy, until="adjust")
-    cells = found["adjust/cells"]
+def test_each_surface_and_pass_has_its_redundancy_and_its_scatter(noisy_found):
+    cells = noisy_found["adjust/cells"]
     many = cells[cells["redundancy"] > 300]
     assert set(many["sensor"]) == {"laser", "mbes"}
     assert len(set(many["pass"])) == 4
@@ -77,4 +73,4 @@ def test_each_surface_and_pass_has_its_redundancy_and_its_scatter(noisy):
     wall = many[many["family"] == "P2"]  # on the smaller faces some moments have too few points to tell
     assert (wall["redundancy"] > wall["count"] / 2).all()
     assert np.abs(many["variance_factor"] - 1).max() < 0.3
-    assert cells["redundancy"].sum() < found["adjust/summary"]["redundancy"].iloc[0]
+    assert cells["redundancy"].sum() < noisy_found["adjust/summary"]["redundancy"].iloc[0]

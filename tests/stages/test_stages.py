@@ -1,5 +1,7 @@
 """Single stages: what they drop and count, what they refuse, what makes a verdict."""
 
+import copy
+import dataclasses
 import json
 
 import numpy as np
@@ -22,8 +24,8 @@ def columns(stream, name):
     return np.concatenate([part.columns[name] for part in stream.parts])
 
 
-def test_every_point_is_counted_from_stage_to_stage(noisy):
-    found = calibrated(noisy, "segment")
+def test_every_point_is_counted_from_stage_to_stage(noisy, noisy_found):
+    found = noisy_found
     georeferenced, segmented = counts(found, "georeference"), counts(found, "segment")
     for raw, source, nxt in (
         ("laser", "laser_points", "laser_pool"),
@@ -56,8 +58,8 @@ def test_repeated_and_unordered_ins_records_are_sorted_out(quiet):
     assert counts(found, "ingest")[("ins", "repeated time")] == 100
 
 
-def test_passes_and_quality_are_recorded(noisy):
-    found = calibrated(noisy, "ingest")
+def test_passes_and_quality_are_recorded(noisy_found):
+    found = noisy_found
     passes = found["ingest/passes"]
     assert len(passes) == 4
     np.testing.assert_allclose(passes["speed_m_s"], 0.4, atol=0.03)
@@ -94,10 +96,9 @@ def test_a_sonar_looking_away_is_refused(quiet):
         calibrated(quiet, "segment", mount={"roll_deg": 48.8})
 
 
-def test_an_unseen_top_makes_the_registration_ambiguous(quiet):
+def test_an_unseen_top_makes_the_registration_ambiguous(quiet, quiet_found):
     """Without the ends of the stacks and the wall's top, one block higher is as good: rejected, not guessed."""
-    found = calibrated(quiet, "georeference")
-    pool = found["georeference/laser_pool"]
+    pool = quiet_found["georeference/laser_pool"]
     low = set(columns(pool, "t_ns")[columns(pool, "z_pool_m") < 2.2].tolist())
     keep = np.array([t in low for t in quiet.laser["t_ns"].tolist()])
     result = calibrated(quiet, raw={"laser": {k: v[keep] for k, v in quiet.laser.items()}})
@@ -167,12 +168,12 @@ def test_good_laser_points_on_a_tilted_target_keep_their_weight():
     assert json.loads(found["report/calibration.json"])["verdict"] == "accepted"
 
 
-def test_a_single_pass_is_weak_and_says_so(noisy):
-    end = calibrated(noisy, "ingest")["ingest/passes"]["end_ns"][0]
+def test_a_single_pass_is_weak_and_says_so(noisy, noisy_found):
+    end = noisy_found["ingest/passes"]["end_ns"][0]
     first = {name: values[noisy.mbes["t_ns"] <= end] for name, values in noisy.mbes.items()}
     result = json.loads(calibrated(noisy, raw={"mbes": first})["report/calibration.json"])
     assert "one pass alone has soundings" in result["geometry"]["advice"]
-    whole = json.loads(calibrated(noisy)["report/calibration.json"])
+    whole = json.loads(noisy_found["report/calibration.json"])
     sigma, best = (np.array(one["mbes"]["sigma"]["rotation_vector_deg"]) for one in (result, whole))
     assert (sigma > 1.5 * best).all()
 
@@ -194,11 +195,11 @@ def test_sigma_limits_reject_and_name_the_parameter(noisy):
     assert result["mbes"]["covariance"] is not None
 
 
-def test_wrong_sigmas_alone_reject_nothing(noisy, errors_of):
+def test_wrong_sigmas_alone_reject_nothing(noisy, noisy_found, errors_of):
     """Five times too small, five times too large: the variance factors say so, and the result moves by less than a
     sigma (beams that are said to stray more keep further from the edges: other points)."""
-    session = made(seed=11)
-    reference = json.loads(calibrated(session)["report/calibration.json"])
+    session = dataclasses.replace(noisy, session=copy.deepcopy(noisy.session))
+    reference = json.loads(noisy_found["report/calibration.json"])
     for factor in (0.2, 5.0):
         session.session["laser"]["range_sigma_m"] = 0.005 * factor
         session.session["mbes"] |= {"range_sigma_m": 0.008 / factor, "angle_sigma_deg": 0.06 / factor}
@@ -212,10 +213,9 @@ def test_wrong_sigmas_alone_reject_nothing(noisy, errors_of):
         assert (moved / sigma).max() < 1
 
 
-def test_the_wall_alone_gives_nulls_and_a_reason(quiet):
+def test_the_wall_alone_gives_nulls_and_a_reason(quiet, quiet_found):
     """Rank-deficient: rejected with nulls, never an error."""
-    found = calibrated(quiet, "segment")
-    labelled = found["segment/soundings_labelled"]
+    labelled = quiet_found["segment/soundings_labelled"]
     t, beam, face = (columns(labelled, name) for name in ("t_ns", "beam", "face"))
     wall = set(zip(t[face == 0].tolist(), beam[face == 0].tolist(), strict=True))
     keep = np.array([key in wall for key in zip(*(quiet.mbes[n].tolist() for n in ("t_ns", "beam")), strict=True)])
