@@ -38,8 +38,8 @@ def _words(row: Mapping[Any, Any]) -> str:
         )
     if name == "sound_speed":
         return (
-            f"the sound speed: it is {_size(100 * value, 100 * sigma, '%')} above the recorded one, or that given as "
-            "mbes.sound_speed_m_s; measure it at the head"
+            f"the sound speed: it is {_size(100 * value, 100 * sigma, '%')} above that recorded, or given as "
+            "mbes.sound_speed_m_s or mbes.svp; measure it at the head"
         )
     if name == "sound_speed_gradient":
         return f"a sound speed that changes with depth, by {_size(value, sigma, 'm/s')} per metre: take a cast"
@@ -47,7 +47,7 @@ def _words(row: Mapping[Any, Any]) -> str:
         return f"{whose} ranges: they should be {_size(1e3 * value, 1e3 * sigma, 'mm')} longer"
     if name.startswith("laser_rotation"):
         angle = _size(np.degrees(value), np.degrees(sigma), "°")
-        return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]})"
+        return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
     if name.startswith("laser_lever_arm"):
         return f"laser.mount: {name[-1]}_m should be {_size(1e3 * value, 1e3 * sigma, 'mm')} more"
     _, family, *what = name.split("_")
@@ -55,7 +55,8 @@ def _words(row: Mapping[Any, Any]) -> str:
         angle = _size(np.degrees(value), np.degrees(sigma), "°")
         return f"the target: its wet faces {FACES[family]} are turned by {angle} against the dry ones"
     off = _size(1e3 * value, 1e3 * sigma, "mm")
-    return f"the target: its wet faces {FACES[family]} stand off by {off}; check target.a, b, c, e and its survey"
+    how = "lie higher" if family == "H" else "stand off"
+    return f"the target: its wet faces {FACES[family]} {how} by {off}; check target.a, b, c, e and its survey"
 
 
 def _size(value: float, sigma: float, unit: str) -> str:

@@ -28,7 +28,8 @@ ODD_FACTOR = 2.0  # a variance factor above this, or below its inverse, is worth
 ODD_COMMON = 4.0  # the same of what an epoch's points share: less is a good INS
 ODD_CUT = 0.01  # and so is a share of cut observations above this
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # and a target found so far off
-RETRACE_DEG = 1.0  # a coarse mount further off than this wants its rays traced again
+RETRACE_DEG = 2.0  # a coarse mount further off than this wants its rays traced again
+ODD_SPEED_M_S = 3.0  # and a head's sound speed so far beyond the cast's
 FEWEST = 30  # soundings on a family of faces
 PLACES = {
     "face": "on face {low:.0f}",
@@ -239,16 +240,27 @@ def warnings(
     return found
 
 
-def bent_elsewhere(mbes: config.Mbes, correction: Mapping[str, Any]) -> list[str]:
-    """Rays are traced through a cast with the coarse mount. A ray at θ from straight down bends by g t sin θ: of that a
-    share of δ / tan θ is wrong where θ is wrong by δ, a sixtieth for a degree at 45°."""
-    turn = correction["rotation_vector_deg"]
-    if mbes.svp is None or turn is None or np.linalg.norm(turn) < RETRACE_DEG:
+def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str, Any]) -> list[str]:
+    """A cast that cannot be of this water by what the head recorded; and rays traced through it with a coarse mount far
+    off: a ray at θ from straight down bends by g t sin θ, of which a share of δ / tan θ is wrong where θ is wrong by δ
+    (a sixtieth for a degree at 45°)."""
+    if mbes.svp is None:
         return []
-    return [
-        f"rays were traced through mbes.svp with a coarse mount that is {np.linalg.norm(turn):.1f}° off: enter the "
-        "values found as mbes.mount and run again"
-    ]
+    found = []
+    speeds = [speed for _, speed in mbes.svp]
+    low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
+    if max(low - max(speeds), min(speeds) - high) > ODD_SPEED_M_S:
+        found.append(
+            f"mbes.svp lies between {min(speeds):.1f} and {max(speeds):.1f} m/s, the head recorded {low:.1f} to "
+            f"{high:.1f}: the cast is taken for true; was it taken here and now?"
+        )
+    turn = correction["rotation_vector_deg"]
+    if turn is not None and np.linalg.norm(turn) > RETRACE_DEG:
+        found.append(
+            f"rays were traced through mbes.svp with a coarse mount that is {np.linalg.norm(turn):.1f}° off: enter the "
+            "values found as mbes.mount and run again"
+        )
+    return found
 
 
 def _so(sigma: Mapping[str, float] | None) -> str:

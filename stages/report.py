@@ -17,7 +17,7 @@ from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
-from pipeline.verdict import Evidence, bent_elsewhere, pattern_tests, reasons, warnings
+from pipeline.verdict import Evidence, cast_doubts, pattern_tests, reasons, warnings
 
 Array = NDArray[np.float64]
 SCHEMA = 1
@@ -35,6 +35,7 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    files: Annotated[pd.DataFrame, artefacts.FILES]
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
     faces: Annotated[pd.DataFrame, artefacts.FACES]
     planes: Annotated[pd.DataFrame, artefacts.PLANES]
@@ -98,7 +99,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
         )
         + oddities(built, config.target)
-        + bent_elsewhere(config.mbes, methods["adjustment"]["correction"]),
+        + cast_doubts(config.mbes, inputs.files, methods["adjustment"]["correction"]),
         "result": config.result,
         "mbes": methods[config.result],
         "methods": methods,

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from pipeline.config import Mbes, Verdict
-from pipeline.verdict import Evidence, bent_elsewhere, pattern_tests, reasons, warnings
+from pipeline.verdict import Evidence, cast_doubts, pattern_tests, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 LEVEL = 0.001
@@ -90,10 +90,10 @@ def test_a_good_session_has_no_reason():
         ({"count": -371}, "only 29 soundings lie on P2"),
         ({"bin_": {"normalised": 3.5}}, "residuals go with angle: from 20° to 25° the sonar lies +1.0 mm off P2"),
         ({"bin_": {"by": "distance", "normalised": -3.5}}, "from 20 to 25 m the sonar lies"),
-        ({"held": {"value": 6e-4}}, "the sound speed: it is +0.06 ± 0.01 % above the recorded one"),
+        ({"held": {"value": 6e-4}}, "the sound speed: it is +0.06 ± 0.01 % above that recorded"),
         ({"held": {"unknown": "mbes_latency", "value": 0.02}}, "the sonar's clock: its latency is +20.0 ± 0.1 ms more"),
         ({"held": {"unknown": "laser_rotation_y", "value": -0.01}}, "it should be turned by -0.573 ± 0.006° about"),
-        ({"held": {"unknown": "wet_H_shift", "value": 0.02}}, "that are horizontal stand off by +20.0 ± 0.1 mm"),
+        ({"held": {"unknown": "wet_H_shift", "value": 0.02}}, "that are horizontal lie higher by +20.0 ± 0.1 mm"),
         ({"summary": {"converged": False}}, "did not converge in 6 steps"),
         ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),
     ],
@@ -207,15 +207,20 @@ def test_each_variable_has_its_own_test():
 
 
 @pytest.mark.parametrize(
-    ("cast", "turn_deg", "said"),
+    ("cast", "recorded_m_s", "turn_deg", "words"),
     [
-        ([[0.0, 1500.0], [5.0, 1501.0]], [0.0, 0.8, 0.7], True),
-        ([[0.0, 1500.0], [5.0, 1501.0]], [0.0, 0.7, 0.7], False),
-        ([[0.0, 1500.0], [5.0, 1501.0]], None, False),
-        (None, [0.0, 2.0, 0.7], False),
+        (((0.0, 1500.0), (5.0, 1501.0)), 1500.0, [0.0, 1.9, 1.0], ["2.1° off"]),
+        (((0.0, 1500.0), (5.0, 1501.0)), 1500.0, [0.0, 1.9, 0.5], []),
+        (((0.0, 1500.0), (5.0, 1501.0)), 1500.0, None, []),
+        (((0.0, 1500.0), (5.0, 1501.0)), 1504.1, None, ["the head recorded 1504.1"]),
+        (((0.0, 1500.0), (5.0, 1501.0)), 1503.9, None, []),
+        (((0.0, 1500.0), (5.0, 1501.0)), 1496.9, None, ["the head recorded 1496.9"]),
+        (((0.0, 1500.0), (5.0, 1501.0)), float("nan"), None, []),
+        (None, 1470.0, [0.0, 3.0, 0.7], []),
     ],
 )
-def test_rays_bent_with_a_wrong_mount_are_to_be_bent_again(cast, turn_deg, said):
-    found = bent_elsewhere(Mbes.model_construct(svp=cast), {"rotation_vector_deg": turn_deg})
-    assert bool(found) == said
-    assert all("1.1° off" in words for words in found)
+def test_a_cast_of_other_water_and_rays_bent_with_a_wrong_mount(cast, recorded_m_s, turn_deg, words):
+    files = pd.DataFrame({"sound_speed_low_m_s": [recorded_m_s], "sound_speed_high_m_s": [recorded_m_s]})
+    found = cast_doubts(Mbes.model_construct(svp=cast), files, {"rotation_vector_deg": turn_deg})
+    assert len(found) == len(words)
+    assert all(one in said for one, said in zip(words, found, strict=True))

@@ -48,18 +48,21 @@ def traced(
 ) -> Array:
     """Points (n, 3) m in the mbes frame, as :func:`points_in_mbes` gives them, where the rays really end.
 
-    ``speed_m_s`` (n,): that at the head, with which they were made; R_up_from_mbes (n, 3, 3) into a frame with z up;
-    the head's depth (n,) m. The ray leaves the head's water with the recorded direction and enters the column by
-    Snell's law, sin θ / c staying what it is; then it is traced for the recorded time.
+    ``speed_m_s`` (n,): that with which they were made; R_up_from_mbes (n, 3, 3) into a frame with z up; the head's
+    depth (n,) m. The flat array measures sin θ / c along itself, so that in the water that the cast says to be at the
+    head's depth sin θ' = k sin θ, k = c_cast / c: whether c is wrong, or right for a thin layer of other water at the
+    array's face. (A layer that lies level would refract otherwise; but the fan of a tilted head looks along it, where
+    any difference of the two speeds would turn rays by degrees.) From there the ray is traced for the recorded time.
     """
     ranges = np.linalg.norm(points_mbes_m, axis=1)
-    directions = np.einsum("nij,nj->ni", R_up_from_mbes, points_mbes_m) / ranges[:, None]
-    level = np.hypot(directions[:, 0], directions[:, 1])
-    sine = np.minimum(level * cast.speed_at(depth_m) / speed_m_s, 1.0)
-    angle = np.where(directions[:, 2] > 0, np.pi - np.arcsin(sine), np.arcsin(sine))
-    across, reached = trace(cast, depth_m, angle, ranges / speed_m_s)
-    heading = directions[:, :2] / np.maximum(level, 1e-12)[:, None]
-    ended = np.column_stack([heading * across[:, None], depth_m - reached])
+    sine, level, cosine = (points_mbes_m / ranges[:, None]).T
+    sine = np.clip(sine * cast.speed_at(depth_m) / speed_m_s, -1.0, 1.0)
+    cosine = np.copysign(np.sqrt(np.maximum(1 - sine**2 - level**2, 0.0)), cosine)
+    directions = np.einsum("nij,nj->ni", R_up_from_mbes, np.column_stack([sine, level, cosine]))
+    across = np.hypot(directions[:, 0], directions[:, 1])
+    reached, depth = trace(cast, depth_m, np.arctan2(across, -directions[:, 2]), ranges / speed_m_s)
+    heading = directions[:, :2] / np.maximum(across, 1e-12)[:, None]
+    ended = np.column_stack([heading * reached[:, None], depth_m - depth])
     return np.asarray(np.einsum("nji,nj->ni", R_up_from_mbes, ended))
 
 

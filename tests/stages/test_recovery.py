@@ -123,6 +123,19 @@ def test_wrong_sound_speed_is_put_right_in_range_and_steering(errors_of):
     assert right[3:].max() < 0.01
 
 
+def test_a_cast_puts_a_wrong_speed_at_the_head_right(errors_of):
+    """Water of one speed, the head working with another: by the cast alone range and steering are recomputed, also of
+    beams that look along the level."""
+    speed = {"mbes": {"sound_speed_true_m_s": 1500.0, "sound_speed_recorded_m_s": 1497.0}}
+    session = made(QUIET, speed, seed=8)
+    given = {**session.session, "mbes": {**session.session["mbes"], "svp": [[0.0, 1500.0], [10.0, 1500.0]]}}
+    result = blocks(calibrated(dataclasses.replace(session, session=given)))
+    right = np.abs(errors_of(result["methods"]["adjustment"], session.truth))
+    assert result["verdict"] == "accepted", result["reasons"]
+    assert right[:3].max() < 1e-4
+    assert right[3:].max() < 0.01
+
+
 def test_latency_is_subtracted(errors_of):
     late = {"mbes": {"latency_s": 0.05, "latency_declared_s": 0.05}, "laser": {"latency_s": -0.03}}
     session = made(QUIET, late, {"laser": {"latency_declared_s": -0.03}}, seed=9)
