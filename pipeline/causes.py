@@ -42,7 +42,7 @@ def _words(row: Mapping[Any, Any]) -> str:
             "mbes.sound_speed_m_s or mbes.svp; measure it at the head"
         )
     if name == "sound_speed_gradient":
-        return f"a sound speed that changes with depth, by {_size(value, sigma, 'm/s')} per metre: take a cast"
+        return f"a sound speed that changes with depth, by {_size(value, sigma, 'm/s')} per metre: take a (better) cast"
     if name.endswith("_range"):
         return f"{whose} ranges: they should be {_size(1e3 * value, 1e3 * sigma, 'mm')} longer"
     if name.startswith("laser_rotation"):

@@ -15,6 +15,11 @@ from pipeline.parsing import parse, read_yaml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+SigmaM = Annotated[float, Field(ge=0, le=10)]
+SigmaDeg = Annotated[float, Field(ge=0, le=45)]
+SigmaS = Annotated[float, Field(ge=0, le=10)]
+BeamWidth = Annotated[float, Field(gt=0, le=45)]
+RangeSigma = Annotated[float, Field(ge=1e-5, le=10)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Length = Annotated[float, Field(gt=0, le=100)]
@@ -41,8 +46,8 @@ class AsBuilt(Model):
     """The target as surveyed: faces off their design, and how far the wet ones of a family may stand off besides."""
 
     faces: dict[str, Annotated[float, Field(ge=-0.05, le=0.05)]] = {}  # m outward of the design, by name: P1-0-top
-    offset_sigma_m: NotNegative = 0.001
-    angle_sigma_deg: NotNegative = 0.005
+    offset_sigma_m: SigmaM = 0.001
+    angle_sigma_deg: SigmaDeg = 0.005
 
 
 class Target(Model):
@@ -123,11 +128,11 @@ Freeable = Literal["mbes_latency", "laser_latency", "sound_speed"]
 class Adjust(Model):
     free: tuple[Freeable, ...] = ()  # estimated besides the mount and the surfaces
     max_iterations: Annotated[int, Field(ge=1, le=100)] = 20
-    robust_k0: Positive = 3.0  # IGG III: full weight below, in sigmas
-    robust_k1: Positive = 6.0  # no weight above
-    moment_s: Positive = 0.1  # observations within this time share the INS's noise (covariance)
+    robust_k0: Annotated[float, Field(ge=0.5, le=1000)] = 3.0  # IGG III: full weight below, in sigmas
+    robust_k1: Annotated[float, Field(ge=0.5, le=1000)] = 6.0  # no weight above
+    moment_s: Annotated[float, Field(ge=0.001, le=1000)] = 0.1  # observations within it share the INS's noise
     test_level: Annotated[float, Field(gt=0, lt=0.5)] = 0.001
-    test_tolerance_m: NotNegative = 0.003  # systematic residual per surface and pass that is not held against a session
+    test_tolerance_m: SigmaM = 0.003  # systematic residual per surface and pass that is not held against a session
 
     @model_validator(mode="after")
     def _ordered(self) -> "Adjust":
@@ -192,18 +197,18 @@ class Mount(Model):
 class Drift(Model):
     """First-order Gauss-Markov errors of the INS: standard deviations and correlation time."""
 
-    horizontal_m: NotNegative = 0.015
-    vertical_m: NotNegative = 0.02
-    roll_pitch_deg: NotNegative = 0.01
-    heading_deg: NotNegative = 0.03
-    time_constant_s: Positive = 200.0
+    horizontal_m: SigmaM = 0.015
+    vertical_m: SigmaM = 0.02
+    roll_pitch_deg: SigmaDeg = 0.01
+    heading_deg: SigmaDeg = 0.03
+    time_constant_s: Annotated[float, Field(ge=1, le=1e6)] = 200.0
 
 
 class White(Model):
     """White noise of the INS, per record."""
 
-    position_m: NotNegative = 0.002
-    attitude_deg: NotNegative = 0.002
+    position_m: SigmaM = 0.002
+    attitude_deg: SigmaDeg = 0.002
 
 
 class Ins(Model):
@@ -218,8 +223,8 @@ class Ins(Model):
 class MountSigma(Model):
     """Of each of the three angles and of each component of the lever arm."""
 
-    angle_deg: NotNegative = 0.005
-    lever_arm_m: NotNegative = 0.0015
+    angle_deg: SigmaDeg = 0.005
+    lever_arm_m: SigmaM = 0.0015
 
 
 class Laser(Model):
@@ -229,11 +234,11 @@ class Laser(Model):
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
     mount: Mount
     mount_sigma: MountSigma = MountSigma()  # of the fine calibration
-    range_sigma_m: Positive = 0.005
-    range_bias_sigma_m: NotNegative = 0.002  # common to all ranges
-    angle_sigma_deg: NotNegative = 0.003
+    range_sigma_m: RangeSigma = 0.005
+    range_bias_sigma_m: SigmaM = 0.002  # common to all ranges
+    angle_sigma_deg: SigmaDeg = 0.003
     latency_s: Latency = 0.0
-    latency_sigma_s: NotNegative = 0.0002
+    latency_sigma_s: SigmaS = 0.0002
 
 
 class Mbes(Model):
@@ -242,15 +247,15 @@ class Mbes(Model):
     mount: Mount
     sound_speed_m_s: SoundSpeed | None = None
     svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
-    sound_speed_sigma_m_s: NotNegative = 0.2
-    sound_speed_gradient_sigma_1_s: NotNegative = 0.1  # (m/s)/m: 0.03 °C per metre
+    sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2
+    sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m: 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
-    range_sigma_m: Positive = 0.008
-    range_bias_sigma_m: NotNegative = 0.002  # common to all detections
-    angle_sigma_deg: NotNegative = 0.06
-    beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # width across track, along track
+    range_sigma_m: RangeSigma = 0.008
+    range_bias_sigma_m: SigmaM = 0.002  # common to all detections
+    angle_sigma_deg: SigmaDeg = 0.06
+    beam_deg: tuple[BeamWidth, BeamWidth] = (0.5, 1.0)  # width across track, along track
     latency_s: Latency = 0.0
-    latency_sigma_s: NotNegative = 0.0005
+    latency_sigma_s: SigmaS = 0.0005
 
     @model_validator(mode="after")
     def _deeper_and_deeper(self) -> "Mbes":

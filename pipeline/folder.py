@@ -53,7 +53,9 @@ def load_settings(session_folder: Path, config_path: Path) -> Settings:
     """Both YAML files, read and checked."""
     pool = config.load_pool(config_path)
     refuse_faces(pool, config_path)
-    return Settings(session_folder.resolve(), pool, config.load_session(session_folder))
+    session = config.load_session(session_folder)
+    refuse_cast(pool.target, session.mbes, session_folder / "session.yaml")
+    return Settings(session_folder.resolve(), pool, session)
 
 
 def refuse_faces(pool: config.PoolConfig, path: Path) -> None:
@@ -63,6 +65,20 @@ def refuse_faces(pool: config.PoolConfig, path: Path) -> None:
         if name not in names:
             known = ", ".join(names)
             raise ConfigError(f"{path}: as_built.faces: {name!r}: no face of this target; its faces are {known}")
+
+
+def refuse_cast(target: config.Target, mbes: config.Mbes, path: Path) -> None:
+    """A cast is of the water that the rays go through: at least of half the depth down to the target's lower end."""
+    model = target_of(target)
+    depth = model.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in model.faces)
+    if mbes.svp is None:
+        return
+    first, last = mbes.svp[0][0], mbes.svp[-1][0]
+    if min(last, depth) - first < depth / 2:
+        raise ConfigError(
+            f"{path}: mbes.svp: reaches from {first:g} to {last:g} m, the target down to {depth:g} m: less than half "
+            "of that; give a cast of the whole depth"
+        )
 
 
 def refuse_folders(run: Path, session_folder: Path) -> None:
@@ -200,7 +216,7 @@ def calibration(run: Path) -> dict[str, Any]:
 
 
 def refuse_output(option: str, file: Path | None, *runs: Path) -> None:
-    """A picture goes to a file of its kind, never over a run's results or anything else."""
+    """A file of its kind, never among a run's results or a session's files (``runs``)."""
     if file is None:
         return
     suffix = option.replace("--", ".")
@@ -210,4 +226,4 @@ def refuse_output(option: str, file: Path | None, *runs: Path) -> None:
         raise ConfigError(f"{option} {file}: is no file; name another")
     for run_folder in runs:
         if file.resolve().is_relative_to(run_folder.resolve()):
-            raise ConfigError(f"{option} {file}: lies in the run folder {run_folder}; name a file elsewhere")
+            raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")

@@ -4,9 +4,11 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.config import Angle, Length, Lever, Model, NotNegative, Positive
+from pipeline.config import Angle, Length, Lever, Model
 
-Rate = Annotated[float, Field(gt=0, le=1e7)]
+Rate = Annotated[float, Field(ge=0.1, le=1e7)]
+Swing = Annotated[float, Field(ge=0, le=45)]
+Sway = Annotated[float, Field(ge=0, le=5)]
 
 
 class LaserFigures(Model):
@@ -19,7 +21,7 @@ class LaserFigures(Model):
 
 
 class MbesFigures(Model):
-    ping_rate_hz: Rate = 20.0
+    ping_rate_hz: Annotated[float, Field(ge=0.1, le=200)] = 20.0
     beams: Annotated[int, Field(ge=2, le=2048)] = 256
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
     max_range_m: Length = 15.0
@@ -28,20 +30,20 @@ class MbesFigures(Model):
 class Unrest(Model):
     """Amplitude and period of what the boat does about its track."""
 
-    roll_deg: NotNegative = 1.0
-    pitch_deg: NotNegative = 0.6
-    sway_m: NotNegative = 0.06
-    heave_m: NotNegative = 0.02
-    period_s: Positive = 4.5
+    roll_deg: Swing = 1.0
+    pitch_deg: Swing = 0.6
+    sway_m: Sway = 0.06
+    heave_m: Sway = 0.02
+    period_s: Annotated[float, Field(ge=0.5, le=1000)] = 4.5
 
 
 class Pass(Model):
     """One pass along the wall."""
 
-    distance_m: Annotated[float, Field(gt=0, le=100)]  # of the INS from the wall
-    speed_m_s: Annotated[float, Field(gt=0, le=10)] = 0.4
+    distance_m: Annotated[float, Field(ge=0.5, le=100)]  # of the INS from the wall
+    speed_m_s: Annotated[float, Field(ge=0.01, le=10)] = 0.4
     heading_swing_deg: Annotated[float, Field(ge=0, le=45)] = 1.5  # amplitude
-    half_length_m: Annotated[float, Field(gt=0, le=100)] | None = None  # null: to 2 m beyond the blocks
+    half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the blocks
 
     def seconds(self, half_length_m: float) -> float:
         return 2 * (self.half_length_m or half_length_m) / self.speed_m_s
@@ -50,8 +52,8 @@ class Pass(Model):
 class Budget(Model):
     """Time for all passes; between two passes the boat has to turn."""
 
-    seconds: Positive
-    turn_s: NotNegative = 60.0
+    seconds: Annotated[float, Field(gt=0, le=36_000)]
+    turn_s: Annotated[float, Field(ge=0, le=3600)] = 60.0
 
 
 class Plan(Model):

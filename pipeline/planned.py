@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.adjusting import free_unknowns
 from pipeline.considered import considered_of
+from pipeline.errors import ConfigError
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
@@ -20,6 +21,7 @@ from pipeline.plan_settings import Budget, Pass, Plan
 from pipeline.planning import Predicted, Setting, predict, state_by_design
 
 Array = NDArray[np.float64]
+MOST_PASSES = 100
 
 
 @dataclass(frozen=True)
@@ -54,28 +56,39 @@ def setting_of(plan: Plan, pool: config.PoolConfig, session: config.SessionConfi
     return Setting(model, state, plan, pool.segment, session.ins, session.laser, session.mbes)
 
 
-def load_plan(path: Path) -> Plan:
-    return parse(Plan, read_yaml(path), str(path))
+def load_plan(path: Path, session: config.SessionConfig) -> Plan:
+    """A plan that can be sailed, with the sonar under water."""
+    plan = parse(Plan, read_yaml(path), str(path))
+    sonar = plan.ins_height_m + session.mbes.mount.z_m
+    if sonar >= 0:
+        raise ConfigError(
+            f"{path}: ins_height_m = {plan.ins_height_m:g}: with mbes.mount.z_m = {session.mbes.mount.z_m:g} the sonar "
+            f"is {sonar:.2f} m above the water; give the height of the INS above the water"
+        )
+    return plan
 
 
 def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Answer:
     setting = setting_of(plan, pool, session)
     considered = considered_of(setting.state.names, session.laser, session.mbes, pool.as_built)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
-    given = _outlook(setting, plan.passes, turn_s, considered)
+    free = free_unknowns(setting.state, pool.adjust.free)
+    given = _outlook(setting, plan.passes, turn_s, considered, free)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
     seen = Seen([one.distance_m for one in plan.passes], soundings(setting, given), float(speeds), float(swings))
     geometry = geometry_of(setting, seen, given.predicted.normal, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:
-        better = _better(setting, plan.candidates, plan.budget.seconds, plan.budget.turn_s, considered)
+        better = _better(setting, plan.candidates, plan.budget.seconds, plan.budget.turn_s, considered, free)
     return Answer(setting, given, geometry.gaps, geometry.remedy, better)
 
 
-def _outlook(setting: Setting, passes: Sequence[Pass], turn_s: float, considered: Array) -> Outlook:
+def _outlook(
+    setting: Setting, passes: Sequence[Pass], turn_s: float, considered: Array, free: list[int]
+) -> Outlook:
     predicted = predict(setting, passes, turn_s)
     normal = predicted.normal
-    solution = solve(normal, np.zeros(len(normal)), free_unknowns(setting.state))
+    solution = solve(normal, np.zeros(len(normal)), free)
     random, total = solution.covariance[:SIX, :SIX], solution.total(considered)[:SIX, :SIX]
     if solution.deficiency:
         random, total = np.full((SIX, SIX), np.nan), np.full((SIX, SIX), np.nan)
@@ -93,7 +106,7 @@ def soundings(setting: Setting, outlook: Outlook) -> dict[str, int]:
 
 
 def _better(
-    setting: Setting, candidates: Sequence[Pass], seconds: float, turn_s: float, considered: Array
+    setting: Setting, candidates: Sequence[Pass], seconds: float, turn_s: float, considered: Array, free: list[int]
 ) -> Outlook | None:
     """Pass after pass the candidate that brings most for its time, as long as there is time; None: not even for one.
 
@@ -103,7 +116,6 @@ def _better(
     predicted = [predict(setting, [one], phases=1) for one in candidates]
     usual = config.Verdict()
     bounds = np.repeat([np.radians(usual.max_sigma_deg), usual.max_sigma_m], 3)
-    free = free_unknowns(setting.state)
     vague = np.zeros((setting.state.size, setting.state.size))
     vague[free, free] = VAGUE**-2
 
@@ -120,7 +132,7 @@ def _better(
             needed = one.seconds[0] + (turn_s if chosen else 0.0)
             if needed <= left:
                 gains.append((np.log(now / cost(normal + one.normal)) / needed, -number))
-        if not gains or max(gains)[0] <= 0:
+        if not gains or max(gains)[0] <= 0 or len(chosen) == MOST_PASSES:
             break
         number = -max(gains)[1]
         left -= predicted[number].seconds[0] + (turn_s if chosen else 0.0)
@@ -128,7 +140,7 @@ def _better(
         chosen.append(number)
     if not chosen:
         return None
-    return _outlook(setting, [candidates[k] for k in chosen], turn_s, considered)
+    return _outlook(setting, [candidates[k] for k in chosen], turn_s, considered, free)
 
 
 # --- in words --------------------------------------------------------------------------------------------------------
@@ -208,7 +220,7 @@ def _lines(setting: Setting, outlook: Outlook, limits: config.Verdict) -> list[s
     random, total = mounted.sigmas(outlook.random), mounted.sigmas(outlook.total)
     for name, _, key, unit in PARAMETERS:
         limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, " m")
-        over = "  above the limit" if total[key] > limit else ""
+        over = "  above the limit" if not total[key] <= limit else ""
         row = "".join(f"{value:>11.4f}{sign.strip()}" for value in (random[key], total[key], limit))
         lines.append(f"  {name:<8}{row}{over}")
     return lines

@@ -188,7 +188,7 @@ def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict) -> l
         f"total sigma of {SIX[place]} is {sigma[key]:.4g}{bounds[unit][1]}, above the limit of "
         f"{bounds[unit][0]:g}{bounds[unit][1]}"
         for _, place, key, unit in PARAMETERS
-        if sigma[key] > bounds[unit][0]
+        if not sigma[key] <= bounds[unit][0]
     ]
 
 

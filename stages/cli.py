@@ -271,7 +271,7 @@ def plan(
     from stages.plan import plan as plan_of
 
     for option, path in (("--yaml", out), ("--rrd", rrd)):
-        refuse_output(option, path)
+        refuse_output(option, path, session)
     said, enough = plan_of(file, session, config, out, rrd)
     say(said, sys.stdout)
     return 0 if enough else 1

@@ -141,3 +141,37 @@ def test_the_command(tmp_path: Path) -> None:
         assert word in told.err
     told = poolcal(*words, "--rrd", tmp_path / "out.png")
     assert (told.status, "ends in .rrd" in told.err) == (2, True)
+
+
+def test_what_is_not_to_be_planned_or_written_over(tmp_path: Path) -> None:
+    """One line each, status 2, and every file as it was."""
+    session = made({"track": {"distances_m": [4.0]}}, seed=2)
+    folder, plan, pool = tmp_path / "session", tmp_path / "plan.yaml", tmp_path / "pool.yaml"
+    folder.mkdir()
+    (folder / "session.yaml").write_text(yaml.safe_dump(session.session))
+    words = ("plan", plan, "--session", folder, "--config", pool)
+
+    def refused(*more: Any, design: dict[str, Any] | None = None, **content: Any) -> str:
+        pool.write_text(yaml.safe_dump(session.pool | (design or {})))
+        plan.write_text(yaml.safe_dump(FIGURES | {"passes": [{"distance_m": 4.0}]} | content))
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        told = poolcal(*words, *more)
+        assert (told.status, len(told.err.splitlines())) == (2, 1), told
+        assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+        return told.err
+
+    for over in (folder / "session.yaml", folder / "new.yaml", plan, pool):
+        assert "name" in refused("--yaml", over)
+    assert "passes.0.distance_m" in refused(passes=[{"distance_m": 0.4}])
+    assert "candidates.0.distance_m" in refused(candidates=[{"distance_m": 0.4}])
+    assert "above the water" in refused(ins_height_m=2.2)
+    assert "no face of this target" in refused(design={"as_built": {"faces": {"P1-9": 0.001}}})
+    for content in ({"unrest": {"roll_deg": 90.0}}, {"budget": {"seconds": 1e9}}, {"mbes": {"ping_rate_hz": 1e7}}):
+        assert "should be less than or equal to" in refused(**content)
+
+
+def test_what_is_freed_is_freed_in_the_prediction_too(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    pool, session = configs
+    freed = pool.model_copy(update={"adjust": pool.adjust.model_copy(update={"free": ("mbes_latency",)})})
+    held, free = (planned.judge(plan_of(4.0, 8.0), one, session).given.random for one in (pool, freed))
+    assert np.sqrt(free[4, 4]) > 1.1 * np.sqrt(held[4, 4])  # y, along the track

@@ -1,12 +1,15 @@
 """Faces off their design, as surveyed; and the target as the laser finds it."""
 
+import contextlib
 import json
 
 import numpy as np
 import pytest
 
+from pipeline.config import Mbes, PoolConfig
 from pipeline.errors import ConfigError
-from pipeline.folder import load_settings
+from pipeline.folder import load_settings, refuse_cast
+from pipeline.parsing import parse
 from tests.stages.conftest import QUIET, calibrated, made
 
 
@@ -44,6 +47,23 @@ def test_an_unknown_face_is_refused(tmp_path, quiet):
     path.write_text(yaml.safe_dump(pool))
     with pytest.raises(ConfigError, match=r"as_built.faces: 'P9-0': no face of this target; its faces are .*P1-0-top"):
         load_settings(tmp_path, path)
+
+
+@pytest.mark.parametrize(
+    ("cast", "refused"),
+    [
+        ([[0.0, 1500.0], [0.01, 1500.0]], True),
+        ([[100.0, 1500.0], [101.0, 1500.0]], True),
+        ([[0.0, 1500.0], [1.9, 1500.0]], True),
+        ([[0.0, 1500.0], [2.1, 1500.0]], False),
+        ([[1.0, 1500.0], [9.0, 1500.0]], False),
+    ],
+)
+def test_a_cast_of_less_than_half_the_depth_is_refused(quiet, cast, refused):
+    pool = parse(PoolConfig, quiet.pool, "pool")
+    session = {**quiet.session["mbes"], "svp": cast}
+    with pytest.raises(ConfigError, match=r"mbes\.svp: reaches") if refused else contextlib.nullcontext():
+        refuse_cast(pool.target, parse(Mbes, session, "session"), "session.yaml")
 
 
 def test_the_target_is_measured_and_what_differs_is_said(quiet, quiet_found):
