@@ -1,6 +1,7 @@
 """The target as the laser finds it, against the letters of the pool's config.
 
-In the target frame (x into the wall, z up). With the adjusted planes n · X = d of P1, P2, P3:
+In the target frame (x into the wall, z up). With the laser's own planes n · X = d of P1, P2, P3 over all passes (the
+adjusted ones are the sonar's as well: what is wrong there would turn them):
 
 * b: P1 and P3 each meet P2 in a line; b is how far apart the two lines are at z = 0;
 * corner: the angle between the normals of P2 and of P1 or P3, 45° by design;
@@ -17,34 +18,35 @@ import numpy as np
 import pandas as pd
 
 from pipeline import config
+from pipeline.fitted import ALL_PASSES, laser_planes
 
 CORNER_DEG = 45.0
 FLANKS = ("P1", "P3")
-ODD_LENGTH_M, ODD_HEIGHT_M, ODD_ANGLE_DEG = 0.005, 0.002, 0.1  # worth a look
+VERTICAL = ("P1", "P2", "P3")
+ODD_LENGTH_M, ODD_HEIGHT_M, ODD_ANGLE_DEG = 0.01, 0.002, 0.2  # worth a look: more than drift between faces makes
 FEWEST_FACES = 3
 TINY_M = 1e-5  # no mean is known better
 
 
-def as_found(surfaces: pd.DataFrame, patterns: pd.DataFrame, faces: pd.DataFrame, e_m: float) -> dict[str, Any]:
+def as_found(planes: pd.DataFrame, patterns: pd.DataFrame, faces: pd.DataFrame, e_m: float) -> dict[str, Any]:
     """b_m, e_m, corner_deg and lean_deg by family; None, or left out, where the laser did not see it."""
-    seen = surfaces[surfaces["laser_points"] > 0]
-    planes = {
-        str(row["family"]): (np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]), float(row["distance_m"]))
-        for row in seen.to_dict("records")
-        if row["family"] != "H"
+    seen = {
+        family: (plane.normal, plane.distance_m)
+        for (number, family), plane in laser_planes(planes).items()
+        if number == ALL_PASSES and family in VERTICAL
     }
     lines = {}
     for flank in FLANKS:
-        if flank in planes and "P2" in planes:
-            (n, d), (wall, at) = planes[flank], planes["P2"]
+        if flank in seen and "P2" in seen:
+            (n, d), (wall, at) = seen[flank], seen["P2"]
             lines[flank] = float(np.linalg.solve(np.array([n[:2], wall[:2]]), np.array([d, at]))[1])
     return {
         "b_m": abs(lines["P3"] - lines["P1"]) if len(lines) == len(FLANKS) else None,
         "e_m": _e(patterns, faces, e_m),
         "corner_deg": {
-            flank: float(np.degrees(np.arccos(np.clip(planes[flank][0] @ planes["P2"][0], -1, 1)))) for flank in lines
+            flank: float(np.degrees(np.arccos(np.clip(seen[flank][0] @ seen["P2"][0], -1, 1)))) for flank in lines
         },
-        "lean_deg": {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in planes.items()},
+        "lean_deg": {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in seen.items()},
     }
 
 
@@ -69,5 +71,5 @@ def oddities(found: dict[str, Any], target: config.Target) -> list[str]:
             words.append(f"the laser finds {letter} = {value:.4f} m where target.{letter} says {given:g} m: measure it")
     for flank, angle in found["corner_deg"].items():
         if abs(angle - CORNER_DEG) > ODD_ANGLE_DEG:
-            words.append(f"the laser finds {angle:.2f}° between wall and {flank}, by design {CORNER_DEG:g}°: measure c")
+            words.append(f"the laser finds {angle:.2f}° between wall and {flank}, by design {CORNER_DEG:g}°")
     return words

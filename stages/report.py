@@ -46,7 +46,6 @@ class Inputs:
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
     geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
-    surfaces: Annotated[pd.DataFrame, artefacts.SURFACES]
     freed: Annotated[pd.DataFrame, artefacts.FREED]
     patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
@@ -88,7 +87,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.patterns,
     )
     found = reasons(evidence, methods, config.verdict, config.adjust.test_level, config.result)
-    built = as_found(inputs.surfaces, inputs.patterns, inputs.faces, config.target.e)
+    built = as_found(inputs.planes, inputs.patterns, inputs.faces, config.target.e)
     summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0]) | {"as_found": built}
     result = {
         "schema": SCHEMA,

@@ -11,12 +11,18 @@ ROOT = np.sqrt(0.5)
 TARGET = Target(a=8.0, b=3.0, c=1.0, e=0.5, origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0))
 
 
-def surfaces(half_width: float, corner_deg: float = 45.0) -> pd.DataFrame:
+def planes(half_width: float, corner_deg: float = 45.0) -> pd.DataFrame:
     """Normals to the vessel; P1 through (0, -half width), P3 through (0, half width), the wall at x = 0."""
     sine, cosine = np.sin(np.radians(corner_deg)), np.cos(np.radians(corner_deg))
     rows = [("P1", -ROOT, -ROOT, ROOT * half_width), ("P2", -1.0, 0.0, 0.0), ("P3", -cosine, sine, sine * half_width)]
-    columns = ["family", "normal_x_target_1", "normal_y_target_1", "distance_m"]
-    return pd.DataFrame(rows, columns=columns).assign(normal_z_target_1=0.0, laser_points=100)
+    columns = ["plane", "normal_x_target_1", "normal_y_target_1", "distance_m"]
+    table = pd.DataFrame(rows, columns=columns).assign(normal_z_target_1=0.0, sensor="laser", count=100, rms_m=0.005)
+    table["pass"] = -1
+    others = {f"centroid_{axis}_target_m": 0.0 for axis in "xyz"}
+    table = table.assign(**others, eigenvalues_m2=[[0.0, 1.0, 1.0]] * 3, tangents=[[0.0] * 6] * 3)
+    table = table.assign(covariance=[[0.0] * 9] * 3)
+    astray = table.assign(distance_m=table["distance_m"] + 0.5)
+    return pd.concat([table, astray.assign(sensor="mbes"), astray.assign(**{"pass": 0})], ignore_index=True)
 
 
 def heights(share: float) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -30,7 +36,7 @@ def heights(share: float) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def test_as_designed_nothing_is_said() -> None:
-    found = as_found(surfaces(1.5), *heights(0.0), 0.5)
+    found = as_found(planes(1.5), *heights(0.0), 0.5)
     assert found["b_m"] == pytest.approx(3.0)
     assert found["e_m"] == pytest.approx(0.5)
     assert found["corner_deg"] == pytest.approx({"P1": 45.0, "P3": 45.0})
@@ -40,26 +46,26 @@ def test_as_designed_nothing_is_said() -> None:
 @pytest.mark.parametrize(
     ("half_width", "corner_deg", "share", "words"),
     [
-        (1.503, 45.0, 0.0, "b = 3.0060 m where target.b says 3 m"),
+        (1.506, 45.0, 0.0, "b = 3.0120 m where target.b says 3 m"),
         (1.5, 45.0, 0.006, "e = 0.5030 m where target.e says 0.5 m"),
         (1.5, 45.0, -0.006, "e = 0.4970 m where target.e says 0.5 m"),
-        (1.5, 45.2, 0.0, "45.20° between wall and P3"),
+        (1.5, 45.3, 0.0, "45.30° between wall and P3"),
     ],
 )
 def test_what_differs_is_said_alone(half_width: float, corner_deg: float, share: float, words: str) -> None:
-    said = oddities(as_found(surfaces(half_width, corner_deg), *heights(share), 0.5), TARGET)
+    said = oddities(as_found(planes(half_width, corner_deg), *heights(share), 0.5), TARGET)
     assert len(said) == 1
     assert words in said[0]
 
 
-@pytest.mark.parametrize("differs", [(1.502, 45.0, 0.0), (1.5, 45.09, 0.0), (1.5, 45.0, 0.003)])
+@pytest.mark.parametrize("differs", [(1.504, 45.0, 0.0), (1.5, 45.19, 0.0), (1.5, 45.0, 0.003)])
 def test_what_a_target_is_built_to_is_not_said(differs: tuple[float, float, float]) -> None:
     half_width, corner_deg, share = differs
-    assert not oddities(as_found(surfaces(half_width, corner_deg), *heights(share), 0.5), TARGET)
+    assert not oddities(as_found(planes(half_width, corner_deg), *heights(share), 0.5), TARGET)
 
 
 def test_without_a_flank_there_is_no_width() -> None:
-    found = as_found(surfaces(1.5).iloc[:2], *heights(0.0), 0.5)
+    found = as_found(planes(1.5).query("plane != 'P3'"), *heights(0.0), 0.5)
     assert found["b_m"] is None
     assert set(found["corner_deg"]) == {"P1"}
     assert not oddities(found, TARGET)
