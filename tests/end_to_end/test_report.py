@@ -210,7 +210,7 @@ def test_compared_as_a_page(undisturbed: tuple[Path, Told], tmp_path: Path) -> N
     kept = digests(run)
     for place, words in (
         (tmp_path / "no" / "such" / "folder.html", "cannot be written"),
-        (run / "report" / "page.html", "lies in the run folder"),
+        (run / "report" / "page.html", "lies in the folder"),
         (run / "report" / "calibration.json", "ends in .html"),
         ("/dev/null", "ends in .html"),
         (tmp_path, "ends in .html"),
