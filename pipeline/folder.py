@@ -69,10 +69,10 @@ def refuse_faces(pool: config.PoolConfig, path: Path) -> None:
 
 def refuse_cast(target: config.Target, mbes: config.Mbes, path: Path) -> None:
     """A cast is of the water that the rays go through: at least of half the depth down to the target's lower end."""
-    model = target_of(target)
-    depth = model.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in model.faces)
     if mbes.svp is None:
         return
+    model = target_of(target)
+    depth = model.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in model.faces)
     first, last = mbes.svp[0][0], mbes.svp[-1][0]
     if min(last, depth) - first < depth / 2:
         raise ConfigError(
