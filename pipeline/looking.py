@@ -93,18 +93,19 @@ def _look(
     robust, _ = weighting.weights(seen)
     plain = seen.sigma_m * np.sqrt(weighting.factor(seen.group))
     size = np.where(robust > 0, np.abs(weighting.normalised(seen)), 0.0)
-    slot = batch["t_ns"] // slot_ns
+    slot = seen.points["t_ns"] // slot_ns
     # a whole cell off must show, not be cut away: plain weights
     moments = {
         name: moments_of(first, second, slot, 1 / plain**2, seen.v_m, size)
-        for name, first, second in _bins(sensor, batch, seen)
+        for name, first, second in _bins(sensor, seen)
     }
     some = {name: values[::step] for name, values in batch.items()}
     return moments, scene.sample(sensor, some, state, drift, weighting)
 
 
-def _bins(sensor: str, batch: Batch, seen: Observations) -> Iterator[tuple[str, Integers, Integers]]:
+def _bins(sensor: str, seen: Observations) -> Iterator[tuple[str, Integers, Integers]]:
     """Name, and two numbers of each point's bin."""
+    batch = seen.points
     own = xyz(batch, f"{sensor}_m").T
     range_m = np.sqrt(np.einsum("in,in->n", own, own))
     angle = np.arcsin(own[2] / range_m) if sensor == "laser" else np.arctan2(own[0], -own[2])

@@ -50,11 +50,9 @@ def _read(
     seen = scene.observe(sensor, batch, state, drift, weighting)
     robust, weight = weighting.weights(seen)
     normalised = weighting.normalised(seen)
-    surfaces = len(state.surfaces)
-    features = seen.adjusted(weight, surfaces)
-    sums = epoch_sums(seen.record, seen.share, seen.surface, surfaces, features, weight, seen.v_m)
+    sums = epoch_sums(seen.record, seen.share, seen.surface, seen.adjusted(weight), weight, seen.v_m)
     counts = {}
-    for number in np.unique(seen.group).tolist():
+    for number in np.flatnonzero(np.bincount(seen.group)).tolist():
         rows = seen.group == number
         w = robust[rows]
         cut = int(np.sum(w == 0))

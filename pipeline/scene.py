@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.fitted import ALL_PASSES, laser_planes
 from pipeline.maths.adjustment import Body, pull_of
-from pipeline.maths.epochs import MOVING
+from pipeline.maths.epochs import MOVING, Runs
 from pipeline.maths.knots import Drift
 from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.robust import igg3_weights
@@ -56,10 +57,12 @@ class Weighting:
 
 @dataclass(frozen=True)
 class Observations:
-    """Of a batch (n,): the record of the INS before each, the share of the step to the next, surface, group of
-    observations, v (m) less the mean of its noise, that mean (m), sigma (m), what its epoch shares of the INS's white
-    noise (m), features (F, n) and slopes (F - 1, n) of :mod:`pipeline.maths.observations`."""
+    """Of a batch (n,) by surface and time, so that epochs lie together: its points; the record of the INS before each,
+    the share of the step to the next, surface, group of observations, v (m) less the mean of its noise, that mean (m),
+    sigma (m), what its epoch shares of the INS's white noise (m), features (F, n) and slopes (F - 1, n) of
+    :mod:`pipeline.maths.observations`."""
 
+    points: Batch
     record: Integers
     share: Array
     surface: Integers
@@ -71,17 +74,31 @@ class Observations:
     features: Array
     slopes: Array
 
-    def epochs(self, surfaces: int) -> Integers:
-        """A number for what one sensor sees of one surface between two records, from 0; (n,)."""
-        first = int(self.record.min()) if len(self.record) else 0
-        return np.asarray((self.record - first) * surfaces + self.surface)
-
-    def adjusted(self, weight: Array, surfaces: int) -> Array:
+    def adjusted(self, weight: Array) -> Array:
         """Features at the adjusted points: free of the noise that is in v."""
-        own = sensor_part(self.v_m, weight, self.epochs(surfaces), self.common_m)
-        features = self.features.copy()
-        features[1:] -= self.slopes * own
-        return features
+        own = sensor_part(self.v_m, weight, Runs.of(self.record, self.surface), self.common_m)
+        return np.concatenate([self.features[:1], self.features[1:] - self.slopes * own])
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a sensor sees of one surface: points (n,) in time's order, each one's share of the step between two records;
+    the first record (g,) of each epoch."""
+
+    points: Batch
+    share: Array
+    record: Integers
+    epochs: Runs
+
+    @classmethod
+    def of(cls, points: Batch, record: Integers, share: Array) -> "Sight":
+        """``record`` (n,) of each point."""
+        epochs = Runs.of(record)
+        return cls(points, share, record[epochs.starts], epochs)
+
+    def spread(self, values: Array) -> Array:
+        """Of epochs (…, g) to points (…, n)."""
+        return self.epochs.spread(values)
 
 
 @dataclass(frozen=True)
@@ -101,112 +118,110 @@ class Scene:
         self, sensor: str, batch: Batch, state: State, drift: Drift | None = None, weighting: Weighting | None = None
     ) -> Observations:
         """The observations of a batch of labelled points; of known drift v is free, and of the mean of its noise."""
-        record, share = self.body.trajectory.located(batch["t_ns"])
-        surface = self.surface_of_face[batch["face"]]
-        horizontal = np.array([one.family == "H" for one in state.surfaces])[surface]
-        group = np.where(horizontal, 2, 1) if sensor == "mbes" else np.zeros(len(surface), dtype=np.int64)
+        points, surface = self._ordered(batch)
+        record, share = self.body.trajectory.located(points["t_ns"])
         see = self._see_laser if sensor == "laser" else self._see_sonar
         v, mean, sigma = np.empty((3, len(surface)))
         features, slopes = np.empty((FEATURES[sensor], len(surface))), np.empty((FEATURES[sensor] - 1, len(surface)))
-        pull, turns = self._pull(sensor, state, drift, record)
-        for number in range(len(state.surfaces)):
-            rows = np.flatnonzero(surface == number)
-            if len(rows):
-                axes = np.vstack([state.surfaces[number].tangents, state.surfaces[number].normal])
-                v[rows], r, found = see(batch, rows, state, number, axes, record[rows], share[rows])
-                v[rows] += pull.of(number, record[rows], found.features)
+        first, pull, turns = self._pull(sensor, state, drift, record)
+        bounds = np.searchsorted(surface, np.arange(len(state.surfaces) + 1)).tolist()
+        for number, (start, stop) in enumerate(pairwise(bounds)):
+            if start < stop:
+                rows, one = slice(start, stop), state.surfaces[number]
+                sight = Sight.of({name: values[rows] for name, values in points.items()}, record[rows], share[rows])
+                axes = np.vstack([one.tangents, one.normal])
+                r, v_m, found = see(sight, state, axes, one.distance_m)
+                pulled = sight.spread(pull[sight.record - first, number].T)
+                v[rows] = v_m + np.einsum("fn,fn->n", pulled, found.features)
                 mean[rows], sigma[rows], features[:, rows], slopes[:, rows] = found
-                features[1:MOVING, rows] += np.cross(axes @ turns[:, record[rows] - pull.first], r, axis=0)[:2]
+                turned = sight.spread(axes @ turns[:, sight.record - first])
+                features[1, rows] += turned[1] * r[2] - turned[2] * r[1]  # turned × r
+                features[2, rows] += turned[2] * r[0] - turned[0] * r[2]
+        groups = [0 if sensor == "laser" else 2 if one.family == "H" else 1 for one in state.surfaces]
+        group = np.array(groups)[surface]
         mean *= (weighting or Weighting()).factor(group)
         common = self.white_m * np.sqrt((1 - share) ** 2 + share**2)
-        return Observations(record, share, surface, group, v - mean, mean, sigma, common, features, slopes)
+        v -= mean
+        return Observations(points, record, share, surface, group, v, mean, sigma, common, features, slopes)
+
+    def _ordered(self, batch: Batch) -> tuple[Batch, Integers]:
+        """The batch by surface and, on each, by time; the surfaces."""
+        t_ns, surface = batch["t_ns"], self.surface_of_face[batch["face"]]
+        ascending = bool(np.all(t_ns[1:] >= t_ns[:-1]))
+        order = np.argsort(surface.astype(np.int16), kind="stable") if ascending else np.lexsort((t_ns, surface))
+        return {name: values[order] for name, values in batch.items()}, surface[order]
 
     def _pull(
         self, sensor: str, state: State, drift: Drift | None, record: Integers
-    ) -> tuple["_Pull", Array]:
-        """What moves v, and how the drift turns the body (3, r), of the records from the batch's first to its last."""
+    ) -> tuple[int, Array, Array]:
+        """The batch's first record; of the records from it to the last what moves v, by feature (r, s, F), and how the
+        drift turns the body (3, r)."""
         first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
         records = np.arange(first, last)
         seconds = self.body.seconds[first : last + 1]
         error = np.zeros((len(records), SIX))
         if drift is not None:
             error = drift.at((seconds[:-1] + seconds[1:]) / 2)
-        return _Pull(first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor])), error[:, 3:].T
+        return first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor]), error[:, 3:].T
 
-    def _see_laser(
-        self, batch: Batch, rows: Integers, state: State, number: int, axes: Array, record: Integers, share: Array
-    ) -> tuple[Array, Array, Seen]:
-        """v, r in surface axes, and what the observations' module makes of them."""
-        surface, trajectory = state.surfaces[number], self.body.trajectory
-        own = xyz(batch, "laser_m", rows)
-        range_m = np.sqrt(np.einsum("ni,ni->n", own, own))
-        first, last = int(record.min()), int(record.max()) + 2
-        where = axes @ trajectory.positions_m[first:last].T
-        lever = axes @ (trajectory.R_frame_from_body[first:last] @ self.body.laser_lever_arm_m).T
-        start = where[:, record - first]
-        points = axes @ xyz(batch, "target_m", rows).T
-        r = points - start - share * (where[:, record - first + 1] - start)
-        lever = lever[:, record - first]
-        v = points[2] - surface.distance_m - self.height_of_face[batch["face"][rows]]
+    def _see_laser(self, sight: "Sight", _: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
+        """r in surface axes, v, and what the observations' module makes of them."""
+        trajectory, record = self.body.trajectory, sight.record
+        x, y, z = (sight.points[f"{axis}_laser_m"] for axis in "xyz")
+        range_m = np.sqrt(x * x + y * y + z * z)
+        start = axes @ trajectory.positions_m[record].T
+        step = axes @ trajectory.positions_m[record + 1].T - start
+        lever = axes @ (trajectory.R_frame_from_body[record] @ self.body.laser_lever_arm_m).T
+        points = axes @ xyz(sight.points, "target_m").T
+        r = points - sight.spread(start) - sight.share * sight.spread(step)
+        v = points[2] - distance_m - self.height_of_face[sight.points["face"]]
         sigmas = Sigmas(self.laser.range_sigma_m, float(np.radians(self.laser.angle_sigma_deg)))
-        return v, r, laser_observations(r, lever, range_m, sigmas)
+        return r, v, laser_observations(r, sight.spread(lever), range_m, sigmas)
 
-    def _see_sonar(
-        self, batch: Batch, rows: Integers, state: State, number: int, axes: Array, _: Integers, __: Array
-    ) -> tuple[Array, Array, Seen]:
-        surface = state.surfaces[number]
-        points = xyz(batch, "mbes_m", rows).T
-        moments, back = np.unique(batch["t_ns"][rows], return_inverse=True)  # beams of a ping share their pose
-        where, R_target_from_body = self.body.trajectory.poses_at(moments)
+    def _see_sonar(self, sight: "Sight", state: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
+        points = xyz(sight.points, "mbes_m").T
+        pings = Runs.of(sight.points["t_ns"])  # beams of a ping share their pose
+        where, R_target_from_body = self.body.trajectory.poses_at(sight.points["t_ns"][pings.starts])
         R = R_target_from_body @ state.R_body_from_mbes
-        in_mbes = np.einsum("kj,gji->kig", axes, R)[:, :, back]
-        up = R[:, 2, :].T[:, back]
-        lever = (axes @ (R_target_from_body @ state.lever_arm_m).T)[:, back]
+        in_mbes = pings.spread(np.einsum("kj,gji->kig", axes, R))
+        up = pings.spread(R[:, 2, :].T)
+        lever = pings.spread(axes @ (R_target_from_body @ state.lever_arm_m).T)
         r = np.einsum("kin,in->kn", in_mbes, points) + lever
-        v = r[2] + (where @ surface.normal)[back] - surface.distance_m - self.height_of_face[batch["face"][rows]]
+        v = r[2] + pings.spread(where @ axes[2]) - distance_m - self.height_of_face[sight.points["face"]]
         sigmas = Sigmas(self.mbes.range_sigma_m, float(np.radians(self.mbes.angle_sigma_deg)))
-        return v, r, sonar_observations(points, in_mbes, up, r, v, sigmas)
+        return r, v, sonar_observations(points, in_mbes, up, r, v, sigmas)
 
     # --- to be looked at ---------------------------------------------------------------------------------------------
     def sample(self, sensor: str, batch: Batch, state: State, drift: Drift | None, weighting: Weighting) -> Batch:
         """Where points lie and their residuals, calibrated and coarse, as columns of the table ``residuals``."""
-        own = xyz(batch, f"{sensor}_m")
-        ranges = np.linalg.norm(own, axis=1)
         seen = self.observe(sensor, batch, state, drift, weighting)
+        points = seen.points
+        own = xyz(points, f"{sensor}_m")
+        ranges = np.linalg.norm(own, axis=1)
         if sensor == "laser":
-            points = coarse_points = xyz(batch, "target_m")
+            placed = coarse_placed = xyz(points, "target_m")
             coarse_residual, angle = seen.v_m, np.arcsin(own[:, 2] / ranges)
         else:
             coarse = replace(self.coarse, surfaces=state.surfaces)
-            points, coarse_points = self._placed(batch, state), self._placed(batch, coarse)
-            before, angle = self.observe(sensor, batch, coarse), np.arctan2(own[:, 0], -own[:, 2])
+            placed, coarse_placed = self._placed(points, state), self._placed(points, coarse)
+            before, angle = self.observe(sensor, points, coarse), np.arctan2(own[:, 0], -own[:, 2])
             coarse_residual = before.v_m + before.mean_m
-        columns = {f"{axis}_target_m": points[:, k] for k, axis in enumerate("xyz")}
-        columns |= {f"coarse_{axis}_target_m": coarse_points[:, k] for k, axis in enumerate("xyz")}
+        columns = {f"{axis}_target_m": placed[:, k] for k, axis in enumerate("xyz")}
+        columns |= {f"coarse_{axis}_target_m": coarse_placed[:, k] for k, axis in enumerate("xyz")}
         columns |= {"range_m": ranges, "angle_deg": np.degrees(angle), "residual_m": seen.v_m + seen.mean_m}
         weight = weighting.weights(seen)[0]
         columns |= {"coarse_residual_m": coarse_residual, "weight": weight}
         single = {name: values.astype(np.float32) for name, values in columns.items()}
         words = np.full(len(seen.v_m), sensor, dtype=object)
-        return {"sensor": words} | {name: batch[name] for name in ("t_ns", "pass", "face")} | single
+        found = {"sensor": words} | {name: points[name] for name in ("t_ns", "pass", "face")} | single
+        in_time = np.argsort(points["t_ns"], kind="stable")
+        return {name: values[in_time] for name, values in found.items()}
 
     def _placed(self, batch: Batch, state: State) -> Array:
         """Soundings in the target frame with the state's mount, (n, 3) m."""
         positions, R_target_from_body = self.body.trajectory.poses_at(batch["t_ns"])
         body = xyz(batch, "mbes_m") @ state.R_body_from_mbes.T + state.lever_arm_m
         return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, body))
-
-
-@dataclass(frozen=True)
-class _Pull:
-    """By how much v is moved, by feature: table (r, s, F) of the records from ``first`` on and the surfaces."""
-
-    first: int
-    table: Array
-
-    def of(self, surface: int, record: Integers, features: Array) -> Array:
-        taken = self.table[record - self.first, surface]
-        return np.asarray(np.einsum("nf,fn->n", taken, features))
 
 
 def scene_of(

@@ -77,22 +77,42 @@ class EpochSums:
         )
 
 
-def epoch_sums(
-    record: Integers, share: Array, surface: Integers, surfaces: int, q: Array, weight: Array, v_m: Array
-) -> EpochSums:
-    """Of one batch: record, share s, surface, weight and v (n,), q (F, n)."""
-    first = int(record.min()) if len(record) else 0
-    key = (record - first) * surfaces + surface
-    size = int(key.max()) + 1 if len(key) else 0
-    found = np.flatnonzero(np.bincount(key, weights=weight, minlength=size) > 0)
-    features = len(q)
+@dataclass(frozen=True)
+class Runs:
+    """Points that follow one another and belong together: first of each run (g,), how many (g,).
 
-    def total(values: Array) -> Array:
-        return np.asarray(np.bincount(key, weights=values, minlength=size)[found])
+    Sums over neighbours cost a quarter of sums by number (bincount), and what a run shares is spread, not looked up.
+    """
 
-    normal, swept = np.empty((len(found), features, features)), np.empty((len(found), MOVING, features))
-    twice, right = np.empty((len(found), MOVING, MOVING)), np.empty((len(found), features))
-    right_swept = np.empty((len(found), MOVING))
+    starts: Integers
+    lengths: Integers
+
+    @classmethod
+    def of(cls, *keys: Integers) -> "Runs":
+        """Of equal keys, (n,) each."""
+        n = len(keys[0])
+        new = np.ones(n, dtype=bool)
+        if n:
+            new[1:] = np.any([key[1:] != key[:-1] for key in keys], axis=0)
+        starts = np.flatnonzero(new)
+        return cls(starts, np.diff(starts, append=n))
+
+    def total(self, values: Array) -> Array:
+        """Sums over each run of values (…, n): (…, g)."""
+        return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
+
+    def spread(self, values: Array) -> Array:
+        """What belongs to each run (…, g), for each of its points (…, n)."""
+        return np.asarray(np.repeat(values, self.lengths, axis=-1))
+
+
+def epoch_sums(record: Integers, share: Array, surface: Integers, q: Array, weight: Array, v_m: Array) -> EpochSums:
+    """Of one batch: record, share s, surface, weight and v (n,), q (F, n); quickest where epochs lie together."""
+    runs = Runs.of(record, surface)
+    features, epochs, total = len(q), len(runs.starts), runs.total
+    normal, swept = np.empty((epochs, features, features)), np.empty((epochs, MOVING, features))
+    twice, right = np.empty((epochs, MOVING, MOVING)), np.empty((epochs, features))
+    right_swept = np.empty((epochs, MOVING))
     for row in range(features):
         weighted = weight * q[row] if row else weight
         right[:, row] = total(weighted * v_m)
@@ -102,30 +122,24 @@ def epoch_sums(
     for row in range(MOVING):
         once = weighted * q[row] if row else weighted
         right_swept[:, row] = total(once * v_m)
+        again = once * share
         for column in range(row, features):
             swept[:, row, column] = total(once * q[column] if column else once)
             if column < MOVING:
                 swept[:, column, row] = swept[:, row, column]
-                again = once * share
                 twice[:, row, column] = twice[:, column, row] = total(again * q[column] if column else again)
-    count = np.bincount(key[weight > 0], minlength=size)[found].astype(np.float64)
-    squares = total(weight * v_m**2)
-    return EpochSums(
-        first + found // surfaces, found % surfaces, normal, swept, twice, right, right_swept, squares, count
-    )
+    count, squares = total((weight > 0).astype(np.float64)), total(weight * v_m**2)
+    first = runs.starts
+    sums = EpochSums(record[first], surface[first], normal, swept, twice, right, right_swept, squares, count)
+    return merged([sums.taken(np.flatnonzero(normal[:, 0, 0] > 0))])
 
 
 def merged(pieces: Iterable[EpochSums]) -> EpochSums:
     """All batches together, in order; an epoch may be spread over several."""
     parts = list(pieces)
-    keys = np.concatenate([np.column_stack([one.record, one.surface]) for one in parts])
-    epochs, inverse = np.unique(keys, axis=0, return_inverse=True)
-
-    def added(name: str) -> Array:
-        values = np.concatenate([getattr(one, name) for one in parts])
-        total = np.zeros((len(epochs), *values.shape[1:]))
-        np.add.at(total, inverse.ravel(), values)
-        return total
-
-    names = [name for name in EpochSums.__dataclass_fields__ if name not in ("record", "surface")]
-    return EpochSums(epochs[:, 0], epochs[:, 1], *map(added, names))
+    names = list(EpochSums.__dataclass_fields__)
+    every = EpochSums(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
+    every = every.taken(np.lexsort((every.surface, every.record)))
+    runs = Runs.of(every.record, every.surface)
+    added = {name: np.add.reduceat(getattr(every, name), runs.starts, axis=0) for name in names[2:]}
+    return replace(every.taken(runs.starts), **added)

@@ -42,8 +42,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.epochs import Runs
+
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 SPEED_M_S = 1480.0  # of sound, where only the size of a small effect depends on it
 FLATTEST = 0.05  # n · d: 3°, flatter than any ray that is used, once the mount is nearly right
 STEEPEST = 0.02  # cos θ: flatter beams are not steered by sin θ
@@ -72,7 +73,8 @@ def laser_observations(r: Array, lever_arm: Array, range_m: Array, sigmas: Sigma
     across = (range_m * sigmas.angle_rad) ** 2
     along = ray[2] * (sigmas.range_m**2 - across)
     variance = along * ray[2] + across
-    slopes = np.vstack([along * ray[:2], across / range_m * (1 - ray[2] ** 2)]) / variance
+    slopes = np.stack([along * ray[0], along * ray[1], across / range_m * (1 - ray[2] * ray[2])])
+    slopes /= variance
     features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2]])
     return Seen(np.zeros_like(range_m), np.sqrt(variance), features, slopes)
 
@@ -99,14 +101,14 @@ def sonar_observations(points_m: Array, axes: Array, up: Array, r: Array, v_m: A
     return Seen(mean, np.sqrt(variance), features, by_range / slant)
 
 
-def sensor_part(v_m: Array, weight: Array, epoch: Integers, common_m: Array) -> Array:
-    """e (n,): what of v is the sensor's own noise, the rest being common to an epoch (numbers (n,) from 0).
+def sensor_part(v_m: Array, weight: Array, epochs: Runs, common_m: Array) -> Array:
+    """e (n,): what of v is the sensor's own noise, the rest being common to an epoch.
 
     With v = e + w, w ~ N(0, s²) common to the epoch (``common_m`` (n,): s, from the INS's white noise), the best linear
     estimate of w is λ v̄ with v̄ = Σ p v / Σ p and λ = s² / (s² + 1 / Σ p). Taking all of v for the sensor's would move
     α with w and turn the heading again, the other way: by 0.4 sigma at 2 mm.
     """
-    p = np.bincount(epoch, weights=weight)
-    mean = np.divide(np.bincount(epoch, weights=weight * v_m), p, out=np.zeros_like(p), where=p > 0)
-    information = common_m**2 * p[epoch]
-    return np.asarray(v_m - information / (1 + information) * mean[epoch])
+    p = epochs.total(weight)
+    mean = np.divide(epochs.total(weight * v_m), p, out=np.zeros_like(p), where=p > 0)
+    information = common_m**2 * epochs.spread(p)
+    return np.asarray(v_m - information / (1 + information) * epochs.spread(mean))

@@ -20,7 +20,7 @@ def points(seed: int, n: int = 500) -> tuple[np.ndarray, ...]:
 
 
 def summed(rows: Any, record: Any, share: Any, surface: Any, q: Any, weight: Any, v: Any) -> EpochSums:
-    return epoch_sums(record[rows], share[rows], surface[rows], 4, q[:, rows], weight[rows], v[rows])
+    return epoch_sums(record[rows], share[rows], surface[rows], q[:, rows], weight[rows], v[rows])
 
 
 def test_sums_are_those_of_the_points() -> None:
@@ -78,7 +78,7 @@ def test_the_scatter_is_the_sensors_noise_alone(on_a_line: bool, aside: float) -
     noise = np.sqrt(factor) * sigma * rng.normal(size=n)
     v = np.einsum("ni,in->n", turns[record], q) + noise
     q[2] += aside * noise
-    sums = epoch_sums(record, rng.uniform(size=n), np.zeros(n, dtype=int), 1, q, sigma**-2, v)
+    sums = epoch_sums(record, rng.uniform(size=n), np.zeros(n, dtype=int), q, sigma**-2, v)
     found = scatter(sums, np.ones(len(sums), dtype=bool))
     assert found.free == epochs * (each - (2 if on_a_line else 3))
     assert abs(found.factor / factor - 1) < 4 * np.sqrt(2 / found.free)
@@ -88,7 +88,7 @@ def test_the_scatter_is_the_sensors_noise_alone(on_a_line: bool, aside: float) -
 
 def test_epochs_of_few_points_tell_no_scatter() -> None:
     q = np.vstack([np.ones(10), np.arange(10.0), np.arange(10.0) ** 2])
-    sums = epoch_sums(np.repeat([3, 4], 5), np.zeros(10), np.zeros(10, dtype=int), 1, q, np.ones(10), np.arange(10.0))
+    sums = epoch_sums(np.repeat([3, 4], 5), np.zeros(10), np.zeros(10, dtype=int), q, np.ones(10), np.arange(10.0))
     found = scatter(sums, np.ones(2, dtype=bool))
     assert (found.free, found.factor) == (0.0, 1.0)
 
@@ -109,7 +109,7 @@ def test_what_an_epoch_has_in_common_is_found(factor: float) -> None:
     at = record // 2
     e = (1 - share)[:, None] * errors[0][at] + share[:, None] * errors[1][at]
     v = np.einsum("in,nij,nj->n", q, poses[surface], e) + 3.0 * rng.normal(size=n)
-    sums = epoch_sums(record, share, surface, 2, q, np.full(n, 1 / 9), v)
+    sums = epoch_sums(record, share, surface, q, np.full(n, 1 / 9), v)
     found = common(sums, poses, white)
     assert abs(found.factor - factor) < 4 * found.sigma
     assert found.sigma < 0.03 + 0.1 * factor

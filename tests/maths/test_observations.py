@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from pipeline.maths.epochs import Runs
 from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.planes import tangents_of
 
@@ -155,7 +156,7 @@ def test_at_the_adjusted_point_noise_does_not_turn_the_surface(common_m: float) 
     v = r @ NORMAL + 3.0 + common_m * rng.normal(size=n // each)[epoch]
     ranges = np.linalg.norm(r, axis=1)
     _, sigma, q, slopes = laser_observations(AXES @ r.T, np.zeros((3, n)), ranges, Sigmas(0.05, 0.0))
-    own = sensor_part(v, sigma**-2, epoch, np.full(n, common_m))
+    own = sensor_part(v, sigma**-2, Runs.of(epoch), np.full(n, common_m))
     shrink = (common_m**2 / (common_m**2 + sigma**2 / each)).reshape(-1, each)
 
     def white(values: np.ndarray) -> np.ndarray:

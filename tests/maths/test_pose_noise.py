@@ -42,7 +42,7 @@ def sources(rng: np.random.Generator, records: np.ndarray) -> tuple[list[Source]
         for k, one in enumerate(record):
             q, s = np.vstack([np.ones(POINTS), rng.normal(size=(FEATURES - 1, POINTS))]), rng.uniform(0, 1, POINTS)
             v, w = rng.normal(size=POINTS), rng.uniform(0.5, 2, POINTS)
-            pieces.append(epoch_sums(np.full(POINTS, one), s, np.zeros(POINTS, dtype=int), 1, q, w, v))
+            pieces.append(epoch_sums(np.full(POINTS, one), s, np.zeros(POINTS, dtype=int), q, w, v))
             whole = np.zeros((FEATURES, UNKNOWNS))
             whole[:, columns] = design[k]
             rows.append((one, whole, np.vstack([pose, np.zeros((FEATURES - 3, SIX))]), q, s, v, w))
