@@ -6,12 +6,14 @@ own considered sigma explain is a cause; of several, which one error makes move 
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 FAR = 4.0  # sigmas: one in 16 000, of some forty parameters one in 400 sessions
+UNITS = {"mbes_latency": "s", "laser_latency": "s", "sound_speed": "1"}
 AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
 FACES = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
 
@@ -19,12 +21,35 @@ FACES = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H
 def causes(freed: pd.DataFrame) -> list[tuple[str, float]]:
     """Parameters that stand out, with how many sigmas they lie from zero by themselves; the most telling first."""
     found = []
-    for row in freed.to_dict("records"):
-        if not np.isfinite(row["value"]):
-            continue
-        if abs(row["value"]) > FAR * np.hypot(row["sigma"], row["considered"]):
+    for row in freed[~freed["estimated"]].to_dict("records"):
+        if _far(row):
             found.append((_words(row), abs(row["value"]) / row["sigma"]))
     return sorted(found, key=lambda one: -one[1])
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """What ``adjust.free`` names, as the adjustment found it: total sigma, unit, in words, and whether it lies farther
+    from zero than its sigma and what the settings concede."""
+
+    unknown: str
+    value: float
+    sigma_total: float
+    unit: str
+    words: str
+    far: bool
+
+
+def estimated(freed: pd.DataFrame) -> list[Estimated]:
+    """What is free beside the mount and the surfaces."""
+    return [
+        Estimated(row["unknown"], row["value"], row["sigma"], UNITS[row["unknown"]], _words(row), _far(row))
+        for row in freed[freed["estimated"]].to_dict("records")
+    ]
+
+
+def _far(row: Mapping[Any, Any]) -> bool:
+    return bool(abs(row["value"]) > FAR * np.hypot(row["sigma"], row["considered"]))
 
 
 def _words(row: Mapping[Any, Any]) -> str:

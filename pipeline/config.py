@@ -104,6 +104,12 @@ class Segment(Model):
         0.02  # another mount that explains so nearly as many soundings
     )
 
+    @property
+    def farthest_mount(self) -> tuple[float, float]:
+        """Angle (degrees) and lever arm (m) beyond which no mount found is taken: the coarse one's error may be half as
+        large again as it is said to be."""
+        return 1.5 * self.search_mount_deg, 1.5 * self.search_mount_m
+
 
 class FitPlanes(Model):
     min_points: Annotated[int, Field(ge=10)] = 50  # a plane of fewer points is not fitted

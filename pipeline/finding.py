@@ -234,7 +234,8 @@ def find_mount(
         behind = closest.hides(placement.origins(p), placement.points(p), BEHIND_M)
         return score(placement, p, closest, SHARP_M) - float(np.mean(behind))
 
-    found = search(placement, starts, closest, normals, same, 1.5 * sigmas, judge)
+    limits = np.repeat(settings.farthest_mount, 3) * np.repeat([np.pi / 180, 1.0], 3)
+    found = search(placement, starts, closest, normals, same, limits, judge)
 
     def label(parameters: Array, points: Array) -> NDArray[np.int16]:
         R = exp_so3(parameters[:3]) @ R_body_from_mbes

@@ -215,8 +215,9 @@ def calibration(run: Path) -> dict[str, Any]:
     return content
 
 
-def refuse_output(option: str, file: Path | None, *runs: Path) -> None:
-    """A file of its kind, never among a run's results or a session's files (``runs``)."""
+def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b"") -> None:
+    """A file of its kind, never among a run's results or a session's files (``runs``). One that is there is replaced if
+    it ``begins`` as we write it: a plan or a config never."""
     if file is None:
         return
     suffix = option.replace("--", ".")
@@ -227,3 +228,5 @@ def refuse_output(option: str, file: Path | None, *runs: Path) -> None:
     for run_folder in runs:
         if file.resolve().is_relative_to(run_folder.resolve()):
             raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")
+    if begins and file.is_file() and not file.read_bytes().startswith(begins):
+        raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")

@@ -56,7 +56,7 @@ def tables(
     return {
         "estimate": estimate,
         "covariance": _covariance_table(random[:SIX, :SIX], total[:SIX, :SIX]),
-        "freed": _freed_table(found, considered),
+        "freed": _freed_table(found, considered, estimate),
         "groups": _groups_table(found),
         "summary": _summary_table(found, cells, settings),
         "drift": _drift_table(found, poses),
@@ -104,16 +104,23 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
     )
 
 
-def _freed_table(found: Adjusted, considered: Array) -> pd.DataFrame:
-    """What is held, and what each of the six owes to it."""
+def _freed_table(found: Adjusted, considered: Array, estimate: pd.DataFrame) -> pd.DataFrame:
+    """What is held, and what each of the six owes to it; and what is free beside the mount and the surfaces."""
     tests = {one.unknown: one for one in freed(found.equations.normal, found.equations.right, found.solution)}
     rows = []
     for place, number in enumerate(found.solution.held.tolist()):
         test = tests.get(number, Freed(number, np.nan, np.nan))
         effect = found.solution.sensitivity[:SIX, place] * considered[number]
         row: dict[str, Any] = {"unknown": found.state.names[number], "considered": considered[number]}
-        row |= {"value": test.value, "sigma": test.sigma}
+        row |= {"estimated": False, "value": test.value, "sigma": test.sigma}
         rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(NAMES)})
+    shared = range(found.state.shared.start, found.state.shared.stop)
+    for place, number in enumerate(found.solution.free.tolist()):
+        if number >= SIX and number not in shared:
+            one = estimate.iloc[place]
+            row = {"unknown": one["unknown"], "estimated": True, "considered": considered[number]}
+            row |= {"value": one["value"], "sigma": one["sigma_total"]}
+            rows.append(row | {f"effect_{name}": 0.0 for name in NAMES})
     return pd.DataFrame(rows)
 
 

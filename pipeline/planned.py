@@ -75,12 +75,13 @@ def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) ->
     free = free_unknowns(setting.state, pool.adjust.free)
     given = _outlook(setting, plan.passes, turn_s, considered, free)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
-    seen = Seen([one.distance_m for one in plan.passes], soundings(setting, given), float(speeds), float(swings))
+    distances = [one.distance_m for one, _, points in _each(given) if points["mbes"].any()]
+    seen = Seen(distances, soundings(setting, given), float(speeds), float(swings))
     geometry = geometry_of(setting, seen, given.predicted.normal, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:
         better = _better(setting, plan.candidates, plan.budget.seconds, plan.budget.turn_s, considered, free)
-    return Answer(setting, given, geometry.gaps, geometry.remedy, better)
+    return Answer(setting, given, [*_blind(given), *geometry.gaps], geometry.remedy, better)
 
 
 def _outlook(
@@ -93,6 +94,16 @@ def _outlook(
     if solution.deficiency:
         random, total = np.full((SIX, SIX), np.nan), np.full((SIX, SIX), np.nan)
     return Outlook(tuple(passes), predicted, random, total, solution)
+
+
+def _blind(outlook: Outlook) -> list[str]:
+    """Passes from which a sensor does not see the target."""
+    found = []
+    for sensor, name in (("laser", "laser"), ("mbes", "sonar")):
+        far = [f"{one.distance_m:g} m" for one, _, points in _each(outlook) if not points[sensor].any()]
+        if far:
+            found.append(f"the {name} sees nothing of the target from {', '.join(dict.fromkeys(far))}")
+    return found
 
 
 def soundings(setting: Setting, outlook: Outlook) -> dict[str, int]:
@@ -197,8 +208,15 @@ def table(answer: Answer, limits: config.Verdict) -> str:
     lines += [f"But: {gap}." for gap in answer.gaps]
     if answer.remedy:
         lines.append(f"Cure: {answer.remedy}.")
+    plan = answer.setting.plan
+    if plan.budget is not None:
+        turns = (len(plan.passes) - 1) * plan.budget.turn_s
+        lines.append(f"Time: {answer.given.seconds:.0f} s and {turns:.0f} s of turns, of {plan.budget.seconds:g} s.")
     if answer.better is not None:
         lines += ["", "Better, in the time there is:", *_lines(answer.setting, answer.better, limits)]
+    elif plan.candidates:
+        short = "no candidate helps within the budget" if plan.budget else "candidates want a budget to be chosen for"
+        lines += ["", f"Nothing better was looked for: {short}."]
     return "\n".join(lines)
 
 

@@ -39,6 +39,7 @@ def summary(calibration: Mapping[str, Any]) -> str:
         lines.append("sigma: from noise, relative to the laser; total: with what does not average.")
     if not block["sigma_mount"] and calibration["result"] != "adjustment":
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
+    lines += [f"Free: {one['words']}." for one in calibration["free"].values()]
     lines.append(_target_line(calibration["target"]))
     lines.append("Points on the target by pass, distance of the INS from the wall, soundings + laser points:")
     seen = [p for p in calibration["passes"] if p["soundings"] or p["laser_points"]]

@@ -1,6 +1,6 @@
 """Accepted or rejected, and why: each reason names its evidence."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline import config
-from pipeline.causes import causes
+from pipeline.causes import causes, estimated
 from pipeline.maths.consistency import consistency_limit
 from pipeline.mounts import PARAMETERS
 
@@ -32,7 +32,7 @@ RETRACE_DEG = 2.0  # a coarse mount further off than this wants its rays traced 
 ODD_SPEED_M_S = 3.0  # and a head's sound speed so far beyond the cast's
 FEWEST = 30  # soundings on a family of faces
 PLACES = {
-    "face": "on face {low:.0f}",
+    "face": "on face {face}",
     "angle": "from {low:.0f}° to {high:.0f}°",
     "distance": "from {low:.0f} to {high:.0f} m",
     "time": "for ten seconds (GPS {low:.0f})",
@@ -43,6 +43,7 @@ PLACES = {
 class Evidence:
     """The tables that a verdict looks at."""
 
+    faces: pd.DataFrame
     target_pose: pd.DataFrame
     provisional_mount: pd.DataFrame
     corrections: pd.DataFrame
@@ -53,15 +54,23 @@ class Evidence:
     patterns: pd.DataFrame
 
 
-def reasons(
-    evidence: Evidence,
-    methods: Mapping[str, Mapping[str, Any]],
-    limits: config.Verdict,
-    test_level: float,
-    chosen: config.Method,
-) -> list[str]:
+@dataclass(frozen=True)
+class Settings:
+    """What it is judged by: limits of the sigmas, level of the tests, the method that is the result; ``farthest``:
+    angle (degrees) and lever arm (m) beyond which no mount is taken for labelling; ``drifts``: whether the session
+    concedes the INS any drift."""
+
+    limits: config.Verdict
+    test_level: float
+    chosen: config.Method
+    farthest: tuple[float, float]
+    drifts: bool
+
+
+def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settings: Settings) -> list[str]:
     """Why the calibration is rejected; empty: accepted. Where labels are in doubt, nothing else is judged."""
-    doubts = _ambiguities(evidence)
+    limits, chosen = settings.limits, settings.chosen
+    doubts = _ambiguities(evidence, settings.farthest)
     if doubts:
         return doubts
     found = []
@@ -71,9 +80,11 @@ def reasons(
     if not summary["converged"]:
         found.append(f"the adjustment did not converge in {summary['iterations']} steps")
     found += _few(cells)
-    if not summary["test_passed"]:
-        found.append(_inconsistency(summary, cells))
-    found += _patterns(evidence.patterns, test_level)
+    tests = [] if summary["test_passed"] else [_inconsistency(summary, cells)]
+    tests += _patterns(evidence, settings.test_level)
+    found += tests
+    if tests and not settings.drifts:
+        found.append("ins.drift concedes the INS no drift at all: give its figures before anything else is looked for")
     found += _causes(evidence.freed)
     found += _wide_sigmas(methods["adjustment"]["sigma_mount_total"], limits)
     if chosen != "adjustment":
@@ -81,7 +92,7 @@ def reasons(
     return found
 
 
-def _ambiguities(evidence: Evidence) -> list[str]:
+def _ambiguities(evidence: Evidence, farthest: tuple[float, float]) -> list[str]:
     found = []
     pose, mount = evidence.target_pose.iloc[0], evidence.provisional_mount.iloc[0]
     if pose["ambiguous"]:
@@ -100,8 +111,9 @@ def _ambiguities(evidence: Evidence) -> list[str]:
         )
     if not mount["within"]:
         found.append(
-            "no mount within the search limits brings the soundings onto the target: the coarse mbes.mount is farther "
-            "off than segment.search_mount_deg and search_mount_m, target.a, b, c, e are wrong, or the clocks differ "
+            f"no mount within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings the soundings onto the "
+            f"target{_beyond(mount, farthest)}: mbes.mount is farther off than segment.search_mount_deg and "
+            "search_mount_m allow (a sign, an axis, a block of 2 e), target.a, b, c, e are wrong, or the clocks differ "
             "(UTC is 18 s behind GPS time)"
         )
     if mount["ambiguous"]:
@@ -110,6 +122,15 @@ def _ambiguities(evidence: Evidence) -> list[str]:
             "mount may be a block off; measure the coarse lever arm again"
         )
     return found
+
+
+def _beyond(mount: pd.Series, farthest: tuple[float, float]) -> str:
+    """Where the mount that fits best lies outside of what is taken."""
+    angles = [(float(mount[f"rotation_{axis}_deg"]), "°", farthest[0]) for axis in "xyz"]
+    arms = [(float(mount[f"lever_arm_{axis}_m"]), " m", farthest[1]) for axis in "xyz"]
+    named = zip(SIX, angles + arms, strict=True)
+    off = [f"{value:+.2f}{unit} in {name}" for name, (value, unit, limit) in named if abs(value) > limit]
+    return f"; best fits {', '.join(off)}" if off else ""
 
 
 def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
@@ -155,15 +176,16 @@ def pattern_tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
     return found
 
 
-def _patterns(patterns: pd.DataFrame, level: float) -> list[str]:
+def _patterns(evidence: Evidence, level: float) -> list[str]:
     """The bin that lies off most, of each variable along which the residuals are not what noise leaves."""
     found = []
-    for test in pattern_tests(patterns, level):
+    for test in pattern_tests(evidence.patterns, level):
         if not test["passed"]:
-            rows = patterns[patterns["by"] == test["by"]]
+            rows = evidence.patterns[evidence.patterns["by"] == test["by"]]
             worst = rows.iloc[int(rows["normalised"].abs().argmax())]
             sensor = {"laser": "the laser", "mbes": "the sonar"}[worst["sensor"]]
-            place = PLACES[test["by"]].format(low=worst["low"], high=worst["low"] + worst["width"])
+            face = evidence.faces["name"].iloc[int(worst["low"])] if test["by"] == "face" else ""
+            place = PLACES[test["by"]].format(face=face, low=worst["low"], high=worst["low"] + worst["width"])
             found.append(
                 f"residuals go with {test['by']}: {place} {sensor} lies {1000 * worst['mean_m']:+.1f} mm off "
                 f"{worst['family']} (statistic {test['statistic']:.0f}, limit {test['limit']:.0f})"
@@ -172,12 +194,17 @@ def _patterns(patterns: pd.DataFrame, level: float) -> list[str]:
 
 
 def _causes(freed: pd.DataFrame) -> list[str]:
-    """The parameter that the residuals ask to be another, and how many more they would ask for instead."""
+    """The parameter that the residuals ask to be another, and how many more they would ask for instead; and what was
+    free and is not as the session says: the mount is right with that alone, and so would the survey's be."""
     found = causes(freed)
-    if not found:
-        return []
     others = f"; {len(found) - 1} other parameter(s) would explain it less well" if len(found) > 1 else ""
-    return [f"likely cause of residuals ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
+    words = [f"likely cause of residuals ({found[0][1]:.0f} sigma): {found[0][0]}{others}"] if found else []
+    return words + [
+        f"adjust.free found {one.words}: the mount holds with that alone; correct it, there and in the survey, and run "
+        "again"
+        for one in estimated(freed)
+        if one.far
+    ]
 
 
 def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict) -> list[str]:
@@ -237,6 +264,19 @@ def warnings(
             f"the target was found {x:+.2f}, {y:+.2f}, {z:+.2f} m (x, y, z) from target.origin, out of plumb by "
             f"{tilts[0]:+.2f}° and {tilts[1]:+.2f}°: if it was set up and surveyed better than this, check laser.mount"
         )
+    return found
+
+
+def one_eyed(passes: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Passes in which one sensor alone saw the target."""
+    found = []
+    for seen, missing, words in (
+        ("laser_points", "soundings", "the laser saw the target, and there are no soundings on it"),
+        ("soundings", "laser_points", "the sonar saw the target, and there are no laser points on it"),
+    ):
+        numbers = [str(one["pass"]) for one in passes if one[seen] and not one[missing]]
+        if numbers:
+            found.append(f"pass{'es' * (len(numbers) > 1)} {', '.join(numbers)}: {words}; was it recording?")
     return found
 
 

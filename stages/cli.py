@@ -270,8 +270,8 @@ def plan(
     from pipeline.folder import refuse_output
     from stages.plan import plan as plan_of
 
-    for option, path in (("--yaml", out), ("--rrd", rrd)):
-        refuse_output(option, path, session)
+    refuse_output("--yaml", out, session, begins=b"given:")
+    refuse_output("--rrd", rrd, session)
     said, enough = plan_of(file, session, config, out, rrd)
     say(said, sys.stdout)
     return 0 if enough else 1

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from pipeline import artefacts, config
 from pipeline.built import as_found, oddities
+from pipeline.causes import estimated
 from pipeline.closing import closing_table
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
-from pipeline.verdict import Evidence, cast_doubts, pattern_tests, reasons, warnings
+from pipeline.verdict import Evidence, Settings, cast_doubts, one_eyed, pattern_tests, reasons, warnings
 
 Array = NDArray[np.float64]
 SCHEMA = 1
@@ -27,7 +28,9 @@ SCHEMA = 1
 class Config:
     name: str
     target: config.Target
+    ins: config.Ins
     mbes: config.Mbes
+    segment: config.Segment
     adjust: config.Adjust
     verdict: config.Verdict
     result: config.Method
@@ -77,6 +80,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
     passes = _passes(inputs.passes, inputs.cells)
     evidence = Evidence(
+        inputs.faces,
         inputs.target_pose,
         inputs.provisional_mount,
         inputs.corrections,
@@ -86,7 +90,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.freed,
         inputs.patterns,
     )
-    found = reasons(evidence, methods, config.verdict, config.adjust.test_level, config.result)
+    drifts = any(value for name, value in config.ins.drift if name != "time_constant_s")
+    judged_by = (config.verdict, config.adjust.test_level, config.result, config.segment.farthest_mount, drifts)
+    found = reasons(evidence, methods, Settings(*judged_by))
     built = as_found(inputs.planes, inputs.patterns, inputs.faces, config.target.e)
     summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0]) | {"as_found": built}
     result = {
@@ -97,6 +103,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "warnings": warnings(
             inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
         )
+        + one_eyed(passes)
         + oddities(built, config.target)
         + cast_doubts(config.mbes, inputs.files, methods["adjustment"]["correction"]),
         "result": config.result,
@@ -110,6 +117,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
             "test": {name: _plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
             "patterns": pattern_tests(inputs.patterns, config.adjust.test_level),
         },
+        "free": _free(inputs.freed),
         "target": target,
         "passes": passes,
         "ranges": _range_note(config.mbes),
@@ -131,6 +139,15 @@ def _plain(value: Any) -> Any:
         return bool(value)
     number = float(value)
     return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
+
+
+def _free(freed: pd.DataFrame) -> dict[str, Any]:
+    """What adjust.free names, by name: value and total sigma in ``unit`` (of the sound speed a share), and in words."""
+    found = {one.unknown: one for one in estimated(freed)}
+    return {
+        name: {"value": _plain(one.value), "sigma_total": _plain(one.sigma_total), "unit": one.unit, "words": one.words}
+        for name, one in found.items()
+    }
 
 
 def _target(pose: pd.Series) -> dict[str, Any]:

@@ -104,11 +104,16 @@ def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, Se
     assert answer.better.random[2, 2] < answer.given.random[2, 2] / 25
     nothing = planned.judge(plan_of(6.0, candidates=candidates, budget={"seconds": 5.0}), *configs)
     assert nothing.better is None
+    words = planned.table(nothing, configs[0].verdict)
+    assert "and 0 s of turns, of 5 s." in words
+    assert "no candidate helps within the budget" in words
 
 
 def test_out_of_sight_there_is_no_result(configs: tuple[PoolConfig, SessionConfig]) -> None:
     answer = planned.judge(plan_of(60.0, mbes={"max_range_m": 15.0}), *configs)
     assert answer.given.solution.deficiency > 0
+    assert answer.gaps[:2] == [f"the {sensor} sees nothing of the target from 60 m" for sensor in ("laser", "sonar")]
+    assert not any("alone has soundings" in gap for gap in answer.gaps)
     assert "stay open" in planned.table(answer, configs[0].verdict)
     assert planned.as_plain(answer)["given"]["sigma_mount"] is None
 

@@ -6,11 +6,16 @@ import pandas as pd
 import pytest
 
 from pipeline.config import Mbes, Verdict
-from pipeline.verdict import Evidence, cast_doubts, pattern_tests, reasons, warnings
+from pipeline.verdict import Evidence, Settings, cast_doubts, one_eyed, pattern_tests, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 LEVEL = 0.001
 ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
+
+
+ADJUSTED = Settings(Verdict(), LEVEL, "adjustment", (4.5, 0.45), True)
+IN_TURN = replace(ADJUSTED, chosen="patent_alternating")
+CLOCK = {"sigma": 3e-4, "considered": 4e-4}
 
 
 def methods(**patent):
@@ -27,6 +32,7 @@ def evidence(pose=None, mount=None, summary=None, alternating=None, held=None, b
         "within": True,
     }
     mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4, "within": True}
+    mount_row |= {f"rotation_{axis}_deg": 4.4 for axis in "xyz"} | {f"lever_arm_{axis}_m": 0.44 for axis in "xyz"}
     summary_row = {
         "reason": "",
         "converged": True,
@@ -46,9 +52,10 @@ def evidence(pose=None, mount=None, summary=None, alternating=None, held=None, b
             "count": [5000, 400, count],
         }
     )
-    nothing = {"unknown": "sound_speed", "considered": 1e-4, "value": 2e-4, "sigma": 1e-4}
+    nothing = {"unknown": "sound_speed", "estimated": False, "considered": 1e-4, "value": 2e-4, "sigma": 1e-4}
     bins = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 5.0, "mean_m": 0.001}
     return Evidence(
+        pd.DataFrame({"name": ["P1-0", "P2"]}),
         pd.DataFrame([pose_row | (pose or {})]),
         pd.DataFrame([mount_row | (mount or {})]),
         pd.DataFrame([row | (alternating or {})]),
@@ -61,12 +68,12 @@ def evidence(pose=None, mount=None, summary=None, alternating=None, held=None, b
 
 
 def judged(found):
-    return reasons(found, methods(), Verdict(), LEVEL, "adjustment")
+    return reasons(found, methods(), ADJUSTED)
 
 
 def test_a_good_session_has_no_reason():
     assert judged(evidence()) == []
-    assert reasons(evidence(), methods(), Verdict(), LEVEL, "patent_alternating") == []
+    assert reasons(evidence(), methods(), IN_TURN) == []
 
 
 @pytest.mark.parametrize(
@@ -81,7 +88,12 @@ def test_a_good_session_has_no_reason():
             "better (11.00 against 10.00 m²); check target.origin",
         ),
         ({"mount": {"ambiguous": True}}, "the soundings fit two ways"),
-        ({"mount": {"within": False}}, "the coarse mbes.mount is farther"),
+        ({"mount": {"within": False}}, "no mount within 4.5° and 0.45 m of the coarse one brings the soundings onto"),
+        (
+            {"mount": {"within": False, "rotation_z_deg": -4.6, "lever_arm_z_m": 0.6}},
+            "onto the target; best fits -4.60° in yaw, +0.60 m in lever arm z: mbes.mount is farther off",
+        ),
+        ({"bin_": {"by": "face", "low": 1.0, "normalised": 3.5}}, "residuals go with face: on face P2 the sonar lies"),
         ({"pose": {"within": False}}, "target.origin or target.azimuth_deg is farther off"),
         (
             {"summary": {"reason": "the data leave 2 directions open"}},
@@ -99,19 +111,19 @@ def test_a_good_session_has_no_reason():
     ],
 )
 def test_each_evidence_is_one_reason(change, words):
-    found = reasons(evidence(**change), methods(), Verdict(), LEVEL, "adjustment")
+    found = judged(evidence(**change))
     assert len(found) == 1
     assert words in found[0]
 
 
 def test_where_labels_are_in_doubt_nothing_else_is_judged():
     doubtful = evidence(pose={"ambiguous": True}, summary={"converged": False, "test_passed": False})
-    assert len(reasons(doubtful, methods(), Verdict(max_sigma_deg=1e-6), LEVEL, "adjustment")) == 1
+    assert len(reasons(doubtful, methods(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=1e-6)))) == 1
 
 
 def test_sigmas_are_held_to_both_limits():
-    assert reasons(evidence(), methods(), Verdict(max_sigma_deg=0.006, max_sigma_m=6e-4), LEVEL, "adjustment") == []
-    found = reasons(evidence(), methods(), Verdict(max_sigma_deg=0.0059, max_sigma_m=5.9e-4), LEVEL, "adjustment")
+    assert reasons(evidence(), methods(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=0.006, max_sigma_m=6e-4))) == []
+    found = reasons(evidence(), methods(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=0.0059, max_sigma_m=5.9e-4)))
     assert [reason.split(" is ")[0] for reason in found] == ["total sigma of yaw", "total sigma of lever arm y"]
 
 
@@ -126,8 +138,8 @@ def test_sigmas_are_held_to_both_limits():
 )
 def test_a_patent_form_as_the_result_is_held_to_the_adjustment(alternating, patent, words):
     one = evidence(alternating=alternating)
-    assert reasons(one, methods(**patent), Verdict(), LEVEL, "adjustment") == []
-    found = reasons(one, methods(**patent), Verdict(), LEVEL, "patent_alternating")
+    assert reasons(one, methods(**patent), ADJUSTED) == []
+    found = reasons(one, methods(**patent), IN_TURN)
     assert len(found) == 1
     assert words in found[0]
 
@@ -137,10 +149,7 @@ def test_both_sensors_off_together_is_the_ins():
     for laser, expected in ((-0.011, "and the laser -11.0 mm off P2"), (0.011, "sonar lies -12.0 mm off P2")):
         cells = found.cells.copy()
         cells.loc[len(cells)] = ["laser", "P2", 3, laser, -2.0, 900]
-        (reason,) = reasons(
-            replace(found, cells=cells),
-            methods(), Verdict(), LEVEL, "adjustment",
-        )  # fmt: skip
+        (reason,) = judged(replace(found, cells=cells))
         assert expected in reason
         assert ("drift of the INS" in reason) == (laser < 0)
 
@@ -191,12 +200,36 @@ def test_both_sides_of_four_sigmas():
     assert len(judged(evidence(held=far))) == 1
 
 
+@pytest.mark.parametrize(("value", "far"), [(1.99e-3, False), (2.01e-3, True)])
+def test_what_was_freed_and_is_not_as_the_session_says(value, far):
+    found = judged(evidence(held={"unknown": "mbes_latency", "estimated": True, "value": value} | CLOCK))
+    assert len(found) == far
+    assert not far or "its latency is +2.0 ± 0.3 ms more than mbes.latency_s says: the mount holds with" in found[0]
+
+
 def test_of_several_causes_the_most_telling_is_named():
     sigmas = (("mbes_range", 1e-3), ("laser_range", 1e-4))
-    one, other = ({"unknown": name, "considered": 0.0, "sigma": sigma} for name, sigma in sigmas)
+    one, other = ({"unknown": name, "estimated": False, "considered": 0.0, "sigma": sigma} for name, sigma in sigmas)
     both = replace(evidence(), freed=pd.DataFrame([one | {"value": 0.01}, other | {"value": 0.002}]))
     (reason,) = judged(both)
     assert "20 sigma): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason
+
+
+def test_a_pass_that_one_sensor_missed_is_said():
+    rows = [(0, 9000, 400), (1, 0, 0), (2, 8000, 0), (5, 8000, 0), (6, 0, 300)]
+    passes = [{"pass": k, "laser_points": laser, "soundings": sonar} for k, laser, sonar in rows]
+    sonar, laser = one_eyed(passes)
+    assert sonar.startswith("passes 2, 5: the laser saw the target, and there are no soundings on it")
+    assert laser.startswith("pass 6: the sonar saw")
+    assert one_eyed(passes[:2]) == []
+
+
+def test_an_ins_that_is_conceded_no_drift_is_looked_at_first():
+    still = replace(ADJUSTED, drifts=False)
+    assert reasons(evidence(), methods(), still) == []
+    found = reasons(evidence(summary={"test_passed": False}), methods(), still)
+    assert found[1].startswith("ins.drift concedes the INS no drift at all")
+    assert len(judged(evidence(summary={"test_passed": False}))) == 1
 
 
 def test_each_variable_has_its_own_test():

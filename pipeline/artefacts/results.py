@@ -37,6 +37,7 @@ FREED = Artefact(
     "adjust", "freed", "table", "what is held: its value, were it freed alone, and what an error of it does",
     (
         Column("unknown", TEXT, "", "parameter of a sensor, or of a family's wet faces"),
+        Column("estimated", BOOL, "", "named in adjust.free: not held; value and total sigma are the solution's"),
         Column("considered", F64, "rad, m, s, 1 or 1/s", "sigma with which it may be wrong"),
         Column("value", F64, "rad, m, s, 1 or 1/s", "its value, had it alone been freed (NaN: nothing tells it)"),
         Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of that"),

@@ -19,6 +19,7 @@ from pipeline.built import CORNER_DEG
 from pipeline.drawn import PAGE, agreeing, drawn_from
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
+from pipeline.maths.unknowns import NAMES
 from pipeline.mounts import PARAMETERS
 from pipeline.pages import render
 from pipeline.pages.pictures import PICTURES
@@ -27,6 +28,17 @@ from pipeline.tables import Tables
 from pipeline.times import utc_text
 
 Row = Mapping[str, Any]
+SOURCES = (  # first part of the unknowns' names
+    ("laser_rotation", "the laser's angles"),
+    ("laser_lever_arm", "the laser's lever arm"),
+    ("laser_range", "the laser's ranges"),
+    ("laser_latency", "the laser's clock"),
+    ("mbes_range", "the sonar's ranges"),
+    ("mbes_latency", "the sonar's clock"),
+    ("sound_speed_gradient", "change of the sound speed with depth"),
+    ("sound_speed", "sound speed"),
+    ("wet", "wet faces against dry ones"),
+)
 STRONG = 0.9  # correlation that is set in bold
 MOST_GAPS = 12
 METHODS = {
@@ -62,6 +74,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         methods=METHODS,
         by_method=list(_by_method(calibrations)),
         closing=tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
+        shares=list(_shares(tables.table(artefacts.FREED), tables.table(artefacts.ESTIMATE))),
         built=_built(result["target"]["as_found"], settings.pool.target),
         names=[name for name, *_ in PARAMETERS],
         correlations=_correlations(result),
@@ -107,9 +120,27 @@ def _six(table: pd.DataFrame, method: str, limits: config.Verdict) -> list[dict[
     values = ("coarse", "total", "change", "correction", "sigma_random", "sigma_total", "low_95", "high_95")
     return [
         {"name": row["parameter"], "limit": _Value(bounds[row["unit"]], row["unit"])}
+        | {"sigma_in": "°" if row["unit"] == "deg" else "mm"}
         | {key: _Value(row[key], row["unit"]) for key in values}
         for row in rows
     ]
+
+
+def _shares(freed: pd.DataFrame, estimate: pd.DataFrame) -> Iterator[Row]:
+    """What each source of errors does to the six (root of its sum of squares), noise first: together the total sigma,
+    of the rotations about the body's axes."""
+    noise = estimate.set_index("unknown")["sigma"].reindex(NAMES).to_numpy(np.float64)
+    effects = freed[[f"effect_{name}" for name in NAMES]].to_numpy(np.float64)
+    source = freed["unknown"].map(lambda name: next((words for start, words in SOURCES if name.startswith(start)), ""))
+    squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for _, words in SOURCES}
+    for words, of_source in {"noise (the random sigma)": noise**2, **squares}.items():
+        yield {
+            "name": words,
+            "cells": [
+                f"{np.degrees(sigma):.4f}" if unit == "deg" else f"{1000 * sigma:.2f}"
+                for sigma, unit in ((np.sqrt(of_source[place]), unit) for _, place, _, unit in PARAMETERS)
+            ],
+        }
 
 
 def _built(found: Row, target: config.Target) -> list[Row]:

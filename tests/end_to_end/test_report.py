@@ -5,6 +5,7 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -73,6 +74,17 @@ def test_the_target_by_design_and_as_found(undisturbed: tuple[Path, Told]) -> No
     assert rows["e"] == ("0.5000 m", f"{found['e_m']:.4f} m")
     assert rows["wall to P3"] == ("45.0000 °", f"{found['corner_deg']['P3']:.4f} °")
     assert float(rows["leaning of P1"][1].split()[0]) == pytest.approx(found["lean_deg"]["P1"], abs=5.1e-5)
+
+
+def test_the_total_sigma_is_the_sum_of_its_parts(undisturbed: tuple[Path, Told]) -> None:
+    run = undisturbed[0]
+    rows = page_of(run).table("", "roll, °", "pitch, °", "yaw, °", "x, mm", "y, mm", "z, mm")
+    assert [row[0] for row in rows[:2]] == ["noise (the random sigma)", "the laser's angles"]
+    parts = np.array([row[1:] for row in rows], dtype=float)
+    total = np.array(result_of(run)["mbes"]["sigma_total"]["rotation_vector_deg"])
+    arms = 1000 * np.array(result_of(run)["mbes"]["sigma_total"]["lever_arm_m"])
+    expected = np.r_[total[[1, 0, 2]], arms]
+    np.testing.assert_allclose(np.sqrt((parts**2).sum(axis=0)), expected, rtol=0.01, atol=0.0002)
 
 
 def test_complete_in_itself_and_not_large(undisturbed: tuple[Path, Told]) -> None:

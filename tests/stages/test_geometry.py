@@ -92,3 +92,17 @@ def test_what_is_wrong_is_found_by_the_simulators_own_sign(
     (cause,) = (reason for reason in result["reasons"] if "likely cause" in reason)
     words = {"mbes_latency": "the sonar's clock", "laser_latency": "the laser's clock", "sound_speed": "sound speed"}
     assert words.get(unknown, "with depth" if "gradient" in unknown else "laser.mount") in cause
+
+
+def test_what_is_freed_is_found_said_and_to_be_corrected(errors_of: Any) -> None:
+    """The same 20 ms with the latency free: the mount is right, and still nobody shall sail with that clock."""
+    session = made({"mbes": {"latency_s": 0.02}}, seed=7)
+    found = calibrated(session, pool={"adjust": {"free": ["mbes_latency"]}})
+    result = json.loads(found["report/calibration.json"])
+    one = result["free"]["mbes_latency"]
+    assert one["unit"] == "s"
+    assert abs(one["value"] - 0.02) < 4 * one["sigma_total"] < 0.005
+    (reason,) = result["reasons"]
+    assert reason.startswith(f"adjust.free found the sonar's clock: its latency is {1000 * one['value']:+.0f}")
+    sigma = np.sqrt(np.diag(result["mbes"]["covariance_total"])) * np.repeat([180 / np.pi, 1000.0], 3)
+    assert np.all(np.abs(errors_of(result["mbes"], session.truth)) < 5 * sigma)
