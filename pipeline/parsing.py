@@ -56,6 +56,12 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return content
 
 
+_WORDS = {  # where pydantic speaks to programmers
+    "too_short": "has too few entries: {actual_length} of at least {min_length}",
+    "too_long": "has more entries than {max_length}; a decimal comma makes two of one",
+}
+
+
 def parse(model: type[M], content: dict[str, Any], where: str) -> M:
     """Check ``content`` against ``model``; the first fault becomes one line that names the key."""
     try:
@@ -68,7 +74,10 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
             raise ConfigError(f"{where}: {key}: unknown key; known here: {known}") from error
         if fault["type"] == "missing":
             raise ConfigError(f"{where}: {key}: is missing; add it") from error
-        message = fault["msg"].removeprefix("Value error, ").replace("a valid array", "a list, in square brackets")
+        message = _WORDS[fault["type"]].format(**fault["ctx"]) if fault["type"] in _WORDS else fault["msg"]
+        message = message.removeprefix("Value error, ").replace("a valid array", "a list, in square brackets")
+        if fault["type"] == "float_type" and "," in str(fault["input"]):
+            message += ", with a point where the comma is"
         shown = repr(fault["input"])
         shown = shown if len(shown) <= 60 else shown[:57] + "..."
         raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; mend this value") from error

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from pipeline.config import PoolConfig, load_pool
+from pipeline.config import Mbes, PoolConfig, load_pool
+from pipeline.errors import ConfigError
 from pipeline.parsing import parse, read_yaml
 from pipeline.simulation.scenario import Scenario
 
@@ -78,3 +79,30 @@ def test_nothing_but_the_required_keys_is_needed() -> None:
 @pytest.mark.parametrize("path", sorted((CONFIGS / "scenarios").glob("*.yaml")), ids=lambda path: path.stem)
 def test_scenarios_load(path: Path) -> None:
     assert parse(Scenario, read_yaml(path), path.name).name == path.stem
+
+
+SONAR: dict[str, Any] = {
+    "files": ["a.bth"],
+    "format": "r2sonic",
+    "mount": {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": -1.0},
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"svp": [[0.0, 1500.0]]}, "svp = [[0.0, 1500.0]]: has too few entries: 1 of at least 2; mend"),
+        ({"svp": [[0, 5, 1500], [3, 1501]]}, "svp.0 = [0, 5, 1500]: has more entries than 2; a decimal comma"),
+        ({"svp": [[1500.0, 0.0], [1501.0, 3.0]]}, "svp.0.0 = 1500.0: input should be less than or equal to 200"),
+        ({"svp": [[2.0, 1500.0], [2.0, 1501.0]]}, "depths must grow"),
+        ({"sound_speed_m_s": "1500,5"}, "'1500,5': input should be a valid number, with a point where the comma is"),
+        ({"sound_speed_m_s": "{1}"}, "'{1}': input should be a valid number; mend"),
+        ({"files": "a.bth"}, "input should be a list, in square brackets"),
+    ],
+)
+def test_one_line_says_what_to_mend(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        parse(Mbes, SONAR | change, "session.yaml")
+    (line,) = str(refused.value).splitlines()
+    assert line.startswith("session.yaml: ")
+    assert words in line

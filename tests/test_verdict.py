@@ -15,6 +15,7 @@ ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
 
 ADJUSTED = Settings(Verdict(), LEVEL, "adjustment", (4.5, 0.45), True)
 IN_TURN = replace(ADJUSTED, chosen="patent_alternating")
+LIMITS = ((0.006, 6e-4), (0.0059, 5.9e-4))  # either side of SIGMA's largest
 CLOCK = {"sigma": 3e-4, "considered": 4e-4}
 
 
@@ -122,8 +123,9 @@ def test_where_labels_are_in_doubt_nothing_else_is_judged():
 
 
 def test_sigmas_are_held_to_both_limits():
-    assert reasons(evidence(), methods(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=0.006, max_sigma_m=6e-4))) == []
-    found = reasons(evidence(), methods(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=0.0059, max_sigma_m=5.9e-4)))
+    wide, narrow = (replace(ADJUSTED, limits=Verdict(max_sigma_deg=d, max_sigma_m=m)) for d, m in LIMITS)
+    assert reasons(evidence(), methods(), wide) == []
+    found = reasons(evidence(), methods(), narrow)
     assert [reason.split(" is ")[0] for reason in found] == ["total sigma of yaw", "total sigma of lever arm y"]
 
 
