@@ -103,7 +103,7 @@ CAMPAIGNS = (
     Campaign("finite beams, outliers, echoes", 600, 6000, {"ins": WHITE["ins"]}),
     Campaign("finite beams and INS white noise", 600, 7000, {}),
     Campaign("finite beams and INS drift", 600, 8000, {"ins": DRIFT}),
-    Campaign("twelve passes, INS drift", 256, 9000, {"ins": DRIFT, "track": TWELVE}),
+    Campaign("twelve passes, INS drift", 160, 9000, {"ins": DRIFT, "track": TWELVE}),
     Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
 )
 
