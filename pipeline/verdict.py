@@ -29,6 +29,8 @@ ODD_COMMON = 4.0  # the same of what an epoch's points share: less is a good INS
 ODD_CUT = 0.01  # and so is a share of cut observations above this
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # and a target found so far off
 RETRACE_DEG = 2.0  # a coarse mount further off than this wants its rays traced again
+NO_DRIFT = "ins.drift concedes the INS no drift at all: give its figures before anything else is looked for"
+ODD_DRIFT = 1.2  # drift found, in sigmas of ins.drift
 ODD_SPEED_M_S = 3.0  # and a head's sound speed so far beyond the cast's
 FEWEST = 30  # soundings on a family of faces
 PLACES = {
@@ -57,14 +59,14 @@ class Evidence:
 @dataclass(frozen=True)
 class Settings:
     """What it is judged by: limits of the sigmas, level of the tests, the method that is the result; ``farthest``:
-    angle (degrees) and lever arm (m) beyond which no mount is taken for labelling; ``drifts``: whether the session
-    concedes the INS any drift."""
+    angle (degrees) and lever arm (m) beyond which no mount is taken for labelling; ``drift_doubt``: what speaks against
+    the session's ins.drift, or nothing."""
 
     limits: config.Verdict
     test_level: float
     chosen: config.Method
     farthest: tuple[float, float]
-    drifts: bool
+    drift_doubt: str
 
 
 def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settings: Settings) -> list[str]:
@@ -82,10 +84,11 @@ def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settin
     found += _few(cells)
     tests = [] if summary["test_passed"] else [_inconsistency(summary, cells)]
     tests += _patterns(evidence, settings.test_level)
+    likely = _causes(evidence.freed)
     found += tests
-    if tests and not settings.drifts:
-        found.append("ins.drift concedes the INS no drift at all: give its figures before anything else is looked for")
-    found += _causes(evidence.freed)
+    if (tests or likely) and settings.drift_doubt:
+        found.append(settings.drift_doubt)
+    found += likely + _away(evidence.freed)
     found += _wide_sigmas(methods["adjustment"]["sigma_mount_total"], limits)
     if chosen != "adjustment":
         found += _patent(chosen, evidence.corrections.set_index("method").loc[chosen], methods, limits)
@@ -194,12 +197,17 @@ def _patterns(evidence: Evidence, level: float) -> list[str]:
 
 
 def _causes(freed: pd.DataFrame) -> list[str]:
-    """The parameter that the residuals ask to be another, and how many more they would ask for instead; and what was
-    free and is not as the session says: the mount is right with that alone, and so would the survey's be."""
+    """The parameter that the residuals ask to be another, and how many more they would ask for instead."""
     found = causes(freed)
+    if not found:
+        return []
     others = f"; {len(found) - 1} other parameter(s) would explain it less well" if len(found) > 1 else ""
-    words = [f"likely cause of residuals ({found[0][1]:.0f} sigma): {found[0][0]}{others}"] if found else []
-    return words + [
+    return [f"likely cause of residuals ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
+
+
+def _away(freed: pd.DataFrame) -> list[str]:
+    """What was free and is not as the session says: the mount is right with that alone, and so is the survey."""
+    return [
         f"adjust.free found {one.words}: the mount holds with that alone; correct it, there and in the survey, and run "
         "again"
         for one in estimated(freed)
@@ -265,6 +273,27 @@ def warnings(
             f"{tilts[0]:+.2f}° and {tilts[1]:+.2f}°: if it was set up and surveyed better than this, check laser.mount"
         )
     return found
+
+
+def drift_doubt(drift: pd.DataFrame, conceded: config.Drift) -> str:
+    """What the drift found (table ``drift``, at its knots) says of the session's figures: empty, if nothing.
+
+    Root mean square of values ÷ conceded sigmas. What is found is drawn towards zero by those same sigmas: 0.6 to 0.7
+    where they are right, at least 1.6 where the INS drifts three times as far.
+    """
+    angles, arm = (conceded.roll_pitch_deg, conceded.roll_pitch_deg, conceded.heading_deg), conceded.horizontal_m
+    sigmas = np.array([arm, arm, conceded.vertical_m, *angles])
+    if not sigmas.any():
+        return NO_DRIFT
+    names = [f"{axis}_target_m" for axis in "xyz"] + [f"turn_{axis}_target_deg" for axis in "xyz"]
+    some = drift[names].to_numpy(np.float64)[:, sigmas > 0] / sigmas[sigmas > 0]
+    ratio = float(np.sqrt(np.mean(some**2))) if some.size else 0.0
+    if not ratio > ODD_DRIFT:
+        return ""
+    return (
+        f"the INS drifts at least {ratio:.1f} times as far as ins.drift says: give its figures before anything else is "
+        "looked for"
+    )
 
 
 def one_eyed(passes: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -18,7 +18,17 @@ from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
 from pipeline.times import utc_text
-from pipeline.verdict import Evidence, Settings, cast_doubts, one_eyed, pattern_tests, reasons, warnings
+from pipeline.verdict import (
+    NO_DRIFT,
+    Evidence,
+    Settings,
+    cast_doubts,
+    drift_doubt,
+    one_eyed,
+    pattern_tests,
+    reasons,
+    warnings,
+)
 
 Array = NDArray[np.float64]
 SCHEMA = 1
@@ -49,6 +59,7 @@ class Inputs:
     estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
     covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
     geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
+    drift: Annotated[pd.DataFrame, artefacts.DRIFT]
     freed: Annotated[pd.DataFrame, artefacts.FREED]
     patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
     cells: Annotated[pd.DataFrame, artefacts.CELLS]
@@ -90,8 +101,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.freed,
         inputs.patterns,
     )
-    drifts = any(value for name, value in config.ins.drift if name != "time_constant_s")
-    judged_by = (config.verdict, config.adjust.test_level, config.result, config.segment.farthest_mount, drifts)
+    doubt = drift_doubt(inputs.drift, config.ins.drift)
+    judged_by = (config.verdict, config.adjust.test_level, config.result, config.segment.farthest_mount, doubt)
     found = reasons(evidence, methods, Settings(*judged_by))
     built = as_found(inputs.planes, inputs.patterns, inputs.faces, config.target.e)
     summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0]) | {"as_found": built}
@@ -103,6 +114,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "warnings": warnings(
             inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
         )
+        + ([doubt] if doubt not in ("", NO_DRIFT, *found) else [])
         + one_eyed(passes)
         + oddities(built, config.target)
         + cast_doubts(config.mbes, inputs.files, methods["adjustment"]["correction"]),

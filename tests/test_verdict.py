@@ -5,17 +5,19 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from pipeline.config import Mbes, Verdict
-from pipeline.verdict import Evidence, Settings, cast_doubts, one_eyed, pattern_tests, reasons, warnings
+from pipeline.config import Drift, Mbes, Verdict
+from pipeline.verdict import Evidence, Settings, cast_doubts, drift_doubt, one_eyed, pattern_tests, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 LEVEL = 0.001
 ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
 
 
-ADJUSTED = Settings(Verdict(), LEVEL, "adjustment", (4.5, 0.45), True)
+ADJUSTED = Settings(Verdict(), LEVEL, "adjustment", (4.5, 0.45), "")
 IN_TURN = replace(ADJUSTED, chosen="patent_alternating")
 LIMITS = ((0.006, 6e-4), (0.0059, 5.9e-4))  # either side of SIGMA's largest
+FIGURES = ("horizontal_m", "vertical_m", "roll_pitch_deg", "heading_deg")
+DRIFTS = "the INS drifts at least 1.2 times as far as ins.drift says: "
 CLOCK = {"sigma": 3e-4, "considered": 4e-4}
 
 
@@ -227,11 +229,29 @@ def test_a_pass_that_one_sensor_missed_is_said():
 
 
 def test_an_ins_that_is_conceded_no_drift_is_looked_at_first():
-    still = replace(ADJUSTED, drifts=False)
+    still = replace(ADJUSTED, drift_doubt=drift_doubt(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0))))
     assert reasons(evidence(), methods(), still) == []
-    found = reasons(evidence(summary={"test_passed": False}), methods(), still)
+    found = reasons(evidence(summary={"test_passed": False}, held={"value": 6e-4}), methods(), still)
     assert found[1].startswith("ins.drift concedes the INS no drift at all")
+    assert found[2].startswith("likely cause")
     assert len(judged(evidence(summary={"test_passed": False}))) == 1
+
+
+def drift(sigmas):
+    """As large as that in every component, of knots here and there."""
+    values = {"x": 0.015, "y": 0.015, "z": 0.02}, {"x": 0.01, "y": 0.01, "z": 0.03}
+    columns = {f"{axis}_target_m": value for axis, value in values[0].items()}
+    columns |= {f"turn_{axis}_target_deg": value for axis, value in values[1].items()}
+    return pd.DataFrame([{name: sign * sigmas * value for name, value in columns.items()} for sign in (1, -1, -1)])
+
+
+@pytest.mark.parametrize(("sigmas", "far"), [(1.19, False), (1.21, True)])
+def test_an_ins_that_drifts_farther_than_its_figures(sigmas, far):
+    doubt = drift_doubt(drift(sigmas), Drift())
+    assert doubt.startswith(DRIFTS) if far else doubt == ""
+    vertical = drift_doubt(drift(sigmas), Drift(**dict.fromkeys(FIGURES, 0.0) | {"vertical_m": 0.02}))
+    assert bool(vertical) == far
+    assert drift_doubt(drift(sigmas).iloc[:0], Drift()) == ""
 
 
 def test_each_variable_has_its_own_test():

@@ -137,9 +137,12 @@ def epoch_sums(record: Integers, share: Array, surface: Integers, q: Array, weig
 def merged(pieces: Iterable[EpochSums]) -> EpochSums:
     """All batches together, in order; an epoch may be spread over several."""
     parts = list(pieces)
-    names = list(EpochSums.__dataclass_fields__)
-    every = EpochSums(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
-    every = every.taken(np.lexsort((every.surface, every.record)))
-    runs = Runs.of(every.record, every.surface)
-    added = {name: np.add.reduceat(getattr(every, name), runs.starts, axis=0) for name in names[2:]}
-    return replace(every.taken(runs.starts), **added)
+    record, surface = (np.concatenate([getattr(one, name) for one in parts]) for name in ("record", "surface"))
+    order = np.lexsort((surface, record))
+    first = Runs.of(record[order], surface[order]).starts
+
+    def added(name: str) -> Array:
+        return np.asarray(np.add.reduceat(np.concatenate([getattr(one, name) for one in parts])[order], first))
+
+    sums = (added(name) for name in list(EpochSums.__dataclass_fields__)[2:])
+    return EpochSums(record[order[first]], surface[order[first]], *sums)

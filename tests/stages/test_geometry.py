@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,15 @@ def test_what_is_wrong_is_found_by_the_simulators_own_sign(
     (cause,) = (reason for reason in result["reasons"] if "likely cause" in reason)
     words = {"mbes_latency": "the sonar's clock", "laser_latency": "the laser's clock", "sound_speed": "sound speed"}
     assert words.get(unknown, "with depth" if "gradient" in unknown else "laser.mount") in cause
+
+
+def test_an_ins_that_drifts_three_times_as_far_is_named_before_any_mount() -> None:
+    figures = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
+    session = made({"ins": {"drift": {name: 3 * value for name, value in figures.items()}}}, seed=1)
+    session = replace(session, session=session.session | {"ins": session.session["ins"] | {"drift": figures}})
+    found = json.loads(calibrated(session)["report/calibration.json"])["reasons"]
+    (place,) = (k for k, reason in enumerate(found) if reason.startswith("the INS drifts at least 1."))
+    assert all(k > place for k, reason in enumerate(found) if reason.startswith("likely cause"))
 
 
 def test_what_is_freed_is_found_said_and_to_be_corrected(errors_of: Any) -> None:
