@@ -194,7 +194,8 @@ class Scene:
     # --- to be looked at ---------------------------------------------------------------------------------------------
     def sample(self, sensor: str, batch: Batch, state: State, drift: Drift | None, weighting: Weighting) -> Batch:
         """Where points lie and their residuals, calibrated and coarse, as columns of the table ``residuals``."""
-        seen = self.observe(sensor, batch, state, drift, weighting)
+        numbered = {**batch, "row": np.arange(len(batch["t_ns"]))}
+        seen = self.observe(sensor, numbered, state, drift, weighting)
         points = seen.points
         own = xyz(points, f"{sensor}_m")
         ranges = np.linalg.norm(own, axis=1)
@@ -214,8 +215,8 @@ class Scene:
         single = {name: values.astype(np.float32) for name, values in columns.items()}
         words = np.full(len(seen.v_m), sensor, dtype=object)
         found = {"sensor": words} | {name: points[name] for name in ("t_ns", "pass", "face")} | single
-        in_time = np.argsort(points["t_ns"], kind="stable")
-        return {name: values[in_time] for name, values in found.items()}
+        as_given = np.argsort(points["row"])
+        return {name: values[as_given] for name, values in found.items()}
 
     def _placed(self, batch: Batch, state: State) -> Array:
         """Soundings in the target frame with the state's mount, (n, 3) m."""
