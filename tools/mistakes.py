@@ -5,7 +5,7 @@ tells how many were accepted, the largest errors of the adjustment in its angles
 were accepted the largest normalised squared error by the total covariance and the largest error in total sigmas: where
 the verdict is blind, the README must say so. Every session is a row of runs/montecarlo/mistakes.parquet.
 
-    python -m tools.mistakes [--jobs 2] [--seeds 25] [--only NAME ...]
+    python -m tools.mistakes [--jobs 2] [--seeds 27] [--only NAME ...]
 """
 
 import argparse
