@@ -41,10 +41,10 @@ class Estimated:
 
 
 def estimated(freed: pd.DataFrame) -> list[Estimated]:
-    """What is free beside the mount and the surfaces."""
+    """What is free beside the mount and the surfaces; nothing, where the data leave no result."""
     return [
         Estimated(row["unknown"], row["value"], row["sigma"], UNITS[row["unknown"]], _words(row), _far(row))
-        for row in freed[freed["estimated"]].to_dict("records")
+        for row in freed[freed["estimated"] & np.isfinite(freed["sigma"])].to_dict("records")
     ]
 
 

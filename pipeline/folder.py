@@ -228,5 +228,7 @@ def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b
     for run_folder in runs:
         if file.resolve().is_relative_to(run_folder.resolve()):
             raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")
-    if begins and file.is_file() and not file.read_bytes().startswith(begins):
-        raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")
+    if begins and file.is_file():
+        with writing(file), file.open("rb") as there:
+            if there.read(len(begins)) != begins:
+                raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")

@@ -164,7 +164,7 @@ class Scene:
             error = drift.at((seconds[:-1] + seconds[1:]) / 2)
         return first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor]), error[:, 3:].T
 
-    def _see_laser(self, sight: "Sight", _: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
+    def _see_laser(self, sight: Sight, _: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
         """r in surface axes, v, and what the observations' module makes of them."""
         trajectory, record = self.body.trajectory, sight.record
         x, y, z = (sight.points[f"{axis}_laser_m"] for axis in "xyz")
@@ -178,7 +178,7 @@ class Scene:
         sigmas = Sigmas(self.laser.range_sigma_m, float(np.radians(self.laser.angle_sigma_deg)))
         return r, v, laser_observations(r, sight.spread(lever), range_m, sigmas)
 
-    def _see_sonar(self, sight: "Sight", state: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
+    def _see_sonar(self, sight: Sight, state: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
         points = xyz(sight.points, "mbes_m").T
         pings = Runs.of(sight.points["t_ns"])  # beams of a ping share their pose
         where, R_target_from_body = self.body.trajectory.poses_at(sight.points["t_ns"][pings.starts])

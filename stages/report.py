@@ -102,8 +102,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.patterns,
     )
     doubt = drift_doubt(inputs.drift, config.ins.drift)
-    judged_by = (config.verdict, config.adjust.test_level, config.result, config.segment.farthest_mount, doubt)
-    found = reasons(evidence, methods, Settings(*judged_by))
+    farthest, level = config.segment.farthest_mount, config.adjust.test_level
+    found = reasons(evidence, methods, Settings(config.verdict, level, config.result, farthest, doubt))
     built = as_found(inputs.planes, inputs.patterns, inputs.faces, config.target.e)
     summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0]) | {"as_found": built}
     result = {

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -209,6 +210,11 @@ def test_what_was_freed_and_is_not_as_the_session_says(value, far):
     found = judged(evidence(held={"unknown": "mbes_latency", "estimated": True, "value": value} | CLOCK))
     assert len(found) == far
     assert not far or "its latency is +2.0 ± 0.3 ms more than mbes.latency_s says: the mount holds with" in found[0]
+
+
+def test_what_was_freed_where_there_is_no_result():
+    nothing = {"unknown": "mbes_latency", "estimated": True, "considered": 4e-4, "value": 0.0, "sigma": np.nan}
+    assert judged(evidence(held=nothing)) == []
 
 
 def test_of_several_causes_the_most_telling_is_named():
