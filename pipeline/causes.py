@@ -75,13 +75,14 @@ def _words(row: Mapping[Any, Any]) -> str:
         return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
     if name.startswith("laser_lever_arm"):
         return f"laser.mount: {name[-1]}_m should be {_size(1e3 * value, 1e3 * sigma, 'mm')} more"
-    _, family, *what = name.split("_")
-    if what[0] == "turn":
+    family, _, what = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
+    faces = FACES.get(family, f"of {family}")
+    if what.startswith("turn"):
         angle = _size(np.degrees(value), np.degrees(sigma), "°")
-        return f"the target: its wet faces {FACES[family]} are turned by {angle} against the dry ones"
+        return f"the target: its wet faces {faces} are turned by {angle} against the dry ones"
     off = _size(1e3 * value, 1e3 * sigma, "mm")
     how = "lie higher" if family == "H" else "stand off"
-    return f"the target: its wet faces {FACES[family]} {how} by {off}; check target.a, b, c, e and its survey"
+    return f"the target: its wet faces {faces} {how} by {off}; check its shape in the config, and its survey"
 
 
 def _size(value: float, sigma: float, unit: str) -> str:

@@ -24,14 +24,14 @@ def closing_table(
     coarse: Mounted,
     mounts: Mapping[str, Mounted],
 ) -> pd.DataFrame:
-    """One row a mount and a vertical family that both sensors see; ``mounts``: totals by name."""
+    """One row a mount and a family in one plane that both sensors see; ``mounts``: totals by name."""
     laser = laser_planes(planes)
     rows = []
     for mount, placed in mounts.items():
         correction = placed.R_body_from_sensor @ coarse.R_body_from_sensor.T
         for family, lifted in families_of(faces, sounding_moments).items():
             plane = laser.get((ALL_PASSES, family))
-            if plane is None or family == "H":
+            if plane is None:
                 continue
             try:
                 sonar = fit_plane(plane_moments(lifted, correction, placed.lever_arm_body_m), plane.normal)

@@ -8,68 +8,38 @@ from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.errors import ConfigError
 from pipeline.parsing import parse, read_yaml
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-SigmaM = Annotated[float, Field(ge=0, le=10)]
-SigmaDeg = Annotated[float, Field(ge=0, le=45)]
-SigmaS = Annotated[float, Field(ge=0, le=10)]
-BeamWidth = Annotated[float, Field(gt=0, le=45)]
-RangeSigma = Annotated[float, Field(ge=1e-5, le=10)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Angle = Annotated[float, Field(ge=-360, le=360)]
-Length = Annotated[float, Field(gt=0, le=100)]
-Lever = Annotated[float, Field(ge=-100, le=100)]
-Depth = Annotated[float, Field(ge=0, le=200)]
-SoundSpeed = Annotated[float, Field(ge=1300, le=1700)]
-Latency = Annotated[float, Field(ge=-10, le=10)]
-
-
-class Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+from pipeline.quantities import (
+    Angle,
+    BeamWidth,
+    Depth,
+    Latency,
+    Lever,
+    Model,
+    NotNegative,
+    Positive,
+    RangeSigma,
+    SigmaDeg,
+    SigmaM,
+    SigmaS,
+    SoundSpeed,
+)
+from pipeline.target_settings import Faces as Faces
+from pipeline.target_settings import Letters as Letters
+from pipeline.target_settings import Origin as Origin
+from pipeline.target_settings import Target as Target
 
 
 # --- the pool --------------------------------------------------------------------------------------------------------
-class Origin(Model):
-    """The target's centre: middle of the centre wall's front face."""
-
-    latitude_deg: Annotated[float, Field(ge=-90, le=90)]
-    longitude_deg: Annotated[float, Field(ge=-180, le=360)]
-    height_m: Annotated[float, Field(ge=-1000, le=10000, description="ellipsoidal")]
-
-
 class AsBuilt(Model):
     """The target as surveyed: faces off their design, and how far the wet ones of a family may stand off besides."""
 
-    faces: dict[str, Annotated[float, Field(ge=-0.05, le=0.05)]] = {}  # m outward of the design, by name: P1-0-top
+    faces: dict[str, Annotated[float, Field(ge=-0.05, le=0.05)]] = Field(default_factory=dict)  # m outward, by name
     offset_sigma_m: SigmaM = 0.001
     angle_sigma_deg: SigmaDeg = 0.005
-
-
-class Target(Model):
-    """The target by design: CONVENTIONS.md, "The target"."""
-
-    a: Length
-    b: Length
-    c: Length
-    e: Length
-    low_side: Literal["south", "north"] = "south"
-    blocks_per_side: Annotated[int, Field(ge=1, le=200)] | None = None
-    first_base_m: Lever | None = None
-    stagger_m: Annotated[float, Field(ge=0, le=100)] | None = None
-    origin: Origin
-    azimuth_deg: Angle | None = None
-    water_level_m: Lever = 0.0
-
-    @model_validator(mode="after")
-    def _blocks_fit(self) -> "Target":
-        if self.blocks_per_side is None and self.a < 2 * self.e:
-            raise ValueError(f"a = {self.a} leaves no room for one block and gap of e = {self.e}: a must be >= 2 e")
-        return self
 
 
 class TargetPlace(Model):

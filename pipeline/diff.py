@@ -14,6 +14,7 @@ import numpy as np
 from pipeline import artefacts, manifest
 from pipeline.drawn import agreeing
 from pipeline.errors import ArtefactError
+from pipeline.families import families_of, level_families
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.planes import angle_between
@@ -24,8 +25,7 @@ from pipeline.verdict import SIX
 LEVEL = 0.01  # of the joint test: so many false alarms where nothing has moved
 UNITS = ("deg",) * 3 + ("m",) * 3
 SHOWN = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}
-FAMILIES = ("P1", "P2", "P3")
-TARGET = ("a", "b", "c", "e", "low_side", "blocks_per_side", "first_base_m", "stagger_m")
+PLACE = ("origin", "azimuth_deg", "water_level_m")  # of a target, not its shape
 Row = dict[str, Any]
 
 
@@ -163,11 +163,14 @@ def _mount(
 def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row]:
     """Each family's plane over all passes in its own target frame; the sonar's are those with the coarse mount."""
     one, other = (run.settings.pool.target.model_dump(mode="json") for run in (first, second))
-    differing = [name for name in TARGET if one[name] != other[name]]
+    shape = [name for name in (one | other) if name not in PLACE]
+    differing = [name for name in shape if one.get(name) != other.get(name)]
     if differing:
         missing.append(f"planes: the targets differ ({', '.join(f'target.{name}' for name in differing)})")
         return
     tables = []
+    faces = Tables(first.path).table(artefacts.FACES)
+    upright = [name for name in families_of(faces.loc[faces["one_plane"]]) if name not in level_families(faces)]
     for run in (first, second):
         rows = Tables(run.path).table(artefacts.PLANES).query("`pass` == -1").to_dict("records")
         tables.append({(row["sensor"], row["plane"]): row for row in rows})
@@ -175,7 +178,7 @@ def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row
     if not same_mount:
         missing.append("planes of the sonar: they were placed with different coarse mounts")
     for sensor in ("laser", "mbes") if same_mount else ("laser",):
-        for family in FAMILIES:
+        for family in upright:
             key = (sensor, family)
             if not all(key in table for table in tables):
                 missing.append(f"planes: {family} of {sensor} is not in both")

@@ -65,16 +65,17 @@ class LaserSample:
 
 
 def find_target(
-    dry: LaserSample, model: TargetModel, swapped: TargetModel, settings: config.Segment, azimuth_known: bool
+    dry: LaserSample, model: TargetModel, settings: config.Segment, azimuth_known: bool
 ) -> FoundTarget:
-    """Pose of the target from dry laser points; rivals are the poses one block off.
+    """Pose of the target from dry laser points; rivals are other poses, and the mirrored target.
 
-    Shifting by one period, or by half of it with the sides swapped, changes nothing but the ends of the stacks and the
-    wall's top edge. A rival half a period off loses the wall's width times half a period; if it loses less than
-    ``ambiguity_share`` of that, the ends were not seen well enough, and the registration is ambiguous.
+    Where the target repeats, shifting it by one period changes nothing but its ends; and so, on the patent's, does half
+    a period with the sides exchanged. A rival half a period off loses the wall's width times half a period; if it loses
+    less than ``ambiguity_share`` of that, the ends were not seen well enough, and the registration is ambiguous.
     """
     azimuth = np.radians(settings.search_azimuth_deg if azimuth_known else max(10.0, settings.search_azimuth_deg))
-    reach_xy, reach_z = settings.search_horizontal_m, settings.search_vertical_e * model.period_m / 2
+    reach_xy = settings.search_horizontal_m
+    reach_z = reach_xy if model.repeats_m is None else settings.search_vertical_e * model.half_period_m
     sigmas = np.array([azimuth, reach_xy, reach_xy, reach_z])
     placement = TargetPose(dry.voxel_means_m, sigmas)
     normals, distances = _planes(model)
@@ -85,7 +86,7 @@ def find_target(
         [np.array([turn, reach_xy * x, reach_xy * y, reach_z * z]) for turn in turns for x in steps for y in steps]
         for z in steps
     ]
-    quarter = model.period_m / 4
+    quarter = model.half_period_m / 2
 
     def same(p: Array, q: Array) -> bool:
         return bool(np.max(np.abs(p[1:] - q[1:])) < quarter)
@@ -98,7 +99,8 @@ def find_target(
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
         above = points[:, 2] > model.water_level_m + settings.water_margin_m
-        labels = label_points(model, points, Beams.head_on(len(points)), WIDE_M, settings.margin_m, 0.0)
+        head_on = Beams.head_on(len(points))
+        labels = label_points(model, points, head_on, WIDE_M, settings.margin_m, 0.0, seen="dry")
         return np.where(above, labels.face, -1).astype(np.int16)
 
     single = TargetPose(dry.points_m, sigmas)
@@ -106,10 +108,9 @@ def find_target(
     best = _agreement(placement, pose.parameters, model, closest)
     tilted = TiltedTarget(single.points(pose.parameters), np.array([0.1, 0.1, 0.1, 1.0, 1.0, 1.0]))
     tilt = refine(tilted, np.zeros(6), label, normals, distances, rounds=2)
-    name, rival = _rivals(placement, pose.parameters, model, swapped)
+    name, rival = _rivals(placement, pose.parameters, model)
     R_target_from_pool = rotation_z(pose.parameters[0])
-    wall = model.faces[model.family_faces("P2")[0]].vertices_m
-    expected = np.ptp(wall[:, 1]) * model.period_m / 2
+    expected = model.width_m * model.half_period_m
     ambiguous = bool(best - rival < settings.ambiguity_share * expected)
     return FoundTarget(
         R_target_from_pool,
@@ -146,28 +147,26 @@ def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, clo
     return float((explained + covered) * VOXEL_M**2)
 
 
-def _rivals(placement: TargetPose, best: Array, model: TargetModel, swapped: TargetModel) -> tuple[str, float]:
-    """The best of the poses one block off, and how well it agrees."""
-    period = model.period_m
-    rivals = []
-    for other, shifts in (
-        (model, {"one block higher": period, "one block lower": -period}),
-        (
-            swapped,
-            {
-                "low_side swapped": 0.0,
-                "low_side swapped, half a period higher": period / 2,
-                "low_side swapped, half a period lower": -period / 2,
-            },
-        ),
-    ):
-        closest = ClosestSurface(other)
-        # No prior here: the rival may settle where it fits best.
-        free = TargetPose(placement.points_pool_m, np.full(4, 1e3))
-        for name, shift in shifts.items():
-            start = best + np.array([0.0, 0.0, 0.0, shift])
-            settled = settle(free, start, closest, _planes(other)[0], NARROW)
-            rivals.append((name, _agreement(free, settled, other, closest)))
+def _rivals(placement: TargetPose, best: Array, model: TargetModel) -> tuple[str, float]:
+    """The best of the rivals, and how well it agrees; none, where the target neither repeats nor has a left and right.
+    """
+    shifts: list[tuple[TargetModel, str, float]] = []
+    whole = model.repeats_m
+    if whole is not None:
+        shifts += [(model, "one period higher", whole), (model, "one period lower", -whole)]
+    if not model.symmetric:
+        other = model.mirrored()
+        shifts.append((other, "left and right exchanged", 0.0))
+        if whole is not None:
+            shifts.append((other, "left and right exchanged, half a period higher", whole / 2))
+            shifts.append((other, "left and right exchanged, half a period lower", -whole / 2))
+    rivals = [("none", 0.0)]
+    # No prior here: the rival may settle where it fits best.
+    free = TargetPose(placement.points_pool_m, np.full(4, 1e3))
+    for one, name, shift in shifts:
+        closest = ClosestSurface(one)
+        settled = settle(free, best + np.array([0.0, 0.0, 0.0, shift]), closest, _planes(one)[0], NARROW)
+        rivals.append((name, _agreement(free, settled, one, closest)))
     return max(rivals, key=lambda rival: rival[1])
 
 
@@ -205,9 +204,10 @@ def find_mount(
     """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search
     limits.
 
-    First the wall: roll turns it about the track and x shifts it, nothing else moves it, so both follow from a vote
-    over the part of the wall that is the wall wherever the rest still stands. Then a search over yaw, y and z; blocks
-    repeat every period, so z is sought within the lever arm's limits and a rival there is reported.
+    First the front (the patent's wall): roll turns it about the track and x shifts it, nothing else moves it, so both
+    follow from a vote over the part of it that is the front wherever the rest still stands; without one roll is
+    searched as well. Then a search over yaw, y and z; blocks repeat every period, so z is sought within the lever arm's
+    limits and a rival there is reported.
     """
     angle, arm = np.radians(settings.search_mount_deg), settings.search_mount_m
     sigmas = np.array([angle, angle, angle, arm, arm, arm])
@@ -215,11 +215,14 @@ def find_mount(
     placement = MountCorrection(sample.positions_m, sample.R_target_from_body, body, lever_arm_m, sigmas)
     normals, distances = _planes(model)
     closest = ClosestSurface(model)
-    roll, shift_x = _wall_vote(placement, model, settings)
-    base = np.array([0.0, roll, 0.0, shift_x, 0.0, 0.0])
+    vote = _wall_vote(placement, model, settings)
+    bases = [np.array([0.0, roll, 0.0, 0.0, 0.0, 0.0]) for roll in np.linspace(-angle, angle, 5)]
+    if vote is not None:
+        bases = [np.r_[0.0, vote[0], 0.0, vote[1]]]
     starts = [
         [
             base + np.array([0.0, 0.0, yaw, 0.0, y, z])
+            for base in bases
             for yaw in np.linspace(-angle, angle, 5)
             for y in np.linspace(-arm, arm, 3)
         ]
@@ -227,7 +230,7 @@ def find_mount(
     ]
 
     def same(p: Array, q: Array) -> bool:
-        return bool(np.max(np.abs(p[3:] - q[3:])) < model.period_m / 4)
+        return bool(np.max(np.abs(p[3:] - q[3:])) < model.half_period_m / 2)
 
     def judge(p: Array) -> float:
         """A sounding behind a face cannot be: a stack shifted onto the floor or the next block explains as many."""
@@ -242,7 +245,7 @@ def find_mount(
         beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, mbes)
         wet = (-np.inf, model.water_level_m - settings.water_margin_m)
         grazing = np.radians(settings.min_grazing_deg)
-        return label_points(model, points, beams, WIDE_M, settings.margin_m, grazing, heights_m=wet).face
+        return label_points(model, points, beams, WIDE_M, settings.margin_m, grazing, heights_m=wet, seen="wet").face
 
     refined = refine(placement, found.parameters, label, normals, distances)
     ambiguous = bool(found.rival_score > found.score * (1 - settings.ambiguity_margin))
@@ -258,27 +261,40 @@ def find_mount(
     )
 
 
-def _wall_vote(placement: MountCorrection, model: TargetModel, settings: config.Segment) -> tuple[float, float]:
-    """Roll correction (rad) and x shift (m) that gather most soundings of the wall's middle in one plane x = 0.
+def _wall_vote(
+    placement: MountCorrection, model: TargetModel, settings: config.Segment
+) -> tuple[float, Array] | None:
+    """Roll correction (rad) and shift (3,) of the lever arm (m, body) that gather most soundings of the front's middle
+    in one plane; None where the target has no front, or it was not seen.
 
-    A turn ρ about body y moves a sounding by ρ T (e_y × m); only its x component matters on the wall.
+    A turn ρ about body y moves a sounding by ρ T (e_y × m); only its part along the front's normal matters there.
     """
+    front = model.front()
+    if front is None:
+        return None
     points = placement.points(np.zeros(6))
-    wall = model.faces[model.family_faces("P2")[0]].vertices_m
-    spare = max(0.25 * wall[:, 1].max(), wall[:, 1].max() - settings.search_mount_m - 0.45)
-    low, high = wall[:, 2].min(), model.water_level_m - settings.water_margin_m
-    use = (np.abs(points[:, 1]) < spare) & (points[:, 2] > low) & (points[:, 2] < high) & (np.abs(points[:, 0]) < 1.0)
+    into = -front.normal
+    along = np.array([-into[1], into[0], 0.0]) / np.hypot(*into[:2])
+    corners = front.vertices_m @ along
+    middle, half = (corners.max() + corners.min()) / 2, np.ptp(corners) / 2
+    behind = points @ into + front.distance_m
+    spare = max(0.25 * half, half - settings.search_mount_m - 0.45)
+    low, high = front.vertices_m[:, 2].min(), model.water_level_m - settings.water_margin_m
+    high = min(high, front.vertices_m[:, 2].max())
+    use = (np.abs(points @ along - middle) < spare) & (points[:, 2] > low) & (points[:, 2] < high)
+    use &= np.abs(behind) < 1.0
     if use.sum() < 20:
-        return 0.0, 0.0
+        return None
+    R = placement.R_target_from_body[use]
     lever = np.cross([0.0, 1.0, 0.0], placement.points_body_m[use])
-    slope = np.einsum("nj,nj->n", placement.R_target_from_body[use, 0, :], lever)
+    slope = np.einsum("i,nij,nj->n", into, R, lever)
     bins = np.arange(-0.9, 0.9 + 1e-9, 0.02)
     best = (-1.0, 0.0, 0.0)
     reach = np.radians(1.2 * settings.search_mount_deg)
     for roll in np.linspace(-reach, reach, 73):
-        votes = np.histogram(points[use, 0] + roll * slope, bins)[0].astype(float)
+        votes = np.histogram(behind[use] + roll * slope, bins)[0].astype(float)
         votes = votes[:-2] + 2 * votes[1:-1] + votes[2:]
         top = int(np.argmax(votes))
         if votes[top] > best[0]:
             best = (float(votes[top]), float(roll), float(-(bins[top + 1] + 0.01)))
-    return best[1], best[2]
+    return best[1], best[2] * np.einsum("i,nij->nj", into, R).mean(axis=0)

@@ -6,10 +6,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.angles import PassPlanes
 from pipeline.maths.moments import SIZE
 from pipeline.maths.offsets import DryFace, PassOffsets, WetFace, by_family
 from pipeline.maths.planes import Plane
+from pipeline.maths.targets import LEVEL
 
 Array = NDArray[np.float64]
 ALL_PASSES = -1
@@ -50,7 +52,18 @@ def lifted_moments(sounding_moments: pd.DataFrame) -> dict[tuple[int, int], Arra
 def angle_passes(
     faces: pd.DataFrame, planes: pd.DataFrame, sounding_moments: pd.DataFrame, min_points: int
 ) -> list[PassPlanes]:
-    """Passes in which both sensors have all of P1, P2, P3: with the laser's normals of the same pass."""
+    """Passes in which both sensors have all of P1, P2, P3: with the laser's normals of the same pass.
+
+    Raises
+    ------
+    DegenerateGeometryError
+        The target has not all of these.
+    """
+    missing = sorted({"P1", "P2", "P3"} - set(faces["family"]))
+    if missing:
+        raise DegenerateGeometryError(
+            f"the patent's steps need faces with the roles P1, P2, P3; this target has none with {', '.join(missing)}"
+        )
     laser = laser_planes(planes)
     laser_p4 = planes[(planes["sensor"] == "laser") & (planes["plane"] == "P4")]
     fourth = {
@@ -89,7 +102,7 @@ def horizontal_faces(
     for (_, face), lifted in lifted_moments(sounding_moments).items():
         total[face] = total[face] + lifted if face in total else lifted
     dry, wet = [], []
-    for row in faces[faces["family"] == "H"].to_dict("records"):
+    for row in faces[faces["normal_z_target_1"].abs() > LEVEL].to_dict("records"):
         design = float(row["distance_m"] * row["normal_z_target_1"])
         plane = laser.get((ALL_PASSES, row["name"]))
         if plane is not None and plane.count >= min_points:

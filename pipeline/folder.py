@@ -52,6 +52,10 @@ class Settings:
 def load_settings(session_folder: Path, config_path: Path) -> Settings:
     """Both YAML files, read and checked."""
     pool = config.load_pool(config_path)
+    try:
+        target_of(pool.target)
+    except ConfigError as error:
+        raise ConfigError(f"{config_path}: {error}") from error
     refuse_faces(pool, config_path)
     session = config.load_session(session_folder)
     refuse_cast(pool.target, session.mbes, session_folder / "session.yaml")

@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import config
+from pipeline.maths.assembly import Outline, Relation, build_target
+from pipeline.maths.letters import lettered
 from pipeline.maths.rotations import mount_from_rotation, mount_partials, rotation_from_mount
-from pipeline.maths.targets import TargetModel, build_target
+from pipeline.maths.targets import TargetModel
 
 Array = NDArray[np.float64]
 PARAMETERS = (  # as people list them: name, place among the six (rotation about body x, y, z, lever arm), setting, unit
@@ -67,16 +69,22 @@ def change_of(total: Mapping[str, float], coarse: Mapping[str, float], key: str)
     return change - 360.0 * round(change / 360.0) if key.endswith("_deg") else change
 
 
-def target_of(target: config.Target, low_side: str | None = None) -> TargetModel:
-    """The target's faces; ``low_side`` overrides the configured one."""
-    return build_target(
+def target_of(target: config.Target) -> TargetModel:
+    """The target's faces."""
+    if isinstance(target, config.Faces):
+        outlines = [Outline(name, one.corners, one.role or "", one.seen) for name, one in target.faces.items()]
+        relations = [
+            Relation(kind, faces, one.name or "") for one in target.relations for kind, faces in one.given.items()
+        ]
+        return build_target(outlines, relations, target.water_level_m, target.repeats_m)
+    outlines, relations, repeats_m = lettered(
         target.a,
         target.b,
         target.c,
         target.e,
-        low_side or target.low_side,
+        target.low_side,
         target.blocks_per_side,
         target.first_base_m,
         target.stagger_m,
-        target.water_level_m,
     )
+    return build_target(outlines, relations, target.water_level_m, repeats_m)

@@ -1,6 +1,6 @@
 """What the passes can tell and what not, in words, and which passes would cure it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,14 +19,19 @@ TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
 TWICE = 2  # passes there
 VAGUE = 1.0  # rad or m, of every unknown
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
+HORIZONTAL = (
+    "the sonar sees no horizontal face: only the boat's rolling and pitching tell its height, and a still boat tells "
+    "nothing"
+)
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What a session had: distances of its passes, number of soundings and of laser points by family."""
+    """What a session had: distances of its passes, number of soundings by family; the families that are horizontal."""
 
     distances_m: Sequence[float]
     soundings: Mapping[str, int]
+    level: Collection[str]
     speed_m_s: float
     heading_swing_deg: float
 
@@ -63,17 +68,17 @@ def _sigmas(normal: Array, solution: Solution) -> Array:
 
 def _gaps(seen: Seen) -> list[str]:
     there = {family for family, count in seen.soundings.items() if count}
-    if there == {"P2"}:
-        return ["the sonar sees the wall alone: nothing tells where it is along the wall, or how high"]
+    upright = [family for family in seen.soundings if family not in seen.level]
+    if len(there) == 1 and len(upright) > 1 and there <= set(upright):
+        (family,) = there
+        one = SIDES.get(family, family).removesuffix(f" ({family})")
+        return [f"the sonar sees {one} alone: nothing tells where it is along it, or how high"]
     found = []
-    missing = [words for family, words in SIDES.items() if family not in there]
+    missing = [SIDES.get(family, family) for family in upright if family not in there]
     if missing:
         found.append(f"the sonar sees nothing of {' and '.join(missing)}")
-    if "H" not in there:
-        found.append(
-            "the sonar sees no horizontal face: only the boat's rolling and pitching tell its height, and a still boat "
-            "tells nothing"
-        )
+    if not there & set(seen.level):
+        found.append(HORIZONTAL)
     low, high = min(seen.distances_m, default=0.0), max(seen.distances_m, default=0.0)
     if len(seen.distances_m) == 1:
         found.append(f"one pass alone has soundings, at {low:.1f} m: nothing shows whether another would agree")

@@ -4,10 +4,10 @@ import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Tag, ValidationError
 
 from pipeline.errors import ConfigError
 
@@ -59,6 +59,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 _WORDS = {  # where pydantic speaks to programmers
     "too_short": "has too few entries: {actual_length} of at least {min_length}",
     "too_long": "has more entries than {max_length}; a decimal comma makes two of one",
+    "union_tag_invalid": "has kind {tag}, which is none of {expected_tags}",
 }
 
 
@@ -68,7 +69,8 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
         return model.model_validate_json(_to_json(content, where), strict=True)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in fault["loc"] if part != "function-after") or "(whole file)"
+        place = _without_tags(model, fault["loc"])
+        key = ".".join(str(part) for part in place if part not in ("function-after", "[key]")) or "(whole file)"
         if fault["type"] == "extra_forbidden":
             known = ", ".join(_known_keys(model, fault["loc"][:-1]))
             raise ConfigError(f"{where}: {key}: unknown key; known here: {known}") from error
@@ -104,14 +106,39 @@ def _to_json(content: dict[str, Any], where: str) -> str:
     return json.dumps(content)
 
 
-def _known_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+Location = tuple[int | str, ...]
+
+
+def _known_keys(model: type[BaseModel], location: Location) -> list[str]:
     current: Any = model
     for part in location:
         field = getattr(current, "model_fields", {}).get(part)
-        if field is None:
-            return ["see README.md"]
-        current = field.annotation
+        current = field.annotation if field is not None else _tagged(current).get(part)
     return sorted(getattr(current, "model_fields", {"see README.md": None}))
+
+
+def _tagged(annotation: Any) -> dict[int | str, Any]:
+    """The models of a union by their tags."""
+    found: dict[int | str, Any] = {}
+    for one in get_args(annotation):
+        tags = [mark.tag for mark in getattr(one, "__metadata__", ()) if isinstance(mark, Tag)]
+        found |= dict.fromkeys(tags, get_args(one)[0] if tags else None)
+    return found
+
+
+def _without_tags(model: type[BaseModel], location: Location) -> Location:
+    """A fault's place as the file has it: no tag of a union stands there."""
+    current: Any = model
+    kept = []
+    for part in location:
+        tagged = _tagged(current)
+        if part in tagged:
+            current = tagged[part]
+            continue
+        kept.append(part)
+        field = getattr(current, "model_fields", {}).get(part)
+        current = field.annotation if field is not None else None
+    return tuple(kept)
 
 
 def changes(model: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:

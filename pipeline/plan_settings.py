@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.config import Angle, Length, Lever, Model
+from pipeline.quantities import Angle, Length, Lever, Model
 
 Rate = Annotated[float, Field(ge=0.1, le=1e7)]
 Swing = Annotated[float, Field(ge=0, le=45)]

@@ -76,7 +76,8 @@ def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) ->
     given = _outlook(setting, plan.passes, turn_s, considered, free)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
     distances = [one.distance_m for one, _, points in _each(given) if points["mbes"].any()]
-    seen = Seen(distances, soundings(setting, given), float(speeds), float(swings))
+    level = {family.name for family in setting.model.families if family.level}
+    seen = Seen(distances, soundings(setting, given), level, float(speeds), float(swings))
     geometry = geometry_of(setting, seen, given.predicted.normal, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:

@@ -22,10 +22,10 @@ from pipeline.maths.labelling import Beams, label_points
 from pipeline.maths.rotations import rotation_from_attitude
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory
-from pipeline.maths.unknowns import SIX, State, Surface
+from pipeline.maths.unknowns import SIX, State
 from pipeline.mounts import mount_of
 from pipeline.plan_settings import Pass, Plan
-from pipeline.scene import Scene
+from pipeline.scene import Scene, by_design
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -75,15 +75,10 @@ class Predicted:
 
 def state_by_design(model: TargetModel, mbes: config.Mbes) -> State:
     """The mount as configured; surfaces where the design has them, their centres among the faces' corners."""
-    surfaces = []
-    for family in dict.fromkeys(face.family for face in model.faces):
-        faces = [model.faces[number] for number in model.family_faces(family)]
-        centre = np.concatenate([face.vertices_m for face in faces]).mean(axis=0)
-        if family == "H":
-            surfaces.append(Surface.at(family, np.array([0.0, 0.0, 1.0]), centre * [1.0, 1.0, 0.0]))
-        else:
-            normal = faces[0].normal
-            surfaces.append(Surface.at(family, normal, centre - (centre @ normal - faces[0].distance_m) * normal))
+    surfaces = [
+        by_design(family, np.concatenate([model.faces[number].vertices_m for number in family.faces]))
+        for family in model.families
+    ]
     mount = mount_of(mbes.mount)
     return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces)
 
@@ -112,7 +107,7 @@ def _sighted(setting: Setting, one: Pass, number: int) -> Sighted:
     scene = Scene(
         _body(setting, trajectory),
         np.array([families[face.family] for face in faces]),
-        np.array([face.distance_m * face.normal[2] if face.family == "H" else 0.0 for face in faces]),
+        np.array([face.offset_m for face in faces]),
         setting.state,
         setting.ins.white.position_m,
         setting.laser,
@@ -233,7 +228,8 @@ def _labelled(
         beams, heights = Beams(directions, range_m), (level + segment.water_margin_m, np.inf)
     grazing = float(np.radians(segment.min_grazing_deg))
     margin = segment.margin_m
-    labels = label_points(setting.model, points, beams, segment.gate_m, margin, grazing, heights_m=heights)
+    seen = "wet" if sensor == "mbes" else "dry"
+    labels = label_points(setting.model, points, beams, segment.gate_m, margin, grazing, None, heights, seen)
     on = np.flatnonzero(labels.face >= 0)
     columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}
     columns |= {f"{axis}_target_m": points[on, k] for k, axis in enumerate("xyz")}

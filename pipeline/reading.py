@@ -79,8 +79,7 @@ def read(
 def refactored(reading: Reading, state: State, weighting: Weighting) -> tuple[Reading, Weighting]:
     """The reading with the variance factors that its own scatter shows; a group too small for one takes the sensor's
     other."""
-    surfaces = [surface.family == "H" for surface in state.surfaces]
-    flat = np.array(surfaces)
+    flat = np.array([surface.level for surface in state.surfaces])
     factors, sums = dict(weighting.factors), {}
     for sensor, one in reading.sums.items():
         names = ["laser"] * len(flat) if sensor == "laser" else [GROUPS[2] if level else GROUPS[1] for level in flat]

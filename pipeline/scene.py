@@ -15,6 +15,7 @@ from pipeline.maths.epochs import MOVING, Runs
 from pipeline.maths.knots import Drift
 from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.robust import igg3_weights
+from pipeline.maths.targets import Family, TargetModel
 from pipeline.maths.unknowns import SIX, State, Surface
 from pipeline.mounts import mount_of
 from pipeline.poses import trajectory_in_target
@@ -137,7 +138,7 @@ class Scene:
                 turned = sight.spread(axes @ turns[:, sight.record - first])
                 features[1, rows] += turned[1] * r[2] - turned[2] * r[1]  # turned × r
                 features[2, rows] += turned[2] * r[0] - turned[0] * r[2]
-        groups = [0 if sensor == "laser" else 2 if one.family == "H" else 1 for one in state.surfaces]
+        groups = [0 if sensor == "laser" else 2 if one.level else 1 for one in state.surfaces]
         group = np.array(groups)[surface]
         mean *= (weighting or Weighting()).factor(group)
         common = self.white_m * np.sqrt((1 - share) ** 2 + share**2)
@@ -225,8 +226,14 @@ class Scene:
         return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, body))
 
 
+def by_design(family: Family, corners_m: Array) -> Surface:
+    """The family's plane where it should be, its centre in the midst of the corners (k, 3) of its faces."""
+    centre = corners_m.mean(axis=0)
+    return Surface.at(family.name, family.normal, centre - (centre @ family.normal - family.distance_m) * family.normal)
+
+
 def scene_of(
-    faces: pd.DataFrame,
+    model: TargetModel,
     poses: pd.DataFrame,
     target_pose: pd.DataFrame,
     planes: pd.DataFrame,
@@ -235,30 +242,22 @@ def scene_of(
     mbes: config.Mbes,
     as_built: Mapping[str, float],
 ) -> Scene:
-    """Coarse mount, and the laser's planes as surfaces; the horizontal faces level at their design heights; faces
-    ``as_built`` off their surface by so much outward (m)."""
+    """Coarse mount, and the laser's planes as surfaces; families that are horizontal, or of several planes, by design;
+    faces ``as_built`` off their surface by so much outward (m)."""
     mount, found = mount_of(mbes.mount), laser_planes(planes)
     surfaces = []
-    for family in ("P1", "P2", "P3"):
-        rows = faces[faces["family"] == family]
-        plane = found.get((ALL_PASSES, family))
+    for family in model.families:
+        plane = found.get((ALL_PASSES, family.name)) if family.one_plane and not family.level else None
+        corners = np.concatenate([model.faces[number].vertices_m for number in family.faces])
         if plane is not None:
-            surfaces.append(Surface.at(family, plane.normal, plane.centroid_m, 0.0))
-        elif len(rows):
-            first = rows.iloc[0]
-            normal = np.array([first[f"normal_{axis}_target_1"] for axis in "xyz"], dtype=np.float64)
-            surfaces.append(Surface.at(family, normal, normal * float(first["distance_m"]), 0.0))
-    horizontal = faces[faces["family"] == "H"]
-    corners = np.concatenate([np.reshape(corner, (-1, 3)) for corner in horizontal["vertices_target_m"]])
-    centre = np.array([corners[:, 0].mean(), 0.0, 0.0])
-    surfaces.append(Surface.at("H", np.array([0.0, 0.0, 1.0]), centre, 0.0))
+            surfaces.append(Surface.at(family.name, plane.normal, plane.centroid_m, 0.0))
+        else:
+            surfaces.append(by_design(family, corners))
     number = {surface.family: k for k, surface in enumerate(surfaces)}
-    outward = np.where(faces["family"] == "H", faces["normal_z_target_1"], 1.0)  # as H's surface looks up
-    heights = np.where(faces["family"] == "H", faces["distance_m"] * outward, 0.0)
-    heights = heights + outward * np.array([as_built.get(name, 0.0) for name in faces["name"]])
+    heights = np.array([face.offset_m + face.sense * as_built.get(face.name, 0.0) for face in model.faces])
     return Scene(
         Body.of(trajectory_in_target(poses, target_pose), mount_of(laser.mount).lever_arm_body_m),
-        np.array([number[family] for family in faces["family"]]),
+        np.array([number[face.family] for face in model.faces]),
         heights,
         State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces),
         ins.white.position_m,

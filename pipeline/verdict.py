@@ -60,19 +60,20 @@ class Evidence:
 class Settings:
     """What it is judged by: limits of the sigmas, level of the tests, the method that is the result; ``farthest``:
     angle (degrees) and lever arm (m) beyond which no mount is taken for labelling; ``drift_doubt``: what speaks against
-    the session's ins.drift, or nothing."""
+    the session's ins.drift, or nothing; ``shape``: the settings that give the target's shape."""
 
     limits: config.Verdict
     test_level: float
     chosen: config.Method
     farthest: tuple[float, float]
     drift_doubt: str
+    shape: str
 
 
 def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settings: Settings) -> list[str]:
     """Why the calibration is rejected; empty: accepted. Where labels are in doubt, nothing else is judged."""
     limits, chosen = settings.limits, settings.chosen
-    doubts = _ambiguities(evidence, settings.farthest)
+    doubts = _ambiguities(evidence, settings.farthest, settings.shape)
     if doubts:
         return doubts
     found = []
@@ -82,7 +83,7 @@ def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settin
     if not summary["converged"]:
         found.append(f"the adjustment did not converge in {summary['iterations']} steps")
     found += _few(cells)
-    tests = [] if summary["test_passed"] else [_inconsistency(summary, cells)]
+    tests = [] if summary["test_passed"] else [_inconsistency(summary, cells, settings.shape)]
     tests += _patterns(evidence, settings.test_level)
     likely = _causes(evidence.freed)
     found += tests
@@ -95,7 +96,7 @@ def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settin
     return found
 
 
-def _ambiguities(evidence: Evidence, farthest: tuple[float, float]) -> list[str]:
+def _ambiguities(evidence: Evidence, farthest: tuple[float, float], shape: str) -> list[str]:
     found = []
     pose, mount = evidence.target_pose.iloc[0], evidence.provisional_mount.iloc[0]
     if pose["ambiguous"]:
@@ -105,7 +106,7 @@ def _ambiguities(evidence: Evidence, farthest: tuple[float, float]) -> list[str]
         found.append(
             f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {how} "
             f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} target.origin (a "
-            "height wrong by e or 2 e does this), azimuth_deg, a, b, c, e and low_side"
+            f"height wrong by e or 2 e, half a period or a whole one, does this), azimuth_deg, and {shape}"
         )
     if not pose["within"]:
         found.append(
@@ -116,8 +117,8 @@ def _ambiguities(evidence: Evidence, farthest: tuple[float, float]) -> list[str]
         found.append(
             f"no mount within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings the soundings onto the "
             f"target{_beyond(mount, farthest)}: mbes.mount is farther off than segment.search_mount_deg and "
-            "search_mount_m allow (a sign, an axis, a block of 2 e), target.a, b, c, e are wrong, or the clocks differ "
-            "(UTC is 18 s behind GPS time)"
+            f"search_mount_m allow (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
+            "18 s behind GPS time)"
         )
     if mount["ambiguous"]:
         found.append(
@@ -136,7 +137,7 @@ def _beyond(mount: pd.Series, farthest: tuple[float, float]) -> str:
     return f"; best fits {', '.join(off)}" if off else ""
 
 
-def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
+def _inconsistency(summary: Any, cells: pd.DataFrame, shape: str) -> str:
     """The cell that lies off most; and whether the other sensor lies off there as well."""
     worst = cells.iloc[int(cells["normalised"].abs().argmax())]
     place = (cells["family"] == worst["family"]) & (cells["pass"] == worst["pass"])
@@ -145,7 +146,7 @@ def _inconsistency(summary: Any, cells: pd.DataFrame) -> str:
     one, another = ("the laser", "the sonar") if worst["sensor"] == "laser" else ("the sonar", "the laser")
     also = f" and {another} {1000 * other.iloc[0]:+.1f} mm" if both else ""
     if abs(worst["mean_m"]) > FAR_M:
-        cause = "a wrong target.a, b, c or e, or a coarse mount farther off than segment searches"
+        cause = f"wrong {shape}, or a coarse mount farther off than segment searches"
     elif both:
         cause = "drift of the INS in that pass, or its clock: sail again, in shorter time"
     elif worst["sensor"] == "mbes":

@@ -65,7 +65,8 @@ class Outputs:
 
 def run(inputs: Inputs, config: Config) -> Outputs:
     settings = config.adjust
-    given = (inputs.faces, inputs.poses, inputs.target_pose, inputs.planes)
+    model = target_of(config.target)
+    given = (model, inputs.poses, inputs.target_pose, inputs.planes)
     scene = scene_of(*given, config.ins, config.laser, config.mbes, config.as_built.faces)
     streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
     found = adjust(streams, scene, noise_of(config.ins), settings, config.ingest.max_gap_s)
@@ -94,8 +95,9 @@ def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Confi
             "mbes": MbesFigures(ping_rate_hz=_or(rates["mbes"], figures.mbes.ping_rate_hz)),
         }
     )
+    model = target_of(config.target)
     setting = Setting(
-        target_of(config.target), found.state, plan, config.segment, config.ins, config.laser, config.mbes
+        model, found.state, plan, config.segment, config.ins, config.laser, config.mbes
     )
     families = [surface.family for surface in found.state.surfaces]
     soundings = dict.fromkeys(families, 0)
@@ -105,7 +107,8 @@ def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Confi
     usual = figures.passes[0]
     speed = _or(passes["speed_m_s"].abs().median(), usual.speed_m_s)
     swing = _or(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg)  # of a wave: its amplitude
-    seen = Seen(distances, soundings, speed, swing)
+    level = {family.name for family in model.families if family.level}
+    seen = Seen(distances, soundings, level, speed, swing)
     geometry = geometry_of(setting, seen, found.equations.normal, found.solution)
     rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
     return pd.DataFrame(rows, columns=["kind", "words"])

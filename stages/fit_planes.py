@@ -95,6 +95,7 @@ def _planes(sensor: str, moments: dict[Key, Moments], faces: pd.DataFrame, min_p
     normals = dict(zip(faces["face"].tolist(), components, strict=True))
     family = dict(zip(faces["face"].tolist(), faces["family"].tolist(), strict=True))
     name = dict(zip(faces["face"].tolist(), faces["name"].tolist(), strict=True))
+    one_plane = dict(zip(faces["face"].tolist(), faces["one_plane"].tolist(), strict=True))
     groups: dict[tuple[int, str], tuple[Moments, Array]] = {}
 
     def add(key: tuple[int, str], moment: Moments, toward: Array) -> None:
@@ -103,7 +104,7 @@ def _planes(sensor: str, moments: dict[Key, Moments], faces: pd.DataFrame, min_p
     for (number, face), moment in moments.items():
         for which in (number, ALL_PASSES):
             add((which, name[face]), moment, normals[face])
-            if family[face] != "H" and family[face] != name[face]:
+            if one_plane[face] and family[face] != name[face]:
                 add((which, family[face]), moment, normals[face])
     fitted: dict[tuple[int, str], Plane] = {}
     for key, (moment, toward) in sorted(groups.items()):

@@ -13,6 +13,8 @@ from pipeline.maths.offsets import alternate, offsets
 from pipeline.maths.rotations import exp_so3
 from pipeline.mounts import mount_of
 
+METHODS = ("patent_sequential", "patent_alternating")
+
 
 @dataclass(frozen=True)
 class Config:
@@ -37,7 +39,10 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    passes = angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
+    try:
+        passes = angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
+    except DegenerateGeometryError as error:
+        return _tables([_none(method, str(error)) for method in METHODS], [], [])
     pool = offset_passes(passes, inputs.planes)
     dry, wet = horizontal_faces(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
     lever = mount_of(config.mbes.mount).lever_arm_body_m
@@ -48,7 +53,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     alternation: list[dict[str, float]] = []
 
     vector = np.radians([float(angles[f"rotation_{axis}_deg"]) for axis in "xyz"])
-    method = "patent_sequential"
+    method = METHODS[0]
     try:
         if angles["reason"]:
             raise DegenerateGeometryError(str(angles["reason"]))
@@ -56,9 +61,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         pairs += [{"method": method, **pair} for pair in once.pairs]
         corrections.append(_row(method, vector, once.body_m, bool(angles["converged"]), int(angles["iterations"]), ""))
     except DegenerateGeometryError as error:
-        corrections.append(_row(method, np.full(3, np.nan), np.full(3, np.nan), False, 0, str(error)))
+        corrections.append(_none(method, str(error)))
 
-    method = "patent_alternating"
+    method = METHODS[1]
     try:
         tolerances = (np.radians(settings.step_tolerance_deg), settings.step_tolerance_m)
         result = alternate(passes, pool, dry, wet, lever, settings.max_iterations, *tolerances)
@@ -68,12 +73,22 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         alternation = result.rows
         corrections.append(_row(method, rotation, shift, result.converged, result.iterations, ""))
     except DegenerateGeometryError as error:
-        corrections.append(_row(method, np.full(3, np.nan), np.full(3, np.nan), False, 0, str(error)))
+        corrections.append(_none(method, str(error)))
+    return _tables(corrections, pairs, alternation)
+
+
+def _tables(
+    corrections: list[dict[str, Any]], pairs: list[dict[str, Any]], alternation: list[dict[str, float]]
+) -> Outputs:
     return Outputs(
         pd.DataFrame(pairs, columns=[column.name for column in artefacts.OFFSET_PAIRS.columns]),
         pd.DataFrame(alternation, columns=[column.name for column in artefacts.ALTERNATION.columns]),
         pd.DataFrame(corrections),
     )
+
+
+def _none(method: str, reason: str) -> dict[str, Any]:
+    return _row(method, np.full(3, np.nan), np.full(3, np.nan), False, 0, reason)
 
 
 def _row(

@@ -11,12 +11,12 @@ import yaml
 from numpy.typing import NDArray
 
 from pipeline import artefacts, config
-from pipeline.built import as_found, oddities
+from pipeline.built import as_found, by_design, oddities
 from pipeline.causes import estimated
 from pipeline.closing import closing_table
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
-from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
+from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of, target_of
 from pipeline.times import utc_text
 from pipeline.verdict import (
     NO_DRIFT,
@@ -103,8 +103,10 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
     doubt = drift_doubt(inputs.drift, config.ins.drift)
     farthest, level = config.segment.farthest_mount, config.adjust.test_level
-    found = reasons(evidence, methods, Settings(config.verdict, level, config.result, farthest, doubt))
-    built = as_found(inputs.planes, inputs.patterns, inputs.faces, config.target.e)
+    settings = Settings(config.verdict, level, config.result, farthest, doubt, config.target.shape)
+    found = reasons(evidence, methods, settings)
+    model = target_of(config.target)
+    built = as_found(inputs.planes, inputs.patterns, model)
     summary, target = inputs.summary.iloc[0], _target(inputs.target_pose.iloc[0]) | {"as_found": built}
     result = {
         "schema": SCHEMA,
@@ -116,7 +118,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         )
         + ([doubt] if doubt not in ("", NO_DRIFT, *found) else [])
         + one_eyed(passes)
-        + oddities(built, config.target)
+        + oddities(built, by_design(model))
         + cast_doubts(config.mbes, inputs.files, methods["adjustment"]["correction"]),
         "result": config.result,
         "mbes": methods[config.result],

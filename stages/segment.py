@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from functools import partial
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -10,10 +11,11 @@ from numpy.typing import NDArray
 
 from pipeline import artefacts, config
 from pipeline.beams import beams_in_target
+from pipeline.clouds import ClosestSurface
 from pipeline.counting import counts_table
 from pipeline.errors import RawDataError
 from pipeline.finding import VOXEL_M, FoundMount, FoundTarget, LaserSample, SoundingSample, find_mount, find_target
-from pipeline.maths.labelling import Beams, Labels, label_points, near_planes
+from pipeline.maths.labelling import Beams, Labels, hidden_in_part, label_points, near_planes
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory
@@ -61,12 +63,12 @@ class Prepared:
     target: FoundTarget
     mount: FoundMount
     trajectory: Trajectory  # in the target frame
+    surface: ClosestSurface
 
 
 def prepare(inputs: Inputs, config: Config) -> Prepared:
     model = target_of(config.target)
-    other_side = "north" if config.target.low_side == "south" else "south"
-    lowest = config.target.water_level_m - model.period_m / 4
+    lowest = config.target.water_level_m - model.half_period_m / 2
     dry = _laser_sample(inputs, lowest)
     if len(dry.voxel_means_m) < 50:
         raise RawDataError(
@@ -74,7 +76,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
             "check target.origin, target.water_level_m and laser.mount"
         )
     known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
-    target = find_target(dry, model, target_of(config.target, other_side), config.segment, known)
+    target = find_target(dry, model, config.segment, known)
     trajectory = trajectory_in_pool(inputs.poses).moved(
         target.R_target_from_pool, -target.R_target_from_pool @ target.origin_pool_m
     )
@@ -83,7 +85,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     mount = find_mount(
         sample, model, coarse.R_body_from_sensor, coarse.lever_arm_body_m, config.mbes, config.segment
     )
-    return Prepared(model, target, mount, trajectory)
+    return Prepared(model, target, mount, trajectory, ClosestSurface(model))
 
 
 def _used(inputs: Inputs, source: str) -> float:
@@ -129,7 +131,7 @@ def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     points = (prepared.target.R_target_from_pool @ (pool - prepared.target.origin_pool_m).T).T
     heights = (model.water_level_m + segment.water_margin_m, np.inf)
     dry = points[:, 2] > model.water_level_m + segment.water_margin_m / 2
-    near, planes = near_planes(model, points, gate, dry)
+    near, planes = near_planes(model, points, gate, dry, "dry")
     points, t_ns = points[near], batch["t_ns"][near]
     rays = points - prepared.trajectory.carried(t_ns, mount_of(config.laser.mount).lever_arm_body_m)
     ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
@@ -154,16 +156,21 @@ def _label_soundings(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     points = prepared.trajectory.place(batch["t_ns"], sensor @ R_body_from_mbes.T + lever)
     heights = (-np.inf, model.water_level_m - segment.water_margin_m)
     wet = points[:, 2] < model.water_level_m - segment.water_margin_m / 2
-    near, planes = near_planes(model, points, mount.gate_m, wet)
+    near, planes = near_planes(model, points, mount.gate_m, wet, "wet")
     _, R_target_from_body = prepared.trajectory.poses_at(batch["t_ns"][near])
     beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[near], config.mbes)
     grazing = np.radians(segment.min_grazing_deg)
     labels = label_points(model, points[near], beams, mount.gate_m, segment.margin_m, grazing, planes, heights)
     on = np.flatnonzero(labels.face >= 0)
+    origins = prepared.trajectory.carried(batch["t_ns"][near[on]], lever)
+    met = partial(prepared.surface.first_met, origins)
+    hidden = hidden_in_part(model, labels.face[on], beams.corners(on), met)
+    on = on[~hidden]
     rows = near[on]
     names = ("t_ns", "pass", "ping", "beam", "x_mbes_m", "y_mbes_m", "z_mbes_m")
     columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on]}
     counts = _counts("above or near the water line", wet, "footprint near an edge", near, labels)
+    counts |= {"footprint partly on another face": int(hidden.sum()), "used": len(on)}
     return Piece({"soundings_labelled": columns}, counts)
 
 
@@ -190,15 +197,17 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
             mount = f"the coarse mount by more than {limits}, " if sensor == "mbes" else ""
             raise RawDataError(
                 f"{sensor}: no point on the target's faces ({why}); target.origin, target.azimuth_deg (of +y) "
-                f"or a, b, c, e may be wrong, {mount}or a clock (UTC is 18 s behind GPS time)"
+                f"or {config.target.shape} may be wrong, {mount}or a clock (UTC is 18 s behind GPS time)"
             )
     return Outputs(_faces(prepared.model), _target_pose(prepared.target), _mount(prepared.mount), counts)
 
 
 def _faces(model: TargetModel) -> pd.DataFrame:
-    rows = []
+    rows: list[dict[str, Any]] = []
+    one_plane = {family.name: family.one_plane for family in model.families}
     for number, face in enumerate(model.faces):
         row = {"face": number, "name": face.name, "family": face.family, "distance_m": face.distance_m}
+        row |= {"sense": face.sense, "offset_m": face.offset_m, "one_plane": one_plane[face.family]}
         row |= {f"normal_{axis}_target_1": face.normal[index] for index, axis in enumerate("xyz")}
         rows.append(row | {"vertices_target_m": face.vertices_m.ravel().tolist()})
     return pd.DataFrame(rows)

@@ -4,11 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.built import as_found, oddities
-from pipeline.config import Origin, Target
+from pipeline.built import as_found, by_design, oddities
+from pipeline.config import Letters, Origin
+from pipeline.mounts import target_of
 
 ROOT = np.sqrt(0.5)
-TARGET = Target(a=8.0, b=3.0, c=1.0, e=0.5, origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0))
+TARGET = Letters(a=8.0, b=3.0, c=1.0, e=0.5, origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0))
+MODEL = target_of(TARGET)
+DESIGN = by_design(MODEL)
 
 
 def planes(half_width: float, corner_deg: float = 45.0) -> pd.DataFrame:
@@ -25,35 +28,35 @@ def planes(half_width: float, corner_deg: float = 45.0) -> pd.DataFrame:
     return pd.concat([table, astray.assign(sensor="mbes"), astray.assign(**{"pass": 0})], ignore_index=True)
 
 
-def heights(share: float) -> tuple[pd.DataFrame, pd.DataFrame]:
+def heights(share: float) -> pd.DataFrame:
     """The laser's residuals (measured - design height) on two tops and a bottom of blocks higher by a share."""
     design = np.array([0.5, 1.5, 2.0])
-    up = np.array([1.0, 1.0, -1.0])
-    faces = pd.DataFrame({"face": [3, 4, 5], "distance_m": design * up, "normal_z_target_1": up})
+    names = [face.name for face in MODEL.faces]
+    numbers = [float(names.index(name)) for name in ("P1-4-top", "P1-5-top", "P1-6-bottom")]
     mean = design * (1 + share) - design + 0.003
-    rows = {"by": "face", "sensor": "laser", "family": "H", "low": [3.0, 4.0, 5.0], "mean_m": mean}
-    return pd.DataFrame(rows | {"sigma_mean_m": 1e-4}), faces
+    rows = {"by": "face", "sensor": "laser", "family": "H", "low": numbers, "mean_m": mean}
+    return pd.DataFrame(rows | {"sigma_mean_m": 1e-4})
 
 
 def test_as_designed_nothing_is_said() -> None:
-    found = as_found(planes(1.5), *heights(0.0), 0.5)
+    found = as_found(planes(1.5), heights(0.0), MODEL)
     assert found["b_m"] == pytest.approx(3.0)
     assert found["e_m"] == pytest.approx(0.5)
     assert found["corner_deg"] == pytest.approx({"P1": 45.0, "P3": 45.0})
-    assert not oddities(found, TARGET)
+    assert not oddities(found, DESIGN)
 
 
 @pytest.mark.parametrize(
     ("half_width", "corner_deg", "share", "words"),
     [
-        (1.506, 45.0, 0.0, "b = 3.0120 m where target.b says 3 m"),
-        (1.5, 45.0, 0.006, "e = 0.5030 m where target.e says 0.5 m"),
-        (1.5, 45.0, -0.006, "e = 0.4970 m where target.e says 0.5 m"),
+        (1.506, 45.0, 0.0, "b = 3.0120 m where the config has 3 m"),
+        (1.5, 45.0, 0.006, "e = 0.5030 m where the config has 0.5 m"),
+        (1.5, 45.0, -0.006, "e = 0.4970 m where the config has 0.5 m"),
         (1.5, 45.3, 0.0, "45.30° between wall and P3"),
     ],
 )
 def test_what_differs_is_said_alone(half_width: float, corner_deg: float, share: float, words: str) -> None:
-    said = oddities(as_found(planes(half_width, corner_deg), *heights(share), 0.5), TARGET)
+    said = oddities(as_found(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)
     assert len(said) == 1
     assert words in said[0]
 
@@ -61,11 +64,11 @@ def test_what_differs_is_said_alone(half_width: float, corner_deg: float, share:
 @pytest.mark.parametrize("differs", [(1.504, 45.0, 0.0), (1.5, 45.19, 0.0), (1.5, 45.0, 0.003)])
 def test_what_a_target_is_built_to_is_not_said(differs: tuple[float, float, float]) -> None:
     half_width, corner_deg, share = differs
-    assert not oddities(as_found(planes(half_width, corner_deg), *heights(share), 0.5), TARGET)
+    assert not oddities(as_found(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)
 
 
 def test_without_a_flank_there_is_no_width() -> None:
-    found = as_found(planes(1.5).query("plane != 'P3'"), *heights(0.0), 0.5)
+    found = as_found(planes(1.5).query("plane != 'P3'"), heights(0.0), MODEL)
     assert found["b_m"] is None
     assert set(found["corner_deg"]) == {"P1"}
-    assert not oddities(found, TARGET)
+    assert not oddities(found, DESIGN)

@@ -14,7 +14,7 @@ LEVEL = 0.001
 ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
 
 
-ADJUSTED = Settings(Verdict(), LEVEL, "adjustment", (4.5, 0.45), "")
+ADJUSTED = Settings(Verdict(), LEVEL, "adjustment", (4.5, 0.45), "", "target.a, b, c, e and low_side")
 IN_TURN = replace(ADJUSTED, chosen="patent_alternating")
 LIMITS = ((0.006, 6e-4), (0.0059, 5.9e-4))  # either side of SIGMA's largest
 FIGURES = ("horizontal_m", "vertical_m", "roll_pitch_deg", "heading_deg")

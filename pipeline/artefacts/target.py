@@ -23,8 +23,11 @@ FACES = Artefact(
     "segment", "faces", "table", "the target's faces by design, in the target frame",
     (
         Column("face", I16, "1", "number of the face"),
-        Column("name", TEXT, "", "P2, P1-0 … (slanted), P1-0-top, P1-0-bottom …"),
-        Column("family", TEXT, "", "P1, P2, P3: coplanar vertical faces; H: horizontal faces"),
+        Column("name", TEXT, "", "P2, P1-0 … (slanted), P1-0-top, P1-0-bottom …, or as the pool's config has it"),
+        Column("family", TEXT, "", "faces parallel at known distances: P1, P2, P3 (one plane each), H (horizontal) …"),
+        Column("sense", F64, "1", "+1: its normal is its family's; -1: the opposite"),
+        Column("offset_m", F64, "m", "from the family's plane, along the family's normal"),
+        Column("one_plane", BOOL, "", "no face of the family stands off its plane"),
         *xyz("target", "1", "normal_"),
         Column("distance_m", F64, "m", "normal · x = distance on the face"),
         Column("vertices_target_m", FLOATS, "m", "corners, x y z one after another"),

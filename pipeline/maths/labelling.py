@@ -1,6 +1,6 @@
 """Which face a point lies on: by polygon, with a margin of the footprint's half extent along its own direction."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -11,6 +11,7 @@ from pipeline.maths.targets import TargetModel
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 
 NO_FACE = -1
 LEVEL_M = 1e-6  # rounding, of points on a horizontal face
@@ -44,6 +45,12 @@ class Beams:
         """Where rays are unknown (averaged points): every face is taken to be seen from its front."""
         return cls(np.zeros((count, 3)), np.zeros(count))
 
+    def corners(self, rows: NDArray[np.int64]) -> Iterator[Array]:
+        """Rays (n, 3) along the four corners of these beams, as far out as the beams may stray."""
+        across, along = (width[rows] for width in self.half_widths)
+        for one, other in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            yield self.directions[rows] + one * (1 + self.stray) * across + other * along
+
     def spreads(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> tuple[Array, ...]:
         """Half axes of the footprints on a plane that these rays meet at ``reached_m``, (n, 3) m each.
 
@@ -55,6 +62,20 @@ class Beams:
         slant, reached = (directions @ normal)[:, None], reached_m[:, None]
         halves = [width[rows] for width in self.half_widths]
         return tuple(reached * (h - directions * ((h @ normal)[:, None] / slant)) for h in halves)
+
+
+def hidden_in_part(
+    model: TargetModel, faces: NDArray[np.int16], corners: Iterable[Array], first_met: Callable[[Array], Integers]
+) -> Flags:
+    """Beams of which a corner ray meets something else than the plane of their face (n,): an edge before it hides part
+    of the footprint, or another face rises out of it, and the echo is the mean of two things. ``first_met``: rays
+    (n, 3) -> the face that each meets first (-1: none)."""
+    planes = {plane: k for k, plane in enumerate(dict.fromkeys((one.family, one.offset_m) for one in model.faces))}
+    plane = np.array([planes[one.family, one.offset_m] for one in model.faces] + [-1])
+    hidden = np.zeros(len(faces), dtype=bool)
+    for rays in corners:
+        hidden |= plane[first_met(rays)] != plane[faces]
+    return hidden
 
 
 @dataclass(frozen=True)
@@ -77,13 +98,18 @@ class NearPlane:
         return points_m[self.rows] - ways, beams.ranges_m[self.rows] - beyond
 
 
-def _planes(model: TargetModel, points_m: Array, reach_m: float, among: Flags | None = None) -> Iterator[NearPlane]:
-    """Each plane of the model with the points (of those ``among``) within ``reach_m``, parallel planes together.
+def _planes(
+    model: TargetModel, points_m: Array, reach_m: float, among: Flags | None = None, seen: str = "both"
+) -> Iterator[NearPlane]:
+    """Each plane of the model with the points (of those ``among``) within ``reach_m``, parallel planes together; of
+    faces to be ``seen`` dry, or wet, or all.
 
     Of parallel planes a point goes to the nearest: one projection and one search for all tops and bottoms, not forty.
     """
     parallel: dict[tuple[float, ...], dict[float, list[int]]] = {}
     for number, face in enumerate(model.faces):
+        if seen != "both" and face.seen not in (seen, "both"):
+            continue
         sign = np.sign(face.normal[np.flatnonzero(np.abs(face.normal) > 1e-9)[0]])
         axis = tuple((sign * face.normal + 0.0).tolist())
         # Tops of one side and bottoms of the other lie at one height, computed by different sums: one plane.
@@ -105,11 +131,12 @@ def _planes(model: TargetModel, points_m: Array, reach_m: float, among: Flags | 
 
 
 def near_planes(
-    model: TargetModel, points_m: Array, reach_m: float, among: Flags
+    model: TargetModel, points_m: Array, reach_m: float, among: Flags, seen: str
 ) -> tuple[NDArray[np.int64], tuple[NearPlane, ...]]:
-    """Rows of the points ``among`` (n,) these that lie within ``reach_m`` of some face's plane, ascending; and the
-    planes, with the points numbered within those rows: for :func:`label_points` of these points alone."""
-    planes = tuple(_planes(model, points_m, reach_m, among))
+    """Rows of the points ``among`` (n,) these that lie within ``reach_m`` of the plane of some face to be ``seen`` dry,
+    or wet, ascending; and the planes, with the points numbered within those rows: for :func:`label_points` of these
+    points alone."""
+    planes = tuple(_planes(model, points_m, reach_m, among, seen))
     near = np.zeros(len(points_m), dtype=bool)
     for plane in planes:
         near[plane.rows] = True
@@ -126,8 +153,10 @@ def label_points(
     min_grazing_rad: float,
     planes: Iterable[NearPlane] | None = None,
     heights_m: tuple[float, float] = (-np.inf, np.inf),
+    seen: str = "both",
 ) -> Labels:
-    """Label points (n, 3) in the target frame; ``planes``: from :func:`near_planes`, where they are known already.
+    """Label points (n, 3) in the target frame by the faces to be ``seen`` dry, or wet, or all; ``planes``: from
+    :func:`near_planes`, where they are known already.
 
     A point belongs to a face if it lies within ``gate_m`` of the face's plane, its ray meets the front at no less than
     ``min_grazing_rad`` and its whole footprint, taken where the ray meets the plane, lies within the polygon with
@@ -147,7 +176,7 @@ def label_points(
     best = np.full(n, np.inf)
     near_plane, seen_flat = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     sine = np.sin(min_grazing_rad) if beams.directions.any() else 0.0
-    for plane in _planes(model, points_m, gate_m) if planes is None else planes:
+    for plane in _planes(model, points_m, gate_m, seen=seen) if planes is None else planes:
         met, ranges = plane.met(points_m, beams, sine)
         for number in plane.faces:
             face = model.faces[number]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.planes import tangents_of
 from pipeline.maths.rotations import exp_so3
+from pipeline.maths.targets import LEVEL
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -45,6 +46,11 @@ class Surface:
     @classmethod
     def at(cls, family: str, normal: Array, centre_m: Array, shift_m: float = 0.0) -> "Surface":
         return cls(family, normal, tangents_of(normal), centre_m, shift_m)
+
+    @property
+    def level(self) -> bool:
+        """Whether it is horizontal."""
+        return bool(abs(self.normal[2]) > LEVEL)
 
     @property
     def distance_m(self) -> float:

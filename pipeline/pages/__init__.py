@@ -18,9 +18,9 @@ from matplotlib.figure import Figure
 # Colours after Okabe and Ito, told apart by all eyes and in grey print.
 INK, QUIET, ALARM = "#1a1a1a", "#8a8f98", "#b00020"
 LASER, COARSE, SONAR = "#3aa0dc", "#b9bcc1", "#d55e00"
-FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a"}
+FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a", "other": "#7a5c00", "more": "#1a1a1a"}
 AXIS = {"roll": "#0072b2", "pitch": "#e6a000", "yaw": "#009e73"}
-MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s"}
+MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s", "other": "D", "more": "X"}
 DPI = 200  # of what is drawn as dots in a vector picture
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",

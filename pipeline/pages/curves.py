@@ -1,5 +1,6 @@
 """Pictures of numbers: residuals along angle, distance and time, means by pass, convergence."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.families import shown_as
 from pipeline.mounts import WITHIN_95
 from pipeline.pages import AXIS, FAMILY, LASER, MARKS, QUIET, SONAR, picture
 from pipeline.residuals import FEWEST
@@ -17,50 +19,51 @@ WORDS = {"angle": "swath angle", "range": "distance"}
 LABELS = {"angle": "angle across track in the sonar's frame, degrees", "range": "distance from the sonar, m"}
 
 
-def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame) -> Markup:
+def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, families: Sequence[str]) -> Markup:
     """Mean residuals of the sonar by face, angle and distance, and of both sensors over time."""
+    colours, marks = shown_as(families, FAMILY), shown_as(families, MARKS)
     figure = Figure(figsize=(7.2, 6.0))
     grid = figure.add_gridspec(3, 2, left=0.08, right=0.98, bottom=0.05, top=0.91, wspace=0.2, hspace=0.55)
     by_face, by_angle, by_range = (figure.add_subplot(grid[place]) for place in ((0, 0), (0, 1), (1, 0)))
-    _by_face(by_face, cells)
+    _by_face(by_face, cells, marks)
     shown = bins[(bins["count"] >= FEWEST) & np.isfinite(bins["mean_m"])]
     sonar = shown[shown["sensor"] == "mbes"]
     for axis, by in ((by_angle, "angle"), (by_range, "range")):
-        for name, colour in FAMILY.items():
+        for name, colour in colours.items():
             rows = sonar[(sonar["by"] == by) & (sonar["family"] == name)]
             scatter = np.sqrt(np.maximum(rows["rms_m"] ** 2 - rows["mean_m"] ** 2, 0.0))
             mean, sigma = 1000 * rows["mean_m"], 1000 * scatter / np.sqrt(rows["count"])
             bars: dict[str, Any] = {"markersize": 3, "linewidth": 0.8, "color": colour}
-            axis.errorbar(rows["low"] + rows["width"] / 2, mean, WITHIN_95 * sigma, fmt=f"{MARKS[name]}-", **bars)
+            axis.errorbar(rows["low"] + rows["width"] / 2, mean, WITHIN_95 * sigma, fmt=f"{marks[name]}-", **bars)
         axis.set(title=f"sonar, by {WORDS[by]}", xlabel=LABELS[by], ylabel="mean residual, mm")
     spread = figure.add_subplot(grid[1, 1])
-    for name, colour in FAMILY.items():
+    for name, colour in colours.items():
         rows = sonar[(sonar["by"] == "angle") & (sonar["family"] == name)]
-        spread.plot(rows["low"] + rows["width"] / 2, 1000 * rows["rms_m"], f"{MARKS[name]}-", color=colour, label=name)
+        spread.plot(rows["low"] + rows["width"] / 2, 1000 * rows["rms_m"], f"{marks[name]}-", color=colour, label=name)
         spread.lines[-1].set(markersize=3, linewidth=0.8)
     spread.set(title="sonar, scatter by swath angle", xlabel=LABELS["angle"], ylabel="RMS residual, mm", ylim=(0, None))
-    figure.legend(*spread.get_legend_handles_labels(), loc="upper center", ncols=4, frameon=False)
+    figure.legend(*spread.get_legend_handles_labels(), loc="upper center", ncols=6, frameon=False)
     _over_time(figure.add_subplot(grid[2, :]), shown[shown["by"] == "time"], passes)
     for axis in (by_face, by_angle, by_range):
         axis.axhline(0, color=QUIET, linewidth=0.6)
     return picture(figure, "mean residuals by face, swath angle, distance and time")
 
 
-def _by_face(axis: Axes, cells: pd.DataFrame) -> None:
+def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
     """The cells of the adjustment: one mark a pass, sonar and laser side by side."""
     for sensor, side, colour in (("laser", -0.18, LASER), ("mbes", 0.18, SONAR)):
-        for place, name in enumerate(FAMILY):
+        for place, name in enumerate(marks):
             rows = cells[(cells["sensor"] == sensor) & (cells["family"] == name)]
             at = place + side + np.linspace(-0.12, 0.12, len(rows)) if len(rows) > 1 else [place + side] * len(rows)
             bars: dict[str, Any] = {"markersize": 3, "linewidth": 0.8, "color": colour}
             mean = 1000 * rows["mean_m"].to_numpy()
-            axis.errorbar(at, mean, 1000 * WITHIN_95 * rows["sigma_mean_m"], fmt=MARKS[name], **bars)
+            axis.errorbar(at, mean, 1000 * WITHIN_95 * rows["sigma_mean_m"], fmt=marks[name], **bars)
             for x, y, number in zip(at, mean, rows["pass"], strict=True):
                 axis.annotate(f"{number}", (x, y), (2, 2), textcoords="offset points", fontsize=5, color=colour)
     if len(cells):
         inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # one cell far off must not hide the others
         axis.set_ylim(-inner, inner)
-    axis.set_xticks(range(len(FAMILY)), list(FAMILY))
+    axis.set_xticks(range(len(marks)), list(marks))
     axis.set(title="by face; a mark a pass: laser light blue, sonar orange", ylabel="mean residual, mm")
 
 

@@ -9,6 +9,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from pipeline import artefacts
+from pipeline.families import families_of
 from pipeline.folder import calibration
 from pipeline.pages import curves, sections, style
 from pipeline.passes import pass_of
@@ -26,18 +27,19 @@ def draw(run: Path, name: str) -> Markup:
 
 def _residuals(tables: Tables) -> Markup:
     passes = tables.table(artefacts.PASSES)
-    return curves.residuals(tables.table(artefacts.RESIDUAL_BINS), tables.table(artefacts.CELLS), passes)
+    families = families_of(tables.table(artefacts.FACES))
+    return curves.residuals(tables.table(artefacts.RESIDUAL_BINS), tables.table(artefacts.CELLS), passes, families)
 
 
 def _distances(tables: Tables) -> Markup:
     residuals = tables.table(artefacts.RESIDUALS, *sections.DISTANCES)
-    return sections.distances(residuals, _family(residuals, tables), _solved(tables))
+    faces = tables.table(artefacts.FACES)
+    return sections.distances(residuals, faces, _family(residuals, tables), _solved(tables))
 
 
 def _sections(tables: Tables) -> Markup:
     residuals = tables.table(artefacts.RESIDUALS, *sections.SECTIONS)
-    family = _family(residuals, tables)
-    return sections.sections(residuals, tables.table(artefacts.FACES), family, _solved(tables))
+    return sections.sections(residuals, tables.table(artefacts.FACES), _solved(tables))
 
 
 def _map_laser(tables: Tables) -> Markup:

@@ -15,12 +15,12 @@ import pandas as pd
 from markupsafe import Markup
 
 from pipeline import artefacts, config, manifest
-from pipeline.built import CORNER_DEG
+from pipeline.built import by_design
 from pipeline.drawn import PAGE, agreeing, drawn_from
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.unknowns import NAMES
-from pipeline.mounts import PARAMETERS
+from pipeline.mounts import PARAMETERS, target_of
 from pipeline.pages import render
 from pipeline.pages.pictures import PICTURES
 from pipeline.parsing import changes
@@ -75,7 +75,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         by_method=list(_by_method(calibrations)),
         closing=tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
         shares=list(_shares(tables.table(artefacts.FREED), tables.table(artefacts.ESTIMATE))),
-        built=_built(result["target"]["as_found"], settings.pool.target),
+        built=_built(result["target"]["as_found"], by_design(target_of(settings.pool.target))),
         names=[name for name, *_ in PARAMETERS],
         correlations=_correlations(result),
         groups=tables.table(artefacts.GROUPS).to_dict("records"),
@@ -143,11 +143,11 @@ def _shares(freed: pd.DataFrame, estimate: pd.DataFrame) -> Iterator[Row]:
         }
 
 
-def _built(found: Row, target: config.Target) -> list[Row]:
-    """What the laser sees of the target, beside the letters of the config."""
-    rows = [(letter, getattr(target, letter), found[f"{letter}_m"], "m") for letter in ("b", "e")]
-    for words, design, angles in (("wall to", CORNER_DEG, found["corner_deg"]), ("leaning of", 0.0, found["lean_deg"])):
-        rows += [(f"{words} {family}", design, angle, "deg") for family, angle in angles.items()]
+def _built(found: Row, design: Row) -> list[Row]:
+    """What the laser sees of the target, beside its design."""
+    rows = [(letter, design[f"{letter}_m"], found[f"{letter}_m"], "m") for letter in ("b", "e")]
+    for words, kind in (("corner to", "corner_deg"), ("leaning of", "lean_deg")):
+        rows += [(f"{words} {family}", design[kind][family], angle, "deg") for family, angle in found[kind].items()]
     return [
         {"name": name, "design": _Value(design, unit), "found": _Value(value, unit)}
         for name, design, value, unit in rows

@@ -1,7 +1,7 @@
-"""Target and pool as planar polygons, built from the letters a, b, c, e; and their triangles.
+"""Target and pool as planar polygons, built from the letters a, b, c, e or from the faces given; and their triangles.
 
-Origin: centre of the wall's front face; x into the wall, y along it ("north" is +y), z up. A block on side s = ±1 is
-the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
+Of the letters: origin in the centre of the wall's front face; x into the wall, y along it ("north" is +y), z up. A
+block on side s = ±1 is the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import Target
+from pipeline.config import Faces, Letters, Target
 from pipeline.simulation.earth import Floats
 from pipeline.simulation.scenario import Surroundings
 
@@ -24,7 +24,7 @@ class Polygon:
     vertices_m: Floats  # (k, 3), seen from outside counter-clockwise
 
 
-def block_bases_m(target: Target, side: str) -> list[float]:
+def block_bases_m(target: Letters, side: str) -> list[float]:
     """Heights of the blocks' bases: the low side's first at first_base_m, the other side's stagger_m above it."""
     first = -target.a / 2 if target.first_base_m is None else target.first_base_m
     stagger = target.e if target.stagger_m is None else target.stagger_m
@@ -45,7 +45,9 @@ def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = 
 
 
 def target_polygons(target: Target) -> list[Polygon]:
-    """The wall as a box back to the pool's wall, and the blocks."""
+    """The faces given; or the wall as a box back to the pool's wall, and the blocks."""
+    if isinstance(target, Faces):
+        return [Polygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
     a, half, c, e = target.a, target.b / 2, target.c, target.e
     polygons = prism("wall", np.array([[0, -half], [c, -half], [c, half], [0, half]]), -a / 2, a / 2)
     for side, s in SIDES.items():
@@ -56,20 +58,32 @@ def target_polygons(target: Target) -> list[Polygon]:
     return polygons
 
 
+def extents(target: Target) -> Floats:
+    """(3, 2): least and greatest x, y, z of the target's faces."""
+    if isinstance(target, Letters):
+        half = target.b / 2 + target.c
+        return np.array([[0.0, target.c], [-half, half], [-target.a / 2, target.a / 2]])
+    corners = np.concatenate([polygon.vertices_m for polygon in target_polygons(target)])
+    return np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
+
+
 def pool_polygons(target: Target, surroundings: Surroundings) -> list[Polygon]:
-    """Back wall (plane x = c) and floor."""
-    reach, c = surroundings.half_length_m, target.c
-    floor, top = -target.a / 2 - surroundings.floor_gap_m, target.a / 2 + surroundings.wall_above_m
+    """Back wall (of the patent's target the plane x = c) and floor."""
+    (_, c), _, (low, high) = extents(target)
+    reach = surroundings.half_length_m
+    floor, top = low - surroundings.floor_gap_m, high + surroundings.wall_above_m
     wall = np.array([[c, -reach, floor], [c, -reach, top], [c, reach, top], [c, reach, floor]])
     ground = np.array([[-BEHIND_M, -reach, floor], [c, -reach, floor], [c, reach, floor], [-BEHIND_M, reach, floor]])
-    return [Polygon("back_wall", wall), Polygon("floor", ground)]
+    return [Polygon("back_wall", wall)] * surroundings.back_wall + [Polygon("floor", ground)]
 
 
 def corner_lines(target: Target) -> Floats:
-    """Inner corners with the back wall, (n, 4): x, y, lowest z, highest z.
+    """Inner corners with the back wall, (n, 4): x, y, lowest z, highest z; of the patent's target alone.
 
     Slanted faces meet it at y = ±(b/2 + c); in the gaps between blocks the wall's sides do at y = ±b/2.
     """
+    if isinstance(target, Faces):
+        return np.empty((0, 4))
     lines = []
     for side, s in SIDES.items():
         bases = block_bases_m(target, side)

@@ -6,25 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from pipeline.config import (
-    Angle,
-    Drift,
-    Latency,
-    Length,
-    Lever,
-    Model,
-    Mount,
-    NotNegative,
-    Origin,
-    Positive,
-    Target,
-    White,
-)
+from pipeline.config import Drift, Letters, Mount, Origin, Target, White
 from pipeline.parsing import parse, read_yaml
+from pipeline.quantities import Angle, Latency, Length, Lever, Model, NotNegative, Positive, SoundSpeed
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1, le=20)]
-SoundSpeed = Annotated[float, Field(ge=1300, le=1700)]
 
 
 def _moment(text: str) -> str:
@@ -39,6 +26,7 @@ class Surroundings(Model):
 
     half_length_m: Annotated[float, Field(gt=0, le=200)] = 15.0  # back wall and floor reach this far along y
     floor_gap_m: NotNegative = 0.3  # the floor lies this much below the target's foot
+    back_wall: bool = True  # false: nothing stands behind the target
     wall_above_m: NotNegative = 0.5  # the back wall ends this much above the target's top
     tilt_deg: tuple[Angle, Angle] = (0.0, 0.0)  # the target as built, turned about its x and y axes
     origin_error_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # configured minus true, target axes
@@ -148,7 +136,7 @@ class Scenario(Model):
     name: Annotated[str, Field(min_length=1, max_length=200)] = "default"
     start_utc: Annotated[str, AfterValidator(_moment)] = "2026-05-12T08:00:00"
     declare_sigmas: bool = True  # false: session.yaml says nothing of noise, drift and beam width
-    target: Target = Target(
+    target: Target = Letters(
         a=8.0, b=3.0, c=1.0, e=0.5, azimuth_deg=0.0,
         origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0),
     )
@@ -175,8 +163,13 @@ class Scenario(Model):
 
     @property
     def half_length_m(self) -> float:
-        """A pass runs from -y to +y of this."""
-        return self.track.half_length_m or self.target.b / 2 + self.target.c + 2.0
+        """A pass runs from -y to +y of this; as it is, 2 m beyond the target."""
+        target = self.target
+        if isinstance(target, Letters):
+            reach_m = target.b / 2 + target.c
+        else:
+            reach_m = max(abs(y) for face in target.faces.values() for _, y, _ in face.corners)
+        return self.track.half_length_m or reach_m + 2.0
 
     @property
     def azimuth_deg(self) -> float:

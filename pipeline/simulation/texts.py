@@ -52,7 +52,7 @@ def _sigmas(range_m: float, angle_deg: float) -> Text:
 
 def pool_text(scenario: Scenario, movement: Movement) -> Text:
     """pool.yaml: the design, standing where the surveyor believes it to stand."""
-    around, target = scenario.surroundings, scenario.target.model_dump()
+    around, target = scenario.surroundings, scenario.target.model_dump(mode="json")
     if any(around.origin_error_m):
         believed = np.array([around.origin_error_m])
         latitude, longitude, height = (float(v[0]) for v in movement.site.geodetic_from_target(believed))

@@ -43,7 +43,10 @@ from stages import ORDER
 APPLICATION = "poolcal"
 DRAWN = ORDER  # stages that have a recording
 AT_MOST = 300_000  # points of a cloud: dense enough to see, few enough for any laptop
-COLOURS = {"P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167)}  # for all eyes
+COLOURS = {  # for all eyes
+    "P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167),
+    "other": (122, 92, 0), "more": (60, 60, 60),
+}
 GREY, SONAR, LASER = (150, 155, 165), (213, 94, 0), (0, 114, 178)
 DOT_M = 0.008  # radius of a point
 

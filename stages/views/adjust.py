@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline import artefacts
+from pipeline.families import families_of, shown_as
 from pipeline.folder import read_settings
 from pipeline.maths.residuals import face_axes
 from pipeline.maths.rotations import exp_so3
@@ -18,6 +19,7 @@ from pipeline.times import NS, unix_ns_from_gps
 from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, words
 
 Array = NDArray[np.float64]
+Shades = dict[str, tuple[int, int, int]]  # by family
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SENSORS = {"laser": LASER, "mbes": SONAR}
 RAYS = 60  # of a fan
@@ -28,10 +30,10 @@ def log(recording: Any, tables: Tables) -> None:
     faces, residuals = tables.table(artefacts.FACES), tables.table(artefacts.RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span, steps = _span(residuals), _steps(tables, residuals)
-    _clouds(recording, tables, residuals, family, span, steps)
+    _clouds(recording, tables, residuals, family, span, steps, shown_as(families_of(faces), COLOURS))
     _maps(recording, tables.table(artefacts.RESIDUAL_MAP), faces, span)
     _fans(recording, tables, residuals)
-    _over_time(recording, tables.table(artefacts.RESIDUAL_BINS), steps)
+    _over_time(recording, tables.table(artefacts.RESIDUAL_BINS), steps, shown_as(families_of(faces), COLOURS))
     _words(recording, tables, span)
 
 
@@ -69,6 +71,7 @@ def _clouds(
     family: Any,
     span: dict[str, float],
     steps: dict[str, int],
+    shades: Shades,
 ) -> None:
     import rerun as rr
 
@@ -79,7 +82,7 @@ def _clouds(
     for sensor in SENSORS:
         of_sensor = (residuals["sensor"] == sensor).to_numpy()
         step = rr.AnyValues(one_in=steps[sensor])
-        for name, colour in COLOURS.items():
+        for name, colour in shades.items():
             rows = residuals[of_sensor & (family == name)]
             points = rows[XYZ].to_numpy()
             colours = coloured(rows["residual_m"].to_numpy(), span[sensor])
@@ -101,7 +104,7 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
     normals = np.column_stack([faces[f"normal_{axis}_target_1"] for axis in "xyz"])
     family = faces["family"].to_numpy()
     for sensor in SENSORS:
-        for name in COLOURS:
+        for name in families_of(faces):
             numbers = cells["face"].to_numpy().astype(int)
             rows = cells[(cells["sensor"] == sensor).to_numpy() & (family[numbers] == name)]
             if not len(rows):
@@ -153,7 +156,7 @@ def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
     return Mounted(exp_so3(values[:3]) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + values[3:])
 
 
-def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int]) -> None:
+def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades: Shades) -> None:
     import rerun as rr
 
     bins = bins[bins["by"] == "time"].sort_values("low", kind="stable")
@@ -172,7 +175,7 @@ def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int]) -> Non
         thinned = f", one in {steps[sensor]} of them" if steps[sensor] > 1 else ""
         shown = count.to_numpy(np.float64)
         curve(f"quality/points/{sensor}", f"{sensor}{thinned}", count.index + 0.5, shown, SENSORS[sensor])
-        for name, colour in COLOURS.items():
+        for name, colour in shades.items():
             of_family = rows[(rows["family"] == name) & np.isfinite(rows["mean_m"])]
             if len(of_family):
                 where = of_family["low"].to_numpy() + 0.5

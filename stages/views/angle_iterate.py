@@ -22,6 +22,7 @@ from stages.views.fit_planes import cut_out
 SOUNDINGS = 20_000  # for all the family's points of one step
 STEPS = 60  # that are replayed
 FAMILIES = ("P1", "P2", "P3")
+ANGLES = dict(zip((*FAMILIES, "P4"), COLOURS.values(), strict=False))
 
 
 def log(recording: Any, tables: Tables) -> None:
@@ -68,7 +69,7 @@ def _curves(recording: Any, iterations: pd.DataFrame) -> None:
 
     steps = rr.TimeColumn("iteration", sequence=iterations["iteration"].to_numpy())
     deviations = dict(zip(("roll", "pitch", "yaw"), COLOURS.values(), strict=False))
-    for folder, stem, colours in (("deviation", "deviation", deviations), ("planes", "angle", COLOURS)):
+    for folder, stem, colours in (("deviation", "deviation", deviations), ("planes", "angle", ANGLES)):
         for name, colour in colours.items():
             column = f"{stem}_{name}_deg"
             if column in iterations:

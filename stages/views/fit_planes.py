@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline import artefacts
+from pipeline.families import families_of
 from pipeline.fitted import ALL_PASSES, planes_of
 from pipeline.maths.planes import Plane
 from pipeline.tables import Tables
@@ -20,7 +21,7 @@ def log(recording: Any, tables: Tables) -> None:
     faces, planes = tables.table(artefacts.FACES), tables.table(artefacts.PLANES)
     for sensor, colour in SHOWN.items():
         found = planes_of(planes, sensor)
-        for family in ("P1", "P2", "P3"):
+        for family in families_of(faces):
             plane = found.get((ALL_PASSES, family))
             if plane is None:
                 continue

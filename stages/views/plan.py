@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.families import shown_as
 from pipeline.files import write_bytes
 from pipeline.planned import Answer, Outlook
 from pipeline.planning import track
@@ -31,9 +32,10 @@ def save_plan(answer: Answer, said: str, path: Path) -> None:
 def _target(recording: Any, answer: Answer) -> None:
     import rerun as rr
 
+    colours = shown_as([family.name for family in answer.setting.model.families], COLOURS)
     for face in answer.setting.model.faces:
         outline = np.vstack([face.vertices_m, face.vertices_m[:1]]).astype(np.float32)
-        strip = rr.LineStrips3D([outline], radii=0.008, colors=COLOURS[face.family])
+        strip = rr.LineStrips3D([outline], radii=0.008, colors=colours[face.family])
         recording.log(f"target/{face.name}", strip, static=True)
 
 

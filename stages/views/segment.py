@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import artefacts
+from pipeline.families import families_of, shown_as
 from pipeline.streams import xyz
 from pipeline.tables import Tables
 from stages.views import AT_MOST, COLOURS, DOT_M
@@ -25,7 +26,7 @@ def log(recording: Any, tables: Tables) -> None:
         artefacts.LASER_LABELLED, AT_MOST, "face", *(f"{axis}_target_m" for axis in "xyz")
     )
     points, family = xyz(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
-    for name, colour in COLOURS.items():
+    for name, colour in shown_as(families_of(faces), COLOURS).items():
         corners = [np.reshape(c, (-1, 3)) for c in faces.loc[family_of == name, "vertices_target_m"]]
         outlines = [np.vstack([one, one[:1]]).astype(np.float32) for one in corners]
         recording.log(f"target/model/{name}", rr.LineStrips3D(outlines, radii=0.008, colors=colour), static=True)

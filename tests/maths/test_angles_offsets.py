@@ -9,7 +9,7 @@ from pipeline.maths.angles import PassPlanes, deviations, fourth_normal, iterate
 from pipeline.maths.moments import lift
 from pipeline.maths.offsets import DryFace, PassOffsets, WetFace, alternate, offsets
 from pipeline.maths.planes import Moments, fit_plane
-from pipeline.maths.targets import build_target
+from tests.targets import by_letters, members
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -55,7 +55,7 @@ def straight_pass(distance, number, mount_error, lever_error, swing_deg=0.0, azi
     sonar coordinates follow by inverting the *true* mount. The lifted features then use the wrong, coarse mount.
     """
     rng = np.random.default_rng(number)
-    model = build_target(8.0, 3.0, 1.0, 0.5)
+    model = by_letters(8.0, 3.0, 1.0, 0.5)
     R_true = Rotation.from_euler("ZXY", np.radians([-2.0, 1.2, -48.8])).as_matrix()
     lever_true = np.array([0.3, 0.2, -2.0])
     R_coarse = Rotation.from_rotvec(-np.asarray(mount_error)).as_matrix() @ R_true
@@ -85,8 +85,8 @@ def straight_pass(distance, number, mount_error, lever_error, swing_deg=0.0, azi
         lifted[key] = lifted.get(key, 0) + features.T @ features
         heights[face.name] = face.vertices_m[0, 2]
     for family in ("P1", "P2", "P3"):
-        dry = np.concatenate([model.faces[k].vertices_m + np.array([0, 0, 4.0]) for k in model.family_faces(family)])
-        laser[family] = fit_plane(Moments.of(dry @ turn.T), turn @ model.faces[model.family_faces(family)[0]].normal)
+        dry = np.concatenate([model.faces[k].vertices_m + np.array([0, 0, 4.0]) for k in members(model, family)])
+        laser[family] = fit_plane(Moments.of(dry @ turn.T), turn @ model.faces[members(model, family)[0]].normal)
     normals = {name: plane.normal for name, plane in laser.items()}
     normals["P4"] = fourth_normal(normals["P1"], normals["P2"])
     one = PassPlanes(number, {f: lifted[f] for f in ("P1", "P2", "P3")}, normals)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from pipeline.maths.labelling import Beams, label_points
-from pipeline.maths.targets import build_target
+from tests.targets import by_letters, members
 
 
 @pytest.fixture
 def target():
-    return build_target(a=8.0, b=3.0, c=1.0, e=0.5)
+    return by_letters(a=8.0, b=3.0, c=1.0, e=0.5)
 
 
 def named(model, name):
@@ -37,16 +37,16 @@ def test_lowest_blocks_stand_at_the_foot_on_the_low_side_and_a_block_higher_on_t
 
 
 def test_low_side_north_mirrors_the_stacks():
-    model = build_target(8.0, 3.0, 1.0, 0.5, low_side="north")
+    model = by_letters(8.0, 3.0, 1.0, 0.5, low_side="north")
     assert named(model, "P3-0").vertices_m[:, 2].min() == -4.0
     assert named(model, "P1-0").vertices_m[:, 2].min() == -3.5
 
 
 def test_given_bases_and_counts():
-    model = build_target(8.0, 3.0, 1.0, 0.5, blocks_per_side=2, first_base_m=-3.0, stagger_m=0.2)
+    model = by_letters(8.0, 3.0, 1.0, 0.5, blocks_per_side=2, first_base_m=-3.0, stagger_m=0.2)
     assert [named(model, f"P1-{k}").vertices_m[:, 2].min() for k in (0, 1)] == [-3.0, -2.0]
     assert named(model, "P3-0").vertices_m[:, 2].min() == -2.8
-    assert len(model.family_faces("P1")) == 2
+    assert len(members(model, "P1")) == 2
 
 
 def test_normals_point_to_the_vessel_and_p4_down(target):
@@ -61,7 +61,7 @@ def test_all_faces_of_a_side_are_coplanar_and_corners_lie_on_their_planes(target
     for face in target.faces:
         np.testing.assert_allclose(face.vertices_m @ face.normal, face.distance_m, atol=1e-12)
     for family in ("P1", "P3"):
-        assert len({round(target.faces[k].distance_m, 12) for k in target.family_faces(family)}) == 1
+        assert len({round(target.faces[k].distance_m, 12) for k in members(target, family)}) == 1
 
 
 def test_clearance_is_the_distance_to_the_edges_not_to_the_box(target):
@@ -154,7 +154,7 @@ def test_an_echo_that_stands_on_the_corner_is_not_taken_wherever_its_beam_points
 @pytest.mark.parametrize("e", [0.5, 0.4, 0.3])
 def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
     """-a/2 + e and -a/2 + 2e - e differ in the last bit for e = 0.4: neither side's faces may be lost by that."""
-    model = build_target(a=12 * e, b=3.0, c=1.0, e=e)
+    model = by_letters(a=12 * e, b=3.0, c=1.0, e=e)
     for number, face in enumerate(model.faces):
         middle = face.vertices_m.mean(axis=0)[None, :]
         ahead = Beams(-face.normal[None, :], np.ones(1))  # a ray from straight in front
@@ -164,7 +164,7 @@ def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
 def test_what_lies_behind_a_face_is_hidden():
     from pipeline.clouds import ClosestSurface
 
-    surface = ClosestSurface(build_target(8.0, 3.0, 1.0, 0.5))
+    surface = ClosestSurface(by_letters(8.0, 3.0, 1.0, 0.5))
     origin = np.array([[-5.0, 0.0, 1.0]])
     for x, hidden in ((-0.5, False), (0.0, False), (0.1, False), (0.2, True), (2.0, True)):  # the wall stands at x = 0
         assert surface.hides(origin, np.array([[x, 0.0, 0.0]]), 0.15).tolist() == [hidden], x

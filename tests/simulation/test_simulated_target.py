@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.config import Origin, Target
+from pipeline.config import Letters, Origin
 from pipeline.simulation.mesh import block_bases_m, build_mesh, corner_lines, target_polygons
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import Surroundings
@@ -11,12 +11,12 @@ from pipeline.simulation.scenario import Surroundings
 ORIGIN = Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0)
 
 
-def target(**changes: object) -> Target:
+def target(**changes: object) -> Letters:
     letters: dict[str, object] = {"a": 8.0, "b": 3.0, "c": 1.0, "e": 0.5, "origin": ORIGIN, "azimuth_deg": 0.0}
-    return Target.model_validate(letters | changes)
+    return Letters.model_validate(letters | changes)
 
 
-def corners(design: Target, name: str) -> set[tuple[float, ...]]:
+def corners(design: Letters, name: str) -> set[tuple[float, ...]]:
     polygon = next(p for p in target_polygons(design) if p.name == name)
     return {tuple(np.round(vertex, 9) + 0.0) for vertex in polygon.vertices_m}
 

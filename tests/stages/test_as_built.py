@@ -74,7 +74,7 @@ def test_the_target_is_measured_and_what_differs_is_said(quiet, quiet_found):
     assert found["corner_deg"] == pytest.approx({"P1": 45.0, "P3": 45.0}, abs=1e-3)
     assert not [words for words in right["warnings"] if "laser finds" in words]
     wrong = result(calibrated(quiet, pool={"target": {"b": 3.02}}))
-    assert any("the laser finds b = 3.0000 m where target.b says 3.02 m" in words for words in wrong["warnings"])
+    assert any("the laser finds b = 3.0000 m where the config has 3.02 m" in words for words in wrong["warnings"])
 
 
 def test_a_leaning_target_is_said():

@@ -130,7 +130,7 @@ def test_a_swapped_low_side_is_seen(quiet):
     found = calibrated(quiet, "segment", pool={"target": {"low_side": "north"}})
     pose = found["segment/target_pose"].iloc[0]
     assert pose["ambiguous"]
-    assert "low_side swapped" in pose["rival"]
+    assert "left and right exchanged" in pose["rival"]
 
 
 def test_a_tilted_target_is_reported_and_does_no_harm(errors_of):

@@ -1,0 +1,24 @@
+"""What settings are made of: a strict model, and numbers within what can be meant."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+SigmaM = Annotated[float, Field(ge=0, le=10)]
+SigmaDeg = Annotated[float, Field(ge=0, le=45)]
+SigmaS = Annotated[float, Field(ge=0, le=10)]
+BeamWidth = Annotated[float, Field(gt=0, le=45)]
+RangeSigma = Annotated[float, Field(ge=1e-5, le=10)]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+Length = Annotated[float, Field(gt=0, le=100)]
+Lever = Annotated[float, Field(ge=-100, le=100)]
+Depth = Annotated[float, Field(ge=0, le=200)]
+SoundSpeed = Annotated[float, Field(ge=1300, le=1700)]
+Latency = Annotated[float, Field(ge=-10, le=10)]
+
+
+class Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
