@@ -1,6 +1,6 @@
 """The adjustment's iteration: read all points, solve, move; until neither values nor weights change any more."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from pipeline.maths.design import of_poses
 from pipeline.maths.drift import Eliminated
 from pipeline.maths.epochs import EpochSums
 from pipeline.maths.knots import Drift, PoseNoise, knots_of
+from pipeline.maths.rigid_design import Design, of_design
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX, State
 from pipeline.maths.variance import Common, Scatter, common, scatter
@@ -75,22 +76,36 @@ def free_unknowns(state: State, further: Sequence[str] = ()) -> list[int]:
     return sorted({*range(SIX), *shared, *(state.names.index(name) for name in further)})
 
 
+@dataclass(frozen=True)
+class Given:
+    """What is known beside the observations: noise of the poses, the target's design (where it takes part), and which
+    of the six may be held, from the normal equations of all unknowns at the first reading."""
+
+    noise: PoseNoise
+    design: Design | None = None
+    held: Callable[[Array], Sequence[int]] | None = None
+
+
 def adjust(
-    streams: Mapping[str, Stream], scene: Scene, noise: PoseNoise, settings: config.Adjust, gap_s: float
+    streams: Mapping[str, Stream], scene: Scene, given: Given, settings: config.Adjust, gap_s: float
 ) -> Adjusted:
     """From the coarse mount to the solution."""
-    state = _near(streams["mbes"], scene)
+    noise = given.noise
+    state = _near(streams["mbes"], scene) if "mbes" in streams else scene.coarse
     free = np.array(free_unknowns(state, settings.free))
     weighting, known, settled = Weighting(), None, False
     for iteration in range(1, settings.max_iterations + 1):
         reading, weighting = refactored(read(streams, scene, state, known, weighting), state, weighting)
         drift = known or _no_drift(reading, scene, noise, gap_s)
-        before = _Point(state, drift, reading.sums)
+        before = _Point(state, drift, reading.sums, given.design)
+        if iteration == 1 and given.held is not None:
+            held = given.held(before.equations(scene, noise).normal)
+            free = np.setdiff1d(free, np.array(held, dtype=np.int64))
         now, solution = before.stepped(scene, noise, free)
         if solution.deficiency:
             return before.adjusted(scene, noise, free, weighting, reading, {}, False, iteration)
         state, known = now.state, now.drift
-        settled = weighting.robust is not None and _small(solution, *SETTLED)
+        settled = weighting.robust is not None and _small(solution, free, *SETTLED)
         if settled and iteration >= LEAST_READINGS:
             break
         known_scales = scales_of(reading) if iteration > 1 else {}  # of the groups that there are
@@ -103,7 +118,7 @@ def adjust(
     converged = False
     for _ in range(CLOSING):  # the weights as they are
         now, solution = now.stepped(scene, noise, free)
-        converged = settled and _small(solution, *NONE)
+        converged = settled and _small(solution, free, *NONE)
         if converged:
             break
     return now.adjusted(scene, noise, free, weighting, reading, shared, converged, iteration)
@@ -116,15 +131,31 @@ class _Point:
     state: State
     drift: Drift
     sums: Mapping[str, EpochSums]
+    design: Design | None
+
+    def equations(self, scene: Scene, noise: PoseNoise, wanted: Integers | None = None) -> Eliminated:
+        """Normal equations of all unknowns, or of those ``wanted``, with what the design says of the surfaces."""
+        found = normal_equations(self.sums, self.state, scene.body, noise, self.drift, wanted)
+        if self.design is None:
+            return found
+        more = of_design(self.design, self.state)
+        places = np.arange(self.state.size) if wanted is None else wanted
+        return replace(
+            found,
+            normal=found.normal + more.normal[np.ix_(places, places)],
+            right=found.right + more.right[places],
+            squares=found.squares + more.squares,
+        )
 
     def stepped(self, scene: Scene, noise: PoseNoise, free: Integers) -> tuple["_Point", Solution]:
         """After a step of the free unknowns; and their solution, numbered as in ``free``."""
-        equations = normal_equations(self.sums, self.state, scene.body, noise, self.drift, free)
+        equations = self.equations(scene, noise, free)
         solution = solve(equations.normal, equations.right, range(len(free)))
         step, drift_step = np.zeros(self.state.size), equations.knots(solution.step)
         step[free] = solution.step
         sums = moved(self.sums, self.state, scene.body, self.drift, step, drift_step)
-        return _Point(self.state.moved(step), self.drift.moved(drift_step), sums), solution
+        moved_to = replace(self, state=self.state.moved(step), drift=self.drift.moved(drift_step), sums=sums)
+        return moved_to, solution
 
     def adjusted(
         self,
@@ -138,7 +169,7 @@ class _Point:
         iterations: int,
     ) -> Adjusted:
         """The end: equations of all unknowns, those held as well."""
-        equations = normal_equations(self.sums, self.state, scene.body, noise, self.drift)
+        equations = self.equations(scene, noise)
         solution = solve(equations.normal, equations.right, free.tolist())
         reading = replace(reading, sums=self.sums)
         ended = (self.state, self.drift, weighting, reading, shared, equations, solution)
@@ -163,7 +194,9 @@ def _no_drift(reading: Reading, scene: Scene, noise: PoseNoise, gap_s: float) ->
     return Drift(knots, np.zeros((len(knots.record), SIX)))
 
 
-def _small(solution: Solution, sigmas: float, rad: float, m: float) -> bool:
-    """Whether the six's step is below this share of their sigmas, or below these values."""
-    sigma = np.sqrt(np.diag(solution.covariance))[:SIX]
-    return bool(np.all(np.abs(solution.step[:SIX]) <= np.maximum(sigmas * sigma, np.repeat([rad, m], 3))))
+def _small(solution: Solution, free: Integers, sigmas: float, rad: float, m: float) -> bool:
+    """Whether the step of the six, or of those that are free, is below this share of their sigmas, or below these
+    values."""
+    six = np.flatnonzero(free < SIX)
+    sigma = np.sqrt(np.diag(solution.covariance))[six]
+    return bool(np.all(np.abs(solution.step[six]) <= np.maximum(sigmas * sigma, np.repeat([rad, m], 3)[free[six]])))

@@ -69,6 +69,8 @@ class Segment(Model):
     search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
+    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # the same of the laser's, where it is calibrated
+    search_laser_m: Annotated[float, Field(gt=0, le=0.2)] = 0.05
     ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # of the wall that a pose half a period off must lose
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
         0.02  # another mount that explains so nearly as many soundings
@@ -117,6 +119,19 @@ class Adjust(Model):
         return self
 
 
+class LaserFit(Model):
+    """What is known where the laser itself is calibrated: of the target, and of the coarse mount."""
+
+    face_sigma_deg: SigmaDeg = 0.02  # each family of faces against the design, about either axis
+    face_sigma_m: SigmaM = 0.002  # and along its normal
+    plumb_sigma_deg: SigmaDeg = 0.02  # the target as a whole out of plumb
+    origin_sigma_m: SigmaM | None = None  # of target.origin, each axis, in the INS's datum; null: not surveyed
+    azimuth_sigma_deg: SigmaDeg | None = None  # of target.azimuth_deg; null: not surveyed
+    coarse_sigma_deg: SigmaDeg = 0.5  # of each coarse angle, where laser.mount_covariance does not say
+    coarse_sigma_m: SigmaM = 0.05
+    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # one that comes out no surer than this of coarse is held
+
+
 class Verdict(Model):
     max_sigma_deg: Positive = 0.05
     max_sigma_m: Positive = 0.005
@@ -137,6 +152,7 @@ class PoolConfig(Model):
     angle_iterate: AngleIterate = AngleIterate()
     offsets: Offsets = Offsets()
     adjust: Adjust = Adjust()
+    laser_fit: LaserFit = LaserFit()
     verdict: Verdict = Verdict()
     result: Method = "adjustment"
 
@@ -255,7 +271,7 @@ class Recording(Model):
 class Recordings(Model):
     ins: Recording
     laser: Recording
-    mbes: Recording
+    mbes: Recording | None
 
 
 class SessionConfig(Model):
@@ -264,7 +280,14 @@ class SessionConfig(Model):
     name: Annotated[str, Field(min_length=1, max_length=300)]  # left out: the session folder's name
     ins: Ins
     laser: Laser
-    mbes: Mbes
+    mbes: Mbes | None = None  # none: only the laser can be calibrated
+
+    @property
+    def sonar(self) -> Mbes:
+        """The sonar, where one is needed."""
+        if self.mbes is None:
+            raise ConfigError("session.yaml: mbes is missing: there is no sonar to be calibrated; add its block")
+        return self.mbes
 
     @property
     def recordings(self) -> Recordings:
@@ -277,7 +300,7 @@ class SessionConfig(Model):
                 frame=getattr(sensor, "frame", "laser"),
             )
 
-        return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=of(self.mbes))
+        return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------

@@ -11,19 +11,21 @@ from pipeline.maths.observations import SPEED_M_S
 Array = NDArray[np.float64]
 
 
-def considered_of(names: Sequence[str], laser: config.Laser, mbes: config.Mbes, as_built: config.AsBuilt) -> Array:
+def considered_of(
+    names: Sequence[str], laser: config.Laser, mbes: config.Mbes | None, as_built: config.AsBuilt
+) -> Array:
     """Sigmas (u,) of the unknowns ``names`` where they are held; zero for the mount and the surfaces."""
     mount = laser.mount_sigma
     sigmas = {f"laser_rotation_{axis}": float(np.radians(mount.angle_deg)) for axis in "xyz"}
     sigmas |= {f"laser_lever_arm_{axis}": mount.lever_arm_m for axis in "xyz"}
-    sigmas |= {
-        "laser_range": laser.range_bias_sigma_m,
-        "laser_latency": laser.latency_sigma_s,
-        "mbes_range": mbes.range_bias_sigma_m,
-        "mbes_latency": mbes.latency_sigma_s,
-        "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
-        "sound_speed_gradient": mbes.sound_speed_gradient_sigma_1_s if mbes.svp is None else 0.0,  # a cast tells it
-    }
+    sigmas |= {"laser_range": laser.range_bias_sigma_m, "laser_latency": laser.latency_sigma_s}
+    if mbes is not None:
+        sigmas |= {
+            "mbes_range": mbes.range_bias_sigma_m,
+            "mbes_latency": mbes.latency_sigma_s,
+            "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
+            "sound_speed_gradient": mbes.sound_speed_gradient_sigma_1_s if mbes.svp is None else 0.0,  # a cast tells it
+        }
     lean = float(np.radians(as_built.angle_sigma_deg))
     for name in names:
         if name.startswith("wet_"):

@@ -174,7 +174,7 @@ def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row
     for run in (first, second):
         rows = Tables(run.path).table(artefacts.PLANES).query("`pass` == -1").to_dict("records")
         tables.append({(row["sensor"], row["plane"]): row for row in rows})
-    same_mount = first.settings.session.mbes.mount == second.settings.session.mbes.mount
+    same_mount = first.settings.session.sonar.mount == second.settings.session.sonar.mount
     if not same_mount:
         missing.append("planes of the sonar: they were placed with different coarse mounts")
     for sensor in ("laser", "mbes") if same_mount else ("laser",):

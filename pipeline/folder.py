@@ -58,7 +58,8 @@ def load_settings(session_folder: Path, config_path: Path) -> Settings:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_faces(pool, config_path)
     session = config.load_session(session_folder)
-    refuse_cast(pool.target, session.mbes, session_folder / "session.yaml")
+    if session.mbes is not None:
+        refuse_cast(pool.target, session.mbes, session_folder / "session.yaml")
     return Settings(session_folder.resolve(), pool, session)
 
 

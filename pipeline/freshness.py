@@ -65,8 +65,10 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
 
 def raw_digests(this: Run, sensor: str) -> dict[str, str]:
     """Digest by file of one sensor, relative to the session folder."""
-    root = this.settings.session_folder
-    paths = readers.raw_files(getattr(this.settings.session, sensor), root)
+    root, settings = this.settings.session_folder, getattr(this.settings.session, sensor)
+    if settings is None:
+        return {}
+    paths = readers.raw_files(settings, root)
     names = [path.relative_to(root).as_posix() for path in paths]
     for name in names:
         if any("\udc80" <= letter <= "\udcff" for letter in name):  # Python's stand-ins for other bytes

@@ -11,7 +11,7 @@ from pipeline.adjusting import Adjusted
 from pipeline.looking import Cells
 from pipeline.maths.consistency import consistency_limit
 from pipeline.maths.rotations import log_so3
-from pipeline.maths.solution import Freed, freed, weakest_direction
+from pipeline.maths.solution import Freed, Solution, freed, weakest_direction
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.maths.variance import scatter
 from pipeline.mounts import Mounted
@@ -29,25 +29,29 @@ def tables(
     settings: config.Adjust,
     poses: pd.DataFrame,
     passes: pd.DataFrame,
+    *blocks: tuple[NDArray[np.int64], Array],
 ) -> dict[str, pd.DataFrame]:
-    """By name; ``considered``: sigmas of all unknowns where they are held."""
+    """By name; ``considered``: sigmas of all unknowns where they are held, ``blocks`` of them correlated
+    (:meth:`Solution.total`)."""
     state, solution = found.state, found.solution
     six = np.concatenate(
         [
-            log_so3(state.R_body_from_mbes @ coarse.R_body_from_sensor.T),
+            log_so3(state.R_body_from_sensor @ coarse.R_body_from_sensor.T),
             state.lever_arm_m - coarse.lever_arm_body_m,
         ]
     )
     shared = [value for surface in state.surfaces for value in (0.0, 0.0, surface.shift_m)]
     values = state.values_of_other()
     values[:SIX], values[state.shared] = six, shared
-    random, total = solution.covariance, solution.total(considered)
-    values = values[solution.free]
+    named = np.union1d(np.arange(SIX), solution.free)  # the six, held or not
+    nothing = np.zeros(state.size)
+    random, total = solution.covariance_of(named, nothing), solution.covariance_of(named, considered, *blocks)
+    values = values[named]
     if solution.deficiency:
         values[:SIX], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
     estimate = pd.DataFrame(
         {
-            "unknown": [state.names[k] for k in solution.free],
+            "unknown": [state.names[k] for k in named],
             "value": values,
             "sigma": np.sqrt(np.diag(random)),
             "sigma_total": np.sqrt(np.diag(total)),
@@ -81,7 +85,7 @@ def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd
         "between_dof": found.between.free,
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
-        "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:SIX, :SIX]),
+        "weakest": "" if solution.deficiency else _weakest(solution),
         "test_statistic": statistic,
         "test_dof": len(cells),
         "test_limit": limit,
@@ -91,14 +95,21 @@ def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd
     return pd.DataFrame([summary])
 
 
+def _weakest(solution: Solution) -> str:
+    """Of the six, where all are free."""
+    return weakest_direction(solution.covariance[:SIX, :SIX]) if np.all(solution.free[:SIX] == np.arange(SIX)) else ""
+
+
 def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
     sigma = np.sqrt(np.diag(random))
+    product = np.outer(sigma, sigma)
+    correlation = np.divide(random, product, out=np.where(np.isnan(product), np.nan, np.eye(SIX)), where=product > 0)
     return pd.DataFrame(
         {
             "row": np.repeat(NAMES, SIX),
             "column": np.tile(NAMES, SIX),
             "covariance": random.ravel(),
-            "correlation": (random / np.outer(sigma, sigma)).ravel(),
+            "correlation": correlation.ravel(),
             "covariance_total": total.ravel(),
         }
     )
@@ -107,17 +118,19 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
 def _freed_table(found: Adjusted, considered: Array, estimate: pd.DataFrame) -> pd.DataFrame:
     """What is held, and what each of the six owes to it; and what is free beside the mount and the surfaces."""
     tests = {one.unknown: one for one in freed(found.equations.normal, found.equations.right, found.solution)}
+    owed = found.solution.depends(np.arange(SIX))
     rows = []
     for place, number in enumerate(found.solution.held.tolist()):
         test = tests.get(number, Freed(number, np.nan, np.nan))
-        effect = found.solution.sensitivity[:SIX, place] * considered[number]
+        effect = owed[:, place] * considered[number]
         row: dict[str, Any] = {"unknown": found.state.names[number], "considered": considered[number]}
         row |= {"estimated": False, "value": test.value, "sigma": test.sigma}
         rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(NAMES)})
     shared = range(found.state.shared.start, found.state.shared.stop)
-    for place, number in enumerate(found.solution.free.tolist()):
+    by_name = estimate.set_index("unknown", drop=False)
+    for number in found.solution.free.tolist():
         if number >= SIX and number not in shared:
-            one = estimate.iloc[place]
+            one = by_name.loc[found.state.names[number]]
             row = {"unknown": one["unknown"], "estimated": True, "considered": considered[number]}
             row |= {"value": one["value"], "sigma": one["sigma_total"]}
             rows.append(row | {f"effect_{name}": 0.0 for name in NAMES})

@@ -52,25 +52,25 @@ class Answer:
 
 def setting_of(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Setting:
     model = target_of(pool.target)
-    state = state_by_design(model, session.mbes)
-    return Setting(model, state, plan, pool.segment, session.ins, session.laser, session.mbes)
+    state = state_by_design(model, session.sonar)
+    return Setting(model, state, plan, pool.segment, session.ins, session.laser, session.sonar)
 
 
 def load_plan(path: Path, session: config.SessionConfig) -> Plan:
     """A plan that can be sailed, with the sonar under water."""
     plan = parse(Plan, read_yaml(path), str(path))
-    sonar = plan.ins_height_m + session.mbes.mount.z_m
+    sonar = plan.ins_height_m + session.sonar.mount.z_m
     if sonar >= 0:
         raise ConfigError(
-            f"{path}: ins_height_m = {plan.ins_height_m:g}: with mbes.mount.z_m = {session.mbes.mount.z_m:g} the sonar "
-            f"is {sonar:.2f} m above the water; give the height of the INS above the water"
+            f"{path}: ins_height_m = {plan.ins_height_m:g}: with mbes.mount.z_m = {session.sonar.mount.z_m:g} the "
+            f"sonar is {sonar:.2f} m above the water; give the height of the INS above the water"
         )
     return plan
 
 
 def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Answer:
     setting = setting_of(plan, pool, session)
-    considered = considered_of(setting.state.names, session.laser, session.mbes, pool.as_built)
+    considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
     free = free_unknowns(setting.state, pool.adjust.free)
     given = _outlook(setting, plan.passes, turn_s, considered, free)

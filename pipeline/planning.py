@@ -210,7 +210,7 @@ def _labelled(
 ) -> dict[str, Array]:
     """Where rays meet the target, with the labels that stage segment would give; columns as of a labelled stream."""
     mount = mount_of(setting.laser.mount) if sensor == "laser" else None
-    R = setting.state.R_body_from_mbes if mount is None else mount.R_body_from_sensor
+    R = setting.state.R_body_from_sensor if mount is None else mount.R_body_from_sensor
     lever = setting.state.lever_arm_m if mount is None else mount.lever_arm_body_m
     figures = setting.plan.laser if sensor == "laser" else setting.plan.mbes
     origins = trajectory.place(t_ns, np.broadcast_to(lever, rays.shape))

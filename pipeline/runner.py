@@ -22,7 +22,7 @@ from pipeline.folder import Settings
 from pipeline.freshness import SENSORS, Run, key_of, out_of_date, raw_digests
 from pipeline.progress import Progress
 from pipeline.sinks import FolderSink
-from pipeline.streams import Chunk, ParquetPart, Part, Stream
+from pipeline.streams import EMPTY, Chunk, ParquetPart, Part, Stream
 
 
 def run(
@@ -182,6 +182,8 @@ def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
         return {"inputs": raw, "software": manifest.versions()}
     if isinstance(marker, Raw):
         settings = getattr(this.settings.session, marker.sensor)
+        if settings is None:
+            return EMPTY
         return _stream(this, readers.raw_parts(marker.sensor, settings, this.settings.session_folder))
     where = this.folder(marker.owner)
     if isinstance(marker, Document):

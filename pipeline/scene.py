@@ -113,7 +113,7 @@ class Scene:
     coarse: State
     white_m: float
     laser: config.Laser
-    mbes: config.Mbes
+    mbes: config.Mbes | None
 
     def observe(
         self, sensor: str, batch: Batch, state: State, drift: Drift | None = None, weighting: Weighting | None = None
@@ -165,15 +165,16 @@ class Scene:
             error = drift.at((seconds[:-1] + seconds[1:]) / 2)
         return first, pull_of(state, sensor, self.body, records, error, FEATURES[sensor]), error[:, 3:].T
 
-    def _see_laser(self, sight: Sight, _: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
+    def _see_laser(self, sight: Sight, state: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
         """r in surface axes, v, and what the observations' module makes of them."""
         trajectory, record = self.body.trajectory, sight.record
         x, y, z = (sight.points[f"{axis}_laser_m"] for axis in "xyz")
         range_m = np.sqrt(x * x + y * y + z * z)
         start = axes @ trajectory.positions_m[record].T
         step = axes @ trajectory.positions_m[record + 1].T - start
-        lever = axes @ (trajectory.R_frame_from_body[record] @ self.body.laser_lever_arm_m).T
-        points = axes @ xyz(sight.points, "target_m").T
+        lever = axes @ (trajectory.R_frame_from_body[record] @ self.body.lever_arm("laser", state)).T
+        placed = xyz(sight.points, "target_m") if state.calibrated != "laser" else self._placed(sight.points, state)
+        points = axes @ placed.T
         r = points - sight.spread(start) - sight.share * sight.spread(step)
         v = points[2] - distance_m - self.height_of_face[sight.points["face"]]
         sigmas = Sigmas(self.laser.range_sigma_m, float(np.radians(self.laser.angle_sigma_deg)))
@@ -183,12 +184,14 @@ class Scene:
         points = xyz(sight.points, "mbes_m").T
         pings = Runs.of(sight.points["t_ns"])  # beams of a ping share their pose
         where, R_target_from_body = self.body.trajectory.poses_at(sight.points["t_ns"][pings.starts])
-        R = R_target_from_body @ state.R_body_from_mbes
+        R = R_target_from_body @ state.R_body_from_sensor
         in_mbes = pings.spread(np.einsum("kj,gji->kig", axes, R))
         up = pings.spread(R[:, 2, :].T)
         lever = pings.spread(axes @ (R_target_from_body @ state.lever_arm_m).T)
         r = np.einsum("kin,in->kn", in_mbes, points) + lever
         v = r[2] + pings.spread(where @ axes[2]) - distance_m - self.height_of_face[sight.points["face"]]
+        if self.mbes is None:
+            raise TypeError("soundings without a sonar")
         sigmas = Sigmas(self.mbes.range_sigma_m, float(np.radians(self.mbes.angle_sigma_deg)))
         return r, v, sonar_observations(points, in_mbes, up, r, v, sigmas)
 
@@ -200,13 +203,14 @@ class Scene:
         points = seen.points
         own = xyz(points, f"{sensor}_m")
         ranges = np.linalg.norm(own, axis=1)
-        if sensor == "laser":
+        angle = np.arctan2(own[:, 0], -own[:, 2]) if sensor == "mbes" else np.arcsin(own[:, 2] / ranges)
+        if sensor != state.calibrated:
             placed = coarse_placed = xyz(points, "target_m")
-            coarse_residual, angle = seen.v_m, np.arcsin(own[:, 2] / ranges)
+            coarse_residual = seen.v_m
         else:
             coarse = replace(self.coarse, surfaces=state.surfaces)
             placed, coarse_placed = self._placed(points, state), self._placed(points, coarse)
-            before, angle = self.observe(sensor, points, coarse), np.arctan2(own[:, 0], -own[:, 2])
+            before = self.observe(sensor, points, coarse)
             coarse_residual = before.v_m + before.mean_m
         columns = {f"{axis}_target_m": placed[:, k] for k, axis in enumerate("xyz")}
         columns |= {f"coarse_{axis}_target_m": coarse_placed[:, k] for k, axis in enumerate("xyz")}
@@ -220,9 +224,9 @@ class Scene:
         return {name: values[as_given] for name, values in found.items()}
 
     def _placed(self, batch: Batch, state: State) -> Array:
-        """Soundings in the target frame with the state's mount, (n, 3) m."""
+        """Points of the sensor that is calibrated in the target frame, with the state's mount, (n, 3) m."""
         positions, R_target_from_body = self.body.trajectory.poses_at(batch["t_ns"])
-        body = xyz(batch, "mbes_m") @ state.R_body_from_mbes.T + state.lever_arm_m
+        body = xyz(batch, f"{state.calibrated}_m") @ state.R_body_from_sensor.T + state.lever_arm_m
         return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, body))
 
 
@@ -242,10 +246,34 @@ def scene_of(
     mbes: config.Mbes,
     as_built: Mapping[str, float],
 ) -> Scene:
-    """Coarse mount, and the laser's planes as surfaces; families that are horizontal, or of several planes, by design;
-    faces ``as_built`` off their surface by so much outward (m)."""
-    mount, found = mount_of(mbes.mount), laser_planes(planes)
-    surfaces = []
+    """Coarse mount of the sonar, and the laser's planes as surfaces; faces ``as_built`` off their surface by so much
+    outward (m)."""
+    mount = mount_of(mbes.mount)
+    state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, _surfaces(model, planes))
+    lever = mount_of(laser.mount).lever_arm_body_m
+    body = Body.of(trajectory_in_target(poses, target_pose), lever)
+    return Scene(body, *_places(model, state, as_built), state, ins.white.position_m, laser, mbes)
+
+
+def laser_scene_of(
+    model: TargetModel,
+    poses: pd.DataFrame,
+    target_pose: pd.DataFrame,
+    planes: pd.DataFrame,
+    ins: config.Ins,
+    laser: config.Laser,
+    as_built: Mapping[str, float],
+) -> Scene:
+    """The same where the laser is calibrated: its own coarse mount, and no sonar."""
+    mount = mount_of(laser.mount)
+    state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, _surfaces(model, planes), "laser")
+    body = Body.of(trajectory_in_target(poses, target_pose), mount.lever_arm_body_m)
+    return Scene(body, *_places(model, state, as_built), state, ins.white.position_m, laser, None)
+
+
+def _surfaces(model: TargetModel, planes: pd.DataFrame) -> list[Surface]:
+    """The laser's planes; families that are horizontal, or of several planes, by design."""
+    found, surfaces = laser_planes(planes), []
     for family in model.families:
         plane = found.get((ALL_PASSES, family.name)) if family.one_plane and not family.level else None
         corners = np.concatenate([model.faces[number].vertices_m for number in family.faces])
@@ -253,14 +281,11 @@ def scene_of(
             surfaces.append(Surface.at(family.name, plane.normal, plane.centroid_m, 0.0))
         else:
             surfaces.append(by_design(family, corners))
-    number = {surface.family: k for k, surface in enumerate(surfaces)}
-    heights = np.array([face.offset_m + face.sense * as_built.get(face.name, 0.0) for face in model.faces])
-    return Scene(
-        Body.of(trajectory_in_target(poses, target_pose), mount_of(laser.mount).lever_arm_body_m),
-        np.array([number[face.family] for face in model.faces]),
-        heights,
-        State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces),
-        ins.white.position_m,
-        laser,
-        mbes,
-    )
+    return surfaces
+
+
+def _places(model: TargetModel, state: State, as_built: Mapping[str, float]) -> tuple[Integers, Array]:
+    """Of each face the number of its surface, and how far it stands off that."""
+    number = {surface.family: k for k, surface in enumerate(state.surfaces)}
+    off = [face.offset_m + face.sense * as_built.get(face.name, 0.0) for face in model.faces]
+    return np.array([number[face.family] for face in model.faces]), np.array(off)

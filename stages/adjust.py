@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline import artefacts, config
-from pipeline.adjusting import Adjusted, adjust, noise_of
+from pipeline.adjusting import Adjusted, Given, adjust, noise_of
 from pipeline.considered import considered_of
 from pipeline.looking import Cells, look
 from pipeline.mounts import mount_of, target_of
@@ -69,7 +69,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     given = (model, inputs.poses, inputs.target_pose, inputs.planes)
     scene = scene_of(*given, config.ins, config.laser, config.mbes, config.as_built.faces)
     streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
-    found = adjust(streams, scene, noise_of(config.ins), settings, config.ingest.max_gap_s)
+    found = adjust(streams, scene, Given(noise_of(config.ins)), settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
     sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
     coarse = mount_of(config.mbes.mount)

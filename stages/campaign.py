@@ -9,8 +9,8 @@ import numpy as np
 
 from pipeline.artefacts import Artefact, Document, Raw
 from pipeline.config import PoolConfig, SessionConfig
-from pipeline.evaluate import declared, run_in_memory
-from pipeline.streams import MemoryPart, Stream
+from pipeline.evaluate import declared, name_of, run_in_memory
+from pipeline.streams import EMPTY, MemoryPart, Stream
 from stages import load
 
 
@@ -27,19 +27,20 @@ def calibrate_in_memory(
 
     def given(marker: Any) -> Any:
         if isinstance(marker, Raw):
-            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),))
+            there = getattr(session, marker.sensor) is not None
+            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if there else EMPTY
         if isinstance(marker, (Artefact, Document)):
             return found[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}
 
-    for stage in load():
+    for stage in load("mbes" if session.mbes is not None else "laser"):
         inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
         outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
         for name, marker in declared(stage.Outputs).items():
             if isinstance(marker, (Artefact, Document)):
                 key = f"{marker.owner}/{marker.name}"
                 found[key] = changed(key, getattr(outputs, name))
-        if stage.__name__ == f"stages.{until}":
+        if name_of(stage) == until:
             break
     return found
 

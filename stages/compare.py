@@ -31,7 +31,7 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
     error, sigma = errors_of(values, R_true, lever_arm_true_m), _sigma_of(values)
     lines = [f"session {result['session']}: {result['verdict']}", *(f"  {reason}" for reason in result["reasons"])]
     lines += ["", f"{chosen} (the result)"]
-    lines += _table(settings.session.mbes.mount, values, R_true, lever_arm_true_m, sigma)
+    lines += _table(settings.session.sonar.mount, values, R_true, lever_arm_true_m, sigma)
     lines += ["", f"errors of all:       {''.join(f'{name:>10}' for name, *_ in PARAMETERS)}   (deg, m)"]
     for method, other in result["methods"].items():
         lines.append(f"  {method:19}{_error_row(errors_of(other, R_true, lever_arm_true_m))}")

@@ -26,7 +26,7 @@ ALL_PASSES = -1
 @dataclass(frozen=True)
 class Config:
     fit_planes: config.FitPlanes
-    mbes: config.Mbes
+    mbes: config.Mbes | None
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,13 @@ class Outputs:
 
 def run(inputs: Inputs, config: Config) -> Outputs:
     trajectory = trajectory_in_target(inputs.poses, inputs.target_pose)
-    mount = mount_of(config.mbes.mount)
     laser = _merge(inputs.laser_labelled.fold(laser_moments))
-    lifted = _merge(inputs.soundings_labelled.fold(sounding_moments, trajectory, mount.R_body_from_sensor))
-    mbes = {key: plane_moments(m, np.eye(3), mount.lever_arm_body_m) for key, m in lifted.items()}
+    lifted: dict[Key, Array] = {}
+    mbes: dict[Key, Moments] = {}
+    if config.mbes is not None:
+        mount = mount_of(config.mbes.mount)
+        lifted = _merge(inputs.soundings_labelled.fold(sounding_moments, trajectory, mount.R_body_from_sensor))
+        mbes = {key: plane_moments(m, np.eye(3), mount.lever_arm_body_m) for key, m in lifted.items()}
     rows = [
         row
         for sensor, moments in (("laser", laser), ("mbes", mbes))

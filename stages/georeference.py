@@ -28,7 +28,7 @@ class Config:
     target: config.Target
     georeference: config.Georeference
     laser: config.Laser
-    mbes: config.Mbes
+    mbes: config.Mbes | None
 
 
 @dataclass(frozen=True)
@@ -93,19 +93,22 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
     if source == "laser_points":
         sensor, pool = _laser(t_ns, xyz(columns, "m"), prepared, config)
         valid = np.ones(len(t_ns), dtype=bool)
-    else:
+    elif config.mbes is not None:
+        mbes = config.mbes
         sensor, valid = soundings.points_in_mbes(
             columns["two_way_time_s"],
             columns["angle_rad"],
             columns["sound_speed_m_s"],
-            config.mbes.sound_speed_m_s,
-            None if config.mbes.projector_offset_m is None else np.array(config.mbes.projector_offset_m),
+            mbes.sound_speed_m_s,
+            None if mbes.projector_offset_m is None else np.array(mbes.projector_offset_m),
         )
-        mount = mount_of(config.mbes.mount)
-        if config.mbes.svp is not None:
-            sensor = _traced(t_ns, sensor, columns["sound_speed_m_s"], prepared, config)
+        mount = mount_of(mbes.mount)
+        if mbes.svp is not None:
+            sensor = _traced(t_ns, sensor, columns["sound_speed_m_s"], prepared, mbes, config.target.water_level_m)
         pool = prepared.trajectory.place(t_ns, sensor @ mount.R_body_from_sensor.T + mount.lever_arm_body_m)
         counts["angle impossible with the given sound speed"] = int((~valid).sum())
+    else:
+        raise TypeError("soundings without a sonar")
     inside = valid.copy()
     for values, low, high in zip(pool.T, prepared.box_low_m, prepared.box_high_m, strict=True):
         inside &= (values >= low) & (values <= high)
@@ -134,21 +137,28 @@ def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: C
 
 
 def _traced(
-    t_ns: NDArray[np.int64], points: Array, recorded_m_s: Array, prepared: Prepared, config: Config
+    t_ns: NDArray[np.int64],
+    points: Array,
+    recorded_m_s: Array,
+    prepared: Prepared,
+    mbes: config.Mbes,
+    water_level_m: float,
 ) -> Array:
     """Soundings in the mbes frame, their rays bent by the cast; its depths are below the water's surface."""
-    mbes, mount = config.mbes, mount_of(config.mbes.mount)
+    mount = mount_of(mbes.mount)
     cast = Cast(*np.array(mbes.svp, dtype=np.float64).T)
     positions, R_pool_from_body = prepared.trajectory.poses_at(t_ns)
     head = positions + R_pool_from_body @ mount.lever_arm_body_m
     speed = recorded_m_s if mbes.sound_speed_m_s is None else np.full(len(t_ns), mbes.sound_speed_m_s)
-    depth = config.target.water_level_m - head[:, 2]
+    depth = water_level_m - head[:, 2]
     return soundings.traced(points, speed, R_pool_from_body @ mount.R_body_from_sensor, depth, cast)
 
 
 def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
     counts = counts_table(partials)
     for source, sensor in (("laser_points", "laser"), ("soundings", "mbes")):
+        if sensor == "mbes" and config.mbes is None:
+            continue
         of_source = counts[counts["source"] == source].set_index("reason")["count"]
         if not of_source["used"]:
             why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")

@@ -46,7 +46,7 @@ class Outputs:
 
 @dataclass(frozen=True)
 class Seen:
-    """What is kept of one chunk: counts, epochs (INS records or pings; of laser points the first and last)."""
+    """What is kept of one chunk: counts, epochs (INS records or pings; of laser points one a second, and the last)."""
 
     count: int
     dropped: dict[str, int]
@@ -66,31 +66,43 @@ def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Piec
     if source == "ins":
         return Piece({}, Seen(len(t_ns), dropped, t_ns, dict(chunk.columns)))
     if source == "laser":
-        span = np.array([t_ns.min(), t_ns.max()]) if len(t_ns) else t_ns
-        return Piece({"laser_points": chunk.columns}, Seen(len(t_ns), dropped, span, {}))
+        return Piece({"laser_points": chunk.columns}, Seen(len(t_ns), dropped, _seconds(t_ns), {}))
     speed = np.asarray(chunk.columns["sound_speed_m_s"]) if len(t_ns) else np.empty(0)
     lowest, highest = (float(speed.min()), float(speed.max())) if len(speed) else (np.inf, -np.inf)
     return Piece({"soundings": chunk.columns}, Seen(len(t_ns), dropped, np.unique(t_ns), {}, lowest, highest))
 
 
 def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config: Config) -> Outputs:
-    _refuse_empty(partials)
+    _refuse_empty({sensor: seen for sensor, seen in partials.items() if sensor != "mbes" or config.recordings.mbes})
     trajectory, backwards = _trajectory([seen.trajectory for _, seen in partials["ins"] if seen.count])
     ins_t = trajectory["t_ns"].to_numpy()
-    pings = np.unique(np.concatenate([seen.epochs_ns for _, seen in partials["mbes"]]))
-    laser = np.concatenate([seen.epochs_ns for _, seen in partials["laser"]])
-    _refuse_apart({"ins": (ins_t[0], ins_t[-1]), "laser": (laser.min(), laser.max()), "mbes": (pings[0], pings[-1])})
+    epochs = {
+        sensor: np.unique(np.concatenate([seen.epochs_ns for _, seen in partials[sensor]]))
+        for sensor in ("laser", "mbes")
+        if partials[sensor]
+    }
+    _refuse_apart((ins_t[0], ins_t[-1]), {sensor: (t_ns[0], t_ns[-1]) for sensor, t_ns in epochs.items()})
+    sounded = "mbes" if "mbes" in epochs else "laser"  # by what passes are told
     pool_frame, frame = _pool_frame(trajectory, config.target_place)
     max_gap_ns = round(config.ingest.max_gap_s * NS)
     counts = _counts(partials, {"ins": backwards})
     return Outputs(
         trajectory=trajectory,
-        passes=_passes(trajectory, frame, pings, max_gap_ns, config.ingest.reversal_m),
+        passes=_passes(trajectory, frame, epochs[sounded], max_gap_ns, config.ingest.reversal_m),
         pool_frame=pool_frame,
         files=_files(partials),
-        gaps=_gaps({"ins": ins_t, "mbes": pings}, max_gap_ns),
+        gaps=_gaps({"ins": ins_t, sounded: epochs[sounded]}, max_gap_ns),
         counts=counts,
     )
+
+
+def _seconds(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first moment of each second in which there is one, and the last of all."""
+    if not len(t_ns):
+        return t_ns
+    ordered = np.sort(t_ns)
+    first = np.flatnonzero(np.diff(ordered // NS, prepend=-1))
+    return np.append(ordered[first], ordered[-1])
 
 
 def _refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
@@ -112,9 +124,9 @@ def _refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
             raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {advice}")
 
 
-def _refuse_apart(spans: dict[str, tuple[int, int]]) -> None:
-    for sensor in ("laser", "mbes"):
-        (start, end), (first, last) = spans["ins"], spans[sensor]
+def _refuse_apart(ins: tuple[int, int], spans: dict[str, tuple[int, int]]) -> None:
+    for sensor, (first, last) in spans.items():
+        start, end = ins
         if last < start or first > end:
             apart = first - start
             hint = (

@@ -14,9 +14,18 @@ from pipeline.beams import beams_in_target
 from pipeline.clouds import ClosestSurface
 from pipeline.counting import counts_table
 from pipeline.errors import RawDataError
-from pipeline.finding import VOXEL_M, FoundMount, FoundTarget, LaserSample, SoundingSample, find_mount, find_target
+from pipeline.finding import (
+    VOXEL_M,
+    FoundMount,
+    FoundTarget,
+    LaserPoses,
+    LaserSample,
+    SoundingSample,
+    find_laser,
+    find_mount,
+    find_target,
+)
 from pipeline.maths.labelling import Beams, Labels, hidden_in_part, label_points, near_planes
-from pipeline.maths.rotations import exp_so3
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory
 from pipeline.mounts import mount_of, target_of
@@ -35,7 +44,7 @@ class Config:
     target: config.Target
     segment: config.Segment
     laser: config.Laser
-    mbes: config.Mbes
+    mbes: config.Mbes | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -77,14 +86,16 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
         )
     known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
     target = find_target(dry, model, config.segment, known)
-    trajectory = trajectory_in_pool(inputs.poses).moved(
-        target.R_target_from_pool, -target.R_target_from_pool @ target.origin_pool_m
-    )
-    sample = _sounding_sample(inputs, trajectory)
-    coarse = mount_of(config.mbes.mount)
-    mount = find_mount(
-        sample, model, coarse.R_body_from_sensor, coarse.lever_arm_body_m, config.mbes, config.segment
-    )
+    in_pool = trajectory_in_pool(inputs.poses)
+    if config.mbes is None:
+        poses = _laser_poses(inputs, in_pool, lowest)
+        target, mount = find_laser(poses, target, model, mount_of(config.laser.mount), config.segment)
+    trajectory = in_pool.moved(target.R_target_from_pool, -target.R_target_from_pool @ target.origin_pool_m)
+    if config.mbes is not None:
+        coarse = mount_of(config.mbes.mount)
+        soundings = _sounding_sample(inputs, trajectory)
+        given = (coarse.R_body_from_sensor, coarse.lever_arm_body_m, config.mbes, config.segment)
+        mount = find_mount(soundings, model, *given)
     return Prepared(model, target, mount, trajectory, ClosestSurface(model))
 
 
@@ -111,6 +122,19 @@ def _thinned(batch: Batch, rows: float, lowest_m: float) -> tuple[Voxels, NDArra
     return voxel_sums(points_above(some, "pool_m", lowest_m), VOXEL_M), points_above(few, "pool_m", lowest_m)
 
 
+def _laser_poses(inputs: Inputs, trajectory: Trajectory, lowest_m: float) -> LaserPoses:
+    """At most about fifty thousand of the points, as the scanner has them."""
+    pieces = list(inputs.laser_pool.fold(_placed, _used(inputs, "laser_points") / RAW_SAMPLE, lowest_m))
+    t_ns, points = (np.concatenate([piece[k] for piece in pieces]) for k in range(2))
+    return LaserPoses(*trajectory.poses_at(t_ns), points)
+
+
+def _placed(batch: Batch, one_in: float, lowest_m: float) -> tuple[NDArray[np.int64], Array]:
+    some = every_nth(batch, one_in)
+    dry = some["z_pool_m"] >= lowest_m
+    return some["t_ns"][dry], xyz(some, "laser_m", dry)
+
+
 def _sounding_sample(inputs: Inputs, trajectory: Trajectory) -> SoundingSample:
     pieces = list(inputs.soundings_pool.fold(every_nth, _used(inputs, "soundings") / SOUNDING_SAMPLE))
     t_ns = np.concatenate([piece["t_ns"] for piece in pieces])
@@ -121,19 +145,27 @@ def _sounding_sample(inputs: Inputs, trajectory: Trajectory) -> SoundingSample:
 def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> Piece:
     if source == "laser_pool":
         return _label_laser(chunk.columns, prepared, config)
-    return _label_soundings(chunk.columns, prepared, config)
+    if config.mbes is None:
+        raise TypeError("soundings without a sonar")
+    return _label_soundings(chunk.columns, prepared, config, config.mbes)
 
 
 def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     model, segment = prepared.model, config.segment
     gate, grazing = prepared.target.gate_m, np.radians(segment.min_grazing_deg)
-    pool = xyz(batch, "pool_m")
-    points = (prepared.target.R_target_from_pool @ (pool - prepared.target.origin_pool_m).T).T
+    coarse = mount_of(config.laser.mount)
+    lever = coarse.lever_arm_body_m
+    if config.mbes is None:
+        R_body_from_laser, lever = prepared.mount.on(coarse)
+        points = prepared.trajectory.place(batch["t_ns"], xyz(batch, "laser_m") @ R_body_from_laser.T + lever)
+    else:
+        pool = xyz(batch, "pool_m")
+        points = (prepared.target.R_target_from_pool @ (pool - prepared.target.origin_pool_m).T).T
     heights = (model.water_level_m + segment.water_margin_m, np.inf)
     dry = points[:, 2] > model.water_level_m + segment.water_margin_m / 2
     near, planes = near_planes(model, points, gate, dry, "dry")
     points, t_ns = points[near], batch["t_ns"][near]
-    rays = points - prepared.trajectory.carried(t_ns, mount_of(config.laser.mount).lever_arm_body_m)
+    rays = points - prepared.trajectory.carried(t_ns, lever)
     ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
     rays /= ranges[:, None]
     labels = label_points(model, points, Beams(rays, ranges), gate, segment.margin_m, grazing, planes, heights)
@@ -147,18 +179,16 @@ def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     return Piece({"laser_labelled": columns}, counts)
 
 
-def _label_soundings(batch: Batch, prepared: Prepared, config: Config) -> Piece:
+def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: config.Mbes) -> Piece:
     model, segment, mount = prepared.model, config.segment, prepared.mount
-    coarse = mount_of(config.mbes.mount)
-    R_body_from_mbes = exp_so3(mount.rotation_vector_rad) @ coarse.R_body_from_sensor
-    lever = coarse.lever_arm_body_m + mount.lever_arm_correction_m
+    R_body_from_mbes, lever = mount.on(mount_of(mbes.mount))
     sensor = xyz(batch, "mbes_m")
     points = prepared.trajectory.place(batch["t_ns"], sensor @ R_body_from_mbes.T + lever)
     heights = (-np.inf, model.water_level_m - segment.water_margin_m)
     wet = points[:, 2] < model.water_level_m - segment.water_margin_m / 2
     near, planes = near_planes(model, points, mount.gate_m, wet, "wet")
     _, R_target_from_body = prepared.trajectory.poses_at(batch["t_ns"][near])
-    beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[near], config.mbes)
+    beams = beams_in_target(R_target_from_body, R_body_from_mbes, sensor[near], mbes)
     grazing = np.radians(segment.min_grazing_deg)
     labels = label_points(model, points[near], beams, mount.gate_m, segment.margin_m, grazing, planes, heights)
     on = np.flatnonzero(labels.face >= 0)
@@ -190,6 +220,8 @@ def _counts(
 def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
     counts = counts_table(partials)
     for source, sensor in (("laser_pool", "laser"), ("soundings_pool", "mbes")):
+        if sensor == "mbes" and config.mbes is None:
+            continue
         of_source = counts[counts["source"] == source].set_index("reason")["count"]
         if not of_source["used"]:
             why = ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")

@@ -138,7 +138,7 @@ def columns(t_ns: np.ndarray, face: np.ndarray, x: np.ndarray, suffix: str) -> d
 
 def error_of(found: Adjusted) -> np.ndarray:
     """ε of R_true = Exp(ε) R, and of the lever arm."""
-    rotation = Rotation.from_matrix(R_TRUE @ found.state.R_body_from_mbes.T).as_rotvec()
+    rotation = Rotation.from_matrix(R_TRUE @ found.state.R_body_from_sensor.T).as_rotvec()
     return np.concatenate([rotation, LEVER_TRUE - found.state.lever_arm_m])
 
 

@@ -70,7 +70,7 @@ class Body:
         return Poses(positions, T, self.rates[record])
 
     def lever_arm(self, sensor: str, state: State) -> Array:
-        return state.lever_arm_m if sensor == "mbes" else self.laser_lever_arm_m
+        return state.lever_arm_m if sensor == state.calibrated else self.laser_lever_arm_m
 
 
 @dataclass(frozen=True)

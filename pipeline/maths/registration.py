@@ -105,6 +105,35 @@ class MountCorrection:
         return np.hstack([np.cross(turned, g), g])
 
 
+@dataclass(frozen=True)
+class LaserMount:
+    """Laser points with poses (n, 3), (n, 3, 3) in the pool frame, m = R_body_from_laser(coarse) x_laser (n, 3);
+    parameters (azimuth correction β, origin o of the target in pool, rotation vector δ, lever arm correction): where
+    the target stands and how the laser sits: x_target = Rz(β) (p + T (Exp(δ) m + l + Δl) - o).
+    """
+
+    positions_m: Array
+    R_pool_from_body: Array
+    points_body_m: Array
+    lever_arm_m: Array
+    prior_sigmas: Array
+
+    def points(self, parameters: Array) -> Array:
+        return (self._in_pool(parameters) - parameters[1:4]) @ rotation_z(parameters[0]).T
+
+    def _in_pool(self, parameters: Array) -> Array:
+        body = self.points_body_m @ exp_so3(parameters[4:7]).T + self.lever_arm_m + parameters[7:]
+        return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_pool_from_body, body))
+
+    def rows(self, parameters: Array, directions: Array) -> Array:
+        placed = self.points(parameters)
+        turn = directions[:, 1] * placed[:, 0] - directions[:, 0] * placed[:, 1]
+        in_pool = directions @ rotation_z(parameters[0])
+        g = np.einsum("nij,ni->nj", self.R_pool_from_body, in_pool)
+        turned = self.points_body_m @ exp_so3(parameters[4:7]).T
+        return np.column_stack([turn, -in_pool, np.cross(turned, g), g])
+
+
 def _some(count: int, most: int) -> NDArray[np.int64]:
     """Which points: by chance, since every so-and-so-many-th of a grid could be one row of it; in their order."""
     return np.sort(np.random.default_rng(0).permutation(count)[:most])

@@ -37,12 +37,31 @@ class Solution:
     def total(self, sigmas: Array, *blocks: tuple[Integers, Array]) -> Array:
         """Covariance with considered errors: sigmas (u,) of the held ones, independent; ``blocks`` of them (numbers
         among all unknowns, covariance) that are not."""
+        return self.covariance_of(self.free, sigmas, *blocks)
+
+    def covariance_of(self, numbers: Integers, sigmas: Array, *blocks: tuple[Integers, Array]) -> Array:
+        """The same of any unknowns (k,): those that are held have their considered error alone, through which those
+        that are free depend on them."""
         Q = np.diag(sigmas[self.held] ** 2)
-        for numbers, covariance in blocks:
-            place = np.searchsorted(self.held, numbers)
+        for among, covariance in blocks:
+            place = np.searchsorted(self.held, among)
             Q[np.ix_(place, place)] = covariance
-        found = self.covariance + self.sensitivity @ Q @ self.sensitivity.T
+        owed, noise = self.depends(numbers), np.zeros((len(numbers), len(numbers)))
+        free = np.flatnonzero(np.isin(numbers, self.free))
+        place = np.searchsorted(self.free, np.asarray(numbers)[free])
+        noise[np.ix_(free, free)] = self.covariance[np.ix_(place, place)]
+        found = noise + owed @ Q @ owed.T
         return np.asarray((found + found.T) / 2)
+
+    def depends(self, numbers: Integers) -> Array:
+        """By how much unknowns (k,) change with the errors of those held, (k, u - f): S, or they themselves."""
+        rows = np.zeros((len(numbers), len(self.held)))
+        for row, number in enumerate(np.asarray(numbers).tolist()):
+            if number in self.free:
+                rows[row] = self.sensitivity[int(np.searchsorted(self.free, number))]
+            else:
+                rows[row, int(np.searchsorted(self.held, number))] = 1.0
+        return rows
 
 
 def solve(normal: Array, right: Array, free: Sequence[int]) -> Solution:

@@ -6,12 +6,15 @@
 * of each surface family two turns of the normal (rad) and a shift (m), shared by both sensors;
 * of each family's wet faces a further two turns and a shift: how they stand off from the dry ones, as built.
 
+Where the laser itself is calibrated there is no sonar: the six are the laser's, and nothing is wet.
+
 The six and the surfaces are estimated. The others are held at zero, estimated where the config frees them, and in any
 case *considered*: an error of theirs within its sigma is carried into the total covariance.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +25,13 @@ from pipeline.maths.targets import LEVEL
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Sensor = Literal["mbes", "laser"]
 
 NAMES = ("rotation_x", "rotation_y", "rotation_z", "lever_arm_x", "lever_arm_y", "lever_arm_z")
 SIX = len(NAMES)
 OF_MBES = (*NAMES, "mbes_latency", "mbes_range", "sound_speed", "sound_speed_gradient")
 OF_LASER = (*(f"laser_{name}" for name in NAMES), "laser_latency", "laser_range")
+LASER_ALONE = (*NAMES, "laser_latency", "laser_range")
 OF_SURFACE = ("turn_1", "turn_2", "shift")
 
 
@@ -68,24 +73,36 @@ class Surface:
 
 @dataclass(frozen=True)
 class State:
-    """Current values: the mount, the surfaces, and ``other`` (u - 6 - 3 s,), the rest of :meth:`names`, in order."""
+    """Current values: the mount of the sensor that is calibrated, the surfaces, and ``other`` (u - 6 - 3 s,), the rest
+    of :meth:`names`, in order."""
 
-    R_body_from_mbes: Array
+    R_body_from_sensor: Array
     lever_arm_m: Array
     surfaces: tuple[Surface, ...]
     other: Array
+    calibrated: Sensor = "mbes"
 
     @classmethod
-    def at(cls, R_body_from_mbes: Array, lever_arm_m: Array, surfaces: Sequence[Surface]) -> "State":
-        others = len(OF_MBES) - SIX + len(OF_LASER) + len(OF_SURFACE) * len(surfaces)
-        return cls(R_body_from_mbes, lever_arm_m, tuple(surfaces), np.zeros(others))
+    def at(
+        cls, R_body_from_sensor: Array, lever_arm_m: Array, surfaces: Sequence[Surface], calibrated: Sensor = "mbes"
+    ) -> "State":
+        first = cls(R_body_from_sensor, lever_arm_m, tuple(surfaces), np.empty(0), calibrated)
+        return replace(first, other=np.zeros(first.size - SIX - len(OF_SURFACE) * len(surfaces)))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of all unknowns, in their order."""
         families = [surface.family for surface in self.surfaces]
         shared = [f"{family}_{name}" for family in families for name in OF_SURFACE]
+        if self.calibrated == "laser":
+            return (*LASER_ALONE, *shared)
         return (*OF_MBES, *OF_LASER, *shared, *(f"wet_{name}" for name in shared))
+
+    @property
+    def _of_sensors(self) -> tuple[int, int]:
+        """How many unknowns are those of the calibrated sensor, and of it and the other."""
+        own = len(LASER_ALONE if self.calibrated == "laser" else OF_MBES)
+        return own, own + (0 if self.calibrated == "laser" else len(OF_LASER))
 
     @property
     def size(self) -> int:
@@ -94,18 +111,18 @@ class State:
     @property
     def shared(self) -> slice:
         """Where the surfaces shared by both sensors stand."""
-        first = len(OF_MBES) + len(OF_LASER)
+        _, first = self._of_sensors
         return slice(first, first + len(OF_SURFACE) * len(self.surfaces))
 
     def columns(self, sensor: str, surface: int) -> Integers:
         """The unknowns that one sensor's observations of one surface depend on, in the order of the design."""
-        own = len(OF_MBES), len(OF_MBES) + len(OF_LASER)
-        first = own[1] + len(OF_SURFACE) * surface
+        own, both = self._of_sensors
+        first = both + len(OF_SURFACE) * surface
         shared = np.arange(first, first + len(OF_SURFACE))
-        if sensor == "laser":
-            return np.concatenate([shared, np.arange(*own)])
-        wet = shared + len(OF_SURFACE) * len(self.surfaces)
-        return np.concatenate([shared, np.arange(own[0]), wet])
+        if sensor != self.calibrated:
+            return np.concatenate([shared, np.arange(own, both)])
+        wet = shared + len(OF_SURFACE) * len(self.surfaces) if sensor == "mbes" else shared[:0]
+        return np.concatenate([shared, np.arange(own), wet])
 
     def values_of_other(self) -> Array:
         """``other`` in the places of all unknowns (u,), zero elsewhere."""
@@ -119,9 +136,10 @@ class State:
     def moved(self, step: Array) -> "State":
         """By a step of all unknowns (u,)."""
         shared = step[self.shared].reshape(-1, len(OF_SURFACE))
-        return State(
-            exp_so3(step[:3]) @ self.R_body_from_mbes,
-            self.lever_arm_m + step[3:SIX],
-            tuple(surface.moved(*turns) for surface, turns in zip(self.surfaces, shared, strict=True)),
-            self.other + np.concatenate([step[SIX : self.shared.start], step[self.shared.stop :]]),
+        return replace(
+            self,
+            R_body_from_sensor=exp_so3(step[:3]) @ self.R_body_from_sensor,
+            lever_arm_m=self.lever_arm_m + step[3:SIX],
+            surfaces=tuple(surface.moved(*turns) for surface, turns in zip(self.surfaces, shared, strict=True)),
+            other=self.other + np.concatenate([step[SIX : self.shared.start], step[self.shared.stop :]]),
         )

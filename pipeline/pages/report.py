@@ -69,7 +69,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         frame=tables.table(artefacts.POOL_FRAME).to_dict("records")[0],
         largest=_largest(tables.table(artefacts.CELLS)),
         tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
-        given_speed=settings.session.mbes.sound_speed_m_s,
+        given_speed=settings.session.sonar.sound_speed_m_s,
         speeds=_speeds(files),
         methods=METHODS,
         by_method=list(_by_method(calibrations)),

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.config import Mount
 from pipeline.simulation.earth import Floats
 from pipeline.simulation.noise import generator
-from pipeline.simulation.scenario import MbesScenario
+from pipeline.simulation.scenario import LaserScenario, MbesScenario
 
 
 def R_body_from_sensor(mount: Mount) -> Rotation:
@@ -18,17 +18,18 @@ def lever_arm_m(mount: Mount) -> Floats:
     return np.array([mount.x_m, mount.y_m, mount.z_m])
 
 
-def coarse_error(scenario: MbesScenario, seed: int) -> Mount:
+def coarse_error(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
     """Coarse minus true: as given, or of the given sizes with random signs."""
     if scenario.coarse_error is not None:
         return scenario.coarse_error
-    signs = generator(seed, "coarse").choice([-1.0, 1.0], 6)
+    noise = "coarse" if isinstance(scenario, MbesScenario) else "coarse_laser"
+    signs = generator(seed, noise).choice([-1.0, 1.0], 6)
     sizes = [scenario.coarse_angle_deg] * 3 + [scenario.coarse_lever_m] * 3
     names = Mount.model_fields
     return Mount(**{name: float(sign * size) for name, sign, size in zip(names, signs, sizes, strict=True)})
 
 
-def coarse_mount(scenario: MbesScenario, seed: int) -> Mount:
+def coarse_mount(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
     """What session.yaml says."""
     true, error = scenario.mount.model_dump(), coarse_error(scenario, seed).model_dump()
     return Mount(**{name: round(true[name] + error[name], 12) for name in true})

@@ -77,7 +77,10 @@ class InsScenario(Model):
 
 
 class LaserScenario(Model):
-    mount: Mount = Mount(roll_deg=0.35, pitch_deg=-0.22, yaw_deg=0.41, x_m=0.21, y_m=0.48, z_m=1.10)
+    mount: Mount = Mount(roll_deg=0.35, pitch_deg=-0.22, yaw_deg=0.41, x_m=0.21, y_m=0.48, z_m=1.10)  # the truth
+    coarse_angle_deg: NotNegative = 0.0  # error of each angle in session.yaml, its sign random
+    coarse_lever_m: NotNegative = 0.0  # the same of the lever arm
+    coarse_error: Mount | None = None  # instead: the six errors, session.yaml's minus true
     point_rate_hz: Annotated[float, Field(ge=1, le=1e6)] = 20000.0
     line_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 50.0
     field_deg: tuple[Angle, Angle] = (30.0, 130.0)  # from the scanner's zenith

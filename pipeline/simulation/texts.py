@@ -27,7 +27,7 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
     about_laser: Text = {"files": [f"laser/*.{laser.format}"], "format": "las"}
     if laser.time == "week_seconds":
         about_laser["gps_week"] = movement.starts_ns[0] // WEEK_NS
-    about_laser |= {"frame": laser.frame, "mount": laser.mount.model_dump()}
+    about_laser |= {"frame": laser.frame, "mount": coarse_mount(laser, seed).model_dump()}
     about_laser["latency_s"] = laser.latency_declared_s
     about_mbes: Text = {
         "files": [f"mbes/*.{mbes.format}"],
@@ -76,6 +76,11 @@ def truth_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
             "lever_arm_m": lever_arm_m(mount).tolist(),
         },
         "coarse_error": error.model_dump(),
+        "laser": {
+            "mount": scenario.laser.mount.model_dump(),
+            "R_body_from_laser": R_body_from_sensor(scenario.laser.mount).as_matrix().tolist(),
+            "lever_arm_m": lever_arm_m(scenario.laser.mount).tolist(),
+        },
         "target": {"origin": scenario.target.origin.model_dump(), "azimuth_deg": scenario.azimuth_deg},
         "sound_speed_true_m_s": mbes.sound_speed_true_m_s,
         "sound_speed_recorded_m_s": mbes.sound_speed_recorded_m_s,

@@ -134,7 +134,9 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
 
     session = read_settings(tables.run).session
     trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
-    mounts = {"laser": mount_of(session.laser.mount), "mbes": _calibrated(tables, mount_of(session.mbes.mount))}
+    mounts = {"laser": mount_of(session.laser.mount)}
+    calibrated = "laser" if session.mbes is None else "mbes"
+    mounts[calibrated] = _calibrated(tables, mount_of((session.mbes or session.laser).mount))
     for (sensor, number), rows in residuals.groupby(["sensor", "pass"], sort=True):
         t_ns = rows["t_ns"].to_numpy()
         middle = int(np.median(t_ns))

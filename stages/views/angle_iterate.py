@@ -29,7 +29,7 @@ def log(recording: Any, tables: Tables) -> None:
     import rerun as rr
 
     faces, iterations = tables.table(artefacts.FACES), tables.table(artefacts.ITERATIONS)
-    mount = mount_of(read_settings(tables.run).session.mbes.mount)
+    mount = mount_of(read_settings(tables.run).session.sonar.mount)
     trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
     columns, step = tables.sample(
         artefacts.SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", "face", *(f"{axis}_mbes_m" for axis in "xyz")

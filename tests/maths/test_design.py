@@ -26,7 +26,7 @@ LASER_LEVER = np.array([0.2, 0.5, 1.1])
 def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.ndarray) -> Any:
     """v of points x (n, 3) in the sensor's frame, seen from a pose in error; nothing linear here but the pose error."""
     other = dict(zip(state.names, state.values_of_other(), strict=True))
-    R, lever, prefix = state.R_body_from_mbes, state.lever_arm_m, ""
+    R, lever, prefix = state.R_body_from_sensor, state.lever_arm_m, ""
     if sensor == "laser":
         prefix = "laser_"
         turn = np.array([other[f"laser_rotation_{axis}"] for axis in "xyz"])

@@ -1,0 +1,66 @@
+"""The laser's own fine calibration: what the target's design tells, and which of the six these passes can give."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.maths.rigid_design import Design
+from pipeline.maths.solution import solve
+from pipeline.maths.targets import TargetModel
+from pipeline.maths.unknowns import SIX
+
+Array = NDArray[np.float64]
+VAGUE = 10.0  # rad or m: what is known of an unknown before any point, where nothing is
+
+
+def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: config.LaserFit) -> Design:
+    """The target by design in the frame in which it was found; where it was surveyed to stand, there."""
+    planes = {}
+    for family in model.families:
+        corners = [model.faces[k].vertices_m - model.faces[k].offset_m * family.normal for k in family.faces]
+        planes[family.name] = family.normal, np.concatenate(corners).mean(axis=0)
+    pose = target_pose.iloc[0]
+    R_target_from_pool = np.array(pose["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
+    origin = np.array([pose[f"origin_{axis}_pool_m"] for axis in "xyz"], dtype=np.float64)
+    turned = np.radians(float(pose["azimuth_correction_deg"]))
+    place = settings.origin_sigma_m
+    heading, plumb = settings.azimuth_sigma_deg, np.radians(settings.plumb_sigma_deg)
+    heading_rad = np.inf if heading is None else np.radians(heading)
+    sigma = [np.inf if place is None else place] * 3 + [plumb, plumb, heading_rad]
+    return Design(
+        planes,
+        float(np.radians(settings.face_sigma_deg)),
+        settings.face_sigma_m,
+        np.r_[-R_target_from_pool @ origin, 0.0, 0.0, turned],
+        np.array(sigma),
+    )
+
+
+def coarse_covariance(laser: config.Laser, settings: config.LaserFit) -> Array:
+    """How sure the coarse mount is, (6, 6) in rad and m."""
+    sigma = np.repeat([np.radians(settings.coarse_sigma_deg), settings.coarse_sigma_m], 3)
+    return np.diag(sigma**2)
+
+
+def held_of(normal: Array, free: Sequence[int], coarse: Array, share: float) -> list[int]:
+    """Which of the six to hold: those that come out no surer than ``share`` of their coarse sigma (6,), the worst
+    first, until the others do.
+
+    What is held is no longer in the others' way: two that only together cannot be told apart are one too many.
+    """
+    held: list[int] = []
+    while len(held) < SIX:
+        left = [number for number in free if number not in held]
+        prior = np.zeros(len(normal))
+        prior[left] = VAGUE**-2
+        found = solve(normal + np.diag(prior), np.zeros(len(normal)), left)
+        six = [k for k in range(SIX) if k not in held]
+        sigma = np.sqrt(np.diag(found.covariance))[: len(six)]
+        worst = int(np.argmax(sigma / coarse[six]))
+        if sigma[worst] <= share * coarse[six[worst]]:
+            break
+        held.append(six[worst])
+    return sorted(held)

@@ -1,0 +1,79 @@
+"""The laser's own fine calibration: its points lie on the target's planes, which stand as designed, or surveyed."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+
+from pipeline import artefacts, config
+from pipeline.adjusting import Adjusted, Given, adjust, free_unknowns, noise_of
+from pipeline.considered import considered_of
+from pipeline.laser_fit import coarse_covariance, design_of, held_of
+from pipeline.looking import look
+from pipeline.maths.unknowns import SIX
+from pipeline.mounts import PARAMETERS, mount_of, target_of
+from pipeline.outcome import tables
+from pipeline.residuals import bins_table, map_table
+from pipeline.scene import laser_scene_of
+from pipeline.streams import Stream
+from stages.adjust import SHOWN, Outputs
+
+__all__ = ["Config", "Inputs", "Outputs", "run"]
+
+
+@dataclass(frozen=True)
+class Config:
+    target: config.Target
+    segment: config.Segment
+    adjust: config.Adjust
+    laser_fit: config.LaserFit
+    ingest: config.Ingest
+    as_built: config.AsBuilt
+    ins: config.Ins
+    laser: config.Laser
+
+
+@dataclass(frozen=True)
+class Inputs:
+    passes: Annotated[pd.DataFrame, artefacts.PASSES]
+    faces: Annotated[pd.DataFrame, artefacts.FACES]
+    poses: Annotated[pd.DataFrame, artefacts.POSES]
+    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
+    planes: Annotated[pd.DataFrame, artefacts.PLANES]
+    laser_labelled: Annotated[Stream, artefacts.LASER_LABELLED]
+
+
+def run(inputs: Inputs, config: Config) -> Outputs:
+    settings, fit = config.adjust, config.laser_fit
+    model, coarse = target_of(config.target), coarse_covariance(config.laser, fit)
+    given = (model, inputs.poses, inputs.target_pose, inputs.planes)
+    scene = laser_scene_of(*given, config.ins, config.laser, config.as_built.faces)
+    free = free_unknowns(scene.coarse, settings.free)
+
+    def held(normal: np.ndarray) -> list[int]:
+        return held_of(normal, free, np.sqrt(np.diag(coarse)), fit.hold_share)
+
+    streams = {"laser": inputs.laser_labelled}
+    known = Given(noise_of(config.ins), design_of(model, inputs.target_pose, fit), held)
+    found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
+    seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
+    sigmas = considered_of(found.state.names, config.laser, None, config.as_built)
+    kept = np.setdiff1d(np.arange(SIX), found.solution.free)
+    sigmas[kept] = np.sqrt(np.diag(coarse))[kept]
+    blocks = [(kept, coarse[np.ix_(kept, kept)])] if len(kept) else []
+    mount = mount_of(config.laser.mount)
+    return Outputs(
+        **tables(found, seen.cells, sigmas, mount, settings, inputs.poses, inputs.passes, *blocks),
+        geometry=_geometry_table(found),
+        patterns=seen.patterns,
+        residuals=seen.residuals,
+        residual_bins=bins_table(seen.residuals, inputs.faces),
+        residual_map=map_table(seen.residuals, inputs.faces),
+    )
+
+
+def _geometry_table(found: Adjusted) -> pd.DataFrame:
+    """Which of the six are held."""
+    kept = [name for name, place, *_ in PARAMETERS if place not in found.solution.free]
+    return pd.DataFrame([("held", name) for name in kept], columns=["kind", "words"])
