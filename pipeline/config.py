@@ -137,6 +137,7 @@ class Verdict(Model):
     max_sigma_m: Positive = 0.005
 
 
+Calibrated = Literal["mbes", "laser"]
 Method = Literal["patent_sequential", "patent_alternating", "adjustment"]
 
 
@@ -281,6 +282,11 @@ class SessionConfig(Model):
     ins: Ins
     laser: Laser
     mbes: Mbes | None = None  # none: only the laser can be calibrated
+
+    @property
+    def calibrated(self) -> Calibrated:
+        """What is calibrated: the laser, where there is no sonar."""
+        return "laser" if self.mbes is None else "mbes"
 
     @property
     def sonar(self) -> Mbes:

@@ -49,8 +49,11 @@ class Settings:
         return {**self.pool.model_dump(mode="json"), **self.session.model_dump(mode="json")}
 
 
-def load_settings(session_folder: Path, config_path: Path) -> Settings:
-    """Both YAML files, read and checked."""
+def load_settings(
+    session_folder: Path, config_path: Path, calibrated: config.Calibrated | None = "mbes"
+) -> Settings:
+    """Both YAML files, read and checked, for calibrating the sonar, or the laser by itself: of a session with both the
+    sonar is left out then. None: whatever the session can."""
     pool = config.load_pool(config_path)
     try:
         target_of(pool.target)
@@ -58,6 +61,11 @@ def load_settings(session_folder: Path, config_path: Path) -> Settings:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_faces(pool, config_path)
     session = config.load_session(session_folder)
+    if calibrated == "laser":
+        session = session.model_copy(update={"mbes": None})
+    elif calibrated == "mbes" and session.mbes is None:
+        where = session_folder / "session.yaml"
+        raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
         refuse_cast(pool.target, session.mbes, session_folder / "session.yaml")
     return Settings(session_folder.resolve(), pool, session)
@@ -96,6 +104,21 @@ def refuse_folders(run: Path, session_folder: Path) -> None:
     inner, outer = run.resolve(), session_folder.resolve()
     if inner.is_relative_to(outer) or outer.is_relative_to(inner):
         raise ConfigError(f"--run {run}: lies in the session folder {session_folder}, or round it; name a folder apart")
+
+
+def holds_run(run: Path) -> bool:
+    """Whether it is a run folder."""
+    return (run / RUN_YAML).is_file()
+
+
+def refuse_other(run: Path, calibrated: config.Calibrated) -> None:
+    """A run folder is the sonar's or the laser's, not both in turn."""
+    if not holds_run(run):
+        return
+    was = read_settings(run).session.calibrated
+    if was != calibrated:
+        what = {"mbes": "the sonar", "laser": "the laser"}[was]
+        raise ArtefactError(f"{run}: holds a calibration of {what}; name another folder")
 
 
 # --- run.yaml --------------------------------------------------------------------------------------------------------

@@ -45,9 +45,16 @@ def coarse_covariance(laser: config.Laser, settings: config.LaserFit) -> Array:
     return np.diag(sigma**2)
 
 
-def held_of(normal: Array, free: Sequence[int], coarse: Array, share: float) -> list[int]:
-    """Which of the six to hold: those that come out no surer than ``share`` of their coarse sigma (6,), the worst
-    first, until the others do.
+def bounds_of(coarse: Array, settings: config.LaserFit, limits: config.Verdict) -> Array:
+    """Sigmas (6,) that the six must come out with to be found: within the verdict's limits, and surer than they were;
+    ``coarse`` (6, 6)."""
+    wanted = np.repeat([np.radians(limits.max_sigma_deg), limits.max_sigma_m], 3)
+    return np.asarray(np.minimum(wanted, settings.hold_share * np.sqrt(np.diag(coarse))))
+
+
+def held_of(normal: Array, free: Sequence[int], bounds: Array) -> list[int]:
+    """Which of the six to hold: those whose sigma would be above its bound (6,), the worst first, until the others'
+    are not.
 
     What is held is no longer in the others' way: two that only together cannot be told apart are one too many.
     """
@@ -59,8 +66,8 @@ def held_of(normal: Array, free: Sequence[int], coarse: Array, share: float) -> 
         found = solve(normal + np.diag(prior), np.zeros(len(normal)), left)
         six = [k for k in range(SIX) if k not in held]
         sigma = np.sqrt(np.diag(found.covariance))[: len(six)]
-        worst = int(np.argmax(sigma / coarse[six]))
-        if sigma[worst] <= share * coarse[six[worst]]:
+        worst = int(np.argmax(sigma / bounds[six]))
+        if sigma[worst] <= bounds[six[worst]]:
             break
         held.append(six[worst])
     return sorted(held)

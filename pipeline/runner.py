@@ -14,6 +14,7 @@ from typing import Any
 
 from pipeline import folder, manifest, readers, store
 from pipeline.artefacts import Artefact, Document, Provenance, Raw
+from pipeline.config import Calibrated
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.evaluate import declared, evaluate, is_stream, name_of, sources
 from pipeline.executor import SERIAL, Stopped, Workers
@@ -33,11 +34,13 @@ def run(
     workers: Workers = SERIAL,
     progress: Progress | None = None,
     finished: Callable[[str], object] = lambda _: None,
+    calibrated: Calibrated = "mbes",
 ) -> list[str]:
     """Bring every stage up to date; the names of those that had to be run, each told to ``finished`` in its turn."""
-    settings = folder.load_settings(session_folder, config_path)
+    settings = folder.load_settings(session_folder, config_path, calibrated)
     folder.refuse_folders(run_folder, session_folder)
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
+        folder.refuse_other(run_folder, calibrated)
         folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
         first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)

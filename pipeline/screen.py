@@ -22,28 +22,37 @@ def summary(calibration: Mapping[str, Any]) -> str:
     rejected = calibration["verdict"] == "rejected"
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
     lines += [f"  but look: {warning}" for warning in calibration["warnings"]]
-    heads = f"{'mbes mount':<12}{'coarse':>12}{'computed' if rejected else 'calibrated':>14}{'change':>14}{'sigma':>12}"
-    heads += f"{'total':>12}"
+    sensor = calibration.get("calibrated", "mbes")
+    heads = f"{sensor + ' mount':<12}{'coarse':>12}{'computed' if rejected else 'calibrated':>14}"
+    heads += f"{'change':>14}{'sigma':>12}{'total':>12}"
     lines += ["", f"{heads}   (result: {calibration['result']})"]
-    block, coarse = calibration["mbes"], calibration["coarse"]["mount"]
+    block, coarse, held = calibration[sensor], calibration["coarse"]["mount"], calibration.get("held", [])
     for parameter, _, key, of_setting in PARAMETERS:
         unit = "°" if of_setting == "deg" else of_setting
         total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
         change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
         names = ("sigma_mount", "sigma_mount_total")
         sigmas = [f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in names]
+        if parameter in held:
+            change, sigmas[0] = "held", "-"
         lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigmas[0]:>12}{sigmas[1]:>12}")
     use = "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."
     lines += ["", "Do not use these values." if rejected else use]
     if block["sigma_mount"]:
-        lines.append("sigma: from noise, relative to the laser; total: with what does not average.")
+        relative = "relative to the laser" if sensor == "mbes" else "with what is known of the target"
+        lines.append(f"sigma: from noise, {relative}; total: with what does not average.")
     if not block["sigma_mount"] and calibration["result"] != "adjustment":
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
     lines += [f"Free: {one['words']}." for one in calibration["free"].values()]
     lines.append(_target_line(calibration["target"]))
-    lines.append("Points on the target by pass, distance of the INS from the wall, soundings + laser points:")
+    what = "soundings + laser points" if sensor == "mbes" else "laser points"
+    lines.append(f"Points on the target by pass, distance of the INS from the wall, {what}:")
     seen = [p for p in calibration["passes"] if p["soundings"] or p["laser_points"]]
-    listed = (f"{p['pass']}: {p['distance_m']:.1f} m {p['soundings']} + {p['laser_points']}" for p in seen)
+    both = sensor == "mbes"
+    listed = (
+        f"{p['pass']}: {p['distance_m']:.1f} m {str(p['soundings']) + ' + ' if both else ''}{p['laser_points']}"
+        for p in seen
+    )
     lines += textwrap.wrap(", ".join(listed), 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
     for key in ("weakest", "advice"):
         if calibration["geometry"][key]:

@@ -1,8 +1,8 @@
 """Accepted or rejected, and why: each reason names its evidence."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -68,12 +68,13 @@ class Settings:
     farthest: tuple[float, float]
     drift_doubt: str
     shape: str
+    calibrated: Literal["mbes", "laser"] = "mbes"
 
 
 def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settings: Settings) -> list[str]:
     """Why the calibration is rejected; empty: accepted. Where labels are in doubt, nothing else is judged."""
     limits, chosen = settings.limits, settings.chosen
-    doubts = _ambiguities(evidence, settings.farthest, settings.shape)
+    doubts = _ambiguities(evidence, settings)
     if doubts:
         return doubts
     found = []
@@ -90,14 +91,17 @@ def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settin
     if (tests or likely) and settings.drift_doubt:
         found.append(settings.drift_doubt)
     found += likely + _away(evidence.freed)
-    found += _wide_sigmas(methods["adjustment"]["sigma_mount_total"], limits)
+    held = set(evidence.geometry.loc[evidence.geometry["kind"] == "held", "words"])
+    if len(held) == len(PARAMETERS):
+        found.append("none of the six can be found: this target and these passes cannot give any within its limit")
+    found += _wide_sigmas(methods["adjustment"]["sigma_mount_total"], limits, held)
     if chosen != "adjustment":
         found += _patent(chosen, evidence.corrections.set_index("method").loc[chosen], methods, limits)
     return found
 
 
-def _ambiguities(evidence: Evidence, farthest: tuple[float, float], shape: str) -> list[str]:
-    found = []
+def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
+    found, farthest, shape = [], settings.farthest, settings.shape
     pose, mount = evidence.target_pose.iloc[0], evidence.provisional_mount.iloc[0]
     if pose["ambiguous"]:
         better = pose["rival_agreement_m2"] > pose["agreement_m2"]
@@ -113,7 +117,13 @@ def _ambiguities(evidence: Evidence, farthest: tuple[float, float], shape: str) 
             "no pose of the target within the search limits fits the laser points: target.origin or target.azimuth_deg "
             "is farther off than segment.search_... allow"
         )
-    if not mount["within"]:
+    if not mount["within"] and settings.calibrated == "laser":
+        found.append(
+            f"no mount of the laser within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings its points "
+            f"onto the target{_beyond(mount, farthest)}: laser.mount is farther off than segment.search_laser_deg and "
+            f"search_laser_m allow, or {shape} are wrong"
+        )
+    elif not mount["within"]:
         found.append(
             f"no mount within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings the soundings onto the "
             f"target{_beyond(mount, farthest)}: mbes.mount is farther off than segment.search_mount_deg and "
@@ -216,15 +226,15 @@ def _away(freed: pd.DataFrame) -> list[str]:
     ]
 
 
-def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict) -> list[str]:
+def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict, held: Collection[str]) -> list[str]:
     if sigma is None:
         return ["the adjustment has no covariance"]
     bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
     return [
         f"total sigma of {SIX[place]} is {sigma[key]:.4g}{bounds[unit][1]}, above the limit of "
         f"{bounds[unit][0]:g}{bounds[unit][1]}"
-        for _, place, key, unit in PARAMETERS
-        if not sigma[key] <= bounds[unit][0]
+        for name, place, key, unit in PARAMETERS
+        if name not in held and not sigma[key] <= bounds[unit][0]
     ]
 
 

@@ -1,13 +1,29 @@
 """The stages, one module each, in the order in which they run."""
 
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
-from typing import Literal
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pipeline.config import Calibrated
 
 ORDER = ("ingest", "georeference", "segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")
 LASER = ("ingest", "georeference", "segment", "fit_planes", "laser.adjust", "laser.report")  # calibrates the laser
 
 
-def load(calibrated: Literal["mbes", "laser"] = "mbes") -> tuple[ModuleType, ...]:
+def load(calibrated: "Calibrated" = "mbes") -> tuple[ModuleType, ...]:
     """The modules of ORDER, or of LASER; late, for they import numpy and pandas."""
     return tuple(import_module(f"stages.{name}") for name in (ORDER if calibrated == "mbes" else LASER))
+
+
+def names_in(run: Path) -> tuple[str, ...]:
+    """The stages of what a run folder calibrates, by their folders' names."""
+    return ORDER if calibrated_in(run) == "mbes" else tuple(name.rpartition(".")[2] for name in LASER)
+
+
+def calibrated_in(run: Path) -> "Calibrated":
+    """What the run in this folder calibrates."""
+    from pipeline.folder import read_settings
+
+    return read_settings(run).session.calibrated

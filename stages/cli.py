@@ -1,7 +1,6 @@
 """The command line: thin. Imports what computes only inside the command that computes."""
 
 import os
-import shlex
 import signal
 import sys
 import traceback
@@ -15,12 +14,13 @@ import typer
 import pipeline
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.progress import say
-from stages import ORDER, load
+from stages import ORDER, calibrated_in, load, names_in
+from stages.saying import answer_of, say_failures, say_where
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
-    from stages.drawing import Failure, Painters
+    from pipeline.config import Calibrated
+    from stages.drawing import Painters
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 STOPPED = "poolcal: interrupted; what was complete is kept"
@@ -91,6 +91,19 @@ def run(
     report: Report = True,
 ) -> int:
     """Run all stages that are out of date, and say why each is."""
+    return _run(session, config, run_folder, jobs, executor, recordings, report, "mbes")
+
+
+def _run(
+    session: Path,
+    config: Path,
+    run_folder: Path,
+    jobs: int | None,
+    executor: str | None,
+    recordings: bool,
+    report: bool,
+    calibrated: "Calibrated",
+) -> int:
     from pipeline import runner
     from pipeline.executor import workers
     from pipeline.progress import Progress
@@ -98,11 +111,28 @@ def run(
 
     with workers(jobs, executor) as pool, painters(report, recordings, pool.jobs > 1) as drawing:
         finished = partial(_go_on, drawing, run_folder)
-        runner.run(load(), session, config, run_folder, pool, Progress(), finished)
-        status = _answer(run_folder)
-        _say_failures(drawing.draw(run_folder), "; the calibration is complete")
-    _say_where(run_folder)
+        runner.run(load(calibrated), session, config, run_folder, pool, Progress(), finished, calibrated)
+        status = answer_of(run_folder)
+        say_failures(drawing.draw(run_folder), "; the calibration is complete")
+    say_where(run_folder)
     return status
+
+
+@app.command()
+def laser(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", help="folder with session.yaml and the raw files")],
+    config: Annotated[Path, typer.Option("--config", metavar="CONFIG", help="the pool's YAML file")],
+    run_folder: Annotated[Path, typer.Option("--run", metavar="RUN", help="folder for the results")],
+    jobs: Jobs = None,
+    executor: Address = None,
+    recordings: Recordings = True,
+    report: Report = True,
+) -> int:
+    """Calibrate the laser itself, from its own passes at the target.
+
+    Of its three angles and lever arm what this target and these passes can give; the rest is held, and said so.
+    """
+    return _run(session, config, run_folder, jobs, executor, recordings, report, "laser")
 
 
 @app.command()
@@ -129,11 +159,14 @@ def stage(
         raise ConfigError(f"NAME {name!r}: is no stage; the stages are {', '.join(ORDER)}")
     if (session is None) != (config is None):
         raise ConfigError("--session and --config: give both, or neither to use those in RUN/run.yaml")
-    settings = folder.load_settings(session, config) if session is not None and config is not None else None
+    calibrated = calibrated_in(run_folder) if folder.holds_run(run_folder) else "mbes"
+    settings = None
+    if session is not None and config is not None:
+        settings = folder.load_settings(session, config, calibrated)
     with workers(jobs, executor) as pool:
-        runner.run_stage(load(), name, run_folder, settings, pool, Progress())
-    status = _answer(run_folder) if name == ORDER[-1] else 0
-    _say_failures(Painters(report, recordings).draw(run_folder))
+        runner.run_stage(load(calibrated), name, run_folder, settings, pool, Progress())
+    status = answer_of(run_folder) if name == ORDER[-1] else 0
+    say_failures(Painters(report, recordings).draw(run_folder))
     return status
 
 
@@ -147,7 +180,7 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
     from pipeline.verify import verify as problems_of
 
     with workers(jobs) as pool:
-        problems = problems_of(load(), run_folder, pool)
+        problems = problems_of(load(calibrated_in(run_folder)), run_folder, pool)
     for problem in problems:
         say(problem, sys.stdout)
     many = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
@@ -175,7 +208,7 @@ def view(
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
         folder.read_settings(first)
-        _say_failures(Painters(report=False, recordings=True).draw(first))
+        say_failures(Painters(report=False, recordings=True).draw(first))
         return show(recordings_of(first, stage))
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
@@ -223,7 +256,7 @@ def diff(
 def _comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
     from pipeline.diff import RunRead, diff
 
-    return diff(RunRead.read(first, ORDER), RunRead.read(second, ORDER), *tolerances)
+    return diff(RunRead.read(first, names_in(first)), RunRead.read(second, names_in(second)), *tolerances)
 
 
 def _save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:
@@ -291,35 +324,6 @@ def compare(
     text, good = table_of(run_folder, truth)
     say(text, sys.stdout)
     return 0 if good else 1
-
-
-def _say_where(run_folder: Path) -> None:
-    """Where to look next."""
-    page = run_folder / "report" / "report.html"
-    if page.is_file():
-        say(f"Report: {page}", sys.stdout)
-    if any(run_folder.glob("*/*.rrd")):
-        program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as it was called
-        place = str(run_folder) if not str(run_folder).startswith("-") else f"./{run_folder}"
-        say(f"Recordings: {program} view {shlex.quote(place)}", sys.stdout)
-
-
-def _say_failures(failed: "Sequence[Failure]", but: str = "") -> None:
-    """Pictures are a help to see by: whatever goes wrong in drawing is said, and what has been computed stands."""
-    for one in failed:
-        if one.trace:
-            say(one.trace, sys.stderr)
-        say(f"{one.what}: not drawn ({one.reason}){but}", sys.stderr)
-
-
-def _answer(run_folder: Path) -> int:
-    """Print the result; 1 if it was rejected."""
-    from pipeline.folder import calibration
-    from pipeline.screen import summary
-
-    result = calibration(run_folder)
-    say(summary(result), sys.stdout)
-    return 0 if result["verdict"] == "accepted" else 1
 
 
 # --- from exceptions to exit status ----------------------------------------------------------------------------------

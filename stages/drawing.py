@@ -24,7 +24,7 @@ from pipeline.drawn import PAGE, agreeing, page_to_draw, recording_path
 from pipeline.errors import PoolcalError
 from pipeline.files import write_bytes
 from pipeline.streams import Mapper, serial
-from stages import ORDER
+from stages import ORDER, calibrated_in, names_in
 
 RECORDINGS = "recordings"
 PATIENCE_S, ENDING_S = 600, 10
@@ -100,10 +100,11 @@ class Painters:
 
     def _missing(self, run: Path) -> list[str]:
         """Names of what is not drawn yet: the page, or stages; of stages that agree with each other alone."""
-        page = [PAGE] if PAGE in self._wanted and page_to_draw(run, ORDER) else []
+        stages = names_in(run)
+        page = [PAGE] if PAGE in self._wanted and page_to_draw(run, stages) else []
         if RECORDINGS not in self._wanted:
             return page
-        return page + [stage for stage in agreeing(run, ORDER) if not recording_path(run, stage).is_file()]
+        return page + [stage for stage in agreeing(run, stages) if not recording_path(run, stage).is_file()]
 
     def close(self) -> None:
         if self._process is not None:
@@ -199,15 +200,15 @@ def _noting(failed: list[Failure], what: str) -> Iterator[None]:
 
 
 def _pictures(run: Path, mapper: Mapper) -> Iterable[Any]:
-    from pipeline.pages.pictures import PICTURES, draw
+    from pipeline.pages.pictures import draw, pictures_of
 
-    return mapper(partial(draw, run), PICTURES)
+    return mapper(partial(draw, run), pictures_of(calibrated_in(run)))
 
 
 def _write_page(run: Path, pictures: Iterable[Any]) -> None:
     from pipeline.pages.report import write_page
 
-    write_page(run, ORDER, pictures)
+    write_page(run, names_in(run), pictures)
 
 
 def _write_recording(run: Path, stage: str, ready: Prepared | None) -> None:

@@ -9,6 +9,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from pipeline import artefacts
+from pipeline.config import Calibrated
 from pipeline.families import families_of
 from pipeline.folder import calibration
 from pipeline.pages import curves, sections, style
@@ -76,6 +77,12 @@ def _family(residuals: pd.DataFrame, tables: Tables) -> NDArray[Any]:
 
 def _solved(tables: Tables) -> bool:
     return calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
+
+
+def pictures_of(calibrated: Calibrated) -> list[str]:
+    """Names of those that a page has."""
+    without = () if calibrated == "mbes" else ("map_mbes", "convergence")
+    return [name for name in PICTURES if name not in without]
 
 
 PICTURES = {  # those that take longest first

@@ -22,7 +22,7 @@ from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.unknowns import NAMES
 from pipeline.mounts import PARAMETERS, target_of
 from pipeline.pages import render
-from pipeline.pages.pictures import PICTURES
+from pipeline.pages.pictures import pictures_of
 from pipeline.parsing import changes
 from pipeline.tables import Tables
 from pipeline.times import utc_text
@@ -38,6 +38,8 @@ SOURCES = (  # first part of the unknowns' names
     ("sound_speed_gradient", "change of the sound speed with depth"),
     ("sound_speed", "sound speed"),
     ("wet", "wet faces against dry ones"),
+    ("rotation", "angles that are held"),  # of a laser that is calibrated
+    ("lever_arm", "lever arm that is held"),
 )
 STRONG = 0.9  # correlation that is set in bold
 MOST_GAPS = 12
@@ -50,13 +52,15 @@ METHODS = {
 
 
 def write_page(run: Path, stages: Sequence[str], pictures: Iterable[Markup]) -> None:
-    """Write RUN/report/report.html of a finished run; ``pictures``: those of :data:`PICTURES`, in their order."""
+    """Write RUN/report/report.html of a finished run; ``pictures``: those of :func:`pictures_of`, in order."""
     write_text(run / "report" / PAGE, page(Tables(run), agreeing(run, stages), pictures))
 
 
 def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterable[Markup]) -> str:
     """``done``: the manifests of all stages."""
     result, settings = calibration(tables.run), read_settings(tables.run)
+    calibrated = settings.session.calibrated
+    laser = calibrated == "laser"
     passes = tables.table(artefacts.PASSES)
     gaps = tables.table(artefacts.GAPS).sort_values("duration_s", ascending=False)
     calibrations, files = tables.table(artefacts.CALIBRATION), tables.table(artefacts.FILES)
@@ -69,11 +73,12 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         frame=tables.table(artefacts.POOL_FRAME).to_dict("records")[0],
         largest=_largest(tables.table(artefacts.CELLS)),
         tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
-        given_speed=settings.session.sonar.sound_speed_m_s,
+        given_speed=None if laser else settings.session.sonar.sound_speed_m_s,
         speeds=_speeds(files),
         methods=METHODS,
-        by_method=list(_by_method(calibrations)),
-        closing=tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
+        laser=laser,
+        by_method=[] if laser else list(_by_method(calibrations)),
+        closing=[] if laser else tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
         shares=list(_shares(tables.table(artefacts.FREED), tables.table(artefacts.ESTIMATE))),
         built=_built(result["target"]["as_found"], by_design(target_of(settings.pool.target))),
         names=[name for name, *_ in PARAMETERS],
@@ -89,7 +94,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         commit=done["report"].git_commit,
         utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
         drawn_from=drawn_from(tables.run, done),
-        pictures=dict(zip(PICTURES, pictures, strict=True)),  # last: others may still be drawing them
+        pictures=dict(zip(pictures_of(calibrated), pictures, strict=True)),  # last: others may still be drawing them
     )
 
 
@@ -132,7 +137,8 @@ def _shares(freed: pd.DataFrame, estimate: pd.DataFrame) -> Iterator[Row]:
     noise = estimate.set_index("unknown")["sigma"].reindex(NAMES).to_numpy(np.float64)
     effects = freed[[f"effect_{name}" for name in NAMES]].to_numpy(np.float64)
     source = freed["unknown"].map(lambda name: next((words for start, words in SOURCES if name.startswith(start)), ""))
-    squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for _, words in SOURCES}
+    there = [words for _, words in SOURCES if (source == words).any()]
+    squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for words in there}
     for words, of_source in {"noise (the random sigma)": noise**2, **squares}.items():
         yield {
             "name": words,

@@ -4,7 +4,8 @@ import numpy as np
 
 PURPOSES = (
     "coarse", "motion", "ins_white", "ins_drift", "laser_range", "laser_angle", "laser_outlier", "laser_water",
-    "mbes_clock", "mbes_range", "mbes_angle", "mbes_outlier", "mbes_surface", "mbes_corner", "mbes_drop", "coarse_laser",
+    "mbes_clock", "mbes_range", "mbes_angle", "mbes_outlier", "mbes_surface", "mbes_corner", "mbes_drop",
+    "coarse_laser",
 )  # append only: the place in this list is part of the seed
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted, Given, adjust, free_unknowns, noise_of
 from pipeline.considered import considered_of
-from pipeline.laser_fit import coarse_covariance, design_of, held_of
+from pipeline.laser_fit import bounds_of, coarse_covariance, design_of, held_of
 from pipeline.looking import look
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
@@ -28,6 +28,7 @@ class Config:
     segment: config.Segment
     adjust: config.Adjust
     laser_fit: config.LaserFit
+    verdict: config.Verdict
     ingest: config.Ingest
     as_built: config.AsBuilt
     ins: config.Ins
@@ -52,7 +53,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     free = free_unknowns(scene.coarse, settings.free)
 
     def held(normal: np.ndarray) -> list[int]:
-        return held_of(normal, free, np.sqrt(np.diag(coarse)), fit.hold_share)
+        return held_of(normal, free, bounds_of(coarse, fit, config.verdict))
 
     streams = {"laser": inputs.laser_labelled}
     known = Given(noise_of(config.ins), design_of(model, inputs.target_pose, fit), held)

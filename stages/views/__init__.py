@@ -38,7 +38,7 @@ from typing import Any
 from pipeline.drawn import agreeing, recording_path
 from pipeline.errors import ArtefactError
 from pipeline.tables import Tables
-from stages import ORDER
+from stages import ORDER, names_in
 
 APPLICATION = "poolcal"
 DRAWN = ORDER  # stages that have a recording
@@ -85,7 +85,7 @@ def content(identity: str, blueprint: Any, draw: Callable[[Any], None]) -> bytes
 
 def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
     """The recordings there are, in the stages' order, of stages that agree with each other."""
-    wanted = agreeing(run, ORDER) if stage is None else (stage,)
+    wanted = agreeing(run, names_in(run)) if stage is None else (stage,)
     found = [path for name in wanted if (path := recording_path(run, name)).is_file()]
     if not found:
         raise ArtefactError(f"{run}: has no recording{'' if stage is None else f' of {stage}'}; run poolcal run first")
