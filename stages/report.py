@@ -39,6 +39,7 @@ class Config:
     name: str
     target: config.Target
     ins: config.Ins
+    laser: config.Laser
     mbes: config.Mbes
     segment: config.Segment
     adjust: config.Adjust
@@ -135,7 +136,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "ranges": _range_note(config.mbes),
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
-    }
+    } | _instruments({"ins": config.ins, "laser": config.laser, "mbes": config.mbes})
     mounts = {"coarse": coarse} | {name: _mounted(block) for name, block in methods.items() if block["mount"]}
     return Outputs(
         _table(methods, coarse),
@@ -151,6 +152,16 @@ def _plain(value: Any) -> Any:
         return bool(value)
     number = float(value)
     return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
+
+
+def _instruments(sensors: Mapping[str, config.Ins | config.Laser | config.Mbes]) -> dict[str, Any]:
+    """The presets that session.yaml names, by sensor; nothing where it names none."""
+    used = {sensor: one.instrument for sensor, one in sensors.items() if one.instrument is not None}
+    found = {
+        sensor: {"name": one.name, "title": one.title, "unverified": list(one.unverified)}
+        for sensor, one in used.items()
+    }
+    return {"instruments": found} if found else {}
 
 
 def _free(freed: pd.DataFrame) -> dict[str, Any]:
