@@ -226,7 +226,7 @@ class InstrumentUsed(Model):
 
     name: Annotated[str, Field(pattern=f"^{INSTRUMENT}$")]
     title: InstrumentTitle
-    unverified: tuple[str, ...]  # keys of the preset that no published document states
+    unverified: tuple[str, ...]  # keys of the preset that were taken from no document
     origins: dict[str, Literal["session", "preset", "default"]]  # where the sensor's figures come from
     rates: dict[str, int | float | tuple[float, float]]  # for poolcal plan
 
