@@ -9,6 +9,7 @@ import pandas as pd
 import yaml
 from numpy.typing import NDArray
 
+from pipeline import config
 from pipeline.causes import estimated
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
@@ -25,6 +26,16 @@ def plain(value: Any) -> Any:
         return bool(value)
     number = float(value)
     return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
+
+
+def instruments_block(sensors: Mapping[str, config.Ins | config.Laser | config.Mbes]) -> dict[str, Any]:
+    """The presets that session.yaml names, by sensor; nothing where it names none."""
+    used = {sensor: one.instrument for sensor, one in sensors.items() if one.instrument is not None}
+    found = {
+        sensor: {"name": one.name, "title": one.title, "unverified": list(one.unverified)}
+        for sensor, one in used.items()
+    }
+    return {"instruments": found} if found else {}
 
 
 def free_block(freed: pd.DataFrame) -> dict[str, Any]:

@@ -204,7 +204,22 @@ class White(Model):
     attitude_deg: SigmaDeg = 0.002
 
 
+INSTRUMENT = "[a-z0-9_]{1,100}"
+InstrumentTitle = Annotated[str, Field(min_length=1, max_length=100)]
+
+
+class InstrumentUsed(Model):
+    """A preset as applied; session.yaml has its name alone (pipeline/instruments.py), run.yaml all of this."""
+
+    name: Annotated[str, Field(pattern=f"^{INSTRUMENT}$")]
+    title: InstrumentTitle
+    unverified: tuple[str, ...]  # keys of the preset that were taken from no document
+    origins: dict[str, Literal["session", "preset", "default"]]  # where the sensor's figures come from
+    rates: dict[str, int | float | tuple[float, float]]  # for poolcal plan
+
+
 class Ins(Model):
+    instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["novatel", "sbet", "table"]
     gps_week: Week = None
@@ -221,6 +236,7 @@ class MountSigma(Model):
 
 
 class Laser(Model):
+    instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["las", "table"]
     gps_week: Week = None
@@ -235,6 +251,7 @@ class Laser(Model):
 
 
 class Mbes(Model):
+    instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["r2sonic", "table"]
     mount: Mount
@@ -319,5 +336,8 @@ def load_session(folder: Path) -> SessionConfig:
     """The session's config, checked."""
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
+    from pipeline.instruments import applied  # here: it is made of the models above
+
     path = folder / "session.yaml"
-    return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | read_yaml(path), str(path))
+    content, _ = applied(read_yaml(path), folder)
+    return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | content, str(path))

@@ -12,6 +12,7 @@ from pipeline import config
 from pipeline.adjusting import free_unknowns
 from pipeline.considered import considered_of
 from pipeline.errors import ConfigError
+from pipeline.instruments import under
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
@@ -57,8 +58,8 @@ def setting_of(plan: Plan, pool: config.PoolConfig, session: config.SessionConfi
 
 
 def load_plan(path: Path, session: config.SessionConfig) -> Plan:
-    """A plan that can be sailed, with the sonar under water."""
-    plan = parse(Plan, read_yaml(path), str(path))
+    """A plan that can be sailed, with the sonar under water; rates that it leaves out are those of the instruments."""
+    plan = parse(Plan, under(read_yaml(path), _rates(session)), str(path))
     sonar = plan.ins_height_m + session.sonar.mount.z_m
     if sonar >= 0:
         raise ConfigError(
@@ -66,6 +67,15 @@ def load_plan(path: Path, session: config.SessionConfig) -> Plan:
             f"sonar is {sonar:.2f} m above the water; give the height of the INS above the water"
         )
     return plan
+
+
+def _rates(session: config.SessionConfig) -> dict[str, Any]:
+    """What the session's instruments can do, as a plan says it."""
+    ins, laser, mbes = (
+        one.instrument.model_dump(mode="json")["rates"] if one.instrument else {}
+        for one in (session.ins, session.laser, session.sonar)
+    )
+    return {**ins, "laser": laser, "mbes": mbes}
 
 
 def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Answer:

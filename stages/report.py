@@ -14,6 +14,7 @@ from pipeline.blocks import (
     calibration_table,
     documents,
     free_block,
+    instruments_block,
     matrix,
     method_block,
     mounted_of,
@@ -44,6 +45,7 @@ class Config:
     name: str
     target: config.Target
     ins: config.Ins
+    laser: config.Laser
     mbes: config.Mbes
     segment: config.Segment
     adjust: config.Adjust
@@ -135,7 +137,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "ranges": _range_note(config.mbes),
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
-    }
+    } | instruments_block({"ins": config.ins, "laser": config.laser, "mbes": config.mbes})
     mounts = {"coarse": coarse} | {name: mounted_of(block) for name, block in methods.items() if block["mount"]}
     return Outputs(
         calibration_table(methods, coarse),

@@ -22,6 +22,7 @@ from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.unknowns import NAMES
 from pipeline.mounts import PARAMETERS, target_of
 from pipeline.pages import render
+from pipeline.pages.figures import figures_used
 from pipeline.pages.pictures import pictures_of
 from pipeline.parsing import changes
 from pipeline.tables import Tables
@@ -90,6 +91,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         gaps=gaps.head(MOST_GAPS).to_dict("records"),
         more_gaps=max(0, len(gaps) - MOST_GAPS),
         counts=[row | {"stage": stage} for stage, one in done.items() for row in one.counts if row["count"]],
+        figures=figures_used(settings.session),
         changed=_changed(settings),
         commit=done["report"].git_commit,
         utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
@@ -216,5 +218,6 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
         {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
         for where, model in (("pool", settings.pool), ("session", settings.session))
         for key, default, value in changes(model)
+        if ".instrument." not in key  # these have a table of their own
     ]
     return sorted(rows, key=lambda row: not row["default"])

@@ -12,6 +12,7 @@ from pipeline.blocks import (
     calibration_table,
     documents,
     free_block,
+    instruments_block,
     matrix,
     pass_rows,
     plain,
@@ -108,7 +109,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "passes": pass_rows(inputs.passes, inputs.cells),
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
-    }
+    } | instruments_block({"ins": config.ins, "laser": config.laser})
     return Outputs(calibration_table(methods, coarse), *documents(result))
 
 
