@@ -1,5 +1,6 @@
 """What the adjustment found, as tables."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted
+from pipeline.considered import Block
 from pipeline.looking import Cells
 from pipeline.maths.consistency import consistency_limit
 from pipeline.maths.rotations import log_so3
@@ -25,12 +27,13 @@ def tables(
     found: Adjusted,
     cells: Cells,
     considered: Array,
+    together: Sequence[Block],
     coarse: Mounted,
     settings: config.Adjust,
     poses: pd.DataFrame,
     passes: pd.DataFrame,
 ) -> dict[str, pd.DataFrame]:
-    """By name; ``considered``: sigmas of all unknowns where they are held."""
+    """By name; ``considered``: sigmas of all unknowns where they are held; ``together``: which of them correlate."""
     state, solution = found.state, found.solution
     six = np.concatenate(
         [
@@ -41,7 +44,7 @@ def tables(
     shared = [value for surface in state.surfaces for value in (0.0, 0.0, surface.shift_m)]
     values = state.values_of_other()
     values[:SIX], values[state.shared] = six, shared
-    random, total = solution.covariance, solution.total(considered)
+    random, total = solution.covariance, solution.total(considered, *together)
     values = values[solution.free]
     if solution.deficiency:
         values[:SIX], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)

@@ -1,7 +1,6 @@
 """The command line: thin. Imports what computes only inside the command that computes."""
 
 import os
-import shlex
 import signal
 import sys
 import traceback
@@ -16,11 +15,12 @@ import pipeline
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.progress import say
 from stages import ORDER, load
+from stages.said import answer as _answer
+from stages.said import say_failures as _say_failures
+from stages.said import say_where as _say_where
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from stages.drawing import Failure, Painters
+    from stages.drawing import Painters
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 STOPPED = "poolcal: interrupted; what was complete is kept"
@@ -278,6 +278,23 @@ def plan(
 
 
 @app.command()
+def coarse(
+    file: Annotated[Path, typer.Argument(metavar="MARKS", help="YAML file: marks as surveyed, and as drawn")],
+    session: Annotated[Path, typer.Option("--session", metavar="SESSION", help="folder with session.yaml")],
+    out: Annotated[Path | None, typer.Option("--yaml", metavar="FILE", help="write all of it as YAML")] = None,
+    write: Annotated[bool, typer.Option("--write/--no-write", help="put the mounts into session.yaml")] = True,
+) -> int:
+    """Coarse mounts from a survey of marks on bracket and instruments. Status 1 if the marks do not agree."""
+    from pipeline.folder import refuse_output
+    from stages.coarse import coarse as coarse_of
+
+    refuse_output("--yaml", out, session, begins=b"agrees:")
+    said, agrees = coarse_of(file, session, out, write)
+    say(said, sys.stdout)
+    return 0 if agrees else 1
+
+
+@app.command()
 def compare(
     run_folder: RunFolder,
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="OUT.truth.json of poolcal simulate")],
@@ -291,35 +308,6 @@ def compare(
     text, good = table_of(run_folder, truth)
     say(text, sys.stdout)
     return 0 if good else 1
-
-
-def _say_where(run_folder: Path) -> None:
-    """Where to look next."""
-    page = run_folder / "report" / "report.html"
-    if page.is_file():
-        say(f"Report: {page}", sys.stdout)
-    if any(run_folder.glob("*/*.rrd")):
-        program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as it was called
-        place = str(run_folder) if not str(run_folder).startswith("-") else f"./{run_folder}"
-        say(f"Recordings: {program} view {shlex.quote(place)}", sys.stdout)
-
-
-def _say_failures(failed: "Sequence[Failure]", but: str = "") -> None:
-    """Pictures are a help to see by: whatever goes wrong in drawing is said, and what has been computed stands."""
-    for one in failed:
-        if one.trace:
-            say(one.trace, sys.stderr)
-        say(f"{one.what}: not drawn ({one.reason}){but}", sys.stderr)
-
-
-def _answer(run_folder: Path) -> int:
-    """Print the result; 1 if it was rejected."""
-    from pipeline.folder import calibration
-    from pipeline.screen import summary
-
-    result = calibration(run_folder)
-    say(summary(result), sys.stdout)
-    return 0 if result["verdict"] == "accepted" else 1
 
 
 # --- from exceptions to exit status ----------------------------------------------------------------------------------
