@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 STARBOARD, FORWARD = 0, 1  # axes of the body that two marks may give
 MOST_ITERATIONS = 50
-STILL = 1e-10  # largest step, rad and m, that ends the iteration
+STILL = 1e-9  # largest step, rad and m, that ends the iteration
 
 
 @dataclass(frozen=True)
@@ -207,9 +207,15 @@ def _system(survey: Survey, frames: Sequence[Frame], poses: Sequence[Pose]) -> _
         design[place, SIX * number : SIX * (number + 1)] = J
         by_survey[place, frame.marks] = B
         R = pose.R_survey_from_frame
-        own[place, place] = np.einsum("aki,kij,bkj->ab", B, R @ frame.covariance @ R.T, B) + np.diag(level)
-    covariance = np.einsum("aki,kij,bkj->ab", by_survey, survey.covariance, by_survey, optimize=True) + own
+        own[place, place] = _through(B, R @ frame.covariance @ R.T) + np.diag(level)
+    covariance = _through(by_survey, survey.covariance) + own
     return _System(np.concatenate([part[0] for part in parts]), design, by_survey, covariance, rows)
+
+
+def _through(by_mark: Array, covariance: Array) -> Array:
+    """Σ_k B_k C_k B_kᵀ over marks: (n, k, 3) and (k, 3, 3) -> (n, n)."""
+    B = np.moveaxis(by_mark, 1, 0)
+    return np.asarray(np.tensordot(B @ covariance, B, axes=([0, 2], [0, 2])))
 
 
 def _rows_of(survey: Survey, frame: Frame, pose: Pose) -> tuple[Array, Array, Array, Array]:
