@@ -10,9 +10,10 @@ from scipy.special import chdtri
 
 from pipeline.coarse_settings import Marks
 from pipeline.errors import ConfigError, NotConvergedError
+from pipeline.marks import FAR_DEG, Placed, examine, examine_flat, place
 from pipeline.maths.rigid import mounted_on
+from pipeline.maths.rotations import log_so3
 from pipeline.maths.snooping import LEVEL, SURVEY, MarkTest, Snooped, limit, snoop
-from pipeline.marks import Placed, examine, examine_flat, place
 from pipeline.mounts import PARAMETERS, Mounted, change_of
 from pipeline.screen import signed
 
@@ -45,7 +46,7 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
         snooped = snoop(placed.survey, list(placed.frames.values()))
     except NotConvergedError as error:
         raise NotConvergedError(f"{where}: {error}") from error
-    warnings = examine_flat(placed, where, turned) if snooped.agrees else []
+    warnings = examine_flat(placed, where, turned)
     mounts = {}
     for number, name in enumerate(placed.frames):
         if name != "body":
@@ -54,6 +55,9 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
                 length = float(np.linalg.norm(lever_arm_m))
                 raise ConfigError(f"{where}: {name}: lies {length:.0f} m from the INS; give all coordinates in m")
             mounts[name] = (Mounted(R, lever_arm_m), covariance)
+            away = float(np.degrees(np.linalg.norm(log_so3(R @ turned[name].T)))) if name in turned else 0.0
+            if away > FAR_DEG:
+                warnings.append(f"{name}.mount is {away:.0f}° from session.yaml's: see that no axis is turned round")
     return Answer(placed, snooped, mounts, tuple(warnings))
 
 
@@ -107,7 +111,7 @@ def _suspicions(answer: Answer) -> list[str]:
         likely = [test for test in snooped.tests if test.ratio > 1 and test.frame != SURVEY] or snooped.tests[:3]
         names = ", ".join(f"{_named(answer, test)} {_normalised(test):.1f}" for test in likely)
         said.append(
-            f"{'also, ' if said else ''}the marks do not agree, and which is wrong cannot be pinned: with three marks in a "
+            f"{'still ' if said else ''}the marks do not agree, and which is wrong cannot be pinned: of three in a "
             f"frame none can, and sigmas that are too small look alike; worst first (normalised): {names}"
         )
     return said
@@ -137,8 +141,8 @@ def table(answer: Answer, present: Mapping[str, Mounted]) -> str:
     for words in _suspicions(answer):
         lines.append(f"Wrong: {words}.")
     if not answer.agrees:
-        without = "without the marks named" if answer.snooped.suspects else "with all marks"
-        lines.append(f"The mounts above are {without}. Measure them again, or put them into leave_out; nothing is written.")
+        which = "without the marks named" if answer.snooped.suspects else "with all marks"
+        lines.append(f"The mounts above are {which}. Measure these again, or name them in leave_out. Nothing is written.")
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""MARKS.yaml: a total-station survey of marks on the bracket and on the instruments, and their places by the drawings."""
+"""MARKS.yaml: a total-station survey of marks on bracket and instruments, and their places by the drawings."""
 
 from pathlib import Path
 from typing import Annotated, Any

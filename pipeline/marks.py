@@ -1,7 +1,7 @@
-"""Marks of a survey and of drawings as frames to be adjusted; and what is wrong with them, named before any result.
+"""Marks of a survey and of drawings as frames to be adjusted; what is wrong with them is named before any result.
 
-Refused, one frame at a time: fewer than three marks, marks in a line, drawings in other units, mirror-imaged ones, names
-interchanged.
+Refused, one frame at a time: fewer than three marks, marks in a line, drawings in other units, mirror-imaged ones,
+names interchanged.
 """
 
 from collections.abc import Mapping
@@ -25,6 +25,7 @@ STEEPEST_DEG = 60.0  # of an axis through two marks: the vertical must give the 
 LIKELY = 3  # pairs of names that are tried in full
 FAR_DEG, NEAR_DEG = 90.0, 30.0  # from the session's mount: turned over, and right
 AXES = "xyz"
+MIRRORED = "mirror-imaged (left-handed, or one axis with the wrong sign)"
 
 
 @dataclass(frozen=True)
@@ -85,12 +86,12 @@ def examine(placed: Placed, where: str, present: Mapping[str, Array]) -> None:
         key = f"{where}: {name}.marks"
         count = len(frame.marks)
         if count < 3:
-            raise DegenerateGeometryError(f"{key}: {count} usable mark(s), and a rotation takes three; survey more of them")
+            raise DegenerateGeometryError(f"{key}: {count} usable mark(s), and a rotation takes three; survey more")
         sigma = np.degrees(sigma_about_line(placed.survey, frame))
         if not sigma <= np.degrees(LINE_RAD):
             known = f"known to {sigma:.0f}° only" if sigma < 90 else "not determined"
             raise DegenerateGeometryError(
-                f"{key}: all {count} lie nearly in a line, and the turn about it is {known}; add a mark well off that line"
+                f"{key}: all {count} lie nearly in a line, and the turn about it is {known}; add a mark well off it"
             )
     for name, frame in placed.frames.items():
         if frame.axes is None:
@@ -138,28 +139,34 @@ def _refuse_units(survey: Survey, frame: Frame, key: str) -> None:
 
 
 def _refuse_misfit(placed: Placed, name: str, key: str, present: Mapping[str, Array]) -> None:
-    """Where a frame does not fit, but its mirror image or with two names interchanged it clearly does (quotient of the
-    two Ω beyond F at LEVEL). One wrong mark alone, which leaving it out shows, is no matter of names."""
+    """Where a frame does not fit, but its mirror image or with two names interchanged it clearly does: quotient of the
+    two Ω beyond F at LEVEL. Of several such explanations those are said that fit as well as the best. Where leaving out
+    one mark explains it too, names must explain it in full."""
     frame, survey = placed.frames[name], placed.survey
     squares, redundancy = fits(survey, frame)
     if squares <= limit(redundancy):
         return
     far = float(fdtri(redundancy, redundancy, 1 - LEVEL))
-    enough = squares / far if np.isfinite(squares) else limit(redundancy)
-    if not is_flat(survey, frame) and fits(survey, mirror(frame, 0))[0] < enough:
-        raise ConfigError(
-            f"{key}: the drawing is mirror-imaged (left-handed, or one axis with the wrong sign): mirrored it fits, as it "
-            f"stands it does not; check its axes{_which_axis(flips(placed, name, present))}"
-        )
-    few = len(frame.marks) < 4
-    if few or min(fits(survey, frame.without(k))[0] for k in range(len(frame.marks))) > limit(redundancy - 3):
-        pairs = [pair for pair in _likely_pairs(survey, frame) if fits(survey, swap(frame, *pair))[0] < enough]
-        if pairs:
-            names = ", or ".join(" and ".join(placed.names[frame.marks[k]] for k in pair) for pair in pairs)
-            raise ConfigError(
-                f"{key}: marks {names} may be interchanged: then they fit, as they stand they do not; check the names in "
-                "the survey and in the drawing"
-            )
+    better: dict[tuple[int, ...], float] = {}
+    if not is_flat(survey, frame):
+        better[()] = fits(survey, mirror(frame, 0))[0]
+    count = len(frame.marks)
+    one_alone = count > 3 and min(fits(survey, frame.without(k))[0] for k in range(count)) <= limit(redundancy - 3)
+    for pair in _likely_pairs(survey, frame):
+        left = fits(survey, swap(frame, *pair))[0]
+        if left <= limit(redundancy) or not one_alone:
+            better[pair] = left
+    best = min(better.values(), default=np.inf)
+    if best >= (squares / far if np.isfinite(squares) else limit(redundancy)):
+        return
+    said = [pair for pair, left in better.items() if left <= max(limit(redundancy), best)]
+    pairs = ", or ".join(" and ".join(placed.names[frame.marks[k]] for k in pair) for pair in said if pair)
+    words = []
+    if () in said:
+        words.append(f"the drawing is {MIRRORED}: check its axes{_which_axis(flips(placed, name, present))}")
+    if pairs:
+        words.append(f"marks {pairs} may be interchanged: check the names in the survey and in the drawing")
+    raise ConfigError(f"{key}: {'; or '.join(words)}; then all fit, as they stand they do not")
 
 
 def _likely_pairs(survey: Survey, frame: Frame) -> list[tuple[int, int]]:
@@ -229,8 +236,8 @@ def flips(placed: Placed, name: str, present: Mapping[str, Array]) -> Flips | No
 
 def _which_axis(flipped: Flips | None) -> str:
     if flipped is None or not flipped.telling:
-        return ", of which any one turned makes it right-handed"
-    return f": with the sign of {flipped.axis} changed the mount is within {flipped.turned_deg:.0f}° of session.yaml's"
+        return " (any one of them turned makes it right-handed)"
+    return f" (with the sign of {flipped.axis} changed the mount is {flipped.turned_deg:.1f}° from session.yaml's)"
 
 
 def examine_flat(placed: Placed, where: str, present: Mapping[str, Array]) -> list[str]:
@@ -243,9 +250,8 @@ def examine_flat(placed: Placed, where: str, present: Mapping[str, Array]) -> li
         flipped = flips(placed, name, present)
         if flipped is not None and flipped.as_drawn_deg > FAR_DEG and flipped.telling:
             raise ConfigError(
-                f"{where}: {name}.marks: the drawing is mirror-imaged (left-handed, or one axis with the wrong sign): as it "
-                f"stands the mount is {flipped.as_drawn_deg:.0f}° from session.yaml's; check its "
-                f"axes{_which_axis(flipped)}"
+                f"{where}: {name}.marks: the drawing is {MIRRORED}: as it stands the mount is "
+                f"{flipped.as_drawn_deg:.0f}° from session.yaml's; check its axes{_which_axis(flipped)}"
             )
         said.append(f"{name}.marks lie in one plane: a mirror-imaged drawing would not show")
     return said

@@ -80,6 +80,9 @@ def _edits(text: str, sensor: str, block: Content, path: Path) -> Iterable[Edit]
     anchor = mount if mount is not None else _value(node, "format")
     if node is None or anchor is None:
         raise ConfigError(f"{path}: {sensor}: has no format; add it")
+    break_ = "\r\n" if "\r\n" in text else "\n"
+    indent = " " * node.value[0][0].start_mark.column
+    between = ", " if node.flow_style else f",{break_}{indent}  "
     missing = []
     for key, value in block.items():
         there = _value(node, key)
@@ -89,18 +92,16 @@ def _edits(text: str, sensor: str, block: Content, path: Path) -> Iterable[Edit]
                 if scalar is not None:
                     yield scalar.start_mark.index, scalar.end_mark.index, f"{number:.6f}"
         elif there is not None:
-            yield there.start_mark.index, _end(there), in_yaml(key, value)
+            yield there.start_mark.index, _end(there), in_yaml(key, value, between)
         else:
-            missing.append(f"{key}: {in_yaml(key, value)}")
+            missing.append(f"{key}: {in_yaml(key, value, between)}")
     if not missing:
         return
     place = _end(anchor)
     if node.flow_style:
         yield place, place, "".join(f", {words}" for words in missing)
         return
-    break_ = "\r\n" if "\r\n" in text else "\n"
     line = len(text) if (found := text.find("\n", place)) < 0 else found + 1
-    indent = " " * node.value[0][0].start_mark.column
     words = "".join(f"{indent}{one}{break_}" for one in missing)
     yield line, line, words if text[:line].endswith("\n") else break_ + words
 
@@ -119,13 +120,13 @@ def _end(node: Any) -> int:
     return _end(last[1] if isinstance(last, tuple) else last)
 
 
-def in_yaml(key: str, value: Any) -> str:
-    """In one line: the numbers with a point, for YAML takes 1e-06 for a word."""
+def in_yaml(key: str, value: Any, between: str) -> str:
+    """Numbers with a point, for YAML takes 1e-06 for a word; ``between``: what stands between a matrix's rows."""
     if key == "mount":
         return "{" + ", ".join(f"{name}: {number:.6f}" for name, number in value.items()) + "}"
     if key == "mount_origin":
         return "{" + ", ".join(f"{name}: {json.dumps(value[name], ensure_ascii=False)}" for name in ORIGIN) + "}"
-    return "[" + ", ".join("[" + ", ".join(f"{one:.9e}" for one in row) + "]" for row in value) + "]"
+    return "[" + between.join("[" + ", ".join(f"{one:.9e}" for one in row) + "]" for row in value) + "]"
 
 
 def replace_session(folder: Path, old: str, text: str) -> Path:

@@ -1,18 +1,18 @@
 """Frames placed in one survey of marks by rigid transformations: weighted least squares with the full covariance.
 
-A mark i stands at s_i in the survey and, by the drawing of frame f, at x_i in that frame; with R_f = R_survey_from_f and
-t_f the frame's origin in the survey,
+A mark i stands at s_i in the survey and, by the drawing of frame f, at x_i in that frame; with R_f = R_survey_from_f
+and t_f the frame's origin in the survey,
 
     r_fi = s_i - R_f x_i - t_f = e_i - R_f d_fi,
 
-e_i the survey's error (covariance S_i), d_fi the drawing's (D_fi, in the frame's own axes). A mark of two frames has its
-e_i in the residuals of both: all frames are one adjustment, with the covariance of the stacked residuals
+e_i the survey's error (covariance S_i), d_fi the drawing's (D_fi, in the frame's own axes). A mark of two frames has
+its e_i in the residuals of both: all frames are one adjustment, with the covariance of the stacked residuals
 
     Σ = B diag(S) Bᵀ + Σ_f B_f diag(R_f D_f R_fᵀ) B_fᵀ,      B = ∂r/∂s, B_f its rows of frame f.
 
-A frame may instead be given by *axes*: its origin is a mark (a point with x = 0), one of its axes runs through two marks
-(with d the vector between them, the two other components of R_fᵀ d are zero), and a level gives the turn about that axis
-(roll or pitch of R_level_from_body, CONVENTIONS.md, minus the reading): six conditions for its six unknowns.
+A frame may instead be given by *axes*: its origin is a mark (a point with x = 0), one of its axes runs through two
+marks (with d the vector between them, the two other components of R_fᵀ d are zero), and a level gives the turn about
+that axis (roll or pitch of R_level_from_body, CONVENTIONS.md, minus the reading): six conditions for six unknowns.
 
 Start: the closed form of Kabsch (1976) and Umeyama (IEEE PAMI 13, 1991), det = +1 enforced. Then Gauss-Newton (the
 Gauss-Helmert model, e.g. Förstner and Wrobel 2016, 4.8) over u = (η_f, δt_f), R_f <- Exp(η_f) R_f, in survey axes:

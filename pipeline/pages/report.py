@@ -129,7 +129,8 @@ def _six(table: pd.DataFrame, method: str, limits: config.Verdict) -> list[dict[
 
 def _shares(freed: pd.DataFrame, estimate: pd.DataFrame, laser: config.Laser) -> Iterator[Row]:
     """What each source of errors does to the six (root of its sum of squares), noise first: together the total sigma,
-    of the rotations about the body's axes. A laser's mount whose six correlate is one source: what is left of the total.
+    of the rotations about the body's axes. A laser's mount whose six correlate is one source: what the total has left
+    over.
     """
     by_name = estimate.set_index("unknown").reindex(NAMES)
     noise, total = (by_name[name].to_numpy(np.float64) for name in ("sigma", "sigma_total"))

@@ -1,4 +1,4 @@
-"""Surveys of marks by a forward model of its own: scipy's rotations, and signs written out as CONVENTIONS.md has them."""
+"""Surveys of marks by a forward model of its own: scipy's rotations, signs as CONVENTIONS.md has them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

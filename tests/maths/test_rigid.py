@@ -1,6 +1,5 @@
 """Frames from surveyed marks: signs, covariance over many draws, derivatives, and which mark is wrong."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom, chi2
 
-from pipeline.maths import rigid, snooping
+from pipeline.maths import rigid
 from pipeline.maths.rigid import FORWARD, STARBOARD, Axes, Frame, Survey
-from tests.maths.surveys import ALONG, ON_BODY, World, attitude_rotation, error
+from tests.maths.surveys import ALONG, World, attitude_rotation, error
 
 DRAWS = 500
 LOPSIDED = np.array([0.0006, 0.0012, 0.003])  # m, along the survey's x, y, z
@@ -32,8 +31,9 @@ class Case:
         self.axes = axes  # (along, origin, first, second, sigma_deg)
         self.root = np.linalg.cholesky(self.covariance)
         self.frames = ["body", *(name for name in world.drawings() if name != "body")]
-        self.exact = {name: np.array(list(marks.values())) for name, marks in world.drawings().items()}
-        self.numbers = {name: np.array([self.names.index(m) for m in marks]) for name, marks in world.drawings().items()}
+        drawings = world.drawings()
+        self.exact = {name: np.array(list(marks.values())) for name, marks in drawings.items()}
+        self.numbers = {name: np.array([self.names.index(mark) for mark in marks]) for name, marks in drawings.items()}
         level = attitude_rotation(*world.attitude)
         self.level_from = {name: (level * world.rotation(name)).as_matrix() for name in self.frames}
 
@@ -68,7 +68,8 @@ class Case:
 
 
 EVERY = World()
-SHARED = World(shared=(("B1", "body", "laser"), ("I1", "body", "laser"), ("B2", "body", "mbes"), ("L4", "laser", "mbes")))
+BOTH = (("B1", "body", "laser"), ("I1", "body", "laser"), ("B2", "body", "mbes"), ("L4", "laser", "mbes"))
+SHARED = World(shared=BOTH)
 ORIGIN = {"O": (0.0, 0.0, 0.0)}
 BY_AXES = World(frames={**EVERY.frames, "body": ORIGIN | ALONG})
 AXES_SHARED = replace(BY_AXES, shared=(("A2", "body", "laser"), ("O", "body", "mbes")))
