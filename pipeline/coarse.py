@@ -142,7 +142,7 @@ def table(answer: Answer, present: Mapping[str, Mounted]) -> str:
         lines.append(f"Wrong: {words}.")
     if not answer.agrees:
         which = "without the marks named" if answer.snooped.suspects else "with all marks"
-        lines.append(f"The mounts above are {which}. Measure these again, or name them in leave_out. Nothing is written.")
+        lines.append(f"The mounts above are {which}. Nothing is written: measure again, or use leave_out.")
     return "\n".join(lines)
 
 
