@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from pipeline.coarse_settings import Marks
 from pipeline.errors import ConfigError, NotConvergedError
-from pipeline.marks import FAR_DEG, Placed, examine, examine_flat, place
+from pipeline.marks import NEAR_DEG, Placed, examine, examine_flat, place
 from pipeline.maths.rigid import mounted_on
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.snooping import LEVEL, SURVEY, MarkTest, Snooped, limit, snoop
@@ -46,7 +46,7 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
         snooped = snoop(placed.survey, list(placed.frames.values()))
     except NotConvergedError as error:
         raise NotConvergedError(f"{where}: {error}") from error
-    warnings = examine_flat(placed, where, turned)
+    warnings = examine_flat(placed, where, turned) if snooped.agrees else []
     mounts = {}
     for number, name in enumerate(placed.frames):
         if name != "body":
@@ -56,7 +56,7 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
                 raise ConfigError(f"{where}: {name}: lies {length:.0f} m from the INS; give all coordinates in m")
             mounts[name] = (Mounted(R, lever_arm_m), covariance)
             away = float(np.degrees(np.linalg.norm(log_so3(R @ turned[name].T)))) if name in turned else 0.0
-            if away > FAR_DEG:
+            if away > NEAR_DEG:
                 warnings.append(f"{name}.mount is {away:.0f}° from session.yaml's: see that no axis is turned round")
     return Answer(placed, snooped, mounts, tuple(warnings))
 

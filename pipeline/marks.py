@@ -253,5 +253,7 @@ def examine_flat(placed: Placed, where: str, present: Mapping[str, Array]) -> li
                 f"{where}: {name}.marks: the drawing is {MIRRORED}: as it stands the mount is "
                 f"{flipped.as_drawn_deg:.0f}° from session.yaml's; check its axes{_which_axis(flipped)}"
             )
-        said.append(f"{name}.marks lie in one plane: a mirror-imaged drawing would not show")
+        seems = flipped is not None and flipped.as_drawn_deg > NEAR_DEG and flipped.telling
+        axis = _which_axis(flipped) if seems else ""
+        said.append(f"{name}.marks lie in one plane: a mirror-imaged drawing would not show{axis}")
     return said

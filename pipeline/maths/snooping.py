@@ -5,7 +5,7 @@ axes, survey or drawing), with W = Σ⁻¹ and Q_v the residuals' cofactors, the
 
     T = rᵀ W G (Gᵀ W Q_v W G)⁺ Gᵀ W r ~ chi²(rank),        W Q_v W = W - W J C Jᵀ W,
 
-and T is by how much Ω falls when the mark is left out. For a mark of one frame this is vᵀ (Q_vv)⁺ v of its residual
+and T is by how much Ω falls when that coordinate is not known. For a mark of one frame this is vᵀ (Q_vv)⁺ v of its v
 (Baarda 1968, "A testing procedure for use in geodetic networks"; in this form Teunissen 2006, "Testing Theory", 4.3).
 T is measured by its critical value: with different ranks the largest quotient is the worst mark (de Jong and Teunissen
 2000, Earth Planets Space 52). Taken at the sigmas as given, not at the variance factor found (Pope 1976), which the
