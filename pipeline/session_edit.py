@@ -97,7 +97,7 @@ def _edits(text: str, sensor: str, block: Content, path: Path) -> Iterable[Edit]
             missing.append(f"{key}: {in_yaml(key, value, between)}")
     if not missing:
         return
-    place = _end(anchor)
+    place = len(text[: _end(anchor)].rstrip())
     if node.flow_style:
         yield place, place, "".join(f", {words}" for words in missing)
         return

@@ -470,16 +470,25 @@ def test_odd_yaml_is_edited_rightly(text: str, session: Path) -> None:
     np.testing.assert_allclose(mounts_in(session)["laser"], World().mounts["laser"], atol=3e-6)
 
 
-def test_what_cannot_be_edited_in_place_is_refused(session: Path) -> None:
-    """What was put in after a block scalar stands a line too low: seen when it is read again."""
-    text = PLAIN.replace("  format: r2sonic\n", "").replace("mbes:\n", "mbes:\n  format: >-\n    r2sonic\n")
-    text = re.sub(r"  mount: \{.*\n", "", text)
+@pytest.mark.parametrize("after", ["", "# end\n", "ins: {files: [i], format: table}\n"])
+def test_a_mount_comes_after_a_format_however_that_is_written(after: str, session: Path) -> None:
+    block = "mbes:\n  files: [m]\n  format: >-\n    r2sonic\n\n"
+    text = PLAIN.replace("ins: {files: [ins/*.gps], format: novatel}\n", "").partition("mbes:")[0]
+    text += block + after if "ins" in after else "ins: {files: [i], format: table}\n" + block + after
     (session / "session.yaml").write_text(text, encoding="utf-8")
-    told = run(session, marks_of(World()))
-    assert told.status in (0, 2)
-    assert "Traceback" not in told.err
+    told = run(session, marks_of(World(), None))
+    assert told.status == 0, told.err
+    np.testing.assert_allclose(mounts_in(session)["mbes"], World().mounts["mbes"], atol=3e-6)
+
+
+def test_what_cannot_be_edited_in_place_is_refused() -> None:
+    """What comes of an edit must say what was meant."""
+    content = yaml.safe_load(PLAIN)
+    refuse_other(PLAIN, content, {"laser": {"format": "las"}}, Path("session.yaml"))
     with pytest.raises(ConfigError, match="cannot be edited where it stands"):
-        refuse_other("name: b\n", yaml.safe_load(text), {"laser": {}}, Path("session.yaml"))
+        refuse_other(PLAIN, content, {"laser": {"format": "table"}}, Path("session.yaml"))
+    with pytest.raises(ConfigError, match="cannot be edited where it stands"):
+        refuse_other(PLAIN + "  {", content, {"laser": {}}, Path("session.yaml"))
     with pytest.raises(ConfigError, match=r"mbes: has no format"):
         edited("mbes: {files: [m]}\n", {"mbes": {"mount": {}}}, Path("session.yaml"))
 
