@@ -19,6 +19,7 @@ from pipeline.screen import signed
 
 Array = NDArray[np.float64]
 FARTHEST_M = 100.0  # of a lever arm that session.yaml takes
+MOST_NAMED = 8
 CAUTIOUS = 30  # degrees of freedom below which a variance factor tells little
 
 
@@ -41,8 +42,8 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
     """Refuse what cannot be meant, then adjust; ``present``: mounts that the session has."""
     placed = place(marks)
     turned = {name: mounted.R_body_from_sensor for name, mounted in present.items()}
-    examine(placed, where, turned)
     try:
+        examine(placed, where, turned)
         snooped = snoop(placed.survey, list(placed.frames.values()))
     except NotConvergedError as error:
         raise NotConvergedError(f"{where}: {error}") from error
@@ -105,11 +106,12 @@ def _suspicions(answer: Answer) -> list[str]:
     said = []
     for one in snooped.suspects:
         rivals = "".join(f" or {_named(answer, test)}" for test in one.rivals)
-        which = "does not fit" if not one.rivals else "does not fit (leaving out either one, the others agree as well)"
-        said.append(f"mark {_named(answer, one.test)}{rivals} {which}")
+        which = " (which of them, the marks do not tell)" if one.rivals else ""
+        said.append(f"mark {_named(answer, one.test)}{rivals} does not fit{which}")
     if not snooped.agrees:
-        likely = [test for test in snooped.tests if test.ratio > 1 and test.frame != SURVEY] or snooped.tests[:3]
-        names = ", ".join(f"{_named(answer, test)} {_normalised(test):.1f}" for test in likely)
+        left = [test for test in snooped.last_tests if test.frame != SURVEY]
+        likely = [test for test in left if test.ratio > 1] or left[:3]
+        names = ", ".join(f"{_named(answer, test)} {_normalised(test):.1f}" for test in likely[:MOST_NAMED])
         said.append(
             f"{'still ' if said else ''}the marks do not agree, and which is wrong cannot be pinned: of three in a "
             f"frame none can, and sigmas that are too small look alike; worst first (normalised): {names}"

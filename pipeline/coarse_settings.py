@@ -33,13 +33,13 @@ class Survey(Model):
     """Total-station coordinates: any origin and heading, right-handed, z up."""
 
     sigma_m: Sigmas = (0.001, 0.001, 0.001)
-    marks: Annotated[dict[Name, Mark], Field(min_length=3, max_length=300)]
+    marks: Annotated[dict[Name, Mark], Field(min_length=3, max_length=100)]
 
 
 class Drawing(Model):
     """Marks in the instrument's own frame."""
 
-    marks: Annotated[dict[Name, Mark], Field(min_length=1, max_length=100)]
+    marks: Annotated[dict[Name, Mark], Field(min_length=1, max_length=30)]
     sigma_m: Sigmas = (0.0005, 0.0005, 0.0005)
 
 
@@ -68,7 +68,7 @@ class Axes(Model):
 class Body(Model):
     """Marks in the body frame, or what gives its axes."""
 
-    marks: Annotated[dict[Name, Mark], Field(min_length=1, max_length=100)] | None = None
+    marks: Annotated[dict[Name, Mark], Field(min_length=1, max_length=30)] | None = None
     axes: Axes | None = None
     sigma_m: Sigmas = (0.0005, 0.0005, 0.0005)
 
@@ -84,7 +84,7 @@ class Marks(Model):
     body: Body
     laser: Drawing | None = None
     mbes: Drawing | None = None
-    leave_out: Annotated[tuple[Name, ...], Field(max_length=300)] = ()
+    leave_out: Annotated[tuple[Name, ...], Field(max_length=100)] = ()
 
     @model_validator(mode="after")
     def _a_sensor(self) -> "Marks":

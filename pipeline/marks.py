@@ -4,7 +4,7 @@ Refused, one frame at a time: fewer than three marks, marks in a line, drawings 
 names interchanged.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -147,18 +147,17 @@ def _refuse_misfit(placed: Placed, name: str, key: str, present: Mapping[str, Ar
     if squares <= limit(redundancy):
         return
     far = float(fdtri(redundancy, redundancy, 1 - LEVEL))
-    better: dict[tuple[int, ...], float] = {}
-    if not is_flat(survey, frame):
-        better[()] = fits(survey, mirror(frame, 0))[0]
-    count = len(frame.marks)
-    one_alone = count > 3 and min(fits(survey, frame.without(k))[0] for k in range(count)) <= limit(redundancy - 3)
-    for pair in _likely_pairs(survey, frame):
-        left = fits(survey, swap(frame, *pair))[0]
-        if left <= limit(redundancy) or not one_alone:
-            better[pair] = left
-    best = min(better.values(), default=np.inf)
-    if best >= (squares / far if np.isfinite(squares) else limit(redundancy)):
+    enough = squares / far if np.isfinite(squares) else limit(redundancy)
+    tried = {pair: fits(survey, swap(frame, *pair))[0] for pair in _likely_pairs(survey, frame)}
+    better = {pair: left for pair, left in tried.items() if left < enough}
+    if any(left > limit(redundancy) for left in better.values()) and _one_explains_it(survey, frame):
+        better = {pair: left for pair, left in better.items() if left <= limit(redundancy)}
+    mirrored = np.inf if is_flat(survey, frame) else fits(survey, mirror(frame, 0))[0]
+    if mirrored < enough:
+        better[()] = mirrored
+    if not better:
         return
+    best = min(better.values())
     said = [pair for pair, left in better.items() if left <= max(limit(redundancy), best)]
     pairs = ", or ".join(" and ".join(placed.names[frame.marks[k]] for k in pair) for pair in said if pair)
     words = []
@@ -166,14 +165,20 @@ def _refuse_misfit(placed: Placed, name: str, key: str, present: Mapping[str, Ar
         words.append(f"the drawing is {MIRRORED}: check its axes{_which_axis(flips(placed, name, present))}")
     if pairs:
         words.append(f"marks {pairs} may be interchanged: check the names in the survey and in the drawing")
-    raise ConfigError(f"{key}: {'; or '.join(words)}; then all fit, as they stand they do not")
+    raise ConfigError(f"{key}: {'; or '.join(words)}; so all fit far better than as they stand")
 
 
-def _likely_pairs(survey: Survey, frame: Frame) -> list[tuple[int, int]]:
+def _one_explains_it(survey: Survey, frame: Frame) -> bool:
+    """Whether all but some one mark fit."""
+    count = len(frame.marks)
+    return count > 3 and any(fits(survey, frame.without(k))[0] <= limit(3 * count - 9) for k in range(count))
+
+
+def _likely_pairs(survey: Survey, frame: Frame) -> Sequence[tuple[int, ...]]:
     """The pairs that, interchanged, leave least to the closed form."""
     at, weight = survey.at_m[frame.marks], np.ones(len(frame.marks))
 
-    def left(pair: tuple[int, int]) -> float:
+    def left(pair: tuple[int, ...]) -> float:
         drawing = swap(frame, *pair).drawing_m
         R, t = closed_form(drawing, at, weight)
         return float(np.sum((at - drawing @ R.T - t) ** 2))

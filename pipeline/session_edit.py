@@ -91,8 +91,9 @@ def _edits(text: str, sensor: str, block: Content, path: Path) -> Iterable[Edit]
                 scalar = _value(there, name)
                 if scalar is not None:
                     yield scalar.start_mark.index, scalar.end_mark.index, f"{number:.6f}"
-        elif there is not None:
-            yield there.start_mark.index, _end(there), in_yaml(key, value, between)
+        elif there is not None:  # from the key on: what stood in lines of its own may not be indented enough
+            name = next(name for name, _ in node.value if name.value == key)
+            yield name.end_mark.index, _end(there), f": {in_yaml(key, value, between)}"
         else:
             missing.append(f"{key}: {in_yaml(key, value, between)}")
     if not missing:

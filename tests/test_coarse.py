@@ -241,6 +241,10 @@ REFUSED: dict[str, tuple[Change, tuple[str, ...]]] = {
         ("laser.marks: L9 is not in survey.marks",),
     ),
     "unknown in leave_out": (lambda marks: marks.update(leave_out=["X"]), ("leave_out: X is not in survey.marks",)),
+    "all left out": (
+        lambda marks: marks.update(leave_out=list(marks["survey"]["marks"])),
+        ("body.marks: 0 usable mark(s)",),
+    ),
     "left out too many": (lambda marks: marks.update(leave_out=["L1", "L3"]), ("laser.marks: 2 usable",)),
     "both ways": (_set("body", axes={"origin": "I1", "forward": ["I3", "I1"], "roll_deg": 0.0}), ("marks, or axes",)),
     "roll missing": (
@@ -320,6 +324,17 @@ def test_with_three_marks_a_misfit_names_candidates(session: Path) -> None:
     assert "which is wrong cannot be pinned: of three in a frame none can" in told.out
     assert all(f"L{k} (laser)" in told.out for k in (1, 2, 3))
     assert "The mounts above are with all marks." in told.out
+
+
+def test_a_drawing_of_something_else_pins_nothing_and_a_wrong_mark_elsewhere_is_still_named(session: Path) -> None:
+    marks = marks_of(World())
+    marks["mbes"]["marks"] = {m: [0.3 * k % 0.5, -0.2 * k % 0.3, 0.1 * k * k % 0.3] for k, m in enumerate(ON_MBES)}
+    marks["survey"]["marks"]["I2"][0] += 0.05
+    told = run(session, marks)
+    assert told.status == 1, told.err
+    assert "Wrong: mark I2 (body) does not fit.\nWrong: still the marks do not agree" in told.out
+    assert "mark M" not in told.out
+    assert all(f"M{k} (mbes)" in told.out for k in (1, 2, 3, 4))
 
 
 def test_a_wrong_survey_of_a_shared_mark_is_told_from_a_wrong_drawing(session: Path) -> None:
@@ -425,6 +440,21 @@ def test_twice_is_once_and_another_survey_is_kept_apart(session: Path) -> None:
         assert (session / f"session.{number}.yaml").read_bytes() == before
     assert (session / "session.3.yaml").read_text() == "mine"
     assert (session / "session.yaml").read_bytes().count(b"mount_origin") == 2
+
+
+def test_what_it_wrote_is_replaced_in_any_style(session: Path) -> None:
+    """As blocks, as other programs write it, and between them comments and a key of ours alone."""
+    assert run(session, marks_of(World())).status == 0
+    path = session / "session.yaml"
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    del content["mbes"]["mount_covariance"]
+    path.write_text(yaml.safe_dump(content, sort_keys=False) + "# end\n", encoding="utf-8")
+    assert run(session, marks_of(World(), None)).status == 0
+    for name, found in mounts_in(session).items():
+        np.testing.assert_allclose(found, World().mounts[name], atol=3e-6)
+    text = path.read_text(encoding="utf-8")
+    assert [text.count(f"mount_{key}:") for key in ("origin", "covariance")] == [2, 2]
+    assert text.endswith("# end\n")
 
 
 @pytest.mark.parametrize("step", ["open", "fsync", "replace"])

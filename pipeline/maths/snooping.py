@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 LEVEL = 0.001  # of the global test; and of all the marks' tests together
 BLIND = 1e-6  # share of an error that reaches the residuals, below which it is not seen
 LINE_RAD = float(np.radians(5.0))  # a turn less certain than this is not determined
+STILL_ODD = 3.0  # critical values: where a frame's worst is beyond that, what went from it did not explain it
 SURVEY = -1  # in place of a frame: the mark's survey, which all its frames share
 
 
@@ -54,14 +55,14 @@ class Suspect:
 
 @dataclass(frozen=True)
 class Snooped:
-    """The adjustment with all marks and its tests; suspects; the adjustment without them, and its frames. ``agrees``:
+    """The adjustment with all marks and its tests; suspects; the adjustment without them and its tests. ``agrees``:
     what is left agrees."""
 
     first: Adjusted
     tests: tuple[MarkTest, ...]
     suspects: tuple[Suspect, ...]
     last: Adjusted
-    frames: tuple[Frame, ...]
+    last_tests: tuple[MarkTest, ...]
     agrees: bool
 
 
@@ -92,6 +93,9 @@ def mark_tests(found: Adjusted, frames: Sequence[Frame]) -> tuple[MarkTest, ...]
 
 def _measure(G: Array, W: Array, P: Array, pull: Array) -> tuple[float, int]:
     """T and its rank: eigenvalues of Gᵀ P G against Gᵀ W G are the shares of an error that the residuals show."""
+    moved = np.flatnonzero(G.any(axis=1))
+    G, pull = G[moved], pull[moved]
+    W, P = (matrix[np.ix_(moved, moved)] for matrix in (W, P))
     whole = G.T @ W @ G
     values, vectors = np.linalg.eigh(whole)
     scale = vectors / np.sqrt(values)
@@ -105,24 +109,31 @@ def snoop(survey: Survey, frames: Sequence[Frame]) -> Snooped:
     """Adjust; while a test fails, leave out the worst mark and adjust again.
 
     Of a frame's k marks at most (k - 2) // 2 go, so that most of them agree on what is left: with three none does.
+    Where a frame is at odds all the same, what went explained nothing and comes back.
     """
     left = tuple(frames)
     first = now = adjust(survey, left)
     first_tests = tests = mark_tests(first, left)
     suspects: list[Suspect] = []
     while not (agrees := now.squares <= limit(now.redundancy) and all(test.ratio <= 1 for test in tests)):
-        worst = tests[0] if tests else None
-        if worst is None or worst.ratio <= 1:
+        failed = [test for test in tests if test.ratio > 1]
+        worst = next((test for test in failed if _may_go(survey, frames, _without(left, test))), None)
+        if worst is None:
             break
-        fewer = _without(left, worst)
-        if not _may_go(survey, frames, fewer):
-            break
-        rivals = [one for one in tests[1:] if worst.statistic - one.statistic < limit(3) and one.mark != worst.mark]
-        suspects.append(Suspect(worst, tuple(rivals)))
-        left = fewer
+        near = [one for one in tests if abs(worst.statistic - one.statistic) < limit(3)]
+        suspects.append(Suspect(worst, tuple(one for one in near if one.mark != worst.mark)))
+        left = _without(left, worst)
         now = adjust(survey, left)
         tests = mark_tests(now, left)
-    return Snooped(first, first_tests, tuple(suspects), now, left, agrees)
+    if not agrees and suspects:
+        still = {test.frame: test.ratio for test in reversed(tests)}
+        suspects = [one for one in suspects if still.get(one.test.frame, 0.0) < STILL_ODD]
+        left = tuple(frames)
+        for one in suspects:
+            left = _without(left, one.test)
+        now = adjust(survey, left)
+        tests = mark_tests(now, left)
+    return Snooped(first, first_tests, tuple(suspects), now, tests, agrees)
 
 
 def _without(frames: tuple[Frame, ...], test: MarkTest) -> tuple[Frame, ...]:
