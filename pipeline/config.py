@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.errors import ConfigError
@@ -187,6 +188,36 @@ class Mount(Model):
     z_m: Lever
 
 
+def _covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    matrix = np.array(rows)
+    sigma = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    size = np.outer(sigma, sigma)
+    if np.any(np.abs(matrix - matrix.T) > 1e-6 * size) or np.any(np.abs(matrix) > (1 + 1e-6) * size):
+        raise ValueError("must be symmetric, with no covariance above the product of its two sigmas")
+    scale = np.where(sigma > 0, sigma, 1.0)
+    if np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0] < -1e-6:
+        raise ValueError("must be positive semidefinite, as a covariance is")
+    return rows
+
+
+Entry = Annotated[float, Field(ge=-100, le=100)]
+Covariance = Annotated[  # of (ε about body x, y, z; lever arm x, y, z), R_true = Exp(ε) R: rad and m
+    tuple[Annotated[tuple[Entry, ...], Field(min_length=6, max_length=6)], ...],
+    Field(min_length=6, max_length=6),
+    AfterValidator(_covariance),
+]
+
+
+class MountOrigin(Model):
+    """Where a mount comes from: what poolcal has written beside it."""
+
+    method: Literal["coarse"]
+    file: Annotated[str, Field(max_length=300)]
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
+    software: Annotated[str, Field(max_length=100)]
+
+
 class Drift(Model):
     """First-order Gauss-Markov errors of the INS: standard deviations and correlation time."""
 
@@ -243,6 +274,8 @@ class Laser(Model):
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
     mount: Mount
     mount_sigma: MountSigma = MountSigma()  # of the fine calibration
+    mount_origin: MountOrigin | None = None
+    mount_covariance: Covariance | None = None  # goes before mount_sigma
     range_sigma_m: RangeSigma = 0.005
     range_bias_sigma_m: SigmaM = 0.002  # common to all ranges
     angle_sigma_deg: SigmaDeg = 0.003
@@ -255,6 +288,8 @@ class Mbes(Model):
     files: Files
     format: Literal["r2sonic", "table"]
     mount: Mount
+    mount_origin: MountOrigin | None = None
+    mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
     sound_speed_m_s: SoundSpeed | None = None
     svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
     sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2

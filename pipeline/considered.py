@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from pipeline import config
 from pipeline.maths.observations import SPEED_M_S
+from pipeline.maths.unknowns import OF_LASER, SIX
 
 Array = NDArray[np.float64]
+Block = tuple[NDArray[np.int64], Array]  # numbers among all unknowns, covariance
 
 
 def considered_of(
@@ -16,8 +18,10 @@ def considered_of(
 ) -> Array:
     """Sigmas (u,) of the unknowns ``names`` where they are held; zero for the mount and the surfaces."""
     mount = laser.mount_sigma
-    sigmas = {f"laser_rotation_{axis}": float(np.radians(mount.angle_deg)) for axis in "xyz"}
-    sigmas |= {f"laser_lever_arm_{axis}": mount.lever_arm_m for axis in "xyz"}
+    six = [float(np.radians(mount.angle_deg))] * 3 + [mount.lever_arm_m] * 3
+    if laser.mount_covariance is not None:
+        six = [float(np.sqrt(max(row[k], 0.0))) for k, row in enumerate(laser.mount_covariance)]
+    sigmas = dict(zip(OF_LASER[:SIX], six, strict=True))
     sigmas |= {"laser_range": laser.range_bias_sigma_m, "laser_latency": laser.latency_sigma_s}
     if mbes is not None:
         sigmas |= {
@@ -31,3 +35,11 @@ def considered_of(
         if name.startswith("wet_"):
             sigmas[name] = as_built.offset_sigma_m if name.endswith("_shift") else lean
     return np.array([sigmas.get(name, 0.0) for name in names])
+
+
+def correlated(names: Sequence[str], laser: config.Laser) -> tuple[Block, ...]:
+    """Those of the unknowns ``names`` whose errors are not independent: the laser's six, where their covariance is
+    given."""
+    if laser.mount_covariance is None:
+        return ()
+    return ((np.array([names.index(name) for name in OF_LASER[:SIX]]), np.array(laser.mount_covariance)),)

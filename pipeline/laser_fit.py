@@ -40,7 +40,9 @@ def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: config.La
 
 
 def coarse_covariance(laser: config.Laser, settings: config.LaserFit) -> Array:
-    """How sure the coarse mount is, (6, 6) in rad and m."""
+    """How sure the coarse mount is, (6, 6) in rad and m: as surveyed, else as the pool's config has it."""
+    if laser.mount_covariance is not None:
+        return np.array(laser.mount_covariance)
     sigma = np.repeat([np.radians(settings.coarse_sigma_deg), settings.coarse_sigma_m], 3)
     return np.diag(sigma**2)
 

@@ -1,5 +1,6 @@
 """What the adjustment found, as tables."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted
+from pipeline.considered import Block
 from pipeline.looking import Cells
 from pipeline.maths.consistency import consistency_limit
 from pipeline.maths.rotations import log_so3
@@ -25,14 +27,13 @@ def tables(
     found: Adjusted,
     cells: Cells,
     considered: Array,
+    together: Sequence[Block],
     coarse: Mounted,
     settings: config.Adjust,
     poses: pd.DataFrame,
     passes: pd.DataFrame,
-    *blocks: tuple[NDArray[np.int64], Array],
 ) -> dict[str, pd.DataFrame]:
-    """By name; ``considered``: sigmas of all unknowns where they are held, ``blocks`` of them correlated
-    (:meth:`Solution.total`)."""
+    """By name; ``considered``: sigmas of all unknowns where they are held; ``together``: which of them correlate."""
     state, solution = found.state, found.solution
     six = np.concatenate(
         [
@@ -45,7 +46,7 @@ def tables(
     values[:SIX], values[state.shared] = six, shared
     named = np.union1d(np.arange(SIX), solution.free)  # the six, held or not
     nothing = np.zeros(state.size)
-    random, total = solution.covariance_of(named, nothing), solution.covariance_of(named, considered, *blocks)
+    random, total = solution.covariance_of(named, nothing), solution.covariance_of(named, considered, *together)
     values = values[named]
     if solution.deficiency:
         values[:SIX], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)

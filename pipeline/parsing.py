@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -37,23 +37,42 @@ class _StrictLoader(yaml.SafeLoader):
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """One mapping from a YAML file; every way this can fail is a ConfigError."""
+    return content_of(text_of(path), path)
+
+
+def text_of(path: Path) -> str:
+    """A YAML file's text as it stands, line ends and all."""
     try:
         if path.stat().st_size > MAX_YAML_BYTES:
             raise ConfigError(f"{path}: {path.stat().st_size} bytes is no config; name the YAML file meant")
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_bytes().decode("utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
-    try:
-        content = yaml.load(text, Loader=_StrictLoader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
+
+
+def content_of(text: str, path: Path) -> dict[str, Any]:
+    """The mapping that it says."""
+    content = _loaded(text, path, _StrictLoader.get_single_data)
     if content is None:
         raise ConfigError(f"{path}: is empty; see README.md for what it must say")
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: holds {type(content).__name__}, not a mapping of keys; see README.md")
     return content
+
+
+def compose(text: str, path: Path) -> yaml.Node:
+    """The text's nodes, which know their places in it."""
+    node: yaml.Node = _loaded(text, path, _StrictLoader.get_single_node)
+    return node
+
+
+def _loaded(text: str, path: Path, how: Callable[[_StrictLoader], Any]) -> Any:
+    try:
+        return how(_StrictLoader(text))
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
 
 
 _WORDS = {  # where pydantic speaks to programmers

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline import config
 from pipeline.adjusting import free_unknowns
-from pipeline.considered import considered_of
+from pipeline.considered import considered_of, correlated
 from pipeline.errors import ConfigError
 from pipeline.instruments import under
 from pipeline.maths.solution import Solution, solve
@@ -101,7 +101,8 @@ def _outlook(
     predicted = predict(setting, passes, turn_s)
     normal = predicted.normal
     solution = solve(normal, np.zeros(len(normal)), free)
-    random, total = solution.covariance[:SIX, :SIX], solution.total(considered)[:SIX, :SIX]
+    together = correlated(setting.state.names, setting.laser)
+    random, total = solution.covariance[:SIX, :SIX], solution.total(considered, *together)[:SIX, :SIX]
     if solution.deficiency:
         random, total = np.full((SIX, SIX), np.nan), np.full((SIX, SIX), np.nan)
     return Outlook(tuple(passes), predicted, random, total, solution)

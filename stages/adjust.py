@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted, Given, adjust, noise_of
-from pipeline.considered import considered_of
+from pipeline.considered import considered_of, correlated
 from pipeline.looking import Cells, look
 from pipeline.mounts import mount_of, target_of
 from pipeline.observability import Seen, geometry_of
@@ -72,9 +72,10 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     found = adjust(streams, scene, Given(noise_of(config.ins)), settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
     sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
+    together = correlated(found.state.names, config.laser)
     coarse = mount_of(config.mbes.mount)
     return Outputs(
-        **tables(found, seen.cells, sigmas, coarse, settings, inputs.poses, inputs.passes),
+        **tables(found, seen.cells, sigmas, together, coarse, settings, inputs.poses, inputs.passes),
         geometry=_geometry_table(found, seen.cells, inputs, config),
         patterns=seen.patterns,
         residuals=seen.residuals,

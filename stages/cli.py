@@ -14,7 +14,8 @@ import typer
 import pipeline
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.progress import say
-from stages import ORDER, calibrated_in, load, names_in
+from stages import ORDER, calibrated_in, load
+from stages.comparing import comparison, save_pair
 from stages.saying import answer_of, say_failures, say_where
 
 if TYPE_CHECKING:
@@ -214,7 +215,7 @@ def view(
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "pair.rrd"
-        _save_pair(first, second, _comparison(first, second), path)
+        save_pair(first, second, comparison(first, second), path)
         return show([path])
 
 
@@ -240,7 +241,7 @@ def diff(
     from pipeline.files import write_text
     from pipeline.folder import refuse_output
 
-    found = _comparison(first, second, tolerance_deg, tolerance_mm)
+    found = comparison(first, second, tolerance_deg, tolerance_mm)
     for option, file in (("--html", html), ("--rrd", rrd)):
         refuse_output(option, file, first, second)
     if html is not None:
@@ -248,23 +249,9 @@ def diff(
 
         write_text(html, page(found))
     if rrd is not None:
-        _save_pair(first, second, found, rrd)
+        save_pair(first, second, found, rrd)
     say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else comparing.text(found), sys.stdout)
     return 1 if comparing.is_moved(found) else 0
-
-
-def _comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
-    from pipeline.diff import RunRead, diff
-
-    return diff(RunRead.read(first, names_in(first)), RunRead.read(second, names_in(second)), *tolerances)
-
-
-def _save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:
-    from pipeline.files import writing
-    from stages.views.pair import save_pair
-
-    with writing(path):
-        save_pair(first, second, found, path)
 
 
 @app.command()
@@ -308,6 +295,23 @@ def plan(
     said, enough = plan_of(file, session, config, out, rrd)
     say(said, sys.stdout)
     return 0 if enough else 1
+
+
+@app.command()
+def coarse(
+    file: Annotated[Path, typer.Argument(metavar="MARKS", help="YAML file: marks as surveyed, and as drawn")],
+    session: Annotated[Path, typer.Option("--session", metavar="SESSION", help="folder with session.yaml")],
+    out: Annotated[Path | None, typer.Option("--yaml", metavar="FILE", help="write all of it as YAML")] = None,
+    write: Annotated[bool, typer.Option("--write/--no-write", help="put the mounts into session.yaml")] = True,
+) -> int:
+    """Coarse mounts from a survey of marks on bracket and instruments. Status 1 if the marks do not agree."""
+    from pipeline.folder import refuse_output
+    from stages.coarse import coarse as coarse_of
+
+    refuse_output("--yaml", out, session, begins=b"agrees:")
+    said, agrees = coarse_of(file, session, out, write)
+    say(said, sys.stdout)
+    return 0 if agrees else 1
 
 
 @app.command()

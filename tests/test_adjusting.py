@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from pipeline import config
 from pipeline.adjusting import Adjusted, adjust, free_unknowns, noise_of
+from pipeline.considered import considered_of, correlated
 from pipeline.maths.adjustment import Body
 from pipeline.maths.solution import freed, solve
 from pipeline.maths.trajectory import Trajectory
@@ -221,6 +222,25 @@ def test_what_is_considered_adds_what_it_would_move() -> None:
     S = found.solution.sensitivity[:, [found.solution.held.tolist().index(k) for k in pair]]
     total = found.solution.total(np.zeros(found.state.size), (pair, together))
     np.testing.assert_allclose(total - found.solution.covariance, S @ together @ S.T, rtol=1e-6, atol=1e-14)
+
+
+def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None:
+    """C + S Q Sᵀ, Q the six by six of session.yaml, in its order: rotation x, y, z, lever arm x, y, z."""
+    found = solved(5, NOISY)
+    names, held = found.state.names, found.solution.held.tolist()
+    root = np.tril(np.random.default_rng(1).normal(size=(6, 6))) * np.repeat([1e-4, 2e-3], 3)[:, None]
+    Q = root @ root.T
+    block = tuple(map(tuple, Q.tolist()))
+    laser = LASER.model_copy(update={"mount_covariance": block, "mount_sigma": config.MountSigma(angle_deg=40.0)})
+    sigmas = considered_of(names, laser, MBES, config.AsBuilt())
+    six = [names.index(f"laser_{kind}_{axis}") for kind in ("rotation", "lever_arm") for axis in "xyz"]
+    np.testing.assert_allclose(sigmas[six], np.sqrt(np.diag(Q)), rtol=1e-12)
+    others = sigmas.copy()
+    others[six] = 0.0
+    S = found.solution.sensitivity[:, [held.index(k) for k in six]]
+    extra = found.solution.total(sigmas, *correlated(names, laser)) - found.solution.total(others)
+    np.testing.assert_allclose(extra, S @ Q @ S.T, rtol=1e-6, atol=1e-14)
+    assert correlated(names, LASER) == ()
 
 
 def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:

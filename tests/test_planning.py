@@ -48,6 +48,20 @@ def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift:
     assert (answer.gaps, answer.remedy, answer.better) == ([], "", None)
 
 
+def test_the_lasers_mount_covariance_is_carried_into_the_total(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    """Six errors that are one, a turn about the INS with the lever arm's share of it, are no more than they are."""
+    pool, session = configs
+    turn = np.r_[0.0, 0.0, 1e-3, np.cross([0.0, 0.0, 1e-3], [0.21, 0.48, 1.1])]
+    totals = {}
+    for name, matrix in (("one", np.outer(turn, turn)), ("apart", np.diag(turn**2)), ("none", np.zeros((6, 6)))):
+        laser = session.laser.model_copy(update={"mount_covariance": tuple(map(tuple, matrix.tolist()))})
+        totals[name] = planned.judge(plan_of(4.0, 8.0), pool, session.model_copy(update={"laser": laser})).given.total
+    added = totals["one"] - totals["none"]
+    assert np.linalg.matrix_rank(added, tol=1e-6 * np.abs(added).max()) == 1
+    assert np.linalg.matrix_rank(totals["apart"] - totals["none"], tol=1e-6 * np.abs(added).max()) == 3
+    assert added[2, 2] > 1e-8
+
+
 def test_usable_points_are_those_that_segment_labels(configs: tuple[PoolConfig, SessionConfig]) -> None:
     session = made({"track": {"distances_m": [4.0]}}, seed=2)
     found = calibrated(session, "segment")

@@ -29,9 +29,10 @@ from pipeline.tables import Tables
 from pipeline.times import utc_text
 
 Row = Mapping[str, Any]
+OF_MOUNT = ("the laser's angles", "the laser's lever arm")
 SOURCES = (  # first part of the unknowns' names
-    ("laser_rotation", "the laser's angles"),
-    ("laser_lever_arm", "the laser's lever arm"),
+    ("laser_rotation", OF_MOUNT[0]),
+    ("laser_lever_arm", OF_MOUNT[1]),
     ("laser_range", "the laser's ranges"),
     ("laser_latency", "the laser's clock"),
     ("mbes_range", "the sonar's ranges"),
@@ -80,7 +81,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         laser=laser,
         by_method=[] if laser else list(_by_method(calibrations)),
         closing=[] if laser else tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
-        shares=list(_shares(tables.table(artefacts.FREED), tables.table(artefacts.ESTIMATE))),
+        shares=list(_shares(tables.table(artefacts.FREED), tables.table(artefacts.ESTIMATE), settings.session)),
         built=_built(result["target"]["as_found"], by_design(target_of(settings.pool.target))),
         names=[name for name, *_ in PARAMETERS],
         correlations=_correlations(result),
@@ -133,14 +134,21 @@ def _six(table: pd.DataFrame, method: str, limits: config.Verdict) -> list[dict[
     ]
 
 
-def _shares(freed: pd.DataFrame, estimate: pd.DataFrame) -> Iterator[Row]:
+def _shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: config.SessionConfig) -> Iterator[Row]:
     """What each source of errors does to the six (root of its sum of squares), noise first: together the total sigma,
-    of the rotations about the body's axes."""
-    noise = estimate.set_index("unknown")["sigma"].reindex(NAMES).to_numpy(np.float64)
+    of the rotations about the body's axes. A laser's mount whose six correlate is one source: what the total has left
+    over.
+    """
+    by_name = estimate.set_index("unknown").reindex(NAMES)
+    noise, total = (by_name[name].to_numpy(np.float64) for name in ("sigma", "sigma_total"))
     effects = freed[[f"effect_{name}" for name in NAMES]].to_numpy(np.float64)
     source = freed["unknown"].map(lambda name: next((words for start, words in SOURCES if name.startswith(start)), ""))
     there = [words for _, words in SOURCES if (source == words).any()]
     squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for words in there}
+    if session.calibrated == "mbes" and session.laser.mount_covariance is not None:
+        others = {words: square for words, square in squares.items() if words not in OF_MOUNT}
+        left = total**2 - noise**2 - np.sum(list(others.values()), axis=0)
+        squares = {"the laser's mount": np.maximum(left, 0.0), **others}
     for words, of_source in {"noise (the random sigma)": noise**2, **squares}.items():
         yield {
             "name": words,

@@ -65,7 +65,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     blocks = [(kept, coarse[np.ix_(kept, kept)])] if len(kept) else []
     mount = mount_of(config.laser.mount)
     return Outputs(
-        **tables(found, seen.cells, sigmas, mount, settings, inputs.poses, inputs.passes, *blocks),
+        **tables(found, seen.cells, sigmas, blocks, mount, settings, inputs.poses, inputs.passes),
         geometry=_geometry_table(found),
         patterns=seen.patterns,
         residuals=seen.residuals,

@@ -17,6 +17,7 @@ from stages.cli import _go_on, call
 from stages.drawing import Painters
 from tests.runner.conftest import Pool
 
+COMMANDS = ("simulate", "run", "stage", "verify", "view", "diff", "history", "plan", "coarse", "compare")
 TOY = [sys.executable, str(Path(__file__).with_name("toy_poolcal.py"))]
 
 
@@ -44,7 +45,7 @@ def test_help_is_quick_and_imports_nothing_that_computes() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert time.monotonic() - start < 1.0
-    for command in ("simulate", "run", "stage", "verify", "view", "diff", "history", "compare"):
+    for command in COMMANDS:
         assert command in done.stdout
 
 
@@ -53,7 +54,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"poolcal {pipeline.__version__}\n"
 
 
-@pytest.mark.parametrize("command", ["simulate", "run", "stage", "verify", "view", "diff", "history", "compare"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert call([command, "--help"]) == 0
     assert "Usage: poolcal" in capsys.readouterr().out
@@ -72,6 +73,8 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
         (["stage", "ingest", "z", "--session", "x"], "--session and --config: give both"),
         (["simulate", "x", "--seed", "-1"], "--seed -1: must not be negative"),
         (["verify", "z"], "z: holds no run.yaml"),
+        (["coarse", "marks.yaml"], "Missing option '--session'"),
+        (["coarse", "marks.yaml", "--session", "missing"], "missing: is no folder; SESSION is the folder that holds"),
         (["compare", "z", "truth.json"], "calibration.json: cannot be read"),
         (["--wrong"], "No such option"),
     ],

@@ -1,0 +1,20 @@
+"""Two runs set beside each other, for ``poolcal diff`` and ``view``."""
+
+from pathlib import Path
+from typing import Any
+
+from stages import names_in
+
+
+def comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
+    from pipeline.diff import RunRead, diff
+
+    return diff(RunRead.read(first, names_in(first)), RunRead.read(second, names_in(second)), *tolerances)
+
+
+def save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:
+    from pipeline.files import writing
+    from stages.views.pair import save_pair as write_pair
+
+    with writing(path):
+        write_pair(first, second, found, path)
