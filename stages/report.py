@@ -14,6 +14,7 @@ from pipeline import artefacts, config
 from pipeline.built import as_found, oddities
 from pipeline.causes import estimated
 from pipeline.closing import closing_table
+from pipeline.ins_sigmas import drift_of, told
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, mount_of, six_of
@@ -50,6 +51,7 @@ class Config:
 class Inputs:
     files: Annotated[pd.DataFrame, artefacts.FILES]
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
+    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
     faces: Annotated[pd.DataFrame, artefacts.FACES]
     planes: Annotated[pd.DataFrame, artefacts.PLANES]
     sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
@@ -101,7 +103,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.freed,
         inputs.patterns,
     )
-    doubt = drift_doubt(inputs.drift, config.ins.drift)
+    from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift = drift_of(config.ins, inputs.ins_sigmas, inputs.passes)
+    doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest, level = config.segment.farthest_mount, config.adjust.test_level
     found = reasons(evidence, methods, Settings(config.verdict, level, config.result, farthest, doubt))
     built = as_found(inputs.planes, inputs.patterns, inputs.faces, config.target.e)
@@ -133,6 +137,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "target": target,
         "passes": passes,
         "ranges": _range_note(config.mbes),
+        "ins_drift": drift.model_dump() | {"from_files": list(from_files)},
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
     }
