@@ -191,13 +191,15 @@ def _days(year: NDArray[np.float64], month: NDArray[np.float64], day: NDArray[np
 
 # --- columns as poses ------------------------------------------------------------------------------------------------
 def _refuse_float32(columns: Columns, layout: Layout, name: str) -> None:
-    """As of other formats, of numbers that have been printed: to within half a step they are float32 numbers."""
+    """As of other formats, of numbers that have been printed: to within half a step they are float32 numbers. Where
+    those lie as near together as what is printed, that says nothing."""
     found = {}
     for column, step in layout.steps.items():
         values = columns[layout.time if column == "time" else column]
         with np.errstate(all="ignore"):
-            rounded = values.astype(np.float32).astype(np.float64)
-            near = np.abs(values - rounded) <= 0.5001 * step
+            single = values.astype(np.float32)
+            rounded = single.astype(np.float64)
+            near = (np.abs(values - rounded) <= 0.5001 * step) & (np.spacing(np.abs(single)) > 4 * step)
         found["seconds_of_week" if column == "time" else f"{column}_deg"] = np.where(near, rounded, values)
     refuse_float32(found, name)
 
