@@ -35,7 +35,8 @@ TITLES = {name.lower(): name for name in (
     "Pitch", "Heading", "Q", "SDNorth", "SDEast", "SDHeight", "RollSD", "PitchSD", "HdngSD",
 )}  # fmt: skip
 OWN = frozenset({"gpstime", "utctime", "h-ell", "h-msl"})  # of these at least one, of all names at least LEAST_NAMES
-LEAST_NAMES = 4
+LEAST_NAMES, MOST_NAMES = 4, 300
+LONGEST = 8192  # letters of the names, or of the units
 ORDERS = ("mdy", "dmy", "ymd")
 THREE = ("dms", "hms", *ORDERS)  # units of three columns
 DEGREES = {
@@ -77,9 +78,11 @@ class Layout:
 
 def column_names(line: str) -> list[str] | None:
     """The names in lower case, where this line is one of Inertial Explorer's names."""
+    if len(line) > LONGEST:
+        return None
     names = [word.strip().lower() for word in (line.split(",") if "," in line else line.split())]
     known = TITLES.keys() & set(names)
-    return names if len(known) >= LEAST_NAMES and known & OWN else None
+    return names if len(known) >= LEAST_NAMES and known & OWN and len(names) <= MOST_NAMES else None
 
 
 def names_line(head: bytes) -> int | None:
@@ -154,7 +157,7 @@ def _units(names: str, line: str, file: str) -> list[str]:
         bare = [_bare(unit) for unit in found]
         return (bare + [""] * names.count(","))[: names.count(",") + 1]
     ends = [found.end() for found in re.finditer(r"\S+", names.expandtabs())]
-    units = list(re.finditer(r"\([^)]*\)|\S+", line.expandtabs()))
+    units = list(re.finditer(r"\([^()]*\)|\S+", line[:LONGEST].expandtabs()))
     if len(units) == len(ends):
         return [_bare(unit.group()) for unit in units]
     nearest = [int(np.argmin([abs(end - unit.end()) for end in ends])) for unit in units]

@@ -13,6 +13,7 @@ where a number should be and a last line without line end are left out and count
 """
 
 import io
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ from pipeline.times import GPS_EPOCH_UNIX_S, NS, gps_ns_from_unix_utc, gps_ns_fr
 BLOCK = 4 << 20
 DAY_S = 86_400
 WORST_Q = 3
-NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
+NUMBER = r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
 Columns = dict[str, NDArray[np.float64]]
 
 
@@ -104,13 +105,16 @@ def _tables(file: BinaryIO, layout: Layout, name: str, dropped: Counter[str]) ->
 
 
 def _separated(block: bytes, separators: bytes) -> bytes:
-    """Rows with one blank between columns, and none at their ends; no empty first row."""
-    blanks = b"\t\v\f\r" + separators
-    codes = np.frombuffer(block.translate(bytes.maketrans(blanks, b" " * len(blanks))), np.uint8)
-    blank, end = codes == ord(" "), codes == ord("\n")
-    follows = np.concatenate([[True], (blank | end)[:-1]])
+    """Rows with one blank between columns, and none at their ends; no empty first row; no + before a number, and no
+    letters that no number has (a ? in their place)."""
+    blanks, end = b" \t\v\f\r" + separators, ord("\n")
+    letters = bytes(32 if one in blanks else one if 32 < one < 127 or one == end else ord("?") for one in range(256))
+    codes = np.frombuffer(block.translate(letters), np.uint8)
+    blank = codes == ord(" ")
+    follows = np.concatenate([[True], (blank | (codes == end))[:-1]])
     kept = codes[~(blank & follows)]
-    return bytes(kept[~((kept == ord(" ")) & np.append(kept[1:] == ord("\n"), True))]).lstrip(b"\n")
+    rows = kept[~((kept == ord(" ")) & np.append(kept[1:] == end, True))].tobytes().lstrip(b"\n")
+    return re.sub(rb"(?:(?<=[ \n])|\A)\+", b"", rows) if b"+" in rows else rows
 
 
 def _parsed(rows: bytes, layout: Layout, dropped: Counter[str]) -> pa.Table:
@@ -148,11 +152,9 @@ def _numbers(table: pa.Table, wrong: Counter[str]) -> pa.Table:
     good = np.ones(table.num_rows, dtype=bool)
     for column in table.columns:
         good &= pc.match_substring_regex(column, NUMBER).to_numpy()
-    found = table.filter(pa.array(good))
-    wrong["word where a number should be"] += table.num_rows - found.num_rows
-    return found.cast(pa.schema([(name, pa.string()) for name in found.column_names])).cast(
-        pa.schema([(name, pa.float64()) for name in found.column_names])
-    )
+    wrong["word where a number should be"] += int(np.count_nonzero(~good))
+    found = table.filter(pa.array(good)).to_pydict()
+    return pa.table({name: pa.array([float(word) for word in words], pa.float64()) for name, words in found.items()})
 
 
 def _columns(table: pa.Table, layout: Layout) -> Columns:

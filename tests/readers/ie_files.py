@@ -127,8 +127,9 @@ def export(
     if commas:
         return (header + "".join(",".join(line) + "\n" for line in [*heads, *printed])).encode("latin-1")
     widths = [max(map(len, column)) + 2 for column in zip(*heads, *printed, strict=True)]
-    lines = ("".join(f"{word:>{width}}" for word, width in zip(line, widths, strict=True)) for line in [*heads, *printed])
-    return (header + "".join(line + "\n" for line in lines)).encode("latin-1")
+    lines = [*heads, *printed]
+    padded = ("".join(f"{word:>{width}}" for word, width in zip(line, widths, strict=True)) for line in lines)
+    return (header + "".join(line + "\n" for line in padded)).encode("latin-1")
 
 
 def whole(layout: str, rows: Iterable[Row] | None = None) -> bytes:

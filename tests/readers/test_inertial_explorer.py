@@ -63,12 +63,12 @@ def test_layouts(layout: str, file: Path) -> None:
 def test_written_out_by_hand(file: Path) -> None:
     """Columns as real profiles have them; the unit stands under its name, and Q has none."""
     file.write_text(
-        "      UTCTime       Week   GPSTime         Latitude        Longitude        H-Ell           Roll        Heading "
-        "Q          Pitch\n"
-        "        (sec)    (weeks)     (sec)       (+/-D M S)       (+/-D M S)          (m)          (deg)          (deg) "
-        "           (deg)\n"
-        " 1621578524.00 2158.00000 455342.00   22 18 05.61075  -114 11 25.11071     2.894  -0.2074966655 -59.3645242579 "
-        "2  -0.6303452479\n"
+        "    UTCTime       Week   GPSTime       Latitude        Longitude    H-Ell           Roll        Heading Q"
+        "          Pitch\n"
+        "      (sec)    (weeks)     (sec)     (+/-D M S)       (+/-D M S)      (m)          (deg)          (deg)  "
+        "          (deg)\n"
+        " 1621578524 2158.00000 455342.00 22 18 05.61075 -114 11 25.11071    2.894  -0.2074966655 -59.3645242579 2"
+        "  -0.6303452479\n"
     )
     columns, dropped = read(file)
     assert not dropped
@@ -127,8 +127,9 @@ def test_before_the_last_leap_second(file: Path) -> None:
 
 def test_angles_in_radians_and_heights_in_centimetres(file: Path) -> None:
     layout = LAYOUTS["degrees"] | {
-        "Roll": ("(rad)", lambda row: f"{np.radians(row.roll):.9f}"), "H-Ell": ("(cm)", lambda row: f"{100 * row.height}")
-    }  # fmt: skip
+        "Roll": ("(rad)", lambda row: f"{np.radians(row.roll):+.9f}"),
+        "H-Ell": ("(cm)", lambda row: f"{100 * row.height:+}"),
+    }
     file.write_bytes(export(layout, ROWS))
     is_truth(read(file)[0])
 
