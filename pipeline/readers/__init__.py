@@ -149,7 +149,7 @@ def _sbet(files: Files, accuracy: Files, settings: Ins) -> tuple[Part, ...]:
         sbet.check_size(path, name)
     for path, name in accuracy:
         if (kind := detect.kind_of(path, name)) is not detect.ACCURACY:
-            raise RawDataError(f"{name}: is {kind.title}, not an accuracy file (SMRMSG); mend ins.accuracy")
+            raise RawDataError(f"{name}: is {kind.title}, not a whole accuracy file (SMRMSG); mend ins.accuracy")
     firsts = [sbet.first_seconds(path, name) for path, name in (*files, *accuracy)]
     weeks = _weeks(firsts, settings.gps_week, "ins", files[0][1])
     solutions = [sbet.SbetPart(*file, week, settings.latency_s) for file, week in zip(files, weeks, strict=False)]

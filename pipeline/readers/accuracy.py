@@ -1,7 +1,7 @@
 """SMRMSG, the accuracies that POSPac and others write beside an SBET: 10 little-endian doubles a record, no header.
 
 Time (GPS seconds of week), RMS of position north, east, down [m], of velocity north, east, down [m/s], of roll, pitch,
-heading [arc-minutes]. The week is not in the file: that nearest to the SBET's. A record that was cut off is counted.
+heading [arc-minutes]. The week is not in the file: that nearest to the SBET's.
 """
 
 from collections import Counter
@@ -38,7 +38,7 @@ class AccuracyPart:
         with opened(self.path, self.name) as file:
             while data := file.read(ROWS * RECORD):
                 records = np.frombuffer(data, "<f8", count=len(data) // RECORD * 10).reshape(-1, 10)
-                dropped = Counter({"accuracy record cut off": 1} if len(data) % RECORD else {})
+                dropped = Counter({"stray bytes at the end": len(data) % RECORD})
                 if len(records):
                     weeks, week, last = running_weeks(records[:, 0], week, last)
                     good = possible_week_time(weeks, records[:, 0])

@@ -96,9 +96,9 @@ class NovatelPart:
             if number is not None:
                 for records in _records(file, number):
                     yield _chunk(records, order, self.latency_s, dropped)
-            if number is not None and telling not in (None, number):
+            if number is not None and telling is not None:
                 for records in _records(file, telling):
-                    sigmas = _sigmas(_usable(records), self.latency_s, dropped)
+                    sigmas = _sigmas(records, self.latency_s, dropped)
                     yield chunk({name: np.empty(0) for name in INS_COLUMNS}, INS_COLUMNS, dropped, sigmas)
             if dropped:
                 yield no_rows(INS_COLUMNS, dropped)
@@ -223,16 +223,13 @@ def _chunk(records: np.ndarray[Any, Any], order: Order, latency_s: float, droppe
     t_ns = gps_ns_from_week_seconds(sieve["week"], sieve["seconds"])
     sieve.columns["t_ns"] = t_ns - latency_ns(latency_s)
     order.keep(sieve)
-    sigmas = _sigmas(records, latency_s, dropped) if "sigmas" in names else {}
-    return chunk(sieve.columns, INS_COLUMNS, dropped, sigmas)
-
-
-def _usable(records: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    return records[np.isin(records["status"], USABLE)] if "status" in (records.dtype.names or ()) else records
+    return chunk(sieve.columns, INS_COLUMNS, dropped)
 
 
 @np.errstate(all="ignore")
 def _sigmas(records: np.ndarray[Any, Any], latency_s: float, dropped: Counter[str]) -> dict[str, np.ndarray[Any, Any]]:
+    if "status" in (records.dtype.names or ()):
+        records = records[np.isin(records["status"], USABLE)]
     week, seconds = records["header_week"].astype(np.int64), records["header_ms"] / 1000.0
     good = possible_week_time(week, seconds)
     dropped["accuracy at an impossible time"] += int(np.count_nonzero(~good))
