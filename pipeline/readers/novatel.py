@@ -95,8 +95,8 @@ class NovatelPart:
             order = Order(self.name)
             if number is not None:
                 for records in _records(file, number):
-                    yield _chunk(records, order, self.latency_s, dropped)
-            if number is not None and telling is not None:
+                    yield _chunk(records, order, self.latency_s, dropped, telling == number)
+            if number is not None and telling is not None and telling != number:
                 for records in _records(file, telling):
                     sigmas = _sigmas(records, self.latency_s, dropped)
                     yield chunk({name: np.empty(0) for name in INS_COLUMNS}, INS_COLUMNS, dropped, sigmas)
@@ -201,7 +201,10 @@ def _arrays(records: list[bytes]) -> Iterator[np.ndarray[Any, Any]]:
 
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-def _chunk(records: np.ndarray[Any, Any], order: Order, latency_s: float, dropped: Counter[str]) -> Chunk:
+def _chunk(
+    records: np.ndarray[Any, Any], order: Order, latency_s: float, dropped: Counter[str], telling: bool
+) -> Chunk:
+    """Poses, and, where these records are those ``telling`` them, the sigmas."""
     bad = ~np.isin(records["status"], USABLE)
     for status, count in zip(*np.unique(records["status"][bad], return_counts=True), strict=True):
         dropped[f"ins status {STATUS.get(int(status), int(status))}"] += int(count)
@@ -223,7 +226,8 @@ def _chunk(records: np.ndarray[Any, Any], order: Order, latency_s: float, droppe
     t_ns = gps_ns_from_week_seconds(sieve["week"], sieve["seconds"])
     sieve.columns["t_ns"] = t_ns - latency_ns(latency_s)
     order.keep(sieve)
-    return chunk(sieve.columns, INS_COLUMNS, dropped)
+    sigmas = _sigmas(records, latency_s, dropped) if telling else {}
+    return chunk(sieve.columns, INS_COLUMNS, dropped, sigmas)
 
 
 @np.errstate(all="ignore")
