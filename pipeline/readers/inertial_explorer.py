@@ -41,10 +41,10 @@ from pipeline.readers.sieve import (
     refuse_float32,
     sigma_rows,
 )
+from pipeline.readers.tabular import CSV_BLOCK, MAX_LINE
 from pipeline.streams import Chunk
 from pipeline.times import GPS_EPOCH_UNIX_S, NS, gps_ns_from_unix_utc, gps_ns_from_week_seconds
 
-BLOCK = 4 << 20
 DAY_S = 86_400
 WORST_Q = 3
 NUMBER = r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
@@ -83,9 +83,9 @@ def _tables(file: BinaryIO, layout: Layout, name: str, dropped: Counter[str]) ->
     """The columns that are read, in degrees, metres and seconds, block by block."""
     file.seek(layout.start)
     held, fitted = b"", False
-    while data := file.read(BLOCK):
+    while data := file.read(CSV_BLOCK):
         whole, end, held = (held + data).rpartition(b"\n")
-        if not end and len(held) > BLOCK:
+        if len(held) > MAX_LINE:
             dropped["line without end"] += 1
             held = b""
         rows = _separated(whole + end, layout.separators)
