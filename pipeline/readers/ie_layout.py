@@ -46,7 +46,7 @@ DEGREES = {
 }  # fmt: skip
 METRES = {"m": 1.0, "metres": 1.0, "meters": 1.0, "cm": 0.01, "mm": 0.001}
 SECONDS = {"sec": 1.0, "s": 1.0, "seconds": 1.0, "hms": 1.0}
-WEEKS = {"weeks": 1.0, "week": 1.0, "wk": 1.0, "gps": 1.0}
+WEEKS = {"weeks": 1.0, "week": 1.0}
 UNITS: dict[str, Mapping[str, float]] = {
     **dict.fromkeys(POSITION, DEGREES | {"dms": 1.0}), **dict.fromkeys(ATTITUDE, DEGREES),
     **dict.fromkeys(HEIGHTS, METRES), **dict.fromkeys(TIMES, SECONDS),
@@ -128,12 +128,8 @@ def read_layout(path: Path, name: str) -> Layout:
     steps = {column: _step(words, places[column]) * scales[column] for column in POSITION} | {
         "time": _step(words, (time[-1],))
     }
-    for column in POSITION if words else ():
-        if steps[column] > COARSEST_DEG:
-            raise RawDataError(
-                f"{name}: {TITLES[column]} is printed in steps of {steps[column]:.0e} degrees, more than 2 cm; "
-                "export it with more digits: 8 in degrees, 5 in seconds of arc"
-            )
+    if words:
+        _refuse_coarse(steps, name)
     first_s = float(words[0][time[0]]) if words and len(time) == 1 and _is_number(words[0][time[0]]) else np.nan
     return Layout(start, separators, starts[-1], places, scales, clock, order, first_s, steps)
 
@@ -228,6 +224,15 @@ def _scale(column: str, unit: str, file: str) -> float:
         told = f"has the unit ({unit})" if unit else "has no unit"
         raise RawDataError(f"{file}: column {TITLES[column]} {told}; export it as one of {', '.join(known)}")
     return known[unit]
+
+
+def _refuse_coarse(steps: Mapping[str, float], file: str) -> None:
+    for column in POSITION:
+        if steps[column] > COARSEST_DEG:
+            raise RawDataError(
+                f"{file}: {TITLES[column]} is printed in steps of {steps[column]:.0e} degrees, more than 2 cm; "
+                "export it with more digits: 8 in degrees, 5 in seconds of arc"
+            )
 
 
 def _step(rows: list[list[str]], places: tuple[int, ...]) -> float:

@@ -34,7 +34,7 @@ class Row:
 
     @property
     def week(self) -> int:
-        return WEEK + int(self.seconds >= 604_800)
+        return WEEK + int(self.seconds // 604_800)
 
     @property
     def of_week(self) -> float:
