@@ -6,7 +6,7 @@ Both keep the units of the contract (degrees, metres); code that computes conver
 
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -173,7 +173,8 @@ def _inside(pattern: str) -> str:
     return pattern
 
 
-Files = Annotated[list[Annotated[str, AfterValidator(_inside)]], Field(min_length=1)]
+Pattern = Annotated[str, AfterValidator(_inside)]
+Files = Annotated[list[Pattern], Field(min_length=1)]
 Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
 
 
@@ -252,11 +253,26 @@ class InstrumentUsed(Model):
 class Ins(Model):
     instrument: InstrumentUsed | None = None
     files: Files
-    format: Literal["novatel", "sbet", "table"]
+    format: Literal["novatel", "sbet", "inertial_explorer", "table"]
+    accuracy: list[Pattern] = Field(default_factory=list)  # SMRMSG files beside an SBET
     gps_week: Week = None
     latency_s: Latency = 0.0
     drift: Drift = Drift()
+    drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, where they tell; else those of drift
     white: White = White()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _given_drift_goes_first(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "drift" in given and "drift_from" not in given:
+            return given | {"drift_from": "settings"}
+        return given
+
+    @model_validator(mode="after")
+    def _accuracy_of_sbet(self) -> "Ins":
+        if self.accuracy and self.format != "sbet":
+            raise ValueError(f"accuracy files belong to an SBET, but format is {self.format}: take accuracy out")
+        return self
 
 
 class MountSigma(Model):
@@ -315,6 +331,7 @@ class Recording(Model):
     """Of a sensor, what its readers need: trying another mount or sigma must not read the files again."""
 
     files: tuple[str, ...]
+    accuracy: tuple[str, ...] = ()
     format: str
     gps_week: Week = None
     latency_s: float
@@ -352,6 +369,7 @@ class SessionConfig(Model):
         def of(sensor: Ins | Laser | Mbes) -> Recording:
             return Recording(
                 files=tuple(sensor.files),
+                accuracy=tuple(getattr(sensor, "accuracy", ())),
                 format=sensor.format,
                 gps_week=getattr(sensor, "gps_week", None),
                 latency_s=sensor.latency_s,
@@ -374,5 +392,8 @@ def load_session(folder: Path) -> SessionConfig:
     from pipeline.instruments import applied  # here: it is made of the models above
 
     path = folder / "session.yaml"
-    content, _ = applied(read_yaml(path), folder)
+    content, own = applied(read_yaml(path), folder)
+    ins = content.get("ins")
+    if isinstance(ins, dict) and "drift" in ins and "ins.drift" not in own:  # a preset's: what files tell goes first
+        content = content | {"ins": {"drift_from": "files"} | ins}
     return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | content, str(path))

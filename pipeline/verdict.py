@@ -286,8 +286,8 @@ def warnings(
     return found
 
 
-def drift_doubt(drift: pd.DataFrame, conceded: config.Drift) -> str:
-    """What the drift found (table ``drift``, at its knots) says of the session's figures: empty, if nothing.
+def drift_doubt(drift: pd.DataFrame, conceded: config.Drift, stated: str = "ins.drift says") -> str:
+    """What the drift found (table ``drift``, at its knots) says of the figures conceded: empty, if nothing.
 
     Root mean square of values ÷ conceded sigmas. What is found is drawn towards zero by those same sigmas: 0.6 to 0.7
     where they are right, at least 1.6 where the INS drifts three times as far.
@@ -302,7 +302,7 @@ def drift_doubt(drift: pd.DataFrame, conceded: config.Drift) -> str:
     if not ratio > ODD_DRIFT:
         return ""
     return (
-        f"the INS drifts at least {ratio:.1f} times as far as ins.drift says: give its figures before anything else is "
+        f"the INS drifts at least {ratio:.1f} times as far as {stated}: give its figures before anything else is "
         "looked for"
     )
 

@@ -9,6 +9,7 @@ import pandas as pd
 from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted, Given, adjust, noise_of
 from pipeline.considered import considered_of, correlated
+from pipeline.ins_sigmas import drift_of
 from pipeline.looking import Cells, look
 from pipeline.mounts import mount_of, target_of
 from pipeline.observability import Seen, geometry_of
@@ -38,6 +39,7 @@ class Config:
 class Inputs:
     files: Annotated[pd.DataFrame, artefacts.FILES]
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
+    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
     faces: Annotated[pd.DataFrame, artefacts.FACES]
     poses: Annotated[pd.DataFrame, artefacts.POSES]
     target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
@@ -67,16 +69,17 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     settings = config.adjust
     model = target_of(config.target)
     given = (model, inputs.poses, inputs.target_pose, inputs.planes)
-    scene = scene_of(*given, config.ins, config.laser, config.mbes, config.as_built.faces)
+    ins = config.ins.model_copy(update={"drift": drift_of(config.ins, inputs.ins_sigmas, inputs.passes)})
+    scene = scene_of(*given, ins, config.laser, config.mbes, config.as_built.faces)
     streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
-    found = adjust(streams, scene, Given(noise_of(config.ins)), settings, config.ingest.max_gap_s)
+    found = adjust(streams, scene, Given(noise_of(ins)), settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
     sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
     together = correlated(found.state.names, config.laser)
     coarse = mount_of(config.mbes.mount)
     return Outputs(
         **tables(found, seen.cells, sigmas, together, coarse, settings, inputs.poses, inputs.passes),
-        geometry=_geometry_table(found, seen.cells, inputs, config),
+        geometry=_geometry_table(found, seen.cells, inputs, config, ins),
         patterns=seen.patterns,
         residuals=seen.residuals,
         residual_bins=bins_table(seen.residuals, inputs.faces),
@@ -84,7 +87,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
 
 
-def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Config) -> pd.DataFrame:
+def _geometry_table(
+    found: Adjusted, cells: Cells, inputs: Inputs, config: Config, ins: config.Ins
+) -> pd.DataFrame:
     """What the passes lack, and what would cure it."""
     passes = inputs.passes.set_index("pass").loc[sorted({number for sensor, _, number in cells if sensor == "mbes"})]
     rates = inputs.files.groupby("sensor")["rate_hz"].median()
@@ -97,9 +102,7 @@ def _geometry_table(found: Adjusted, cells: Cells, inputs: Inputs, config: Confi
         }
     )
     model = target_of(config.target)
-    setting = Setting(
-        model, found.state, plan, config.segment, config.ins, config.laser, config.mbes
-    )
+    setting = Setting(model, found.state, plan, config.segment, ins, config.laser, config.mbes)
     families = [surface.family for surface in found.state.surfaces]
     soundings = dict.fromkeys(families, 0)
     for (sensor, surface, _), cell in cells.items():

@@ -1,6 +1,6 @@
 """Raw instrument files -> canonical streams and tables, with quality control."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline import artefacts, config
 from pipeline.errors import RawDataError
+from pipeline.ins_sigmas import thinned
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.passes import estimate_azimuth, find_passes, pass_of, split_at_gaps
 from pipeline.streams import EMPTY, Chunk, Piece, Stream
@@ -35,6 +36,7 @@ class Inputs:
 @dataclass(frozen=True)
 class Outputs:
     trajectory: Annotated[pd.DataFrame, artefacts.TRAJECTORY]
+    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
     pool_frame: Annotated[pd.DataFrame, artefacts.POOL_FRAME]
     files: Annotated[pd.DataFrame, artefacts.FILES]
@@ -52,6 +54,8 @@ class Seen:
     dropped: dict[str, int]
     epochs_ns: NDArray[np.int64]
     trajectory: Columns
+    sigmas: Columns = field(default_factory=dict)  # of the INS, thinned
+    accuracy: bool = False  # of a file of sigmas alone
     lowest_speed_m_s: float = np.inf  # sound speeds recorded with the pings
     highest_speed_m_s: float = -np.inf
 
@@ -64,12 +68,17 @@ def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Piec
     t_ns = np.asarray(chunk.columns["t_ns"], dtype=np.int64) if chunk.columns else np.empty(0, np.int64)
     dropped = dict(chunk.dropped)
     if source == "ins":
-        return Piece({}, Seen(len(t_ns), dropped, t_ns, dict(chunk.columns)))
+        accuracy, sigmas = not chunk.columns, thinned(chunk.sigmas)
+        epochs = sigmas.get("t_ns", t_ns) if accuracy else t_ns
+        return Piece({}, Seen(len(t_ns), dropped, epochs, dict(chunk.columns), sigmas, accuracy))
     if source == "laser":
         return Piece({"laser_points": chunk.columns}, Seen(len(t_ns), dropped, _seconds(t_ns), {}))
     speed = np.asarray(chunk.columns["sound_speed_m_s"]) if len(t_ns) else np.empty(0)
     lowest, highest = (float(speed.min()), float(speed.max())) if len(speed) else (np.inf, -np.inf)
-    return Piece({"soundings": chunk.columns}, Seen(len(t_ns), dropped, np.unique(t_ns), {}, lowest, highest))
+    seen = Seen(
+        len(t_ns), dropped, np.unique(t_ns), {}, lowest_speed_m_s=lowest, highest_speed_m_s=highest
+    )
+    return Piece({"soundings": chunk.columns}, seen)
 
 
 def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config: Config) -> Outputs:
@@ -85,9 +94,11 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config:
     sounded = "mbes" if "mbes" in epochs else "laser"  # by what passes are told
     pool_frame, frame = _pool_frame(trajectory, config.target_place)
     max_gap_ns = round(config.ingest.max_gap_s * NS)
-    counts = _counts(partials, {"ins": backwards})
+    sigmas, outside = _sigmas(partials["ins"], int(ins_t[0]), int(ins_t[-1]))
+    counts = _counts(partials, {"ins": backwards}, outside)
     return Outputs(
         trajectory=trajectory,
+        ins_sigmas=sigmas,
         passes=_passes(trajectory, frame, epochs[sounded], max_gap_ns, config.ingest.reversal_m),
         pool_frame=pool_frame,
         files=_files(partials),
@@ -150,6 +161,26 @@ def _trajectory(chunks: list[Columns]) -> tuple[pd.DataFrame, int]:
     table = table.iloc[order]
     keep = np.diff(table["t_ns"].to_numpy(), prepend=np.iinfo(np.int64).min // 2) > 0
     return table[keep].reset_index(drop=True), int((~keep).sum())
+
+
+def _sigmas(pieces: list[tuple[str, Seen]], start: int, end: int) -> tuple[pd.DataFrame, int]:
+    """What the INS states of its accuracy while it ran, in order of time; and how many rows lie outside."""
+    for name in dict.fromkeys(name for name, seen in pieces if seen.accuracy):
+        times = np.concatenate([seen.epochs_ns for other, seen in pieces if other == name])
+        if not len(times):
+            raise RawDataError(f"{name}: no usable accuracy record; export it again, or take it out of ins.accuracy")
+        if times.max() < start or times.min() > end:
+            raise RawDataError(
+                f"{name}: no time overlap: ins {utc_text(start)} to {utc_text(end)}, "
+                f"accuracy {utc_text(int(times.min()))} to {utc_text(int(times.max()))}; give the one of this SBET"
+            )
+    names = [column.name for column in artefacts.INS_SIGMAS.columns]
+    told = [seen.sigmas for _, seen in pieces if seen.sigmas]
+    if not told:
+        return pd.DataFrame(columns=names), 0
+    table = pd.DataFrame(thinned({name: np.concatenate([one[name] for one in told]) for name in names}))
+    inside = table["t_ns"].between(start, end)
+    return table[inside].reset_index(drop=True), int((~inside).sum())
 
 
 def _pool_frame(trajectory: pd.DataFrame, target: config.TargetPlace) -> tuple[pd.DataFrame, PoolFrame]:
@@ -227,6 +258,9 @@ def _files(partials: dict[str, list[tuple[str, Seen]]]) -> pd.DataFrame:
         for name, seen_list in by_file.items():
             epochs = np.concatenate([seen.epochs_ns for seen in seen_list])
             records = sum(seen.count for seen in seen_list)
+            accuracy = any(seen.accuracy for seen in seen_list)
+            if accuracy:
+                records = len(epochs)
             seconds = (epochs.max() - epochs.min()) / NS if len(epochs) else 0.0
             if sensor == "laser":
                 rate = records / seconds if seconds > 0 else np.nan
@@ -235,7 +269,7 @@ def _files(partials: dict[str, list[tuple[str, Seen]]]) -> pd.DataFrame:
                 rate = NS / float(np.median(steps)) if len(steps) else np.nan
             rows.append(
                 {
-                    "sensor": sensor,
+                    "sensor": "accuracy" if accuracy else sensor,
                     "file": name,
                     "records": records,
                     "dropped": sum(sum(seen.dropped.values()) for seen in seen_list),
@@ -262,7 +296,9 @@ def _gaps(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.DataFr
     return pd.DataFrame(rows, columns=[column.name for column in artefacts.GAPS.columns])
 
 
-def _counts(partials: dict[str, list[tuple[str, Seen]]], repeated: dict[str, int]) -> pd.DataFrame:
+def _counts(
+    partials: dict[str, list[tuple[str, Seen]]], repeated: dict[str, int], sigmas_outside: int
+) -> pd.DataFrame:
     rows = []
     for source, pieces in partials.items():
         total: dict[str, int] = {"used": 0, "repeated time": repeated.get(source, 0)}
@@ -271,5 +307,7 @@ def _counts(partials: dict[str, list[tuple[str, Seen]]], repeated: dict[str, int
             for reason, number in seen.dropped.items():
                 total[reason] = total.get(reason, 0) + number
         total["used"] -= total["repeated time"]
+        if source == "ins" and sigmas_outside:
+            total["accuracy outside the INS's time"] = sigmas_outside
         rows += [{"source": source, "reason": reason, "count": number} for reason, number in sorted(total.items())]
     return pd.DataFrame(rows)

@@ -24,6 +24,7 @@ from pipeline.blocks import (
 )
 from pipeline.built import as_found, by_design, oddities
 from pipeline.closing import closing_table
+from pipeline.ins_sigmas import drift_of, told
 from pipeline.mounts import Mounted, mount_of, target_of
 from pipeline.verdict import (
     NO_DRIFT,
@@ -57,6 +58,7 @@ class Config:
 class Inputs:
     files: Annotated[pd.DataFrame, artefacts.FILES]
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
+    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
     faces: Annotated[pd.DataFrame, artefacts.FACES]
     planes: Annotated[pd.DataFrame, artefacts.PLANES]
     sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
@@ -101,7 +103,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.freed,
         inputs.patterns,
     )
-    doubt = drift_doubt(inputs.drift, config.ins.drift)
+    from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift = drift_of(config.ins, inputs.ins_sigmas, inputs.passes)
+    doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest, level = config.segment.farthest_mount, config.adjust.test_level
     settings = Settings(config.verdict, level, config.result, farthest, doubt, config.target.shape)
     found = reasons(evidence, methods, settings)
@@ -135,6 +139,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "target": target,
         "passes": passes,
         "ranges": _range_note(config.mbes),
+        "ins_drift": drift.model_dump() | {"from_files": list(from_files)},
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
     } | instruments_block({"ins": config.ins, "laser": config.laser, "mbes": config.mbes})

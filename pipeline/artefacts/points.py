@@ -17,6 +17,14 @@ TRAJECTORY = Artefact(
         Column("azimuth_rad", F64, "rad", "heading, clockwise from true north"),
     ),
 )
+INS_SIGMAS = Artefact(
+    "ingest", "ins_sigmas", "table", "standard deviations that the INS states, two a second; NaN: it does not say",
+    (
+        T_NS,
+        *(Column(f"{axis}_m", F64, "m", f"of the position, {axis}") for axis in ("north", "east", "up")),
+        *(Column(f"{angle}_deg", F64, "deg", f"of the {angle}") for angle in ("roll", "pitch", "heading")),
+    ),
+)
 LASER_POINTS = Artefact(
     "ingest", "laser_points", "stream", "laser points as recorded: in the scanner's frame, or in ECEF if georeferenced",
     (T_NS, *(Column(f"{axis}_m", F64, "m", f"{axis}, frame laser (or ecef)") for axis in "xyz")),
@@ -49,7 +57,7 @@ PASSES = Artefact(
 FILES = Artefact(
     "ingest", "files", "table", "quality of each raw file",
     (
-        Column("sensor", TEXT, "", "ins, laser or mbes"),
+        Column("sensor", TEXT, "", "ins, laser, mbes or accuracy (of the INS)"),
         Column("file", TEXT, "", "path in the session folder"),
         Column("records", I64, "1", "usable records"),
         Column("dropped", I64, "1", "records left out"),

@@ -6,6 +6,7 @@ roll starboard down +, pitch bow up +, azimuth clockwise from north) together wi
 Damaged files give RawDataError or fewer rows, never another exception.
 """
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -27,20 +28,32 @@ def raw_files(settings: Settings, folder: Path) -> list[Path]:
     RawDataError
         A pattern matches no file, or a file that lies outside the session folder (by way of a symbolic link).
     """
-    sensor = type(settings).__name__.lower()
+    key = f"{type(settings).__name__.lower()}.files"
+    return sorted({*_found(folder, settings.files, key), *_accuracy_files(settings, folder)}, key=_in(folder))
+
+
+def _accuracy_files(settings: Settings, folder: Path) -> list[Path]:
+    return _found(folder, settings.accuracy, "ins.accuracy") if isinstance(settings, Ins) else []
+
+
+def _in(folder: Path) -> Callable[[Path], str]:
+    return lambda path: path.relative_to(folder).as_posix()
+
+
+def _found(folder: Path, patterns: Sequence[str], key: str) -> list[Path]:
     if not folder.is_dir():
         raise RawDataError(f"{folder}: the session folder is gone; put it back, or name its new place")
     found: dict[Path, Path] = {}
-    for pattern in settings.files:
-        matches = _matches(folder, pattern, sensor)
+    for pattern in patterns:
+        matches = _matches(folder, pattern, key)
         if not matches:
-            raise RawDataError(f"session.yaml: {sensor}.files: {pattern!r} matches no file in {folder}; mend it")
+            raise RawDataError(f"session.yaml: {key}: {pattern!r} matches no file in {folder}; mend it")
         for path, real in matches:
             found[real] = min(path, found.get(real, path))
-    return sorted(found.values(), key=lambda path: path.relative_to(folder).as_posix())
+    return sorted(found.values(), key=_in(folder))
 
 
-def _matches(folder: Path, pattern: str, sensor: str) -> list[tuple[Path, Path]]:
+def _matches(folder: Path, pattern: str, key: str) -> list[tuple[Path, Path]]:
     """Regular files that match, with their resolved paths."""
     files = []
     try:
@@ -53,7 +66,7 @@ def _matches(folder: Path, pattern: str, sensor: str) -> list[tuple[Path, Path]]
                 raise RawDataError(f"{path}: leads out of the session folder, to {real}; copy the file into it")
             files.append((path, real))
     except (ValueError, NotImplementedError) as error:
-        raise ConfigError(f"session.yaml: {sensor}.files: {pattern} is no pattern ({error}); mend it") from error
+        raise ConfigError(f"session.yaml: {key}: {pattern} is no pattern ({error}); mend it") from error
     except (OSError, RuntimeError) as error:
         raise RawDataError(f"{folder}: {pattern} cannot be searched ({error}); check the folder") from error
     return files
@@ -71,7 +84,7 @@ def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, .
     """
     if isinstance(settings, Laser):
         crs.to_ecef(settings.frame)
-    files = [(path, path.relative_to(folder).as_posix()) for path in raw_files(settings, folder)]
+    files = _named(folder, _found(folder, settings.files, f"{sensor}.files"))
     for path, name in files:
         _check_kind(path, name, sensor, settings)
     if settings.format == "table":
@@ -80,10 +93,16 @@ def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, .
         return _las(files, settings)
     if isinstance(settings, Mbes):
         return _r2sonic(files, settings)
-    return _sbet(files, settings) if settings.format == "sbet" else _novatel(files, settings)
+    if settings.format == "sbet":
+        return _sbet(files, _named(folder, _accuracy_files(settings, folder)), settings)
+    return _inertial_explorer(files, settings) if settings.format == "inertial_explorer" else _novatel(files, settings)
 
 
 Files = list[tuple[Path, str]]
+
+
+def _named(folder: Path, paths: list[Path]) -> Files:
+    return [(path, _in(folder)(path)) for path in paths]
 
 
 def _check_kind(path: Path, name: str, sensor: Sensor, settings: Settings) -> None:
@@ -109,15 +128,35 @@ def _novatel(files: Files, settings: Ins) -> tuple[Part, ...]:
     return tuple(NovatelPart(path, name, settings.latency_s) for path, name in files)
 
 
-def _sbet(files: Files, settings: Ins) -> tuple[Part, ...]:
+def _inertial_explorer(files: Files, settings: Ins) -> tuple[Part, ...]:
+    from pipeline.readers.ie_layout import read_layout
+    from pipeline.readers.inertial_explorer import InertialExplorerPart
+
+    layouts = [(name, read_layout(path, name)) for path, name in files]
+    weekly = [(name, layout.first_s) for name, layout in layouts if layout.clock == "gps_week"]
+    weeks = iter(_weeks([first for _, first in weekly], settings.gps_week, "ins", weekly[0][0]) if weekly else [])
+    return tuple(
+        InertialExplorerPart(path, name, next(weeks) if layout.clock == "gps_week" else None, settings.latency_s)
+        for (path, name), (_, layout) in zip(files, layouts, strict=True)
+    )
+
+
+def _sbet(files: Files, accuracy: Files, settings: Ins) -> tuple[Part, ...]:
     from pipeline.readers import sbet
+    from pipeline.readers.accuracy import AccuracyPart
 
     for path, name in files:
         sbet.check_size(path, name)
-    weeks = _weeks([sbet.first_seconds(path, name) for path, name in files], settings.gps_week, "ins", files[0][1])
-    return tuple(
-        sbet.SbetPart(path, name, week, settings.latency_s) for (path, name), week in zip(files, weeks, strict=True)
-    )
+    for path, name in accuracy:
+        if (kind := detect.kind_of(path, name)) is not detect.ACCURACY:
+            raise RawDataError(f"{name}: is {kind.title}, not a whole accuracy file (SMRMSG); mend ins.accuracy")
+    firsts = [sbet.first_seconds(path, name) for path, name in (*files, *accuracy)]
+    weeks = _weeks(firsts, settings.gps_week, "ins", files[0][1])
+    solutions = [sbet.SbetPart(*file, week, settings.latency_s) for file, week in zip(files, weeks, strict=False)]
+    sigmas = [
+        AccuracyPart(*file, week, settings.latency_s) for file, week in zip(accuracy, weeks[len(files) :], strict=True)
+    ]
+    return (*solutions, *sigmas)
 
 
 def _las(files: Files, settings: Laser) -> tuple[Part, ...]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.readers.files import opened, size_of
+from pipeline.readers.ie_layout import names_line
 from pipeline.readers.packets import BTH0, OTHERS, packet_size
 from pipeline.readers.sieve import through_float32
 
@@ -29,13 +30,14 @@ _BATHYMETRY = "log the R2Sonic's bathymetry packets (BTH0), or convert the sound
 LAS = Kind("LAS or LAZ", "las", ("laser",))
 NOVATEL = Kind("a NovAtel log", "novatel", ("ins",))
 SBET = Kind("SBET", "sbet", ("ins",))
+INERTIAL_EXPLORER = Kind("an Inertial Explorer export", "inertial_explorer", ("ins",))
 XTF = Kind("XTF", "r2sonic", ("mbes",))
 PACKETS = Kind("R2Sonic packets", "r2sonic", ("mbes",))
 PARQUET = Kind("a Parquet table", "table", ("ins", "laser", "mbes"))
 CSV = Kind("a CSV table", "table", ("ins", "laser", "mbes"))
 EMPTY = Kind("empty", advice="copy it again, or take it out of the list")
 ACCURACY = Kind(
-    "an accuracy file (SMRMSG)", advice="give the SBET that belongs to it, and take this one out of the list"
+    "an accuracy file (SMRMSG)", advice="give the SBET that belongs to it, and list this one under ins.accuracy"
 )
 FLOAT32_TEXT = Kind(
     "a text whose numbers went through float32: times and positions have lost their digits",
@@ -92,6 +94,8 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
         return PACKETS
     if b"riegl" in head[:4096].lower() and b"rdb" in head[:4096].lower():
         return RDBX
+    if names_line(head) is not None:
+        return INERTIAL_EXPLORER
     text = _is_text(head)
     if not text and (doubles := _kind_of_doubles(head, size)) is not None:
         return doubles

@@ -1,12 +1,16 @@
-"""NovAtel OEM/SPAN logs, binary and ASCII: INSPVA, INSPVAS and INSPVAX records.
+"""NovAtel OEM/SPAN logs, binary and ASCII: INSPVA, INSPVAS and INSPVAX records, and the INS's own sigmas.
 
 Framing and ASCII are left to NovAtel's own decoder (novatel_edie), which turns every record into its binary form;
-the layouts below are those of the OEM7 Commands and Logs Reference Manual (INSPVA 507, INSPVAS 508, INSPVAX 1465;
-binary header 28 bytes after sync 0xAA4412, short header 12 bytes after 0xAA4413, CRC 4 bytes behind the body).
+the layouts below are those of the OEM7 Commands and Logs Reference Manual (INSPVA 507, INSPVAS 508, INSPVAX 1465,
+INSSTDEV 2051, INSSTDEVS 2052; binary header 28 bytes after sync 0xAA4412, short header 12 bytes after 0xAA4413, CRC
+4 bytes behind the body).
 
 Where a file holds several of the three, one is used: that with the most usable records, but INSPVA or INSPVAS, whose
 heights are ellipsoidal, unless INSPVAX has more than twice as many. INSPVAX heights are above sea level: its own
 undulation is added. Usable: status INS_SOLUTION_GOOD, INS_ALIGNMENT_COMPLETE or INS_SOLUTION_FREE.
+
+The sigmas (latitude, longitude, height [m], velocities, roll, pitch, azimuth [degrees]) are those of INSSTDEV, else of
+INSSTDEVS, at the header's milliseconds, else those of usable INSPVAX.
 """
 
 import re
@@ -23,6 +27,7 @@ import numpy as np
 from pipeline.readers.files import opened
 from pipeline.readers.sieve import (
     INS_COLUMNS,
+    SIGMA_COLUMNS,
     Order,
     Sieve,
     chunk,
@@ -30,11 +35,13 @@ from pipeline.readers.sieve import (
     latency_ns,
     no_rows,
     possible_week_time,
+    sigma_rows,
 )
 from pipeline.streams import Chunk
 from pipeline.times import gps_ns_from_week_seconds
 
 NAMES = {507: "INSPVA", 508: "INSPVAS", 1465: "INSPVAX"}
+SIGMAS = {2051: "INSSTDEV", 2052: "INSSTDEVS", 1465: "INSPVAX"}  # the first that is there
 GOOD, FREE, COMPLETE = 3, 6, 7
 USABLE = (GOOD, FREE, COMPLETE)
 STATUS = {
@@ -49,12 +56,14 @@ PVAX = [
     ("status", "<u4"), ("type", "<u4"), *_PLACE, ("undulation", "<f4"), ("velocity", "<f8", 3), *_POSE,
     ("sigmas", "<f4", 9), ("extended", "<u4"), ("since_update", "<u2"),
 ]
+STDEV = [("sigmas", "<f4", 9), ("extended", "<u4"), ("since_update", "<u2"), ("reserved", "V10")]
 _LONG = [("sync", "V14"), ("header_week", "<u2"), ("header_ms", "<u4"), ("rest", "V8")]
 _SHORT = [("sync", "V6"), ("header_week", "<u2"), ("header_ms", "<u4")]
 RECORDS = {
     dtype.itemsize: dtype
-    for dtype in (np.dtype([*head, *body, ("crc", "<u4")]) for head in (_LONG, _SHORT) for body in (PVA, PVAX))
+    for dtype in (np.dtype([*head, *body, ("crc", "<u4")]) for head in (_LONG, _SHORT) for body in (PVA, PVAX, STDEV))
 }
+TOLD = dict(zip(SIGMA_COLUMNS[1:], (0, 1, 2, 6, 7, 8), strict=True))  # places among the nine
 ANGLES = ("latitude", "longitude", "roll", "pitch", "azimuth")
 BLOCK = 32_768  # the decoder's buffer is 262,144 bytes
 RECORDS_PER_CHUNK = 65_536
@@ -82,11 +91,15 @@ class NovatelPart:
     def _decode(self) -> Iterator[Chunk]:
         dropped: Counter[str] = Counter()
         with opened(self.path, self.name) as file:
-            number = _survey(file, dropped)
+            number, telling = _survey(file, dropped)
             order = Order(self.name)
             if number is not None:
                 for records in _records(file, number):
-                    yield _chunk(records, order, self.latency_s, dropped)
+                    yield _chunk(records, order, self.latency_s, dropped, telling == number)
+            if number is not None and telling is not None and telling != number:
+                for records in _records(file, telling):
+                    sigmas = _sigmas(records, self.latency_s, dropped)
+                    yield chunk({name: np.empty(0) for name in INS_COLUMNS}, INS_COLUMNS, dropped, sigmas)
             if dropped:
                 yield no_rows(INS_COLUMNS, dropped)
             order.check()
@@ -128,8 +141,9 @@ def _fed(parser: Any, file: BinaryIO, dropped: Counter[str]) -> Iterator[None]:
         rest = bytes(parser.flush(True))
 
 
-def _survey(file: BinaryIO, dropped: Counter[str]) -> int | None:
-    """Which record to use, by its number; the others, and what is no record at all, are counted."""
+def _survey(file: BinaryIO, dropped: Counter[str]) -> tuple[int | None, int | None]:
+    """Which record to use, by its number, and which for the sigmas; the others, and what is no record at all, are
+    counted."""
     from novatel_edie.oem import Parser
 
     parser, total = Parser(), Counter[str]()
@@ -145,12 +159,12 @@ def _survey(file: BinaryIO, dropped: Counter[str]) -> int | None:
     there = [number for number, name in NAMES.items() if total[name]]
     if not there:
         dropped["message other than INSPVA, INSPVAS, INSPVAX"] += total.total() - total["UnknownBytes"]
-        return None
+        return None, None
     chosen = there[0] if len(there) == 1 else _best(file, there)
     for number in there:
         if number != chosen:
             dropped[f"{NAMES[number]} beside {NAMES[chosen]}"] += total[NAMES[number]]
-    return chosen
+    return chosen, next((number for number, name in SIGMAS.items() if total[name]), None)
 
 
 def _best(file: BinaryIO, numbers: list[int]) -> int:
@@ -187,7 +201,10 @@ def _arrays(records: list[bytes]) -> Iterator[np.ndarray[Any, Any]]:
 
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-def _chunk(records: np.ndarray[Any, Any], order: Order, latency_s: float, dropped: Counter[str]) -> Chunk:
+def _chunk(
+    records: np.ndarray[Any, Any], order: Order, latency_s: float, dropped: Counter[str], telling: bool
+) -> Chunk:
+    """Poses, and, where these records are those ``telling`` them, the sigmas."""
     bad = ~np.isin(records["status"], USABLE)
     for status, count in zip(*np.unique(records["status"][bad], return_counts=True), strict=True):
         dropped[f"ins status {STATUS.get(int(status), int(status))}"] += int(count)
@@ -209,4 +226,17 @@ def _chunk(records: np.ndarray[Any, Any], order: Order, latency_s: float, droppe
     t_ns = gps_ns_from_week_seconds(sieve["week"], sieve["seconds"])
     sieve.columns["t_ns"] = t_ns - latency_ns(latency_s)
     order.keep(sieve)
-    return chunk(sieve.columns, INS_COLUMNS, dropped)
+    sigmas = _sigmas(records, latency_s, dropped) if telling else {}
+    return chunk(sieve.columns, INS_COLUMNS, dropped, sigmas)
+
+
+@np.errstate(all="ignore")
+def _sigmas(records: np.ndarray[Any, Any], latency_s: float, dropped: Counter[str]) -> dict[str, np.ndarray[Any, Any]]:
+    if "status" in (records.dtype.names or ()):
+        records = records[np.isin(records["status"], USABLE)]
+    week, seconds = records["header_week"].astype(np.int64), records["header_ms"] / 1000.0
+    good = possible_week_time(week, seconds)
+    dropped["accuracy at an impossible time"] += int(np.count_nonzero(~good))
+    t_ns = gps_ns_from_week_seconds(week[good], seconds[good]) - latency_ns(latency_s)
+    told = records["sigmas"][good].T
+    return sigma_rows(t_ns, {name: told[place] for name, place in TOLD.items()}, dropped)

@@ -59,7 +59,7 @@ class SbetPart:
                 if first and through_float32(seconds):
                     raise RawDataError(f"{self.name}: its times went through float32; export it again as double")
                 first = False
-                weeks, week, last = _weeks(seconds, week, last)
+                weeks, week, last = running_weeks(seconds, week, last)
                 yield _chunk(records, weeks, order, self.latency_s, dropped)
             if dropped:
                 yield no_rows(INS_COLUMNS, dropped)
@@ -90,7 +90,7 @@ def first_seconds(path: Path, name: str) -> float:
 
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-def _weeks(seconds: NDArray[np.float64], week: int, last: float) -> tuple[NDArray[np.int64], int, float]:
+def running_weeks(seconds: NDArray[np.float64], week: int, last: float) -> tuple[NDArray[np.int64], int, float]:
     """The week of each record: one more after each step back by about a week."""
     steps = np.diff(seconds, prepend=last if np.isfinite(last) else seconds[0])
     over = (steps < -0.9 * WEEK_S) & (steps > -1.1 * WEEK_S)

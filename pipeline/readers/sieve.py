@@ -18,6 +18,7 @@ Mask = NDArray[np.bool_]
 INS_COLUMNS = ("t_ns", "latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
 LASER_COLUMNS = ("t_ns", "x_m", "y_m", "z_m")
 MBES_COLUMNS = ("t_ns", "ping", "beam", "two_way_time_s", "angle_rad", "sound_speed_m_s")
+SIGMA_COLUMNS = ("t_ns", "north_m", "east_m", "up_m", "roll_deg", "pitch_deg", "heading_deg")
 TYPES = {"t_ns": np.int64, "ping": np.int64, "beam": np.int16}
 
 FIRST_WEEK, LAST_WEEK = 1000, 5000  # as in config: March 1999 to 2075
@@ -26,14 +27,20 @@ MIN_SPEED_M_S, MAX_SPEED_M_S = 1300.0, 1700.0
 MAX_TRAVEL_S = 20.0
 MAX_HEIGHT_M = 20_000.0
 MAX_BACKWARDS_SHARE = 0.01
+MAX_SIGMA = {"m": 10.0, "deg": 45.0}  # as in config
 
 
-def chunk(columns: Mapping[str, NDArray[Any]], names: tuple[str, ...], dropped: Counter[str]) -> Chunk:
+def chunk(
+    columns: Mapping[str, NDArray[Any]],
+    names: tuple[str, ...],
+    dropped: Counter[str],
+    sigmas: Mapping[str, NDArray[Any]] | None = None,
+) -> Chunk:
     """A chunk with exactly the canonical columns and types; ``dropped`` starts again from nothing."""
     typed = {name: np.ascontiguousarray(columns[name], dtype=TYPES.get(name, np.float64)) for name in names}
     counts = {reason: number for reason, number in dropped.items() if number}
     dropped.clear()
-    return Chunk(typed, counts)
+    return Chunk(typed, counts, sigmas or {})
 
 
 def no_rows(names: tuple[str, ...], dropped: Counter[str]) -> Chunk:
@@ -95,6 +102,19 @@ def keep_possible_poses(sieve: Sieve) -> None:
     sieve.columns["azimuth_rad"] = np.mod(sieve["azimuth_rad"], 2 * np.pi)
 
 
+def sigma_rows(t_ns: NDArray[np.int64], given: Mapping[str, NDArray[Any]], dropped: Counter[str]) -> Columns:
+    """What an INS says of its own accuracy, columns SIGMA_COLUMNS (NaN: it does not say); nothing where it says
+    nothing. Zero is no standard deviation."""
+    if not given or not len(t_ns):
+        return {}
+    sieve = Sieve({"t_ns": t_ns} | {name: np.asarray(values, np.float64) for name, values in given.items()}, dropped)
+    good = np.ones(len(sieve), dtype=bool)
+    for name in given:
+        good &= (sieve[name] > 0) & (sieve[name] <= MAX_SIGMA[name.rpartition("_")[2]])
+    sieve.keep(good, "impossible accuracy")
+    return {name: sieve.columns.get(name, np.full(len(sieve), np.nan)) for name in SIGMA_COLUMNS}
+
+
 def keep_possible_soundings(sieve: Sieve) -> None:
     """Soundings: a detection, with a travel time, an angle and a sound speed that water and sonar can have."""
     sieve.keep_finite()
@@ -152,3 +172,16 @@ def through_float32(values: NDArray[np.float64]) -> bool:
     if step < 1:
         return bool(np.any(np.mod(values * 8, 1) != 0))
     return len(values) >= 100 and step >= 8
+
+
+@np.errstate(all="ignore")
+def refuse_float32(columns: Mapping[str, NDArray[Any]], name: str) -> None:
+    """RawDataError where seconds_of_week, latitude_deg or longitude_deg have lost their digits as float32."""
+    seconds = columns.get("seconds_of_week")
+    degraded = seconds is not None and through_float32(seconds)
+    for column in ("latitude_deg", "longitude_deg"):
+        values = columns.get(column)
+        if values is not None and len(values) >= 20 and len(np.unique(values)) > 1:
+            degraded = degraded or bool(np.all(np.abs(values - values.astype(np.float32)) < 1e-11))
+    if degraded:
+        raise RawDataError(f"{name}: its times or positions went through float32; export it again in double precision")

@@ -24,7 +24,6 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipeline.errors import RawDataError
 from pipeline.readers.crs import to_ecef
 from pipeline.readers.files import opened
 from pipeline.readers.sieve import (
@@ -40,7 +39,7 @@ from pipeline.readers.sieve import (
     no_rows,
     possible_ns,
     possible_week_time,
-    through_float32,
+    refuse_float32,
 )
 from pipeline.readers.tabular import WHOLE, Sensor, batches
 from pipeline.streams import Chunk
@@ -68,7 +67,7 @@ class TablePart:
             for batch in batches(file, self.name, self.sensor, dropped):
                 columns = _numpy(batch, dropped)
                 if first:
-                    _refuse_float32(columns, self.name)
+                    refuse_float32(columns, self.name)
                     first = False
                 yield self._chunk(columns, order, dropped)
             if dropped:
@@ -98,18 +97,6 @@ def _numpy(batch: pa.RecordBatch, dropped: Counter[str]) -> dict[str, NDArray[An
         values = whole[column].to_numpy(zero_copy_only=False)
         columns[column] = values if column in WHOLE else values.astype(np.float64)
     return columns
-
-
-@np.errstate(all="ignore")
-def _refuse_float32(columns: dict[str, NDArray[Any]], name: str) -> None:
-    seconds = columns.get("seconds_of_week")
-    degraded = seconds is not None and through_float32(seconds)
-    for column in ("latitude_deg", "longitude_deg"):
-        values = columns.get(column)
-        if values is not None and len(values) >= 20 and len(np.unique(values)) > 1:
-            degraded = degraded or bool(np.all(np.abs(values - values.astype(np.float32)) < 1e-11))
-    if degraded:
-        raise RawDataError(f"{name}: its times or positions went through float32; export it again in double precision")
 
 
 def _keep_timed(sieve: Sieve, latency_s: float) -> None:

@@ -9,6 +9,7 @@ import pandas as pd
 from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted, Given, adjust, free_unknowns, noise_of
 from pipeline.considered import considered_of
+from pipeline.ins_sigmas import drift_of
 from pipeline.laser_fit import bounds_of, coarse_covariance, design_of, held_of
 from pipeline.looking import look
 from pipeline.maths.unknowns import SIX
@@ -37,6 +38,7 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
     faces: Annotated[pd.DataFrame, artefacts.FACES]
     poses: Annotated[pd.DataFrame, artefacts.POSES]
@@ -49,14 +51,15 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     settings, fit = config.adjust, config.laser_fit
     model, coarse = target_of(config.target), coarse_covariance(config.laser, fit)
     given = (model, inputs.poses, inputs.target_pose, inputs.planes)
-    scene = laser_scene_of(*given, config.ins, config.laser, config.as_built.faces)
+    ins = config.ins.model_copy(update={"drift": drift_of(config.ins, inputs.ins_sigmas, inputs.passes)})
+    scene = laser_scene_of(*given, ins, config.laser, config.as_built.faces)
     free = free_unknowns(scene.coarse, settings.free)
 
     def held(normal: np.ndarray) -> list[int]:
         return held_of(normal, free, bounds_of(coarse, fit, config.verdict))
 
     streams = {"laser": inputs.laser_labelled}
-    known = Given(noise_of(config.ins), design_of(model, inputs.target_pose, fit), held)
+    known = Given(noise_of(ins), design_of(model, inputs.target_pose, fit), held)
     found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
     sigmas = considered_of(found.state.names, config.laser, None, config.as_built)

@@ -19,6 +19,7 @@ from pipeline.blocks import (
     target_block,
 )
 from pipeline.built import as_found, by_design, oddities
+from pipeline.ins_sigmas import drift_of, told
 from pipeline.mounts import mount_of, target_of
 from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, pattern_tests, reasons, warnings
 
@@ -36,6 +37,7 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
     passes: Annotated[pd.DataFrame, artefacts.PASSES]
     faces: Annotated[pd.DataFrame, artefacts.FACES]
     planes: Annotated[pd.DataFrame, artefacts.PLANES]
@@ -76,7 +78,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.freed,
         inputs.patterns,
     )
-    doubt, level = drift_doubt(inputs.drift, config.ins.drift), config.adjust.test_level
+    from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift, level = drift_of(config.ins, inputs.ins_sigmas, inputs.passes), config.adjust.test_level
+    doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest = (3 * config.segment.search_laser_deg, 3 * config.segment.search_laser_m)
     given = Settings(config.verdict, level, "adjustment", farthest, doubt, config.target.shape, "laser")
     found = reasons(evidence, {"adjustment": block}, given)
@@ -107,6 +111,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "free": free_block(inputs.freed),
         "target": target,
         "passes": pass_rows(inputs.passes, inputs.cells),
+        "ins_drift": drift.model_dump() | {"from_files": list(from_files)},
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
     } | instruments_block({"ins": config.ins, "laser": config.laser})

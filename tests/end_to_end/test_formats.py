@@ -8,8 +8,10 @@ import pytest
 
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import simulate as simulate_in_memory
+from pipeline.times import NS, WEEK_NS
 from tests.end_to_end.places import Place, errors, poolcal, result_of, sigmas, simulate
 from tests.end_to_end.tables import write_tables
+from tests.readers import ie_files
 
 # Every format of each sensor; files of one sensor do not meet those of another before ingest has read them.
 FILES: dict[str, dict[str, Any]] = {
@@ -70,6 +72,24 @@ def test_equidistant_beams(tmp_path: Path, truth: dict[str, Any]) -> None:
     bare, in_xtf = (run(simulate(tmp_path / f"session_{k}", **EQUIDISTANT[k])) for k in EQUIDISTANT)
     same(bare, in_xtf, 1e-6)
     assert np.all(np.abs(errors(bare["mbes"], truth)) < 4 * sigmas(bare["mbes"]))
+
+
+def test_inertial_explorer(small: Path, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None:
+    """The INS's numbers, as simulated, in sixtieths, to 0.01 mm and a millionth of a degree."""
+    simulated = simulate_in_memory(load_scenario(small.with_name("session.scenario.yaml")), 1)
+    place = Place(small, tmp_path)
+    place.mend()
+    names = ("latitude", "longitude", "roll", "pitch", "azimuth")
+    latitude, longitude, roll, pitch, heading = (np.degrees(simulated.ins[f"{name}_rad"]) for name in names)
+    seconds = (simulated.ins["t_ns"] - ie_files.WEEK * WEEK_NS) / NS
+    columns = (seconds, latitude, longitude, simulated.ins["height_m"], roll, pitch, heading)
+    rows = [ie_files.Row(*map(float, row)) for row in zip(*columns, strict=True)]
+    finer: ie_files.Columns = {
+        "GPSTime": ("(sec)", lambda row: f"{row.of_week:.9f}"), "H-Ell": ("(m)", lambda row: f"{row.height:.5f}")
+    }  # fmt: skip
+    place.raw("ins").write_bytes(ie_files.export(ie_files.LAYOUTS["sixtieths"] | finer, rows))
+    place.edit_session("ins", format="inertial_explorer")
+    same(result_of(undisturbed[0]), run(place.session), 0.05)
 
 
 @pytest.mark.parametrize(("kind", "weeks"), [("parquet", False), ("csv", True)])

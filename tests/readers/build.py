@@ -137,9 +137,10 @@ def pva(seconds: float, week: int = WEEK, status: int = GOOD, height: float = 50
     return struct.pack("<Id3d3d3dI", week, seconds, *values, *attitude, status)
 
 
-def pvax(status: int = GOOD, height: float = 40.0, undulation: float = 10.0) -> bytes:
+def pvax(
+    status: int = GOOD, height: float = 40.0, undulation: float = 10.0, sigmas: Sequence[float] = (0.01,) * 9
+) -> bytes:
     """Body of INSPVAX: height above sea level, and undulation."""
-    sigmas = [0.01] * 9
     return struct.pack(
         "<II3df3d3d9fIH", status, 56, 36.0, 120.0, height, undulation, 0.1, 0.2, 0.3, 1.0, 2.0, 3.0, *sigmas, 0, 0
     )
@@ -155,6 +156,29 @@ def inspva(seconds: float, **body: Any) -> bytes:
 
 def inspvax(seconds: float, week: int = WEEK, **body: Any) -> bytes:
     return long(1465, week, seconds, pvax(**body))
+
+
+SIGMAS = (0.011, 0.012, 0.023, 0.1, 0.2, 0.3, 0.006, 0.007, 0.031)  # N, E, up; velocities; roll, pitch, azimuth
+
+
+def stdev(sigmas: Sequence[float] = SIGMAS) -> bytes:
+    """Body of INSSTDEV and INSSTDEVS."""
+    return struct.pack("<9fIHHII", *sigmas, 0, 0, 0, 0, 0)
+
+
+def insstdev(seconds: float, sigmas: Sequence[float] = SIGMAS, week: int = WEEK) -> bytes:
+    return long(2051, week, seconds, stdev(sigmas))
+
+
+def insstdevs(seconds: float, sigmas: Sequence[float] = SIGMAS, week: int = WEEK) -> bytes:
+    return short(2052, week, seconds, stdev(sigmas))
+
+
+def insstdeva(seconds: float, sigmas: Sequence[float] = SIGMAS, week: int = WEEK) -> bytes:
+    told = ",".join(f"{sigma:.4f}" for sigma in sigmas)
+    head = f"INSSTDEVA,COM1,0,0.0,FINESTEERING,{week},{seconds:.3f},00000000,3deb,16248"
+    inside = f"{head};{told},00000000,0,0,00000000,0"
+    return f"#{inside}*{crc(inside.encode()):08x}\r\n".encode()
 
 
 def bestpos(seconds: float) -> bytes:
@@ -178,6 +202,11 @@ def sbet_row(seconds: float, heading: float = 1.0, wander: float = 0.25) -> list
 
 def sbet(*seconds: float) -> bytes:
     return b"".join(struct.pack("<17d", *sbet_row(second)) for second in seconds)
+
+
+def smrmsg(*seconds: float, rms: Sequence[float] = (0.01, 0.02, 0.03, 0.1, 0.1, 0.1, 0.6, 0.9, 1.8)) -> bytes:
+    """Accuracies: north, east, down; velocities; roll, pitch, heading in arc-minutes."""
+    return b"".join(struct.pack("<10d", second, *rms) for second in seconds)
 
 
 # --- LAS -------------------------------------------------------------------------------------------------------------

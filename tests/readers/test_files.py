@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import raw_files, raw_parts
-from tests.readers import build
+from tests.readers import build, ie_files
 
 
 @pytest.fixture
@@ -103,9 +103,12 @@ GOOD = {
     "d.las": ("laser", "las", build.las([(1, 2, 3, 4e8 + 0.001)] * 3)),
     "e.xtf": ("mbes", "r2sonic", build.xtf(build.ping(1))),
     "f.r2s": ("mbes", "r2sonic", build.ping(1)),
+    "h.txt": ("ins", "inertial_explorer", ie_files.whole("degrees", ie_files.truth(9))),
     "g.csv": ("laser", "table", b"gps_ns,x_m,y_m,z_m\n1400000000000000000,1,2,3\n"),
 }
-FORMATS = [("ins", "novatel"), ("ins", "sbet"), ("laser", "las"), ("mbes", "r2sonic")]
+FORMATS = [
+    ("ins", "novatel"), ("ins", "sbet"), ("ins", "inertial_explorer"), ("laser", "las"), ("mbes", "r2sonic")
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", GOOD)

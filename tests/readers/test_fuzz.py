@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import PoolcalError
 from pipeline.readers.detect import HEAD, kind_of_bytes
-from tests.readers import build
+from tests.readers import build, ie_files
 
 WEEK_NS = 604_800 * 10**9
 OPTIONS = {"deadline": None, "suppress_health_check": list(HealthCheck), "derandomize": True, "database": None}
@@ -47,6 +47,10 @@ WHOLE: dict[str, tuple[str, str, bytes]] = {
     "binary": ("ins", "novatel", b"".join(build.inspvas(9.0 + k) + build.inspvax(9.0 + k) for k in range(8))),
     "ascii": ("ins", "novatel", b"".join(build.inspvasa(9.0 + k) for k in range(12))),
     "sbet": ("ins", "sbet", build.sbet(*(9.0 + k for k in range(12)))),
+    "ie": ("ins", "inertial_explorer", ie_files.whole("degrees", ie_files.truth(12))),
+    "ie dms": ("ins", "inertial_explorer", ie_files.whole("sixtieths", ie_files.truth(12))),
+    "ie utc": ("ins", "inertial_explorer", ie_files.whole("utc", ie_files.truth(12))),
+    "ie commas": ("ins", "inertial_explorer", ie_files.whole("commas", ie_files.truth(12))),
     "las": ("laser", "las", build.las([(k, k, k, 4e8 + k / 1000 + 0.0001) for k in range(40)])),
     "csv": ("laser", "table", _csv()),
     "parquet": ("laser", "table", _parquet()),
@@ -123,7 +127,7 @@ def test_damaged_files(form: str, how: Callable[[bytes], st.SearchStrategy[bytes
 
 
 STARTS = [b"", b"LASF", b"PAR1", b"\x7b" + bytes(1023), b"BTH0", b"\xaaD\x12\x1c", b"\xaaD\x13X", b"#INSPVAA,"]
-STARTS += [b"gps_ns,x_m\n"]
+STARTS += [b"gps_ns,x_m\n", b"Week GPSTime Latitude Longitude H-Ell Roll Pitch Heading\n"]
 FORMATS = sorted({pair[:2] for pair in WHOLE.values()})
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import PoolcalError
-from tests.readers import build
+from tests.readers import build, ie_files
 from tests.readers.build import read, rows
 
 MEGABYTE = 1 << 20
@@ -39,6 +39,20 @@ def test_a_gap_of_zeros_costs_no_memory(shell: str, tmp_path: Path) -> None:
     assert np.unique(columns["ping"]).tolist() == [1, 2]
     assert sum(dropped.values()) >= 1
     assert peak < 16 * MEGABYTE
+
+
+@pytest.mark.parametrize("size", [64 * MEGABYTE, 193 * MEGABYTE + 7])
+def test_a_line_without_end_costs_no_memory(size: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    start = ie_files.whole("degrees", ie_files.truth(100))
+    sparse(path, start, size, b"\n" + start.splitlines(keepends=True)[-1].replace(b"604799.900", b"604799.950"))
+    tracemalloc.start()
+    columns, dropped = read("ins", path, "inertial_explorer")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert rows(columns) == 101
+    assert sum(dropped.values()) >= 1
+    assert peak < 96 * MEGABYTE
 
 
 LIES = {  # what keeps a reader searching: starts of records that are none
@@ -113,6 +127,7 @@ def _contents() -> dict[str, tuple[str, str, bytes]]:
         "c.out": ("ins", "sbet", build.sbet(*(10.0 + k / 100 for k in range(1500)))),
         "d.las": ("laser", "las", build.las([(k, 0, 0, 4e8 + k / 1000 + 0.0001) for k in range(1500)])),
         "e.xtf": ("mbes", "r2sonic", build.xtf(*(build.ping(k) for k in range(300)))),
+        "g.txt": ("ins", "inertial_explorer", ie_files.whole("utc", ie_files.truth(1500))),
         "f.csv": ("laser", "table", b"gps_ns,x_m,y_m,z_m\n" + b"1400000000000000000,1,2,3\n" * 1500),
     }
 

@@ -37,9 +37,12 @@ def settings_of(sensor: Sensor, name: str, kind: str, **more: Any) -> Ins | Lase
 
 @pytest.fixture
 def read(data: Path, tmp_path: Path) -> Read:
-    """Reads a file as a session would: all its rows, and what was left out by reason."""
+    """Reads a file as a session would: all its rows, and what was left out by reason; with ``sigmas``, of an INS all
+    rows of what it says of its accuracy."""
 
-    def read_(sensor: Sensor, kind: str, name: str, content: bytes | None = None, **more: Any) -> Any:
+    def read_(
+        sensor: Sensor, kind: str, name: str, content: bytes | None = None, sigmas: bool = False, **more: Any
+    ) -> Any:
         path = tmp_path / Path(name).name
         if content is None:
             shutil.copy(data / name, path)
@@ -53,7 +56,8 @@ def read(data: Path, tmp_path: Path) -> Read:
         for chunk in chunks:
             for reason, number in chunk.dropped.items():
                 dropped[reason] = dropped.get(reason, 0) + number
-        full = [chunk.columns for chunk in chunks if chunk.columns]
+        wanted = [chunk.sigmas if sigmas else chunk.columns for chunk in chunks]
+        full = [columns for columns in wanted if columns]
         names = full[0] if full else {}
         return {name: np.concatenate([columns[name] for columns in full]) for name in names}, dropped
 

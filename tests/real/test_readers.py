@@ -16,6 +16,7 @@ XTF = "mbes/r2sonic2026_qinsy.xtf"
 PPP, PPP_ASCII = "ins/propak6-ins-ppp_payload.gps", "ins/propak6-ins-ppp_INSPVAXA.asc"
 ATLANS = "ins/sbet_ATLANS-20181023.out"
 INS = ("t_ns", "latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
+SIGMAS = ("north_m", "east_m", "up_m", "roll_deg", "pitch_deg", "heading_deg")
 XYZ = ("x_m", "y_m", "z_m")
 NO_INS_RECORDS = {"ins status INS_ALIGNING": 1988}
 
@@ -96,6 +97,31 @@ def test_r2sonic_angles_are_not_roll_corrected_and_starboard_is_positive(read: R
     roll = np.interp(ping_times, times, rolls)
     assert np.corrcoef(roll, slopes)[0, 1] < -0.991
     assert np.polyfit(roll, np.arctan(slopes), 1) == pytest.approx([-0.993, -0.031], abs=0.02)
+
+
+# --- INS, its own sigmas ---------------------------------------------------------------------------------------------
+def test_accuracy_file(read: Read, data: Path, tmp_path: Path) -> None:
+    """10,495 records at the times of the SBET; the first roll RMS is 0.165451 arc-minutes."""
+    (tmp_path / "x.smr").write_bytes((data / "ins/sbet_ATLANS-20181023-accuracy.out").read_bytes())
+    sigmas, dropped = read("ins", "sbet", ATLANS, sigmas=True, gps_week=2024, accuracy=["x.smr"])
+    ins, _ = read("ins", "sbet", ATLANS, gps_week=2024)
+    assert not dropped
+    assert len(sigmas["t_ns"]) == 10_495
+    assert np.array_equal(sigmas["t_ns"], ins["t_ns"])
+    assert sigmas["roll_deg"][0] == pytest.approx(0.002758, abs=5e-7)
+    assert 0.001 < np.median(sigmas["pitch_deg"]) < 0.01
+    assert 0.001 < np.median(sigmas["heading_deg"]) < 0.1
+
+
+def test_novatel_inspvax_sigmas(read: Read) -> None:
+    """Binary as ASCII: 2289 records, of a receiver with a precise point positioning that converges."""
+    (binary, _), (ascii_, _) = (read("ins", "novatel", name, sigmas=True) for name in (PPP, PPP_ASCII))
+    assert binary.keys() == ascii_.keys() == {"t_ns", *SIGMAS}
+    for name in SIGMAS:
+        assert ascii_[name] == pytest.approx(binary[name], rel=1e-3, abs=1e-4), name
+    assert np.array_equal(binary["t_ns"], read("ins", "novatel", PPP)[0]["t_ns"])
+    assert np.all(binary["north_m"] < 1)
+    assert np.all(binary["roll_deg"] < 1)
 
 
 # --- INS, NovAtel ----------------------------------------------------------------------------------------------------
@@ -263,7 +289,11 @@ REFUSED = {
     "georeferencing/q_25_passage_2_sphere2.bin": ("of no kind that is read", "README.md"),
     "georeferencing/q_25_passage_2_target1.bin": ("of no kind that is read", "README.md"),
 }
-FORMATS = {"laser": ("las", "table"), "mbes": ("r2sonic", "table"), "ins": ("novatel", "sbet", "table")}
+FORMATS = {
+    "laser": ("las", "table"),
+    "mbes": ("r2sonic", "table"),
+    "ins": ("novatel", "sbet", "inertial_explorer", "table"),
+}
 
 
 @pytest.mark.parametrize("name", REFUSED)
