@@ -186,6 +186,7 @@ def _inside(pattern: str) -> str:
 
 
 Files = Annotated[list[Annotated[str, AfterValidator(_inside)]], Field(min_length=1)]
+Heights = Literal["ellipsoidal"] | None
 Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
 
 
@@ -235,9 +236,10 @@ class MountSigma(Model):
 
 class Laser(Model):
     files: Files
-    format: Literal["las", "table"]
+    format: Literal["las", "e57", "table"]
     gps_week: Week = None
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
+    heights: Heights = None  # above what, where frame is a CRS that does not say
     mount: Mount
     mount_sigma: MountSigma = MountSigma()  # of the fine calibration
     range_sigma_m: RangeSigma = 0.005
@@ -246,10 +248,16 @@ class Laser(Model):
     latency_s: Latency = 0.0
     latency_sigma_s: SigmaS = 0.0002
 
+    @model_validator(mode="after")
+    def _heights_of_a_crs(self) -> "Laser":
+        if self.heights is not None and self.frame == "laser":
+            raise ValueError("heights is for points in a CRS, but frame is laser: leave it out, or name the CRS")
+        return self
+
 
 class Mbes(Model):
     files: Files
-    format: Literal["r2sonic", "table"]
+    format: Literal["r2sonic", "gsf", "kmall", "table"]
     mount: Mount
     sound_speed_m_s: SoundSpeed | None = None
     svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
@@ -280,6 +288,8 @@ class Recording(Model):
     gps_week: Week = None
     latency_s: float
     frame: str = "laser"
+    heights: Heights = None
+    sound_speed_m_s: float | None = None  # of GSF alone, which may have none
 
 
 class Recordings(Model):
@@ -305,6 +315,8 @@ class SessionConfig(Model):
                 gps_week=getattr(sensor, "gps_week", None),
                 latency_s=sensor.latency_s,
                 frame=getattr(sensor, "frame", "laser"),
+                heights=getattr(sensor, "heights", None),
+                sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
             )
 
         return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=of(self.mbes))
