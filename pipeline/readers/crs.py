@@ -134,7 +134,10 @@ def _transform(solid: Any, height_scale: float) -> Transform | None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a missing grid: refused by the caller
-        group = TransformerGroup(solid, CRS.from_user_input(ECEF), always_xy=True, allow_ballpark=False)
+        try:
+            group = TransformerGroup(solid, CRS.from_user_input(ECEF), always_xy=True, allow_ballpark=False)
+        except IndexError:  # pyproj's way to say that there is none
+            return None
     if not group.transformers or not group.best_available:
         return None
     best = group.transformers[0]
@@ -155,9 +158,10 @@ def _box(crs: Any) -> Box | None:
     if area is None or area.west >= area.east:
         return None
     south, north = max(area.south - MARGIN_DEG, -90.0), min(area.north + MARGIN_DEG, 90.0)
-    bounds = (area.west - MARGIN_DEG, south, area.east + MARGIN_DEG, north)
     if crs.is_geographic:
-        return bounds
+        turn = 360.0 if (area.west, area.east) == (-180.0, 180.0) else MARGIN_DEG  # of the whole earth, 190 degrees too
+        return area.west - turn, south, area.east + turn, north
+    bounds = (max(area.west - MARGIN_DEG, -180.0), south, min(area.east + MARGIN_DEG, 180.0), north)
     flat = crs.to_2d()
     box = Transformer.from_crs(flat.geodetic_crs, flat, always_xy=True).transform_bounds(*bounds)
     return box if np.all(np.isfinite(box)) else None

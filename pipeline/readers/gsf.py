@@ -11,8 +11,8 @@ says, which is about depths. Angles are positive to port, the first beam's side,
 here starboard +. It has no way of the fan along track, so sonars that stabilise pitch or yaw cannot be calibrated.
 
 Angles and times are 16-bit numbers in most files, and some writers overflow them: an angle then jumps by 65536 steps.
-Pings in which neighbouring beams differ by more than 20 degrees are left out, as are those and beams flagged as not
-usable. The sound speed is the sensor's own of the ping, else that of the last profile at its top, else session.yaml's.
+Pings in which two neighbouring beams lie more than 20 degrees apart, and ten times as far as is usual in the ping, are
+left out, as are pings and beams flagged as not usable. The sound speed is the sensor's own of the ping, else that of the last profile at its top, else session.yaml's.
 """
 
 import struct
@@ -230,6 +230,11 @@ def top_of_profile(body: bytes) -> float | None:
     return top if MIN_SPEED_M_S <= top <= MAX_SPEED_M_S else None
 
 
+def _is_smooth(angle_deg: NDArray[np.float64]) -> bool:
+    steps = np.abs(np.diff(angle_deg))
+    return bool(len(steps) < 2 or steps.max() <= max(MAX_STEP_DEG, 10 * float(np.median(steps))))
+
+
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
 def _chunk(pings: list[tuple[int, Ping, float]], latency_s: float, dropped: Counter[str]) -> Chunk:
     counts = np.array([len(ping.angle_deg) for _, ping, _ in pings])
@@ -237,7 +242,7 @@ def _chunk(pings: list[tuple[int, Ping, float]], latency_s: float, dropped: Coun
     def spread(values: Any, dtype: Any) -> NDArray[Any]:
         return np.repeat(np.asarray(values, dtype=dtype), counts)
 
-    smooth = [bool(np.all(np.abs(np.diff(ping.angle_deg)) <= MAX_STEP_DEG)) for _, ping, _ in pings]
+    smooth = [_is_smooth(ping.angle_deg) for _, ping, _ in pings]
     sieve = Sieve(
         {
             "t_ns": spread([ping.t_ns for _, ping, _ in pings], np.int64),

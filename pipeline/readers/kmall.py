@@ -3,8 +3,9 @@
 pykmall decodes a datagram's heads, each from its own bytes. It does not lead through the file: its index and scan
 print, hold all of the file's index, end with whatever exception at the first damaged datagram, and may not end at all;
 and it makes a dictionary of each sounding, blind to the size that the datagram gives for one. So datagrams are found
-here, and the soundings of one are read at once. A datagram: u32 length, '#' and three letters, u8 version, u8 system, u16 sonar,
-u32 Unix seconds (UTC), u32 nanoseconds, its body, u32 length again; damaged ones are counted, and the next is searched.
+here, and the soundings of one are read at once. A datagram: u32 length, '#' and three letters, u8 version, u8 system,
+u16 sonar, u32 Unix seconds (UTC), u32 nanoseconds, its body, u32 length again; damaged ones are counted, and the next
+is searched.
 
 Of a sounding, offsets in bytes: 2 u8 transmit sector, 3 u8 type (0 normal, 1 extra, 2 rejected), 72 f32 angle to the
 array [degrees], 80 f32 two-way travel time [s]; corrections at 76 and 84 are applied in them already. Time is the
