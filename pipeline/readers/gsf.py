@@ -12,7 +12,8 @@ here starboard +. It has no way of the fan along track, so sonars that stabilise
 
 Angles and times are 16-bit numbers in most files, and some writers overflow them: an angle then jumps by 65536 steps.
 Pings in which two neighbouring beams lie more than 20 degrees apart, and ten times as far as is usual in the ping, are
-left out, as are pings and beams flagged as not usable. The sound speed is the sensor's own of the ping, else that of the last profile at its top, else session.yaml's.
+left out, as are pings and beams flagged as not usable. The sound speed is the sensor's own of the ping, else that of
+the last profile at its top, else session.yaml's.
 """
 
 import struct

@@ -1,5 +1,6 @@
 """E57 files with times, by the writer of pye57's libE57Format."""
 
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,6 +36,29 @@ def write(path: Path, *scans: Scan, crs: str = "") -> None:
     for scan in scans:
         _add(image, data, scan)
     image.close()
+
+
+def edited(content: bytes, old: bytes, new: bytes) -> bytes:
+    """A file with something of its XML replaced, its lengths and the checksums of its pages right."""
+    inside = b"".join(content[k : k + 1020] for k in range(0, len(content), 1024))
+    (length,) = struct.unpack_from("<Q", inside, 32)
+    inside = inside.replace(old, new)
+    inside = inside[:32] + struct.pack("<Q", length + len(new) - len(old)) + inside[40:]
+    inside = inside.ljust(len(content) // 1024 * 1020, b"\0")
+    inside += bytes(-len(inside) % 1020)
+    size = len(inside) // 1020 * 1024
+    inside = inside[:16] + struct.pack("<Q", size) + inside[24:]
+    pages = (inside[k : k + 1020] for k in range(0, len(inside), 1020))
+    return b"".join(page + struct.pack(">I", _crc32c(page)) for page in pages)
+
+
+def _crc32c(data: bytes) -> int:
+    value = 0xFFFFFFFF
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = (value >> 1) ^ (0x82F63B78 if value & 1 else 0)
+    return value ^ 0xFFFFFFFF
 
 
 def _add(image: libe57.ImageFile, data: libe57.VectorNode, scan: Scan) -> None:

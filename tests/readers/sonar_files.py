@@ -54,7 +54,8 @@ def gsf_ping(
     checked: bool = False,
 ) -> bytes:
     """Times in microseconds, angles in hundredths of a degree, port +, with the scale factors SCALES."""
-    body = struct.pack(">2I2i4H", seconds + k, 250_000_000, 1_201_000_000, 360_000_000, beams, beams // 2, ping_flags, 0)
+    place = (1_201_000_000, 360_000_000)
+    body = struct.pack(">2I2i4H", seconds + k, 250_000_000, *place, beams, beams // 2, ping_flags, 0)
     body += struct.pack(">hiH3h2H3ih", 0, 0, 9000, 0, 0, 0, 0, 0, 0, 0, 0, 0)
     body += extra
     if times is not None:

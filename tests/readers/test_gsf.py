@@ -51,8 +51,8 @@ def test_sound_speed_of_the_sensor_comes_first(file: Path) -> None:
 
 
 def test_then_the_top_of_the_last_profile(file: Path) -> None:
-    pings = gsf_ping(0, extra=SCALES + seabat(0.0)), gsf_ping(1)
-    file.write_bytes(gsf_header() + profile((0.5, 1450.0)) + pings[0] + profile((3.0, 1460.0), (0.2, 1462.5)) + pings[1])
+    first = profile((0.5, 1450.0)) + gsf_ping(0, extra=SCALES + seabat(0.0))
+    file.write_bytes(gsf_header() + first + profile((3.0, 1460.0), (0.2, 1462.5)) + gsf_ping(1))
     speeds = read("mbes", file, "gsf", sound_speed_m_s=1500.0)[0]["sound_speed_m_s"]
     assert speeds.tolist() == [1450.0] * 5 + [1462.5] * 5
 
