@@ -41,6 +41,7 @@ PINGS = 8_192
 HEAD = struct.Struct("<I4s2BH2I")
 LENGTH = struct.Struct("<I")
 SMALLEST, LARGEST = HEAD.size + LENGTH.size, 1 << 24
+LEAST_MRZ = 200  # its heads alone are longer
 BLOCK = 1 << 16
 MRZ = b"#MRZ"
 MAX_BEAMS = np.iinfo(np.int16).max
@@ -164,6 +165,8 @@ def decode(datagram: bytes) -> Ping | None:
     """The contents of one #MRZ datagram; None where they contradict themselves, or are one part of several."""
     from KMALL import kmall
 
+    if len(datagram) < LEAST_MRZ:
+        return None
     reader: Any = kmall()
     reader.FID = io.BytesIO(datagram)
     try:

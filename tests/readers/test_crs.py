@@ -102,7 +102,9 @@ def test_the_formulas_of_this_test_are_right() -> None:
         ("EPSG:32651", "ellipsoidal", UTM),
     ],
 )
-def test_one_place_by_every_way(frame: str, heights: str | None, points: list[tuple[float, ...]], tmp_path: Path) -> None:
+def test_one_place_by_every_way(
+    frame: str, heights: str | None, points: list[tuple[float, ...]], tmp_path: Path
+) -> None:
     columns, dropped = read("laser", table(tmp_path, points), "table", frame=frame, heights=heights)
     assert not dropped
     assert np.abs(placed(columns) - np.array(ECEF)).max() < 1e-6
