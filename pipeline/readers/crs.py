@@ -24,6 +24,7 @@ AXES = ("x_m", "y_m", "z_m")
 DEGREE_M = 111_320.0  # along a meridian
 MARGIN_DEG = 1.0  # beyond a CRS's area of use, which is rounded
 CLEARLY_ELSEWHERE_M = 1000.0
+ENOUGH = 100  # points by which lost digits are told from chance
 
 
 @dataclass(frozen=True)
@@ -43,9 +44,17 @@ class Placing:
     unit_m: float  # metres in one unit of x and y
 
 
-def keep_placed(sieve: Sieve, frame: Frame) -> None:
-    """x_m, y_m, z_m in ``frame`` become ECEF; rows that have no place there are left out."""
+def keep_placed(sieve: Sieve, frame: Frame, name: str) -> None:
+    """x_m, y_m, z_m in ``frame`` become ECEF; rows that have no place there are left out.
+
+    Raises
+    ------
+    RawDataError
+        The coordinates have lost their digits: whole pieces of a file are numbers of single precision.
+    """
     placing = placing_of(frame)
+    if frame.name != LASER:
+        _refuse_float32(sieve["x_m"], sieve["y_m"], 1.0 if placing is None else placing.unit_m, name)
     if placing is None:
         return
     if placing.box is not None:
@@ -55,6 +64,18 @@ def keep_placed(sieve: Sieve, frame: Frame) -> None:
     moved = placing.to_ecef(*(sieve[axis] for axis in AXES))
     sieve.columns |= dict(zip(AXES, moved, strict=True))
     sieve.keep_finite()
+
+
+def _refuse_float32(x: Array, y: Array, unit_m: float, name: str) -> None:
+    """Whether all lie as near to a float32 as the rounding of a text or LAS brings them, where these lie far apart."""
+    near = (0.006 if unit_m == DEGREE_M else 0.0006) / unit_m
+    for values in (x, y):
+        singles = values.astype(np.float32)
+        apart = float(np.spacing(np.abs(singles).max(initial=0.0)))
+        few = len(values) < ENOUGH or values.min() == values.max()
+        if few or not apart > 10 * near or not np.all(np.abs(values - singles) <= near):
+            return
+    raise RawDataError(f"{name}: its coordinates went through float32; export it again in double precision")
 
 
 @lru_cache(maxsize=8)

@@ -75,7 +75,7 @@ class E57Part:
         done = 0
         for numbers in points(self.path, self.name, self.number):
             if not done:
-                refuse_another(self.frame, self.crs, _placed(numbers, self.scan), self.name)
+                refuse_another(self.frame, self.crs, placed(numbers, self.scan), self.name)
             done += len(numbers[0])
             yield self._chunk(numbers, dropped)
         dropped["truncated"] += self.scan.points - done
@@ -86,7 +86,7 @@ class E57Part:
     def _chunk(self, numbers: Numbers, dropped: Counter[str]) -> Chunk:
         self._refuse_float32(numbers)
         seconds, *_, invalid, untimed = numbers
-        columns = dict(zip(AXES, _placed(numbers, self.scan), strict=True))
+        columns = dict(zip(AXES, placed(numbers, self.scan), strict=True))
         sieve = Sieve(columns | {"seconds": seconds, "invalid": invalid, "untimed": untimed}, dropped)
         sieve.keep(sieve["invalid"] == 0, "point marked as invalid")
         sieve.keep(sieve["untimed"] == 0, "no time")
@@ -95,7 +95,7 @@ class E57Part:
         sieve.columns["t_ns"] = self._gps_ns(sieve["seconds"])
         sieve.keep(possible_ns(sieve["t_ns"]), "impossible time")
         sieve.columns["t_ns"] = sieve["t_ns"] - latency_ns(self.latency_s)
-        keep_placed(sieve, self.frame)
+        keep_placed(sieve, self.frame, self.name)
         return chunk(sieve.columns, LASER_COLUMNS, dropped)
 
     def _gps_ns(self, seconds: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -174,7 +174,7 @@ def points(path: Path, name: str, number: int) -> Iterator[Numbers]:
 
 
 @np.errstate(all="ignore")
-def _placed(numbers: Numbers, scan: Scan) -> tuple[Array, Array, Array]:
+def placed(numbers: Numbers, scan: Scan) -> tuple[Array, Array, Array]:
     """Coordinates in the frame of the file: Cartesian, through the scan's pose."""
     x, y, z = numbers[1:4]
     if scan.axes == "spherical":

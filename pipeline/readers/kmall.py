@@ -161,6 +161,7 @@ def _next_start(file: BinaryIO, start: int, size: int) -> int:
     return size
 
 
+@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
 def decode(datagram: bytes) -> Ping | None:
     """The contents of one #MRZ datagram; None where they contradict themselves, or are one part of several."""
     from KMALL import kmall

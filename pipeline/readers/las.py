@@ -98,7 +98,7 @@ class LasPart:
         sieve.columns["t_ns"] = self._gps_ns(sieve) - latency_ns(self.latency_s)
         if first:
             refuse_another(self.frame, self.crs, (sieve["x_m"], sieve["y_m"], sieve["z_m"]), self.name)
-        keep_placed(sieve, self.frame)
+        keep_placed(sieve, self.frame, self.name)
         return chunk(sieve.columns, LASER_COLUMNS, dropped)
 
     def _gps_ns(self, sieve: Sieve) -> NDArray[np.int64]:

@@ -84,7 +84,7 @@ class TablePart:
             order.keep(sieve)
         elif self.sensor == "laser":
             sieve.keep_finite()
-            keep_placed(sieve, self.frame)
+            keep_placed(sieve, self.frame, self.name)
         else:
             _to_soundings(sieve)
         return chunk(sieve.columns, CANONICAL[self.sensor], dropped)

@@ -225,6 +225,25 @@ def test_coarse_steps_are_refused(frame: str, scale: float, z: float, axis: str,
         read("laser", las(tmp_path, points, None, scale, z), "las", frame=frame, heights=heights)
 
 
+@pytest.mark.parametrize("frame", ["EPSG:32651", "EPSG:4978", "EPSG:4979"])
+@pytest.mark.parametrize("form", ["table", "las"])
+def test_coordinates_through_float32(form: str, frame: str, tmp_path: Path) -> None:
+    """In single precision UTM has steps of 16 mm and more; the same points in double precision are read."""
+    start = {"EPSG:32651": UTM[0], "EPSG:4978": ECEF[0], "EPSG:4979": PLACES[0]}[frame]
+    step = 1e-6 if frame == "EPSG:4979" else 0.1
+    along = np.arange(200)[:, None] * np.array([step * 1.01, step * 1.07, 0.01])
+    points = [tuple(float(value) for value in row) for row in np.array(start) + along]
+    truncated = [(*map(float, np.array(point[:2], np.float32)), point[2]) for point in points]
+    more = {"frame": frame, "heights": "ellipsoidal"}
+
+    def file(rows_: list[tuple[float, ...]]) -> Path:
+        return table(tmp_path, rows_) if form == "table" else las(tmp_path, rows_, None, min(step / 10, 0.001))
+
+    assert rows(read("laser", file(points), form, **more)[0]) == 200
+    with pytest.raises(RawDataError, match=r"its coordinates went through float32; export it again in double"):
+        read("laser", file(truncated), form, **more)
+
+
 @pytest.mark.parametrize(("frame", "scale"), [("laser", 0.01), ("EPSG:32651", 0.01), ("EPSG:4979", 1e-7)])
 def test_a_centimetre_is_fine_enough(frame: str, scale: float, tmp_path: Path) -> None:
     points = PLACES[:1] if frame == "EPSG:4979" else UTM[:1]

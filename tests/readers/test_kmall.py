@@ -136,6 +136,17 @@ def test_impossible_clock_speed_and_times(file: Path) -> None:
     assert dropped == {"impossible time (clock not set)": 5, "impossible sound speed": 5, "no detection": 1}
 
 
+def test_numbers_that_are_none(file: Path) -> None:
+    """Signalling ones too, at which processors warn."""
+    content = bytearray(mrz(1, FAN))
+    at = content.index(struct.pack("<f", 30.0))
+    content[at : at + 4] = b"\1\0\x80\x7f"
+    file.write_bytes(content)
+    columns, dropped = read("mbes", file, "kmall")
+    assert rows(columns) == 4
+    assert dropped == {"not a finite number": 1}
+
+
 def test_lengths_that_claim_more_than_there_is(file: Path) -> None:
     """Neither time nor memory for a million datagrams of no length, or one of 4 GB."""
     claims = (struct.pack("<I4s", 0, b"#MRZ") + bytes(16)) * 5000 + struct.pack("<I4s", 2**32 - 1, b"#MRZ")
