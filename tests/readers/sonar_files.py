@@ -52,14 +52,17 @@ def gsf_ping(
     seconds: int = UTC_2024,
     beams: int = 5,
     checked: bool = False,
+    unix_ns: int | None = None,
+    wide: bool = False,
 ) -> bytes:
-    """Times in microseconds, angles in hundredths of a degree, port +, with the scale factors SCALES."""
+    """By SCALES times are in microseconds and angles in hundredths of a degree, port +. ``wide``: times in 4 bytes."""
     place = (1_201_000_000, 360_000_000)
-    body = struct.pack(">2I2i4H", seconds + k, 250_000_000, *place, beams, beams // 2, ping_flags, 0)
+    when = divmod(unix_ns, 10**9) if unix_ns is not None else (seconds + k, 250_000_000)
+    body = struct.pack(">2I2i4H", *when, *place, beams, beams // 2, ping_flags, 0)
     body += struct.pack(">hiH3h2H3ih", 0, 0, 9000, 0, 0, 0, 0, 0, 0, 0, 0, 0)
     body += extra
     if times is not None:
-        body += subrecord(4, struct.pack(f">{len(times)}H", *times))
+        body += subrecord(4, struct.pack(f">{len(times)}{'I' if wide else 'H'}", *times))
     if angles is not None:
         body += subrecord(5, struct.pack(f">{len(angles)}h", *angles))
     if flags:
