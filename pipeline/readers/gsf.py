@@ -8,7 +8,8 @@ or profile is searched. Scale factors are those of the last ping that had any; a
 BEAM_ANGLE is, in the specification's words, the "incoming beam angle at transducer face" (table 4-3) and elsewhere the
 "rotation from vertical" (4.3.4.9). What writers put there is the former, not roll corrected, whatever ROLL_COMPENSATED
 says, which is about depths. Angles are positive to port, the first beam's side, which the specification leaves open;
-here starboard +. It has no way of the fan along track, so sonars that stabilise pitch or yaw cannot be calibrated.
+here starboard +. Where the fan lies along track is not told, so it must be fixed to the boat: files that say that pitch
+or yaw were stabilised, or that have several receivers or swaths (Kongsberg's newer sonars say so), are refused.
 
 Angles and times are 16-bit numbers in most files, and some writers overflow them: an angle then jumps by 65536 steps.
 Pings in which two neighbouring beams lie more than 20 degrees apart, and ten times as far as is usual in the ping, are
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
 from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.kmall import STABILISED
 from pipeline.readers.sieve import (
     MAX_SPEED_M_S,
     MBES_COLUMNS,
@@ -65,6 +67,8 @@ class Ping(NamedTuple):
     angle_deg: NDArray[np.float64]
     two_way_time_s: NDArray[np.float64]
     sound_speed_m_s: float | None  # as the sensor's own part of the record has it
+    stabilised: bool = False
+    head: tuple[Any, ...] = ()  # receiver and swath, where the sensor's own part tells them
     lacks: str = ""  # what the record has not, without which there are no soundings
 
 
@@ -96,6 +100,7 @@ class GsfPart:
     def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, Ping, float]]:
         """Pings, their numbers, and the sound speeds at the head."""
         version, scales, profile_m_s, number = 3, Scales(), None, -1
+        head: tuple[Any, ...] | None = None
         for kind, body in records(file, dropped):
             if kind == HEADER:
                 version = _version(body)
@@ -112,6 +117,8 @@ class GsfPart:
                         f"{self.name}: cannot be served: no {ping.lacks} in its pings, positions of soundings alone; "
                         "export it again with travel times and beam angles, or give the sonar's own files"
                     )
+                head = ping.head if head is None else head
+                self._refuse_other_fans(number, ping, head)
                 speed = ping.sound_speed_m_s or profile_m_s or self.sound_speed_m_s
                 if speed is None:
                     raise RawDataError(
@@ -119,6 +126,18 @@ class GsfPart:
                         "mbes.sound_speed_m_s in session.yaml, the one that its beams were steered with"
                     )
                 yield number, ping, speed
+
+    def _refuse_other_fans(self, number: int, ping: Ping, head: tuple[Any, ...]) -> None:
+        if ping.stabilised:
+            raise RawDataError(
+                f"{self.name}: ping {number} was sent with pitch or yaw stabilisation: its fan has another direction "
+                "in each ping; switch both off and sail again"
+            )
+        if ping.head != head:
+            raise RawDataError(
+                f"{self.name}: has soundings of several receivers or swaths, each with a mount of its own; log one "
+                "head alone, without dual swath"
+            )
 
 
 def records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, bytes]]:
@@ -201,7 +220,7 @@ def decode(body: bytes, version: int, scales: Scales) -> Ping | None:
     t_ns = int(gps_ns_from_unix_utc(np.array([seconds]), np.array([nanoseconds]))[0])
     for label, what in (("TravelTime_s", "travel times"), ("BeamAngle_deg", "beam angles")):
         if beams[label] is None and label not in undecoded:
-            return Ping(t_ns, np.empty(0, bool), np.empty(0), np.empty(0), None, what)
+            return Ping(t_ns, np.empty(0, bool), np.empty(0), np.empty(0), None, lacks=what)
     angles, times, flags = beams["BeamAngle_deg"], beams["TravelTime_s"], beams["BeamFlags"]
     if nanoseconds >= NS or any(values is None or len(values) != count for values in (angles, times)):
         return None
@@ -209,12 +228,15 @@ def decode(body: bytes, version: int, scales: Scales) -> Ping | None:
         return None
     good = np.ones(count, dtype=bool) if flags is None or len(flags) != count else flags & UNUSABLE == 0
     usable = good & (record["PingFlags"] & UNUSABLE == 0)
-    return Ping(t_ns, usable, angles, times, _speed_of(record.get("SensorSpecific")))
+    sensor = record.get("SensorSpecific") or {}
+    stabilised = bool(sensor.get("ModeAndStabilisation", 0) & STABILISED)
+    head = tuple(sensor.get(name) for name in ("RxTransducerInd", "SwathAlongPosition"))
+    return Ping(t_ns, usable, angles, times, _speed_of(sensor), stabilised, head)
 
 
-def _speed_of(sensor: dict[str, Any] | None) -> float | None:
+def _speed_of(sensor: dict[str, Any]) -> float | None:
     """The sound speed in a sensor's own part of a ping, if it has one."""
-    found = (float((sensor or {}).get(name) or 0.0) for name in SPEEDS)
+    found = (float(sensor.get(name) or 0.0) for name in SPEEDS)
     return next((speed for speed in found if MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S), None)
 
 

@@ -112,6 +112,32 @@ def test_soundings_without_times_or_angles(more: dict[str, None], what: str, fil
     assert dropped == {"ping without times or angles": 1}
 
 
+def kongsberg(**fields: int) -> bytes:
+    """Kongsberg's part of a ping, made by the library: it has the sonar's modes."""
+    from GSFU.gsfu import _encode_kmall_specific, new_kmall_specific
+
+    part = new_kmall_specific() | {"SoundSpeedAtTxDepth_mPerSec": 1450.0} | fields
+    return bytes(_encode_kmall_specific(part))
+
+
+@pytest.mark.parametrize("field", ["RxTransducerInd", "SwathAlongPosition"])
+def test_several_fans(field: str, file: Path) -> None:
+    pings = gsf_ping(0, extra=SCALES + kongsberg()), gsf_ping(1, extra=kongsberg(**{field: 1}))
+    file.write_bytes(gsf_header() + b"".join(pings))
+    with pytest.raises(RawDataError, match=r"a\.gsf: .*several receivers or swaths.*log one head alone"):
+        read("mbes", file, "gsf")
+
+
+@pytest.mark.parametrize("mode", [0, 1, 2, 8])
+def test_a_stabilised_fan(mode: int, file: Path) -> None:
+    file.write_bytes(gsf_header() + gsf_ping(extra=SCALES + kongsberg(ModeAndStabilisation=mode)))
+    if mode in (0, 8):
+        assert np.all(read("mbes", file, "gsf")[0]["sound_speed_m_s"] == 1450.0)
+    else:
+        with pytest.raises(RawDataError, match=r"a\.gsf: .*stabilisation.*switch both off"):
+            read("mbes", file, "gsf")
+
+
 # --- damage ----------------------------------------------------------------------------------------------------------
 def test_damaged_records_are_counted_and_the_rest_is_read(file: Path) -> None:
     good = [gsf_ping(k, extra=SOUND, checked=True) for k in range(4)]
