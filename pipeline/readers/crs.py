@@ -23,7 +23,6 @@ LASER = "laser"
 AXES = ("x_m", "y_m", "z_m")
 DEGREE_M = 111_320.0  # along a meridian
 MARGIN_DEG = 1.0  # beyond a CRS's area of use, which is rounded
-CLEARLY_ELSEWHERE_M = 1000.0
 ENOUGH = 100  # points by which lost digits are told from chance
 
 
@@ -121,7 +120,7 @@ def _refuse_unsaid_heights(crs: Any, frame: Frame, where: str) -> None:
             f"{where}: {crs.name} has {len(crs.axis_info)} axes: heights above what? Write laser.heights: ellipsoidal "
             "if they are above the ellipsoid; else export ellipsoidal heights"
         )
-    vertical = _vertical_of(crs)
+    vertical = vertical_of(crs)
     if vertical is not None and frame.heights is not None:
         raise ConfigError(
             f"{where}: {crs.name} has heights of {vertical}, but laser.heights is {frame.heights}; "
@@ -129,7 +128,7 @@ def _refuse_unsaid_heights(crs: Any, frame: Frame, where: str) -> None:
         )
 
 
-def _vertical_of(crs: Any) -> str | None:
+def vertical_of(crs: Any) -> str | None:
     """The name of a compound CRS's vertical part, unless that is the ellipsoid."""
     names = [part.name for part in crs.sub_crs_list if part.is_vertical]
     return next((name for name in names if "ellipsoid" not in name.lower()), None)
@@ -186,45 +185,3 @@ def _box(crs: Any) -> Box | None:
     flat = crs.to_2d()
     box = Transformer.from_crs(flat.geodetic_crs, flat, always_xy=True).transform_bounds(*bounds)
     return box if np.all(np.isfinite(box)) else None
-
-
-def refuse_another(frame: Frame, declared: str, points: tuple[Array, Array, Array], name: str) -> None:
-    """Refuse a file whose own CRS (``declared``, WKT) is clearly another one than session.yaml's.
-
-    It is where the points' middle lies more than 1 km elsewhere, or nowhere, or the heights are said to be above a
-    geoid and the session says the ellipsoid. What cannot be understood is not held against the file.
-    """
-    if frame.name == LASER or not declared or not len(points[0]):
-        return
-    from pyproj import CRS
-    from pyproj.exceptions import ProjError
-
-    try:
-        own, given = CRS.from_user_input(declared), CRS.from_user_input(frame.name)
-        x, y, z = (float(np.median(values)) for values in points)
-        one, other = _place_deg(own, x, y, z), _place_deg(given, x, y, z)
-    except (ProjError, ValueError):
-        return
-    away_m = DEGREE_M * np.hypot((one[0] - other[0]) * np.cos(np.radians(other[1])), one[1] - other[1])
-    if np.all(np.isfinite(one)) and not away_m <= CLEARLY_ELSEWHERE_M:
-        raise RawDataError(
-            f"{name}: says itself that its points are in {own.name}, but laser.frame is {frame.name!r} ({given.name}); "
-            "mend laser.frame, or export the points anew"
-        )
-    vertical = _vertical_of(own)
-    if vertical is not None and frame.heights is not None:
-        raise RawDataError(
-            f"{name}: says itself that its heights are {vertical}, but laser.heights is {frame.heights}; "
-            "export ellipsoidal heights"
-        )
-
-
-def _place_deg(crs: Any, x: float, y: float, z: float) -> tuple[float, float]:
-    """Longitude and latitude of a point, by whatever way."""
-    from pyproj import Transformer
-
-    if crs.is_geocentric:
-        longitude, latitude, _ = Transformer.from_crs(crs, "EPSG:4979", always_xy=True).transform(x, y, z)
-    else:
-        longitude, latitude = Transformer.from_crs(crs.to_2d(), "EPSG:4326", always_xy=True).transform(x, y)
-    return float(longitude), float(latitude)

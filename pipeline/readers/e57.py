@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
 from pipeline.maths.rotations import rotation_from_quaternion
-from pipeline.readers.crs import AXES, Array, Frame, keep_placed, refuse_another
+from pipeline.readers.crs import AXES, Array, Frame, keep_placed
+from pipeline.readers.declared import refuse_another
 from pipeline.readers.files import opened, size_of
 from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns, through_float32
 from pipeline.readers.worker import ADVICE, Numbers, batches, text

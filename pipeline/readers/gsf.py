@@ -1,14 +1,13 @@
 """GSF ("Generic Sensor Format Specification", 03.06, Leidos 98-16v), ping by ping; big-endian, times in UTC.
 
 gsfu decodes a record. It does not lead through the file: its index holds all records and refuses the whole file for the
-first damaged one, and its iterator ends there. So records are found here: u32 size, u32 of checksum flag (bit 31) and
-kind (bits 0 to 21), with the flag u32 sum of the bytes, then the bytes; damaged records are counted, and the next ping
-or profile is searched. Scale factors are those of the last ping that had any; a file begins with them.
+first damaged one, and its iterator ends there. So records are found by :mod:`pipeline.readers.gsf_records`. Scale
+factors are those of the last ping that had any; a file begins with them.
 
 BEAM_ANGLE is, in the specification's words, the "incoming beam angle at transducer face" (table 4-3) and elsewhere the
-"rotation from vertical" (4.3.4.9). What writers put there is the former, not roll corrected, whatever ROLL_COMPENSATED
-says, which is about depths. Angles are positive to port, the first beam's side, which the specification leaves open;
-here starboard +. Where the fan lies along track is not told, so it must be fixed to the boat: files that say that pitch
+"rotation from vertical" (4.3.4.9). The writers looked at (CARIS HIPS, gsfu's own converter) put the former there, not
+roll corrected, whatever ROLL_COMPENSATED says, which is about depths; and positive to port, the first beam's side,
+which the specification leaves open; here starboard +. Where the fan lies along track is not told, so it must be fixed to the boat: files that say that pitch
 or yaw were stabilised, or that have several receivers or swaths (Kongsberg's newer sonars say so), are refused.
 
 Angles and times are 16-bit numbers in most files, and some writers overflow them: an angle then jumps by 65536 steps.
@@ -28,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.files import opened
+from pipeline.readers.gsf_records import HEADER, PING, PROFILE, records
 from pipeline.readers.kmall import STABILISED
 from pipeline.readers.sieve import (
     MAX_SPEED_M_S,
@@ -46,12 +46,7 @@ from pipeline.times import NS, gps_ns_from_unix_utc
 
 SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 PINGS = 8_192
-HEAD = struct.Struct(">2I")
 TIME = struct.Struct(">2I")
-CHECKED, KIND = 1 << 31, (1 << 22) - 1
-HEADER, PING, PROFILE, KINDS = 1, 2, 3, 12
-LARGEST = 524_288
-BLOCK = 1 << 16
 MAX_BEAMS = np.iinfo(np.int16).max
 UNUSABLE = 1  # bit of a ping's or a beam's flags
 MAX_STEP_DEG = 20.0
@@ -138,65 +133,6 @@ class GsfPart:
                 f"{self.name}: has soundings of several receivers or swaths, each with a mount of its own; log one "
                 "head alone, without dual swath"
             )
-
-
-def records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, bytes]]:
-    """Headers, pings and profiles: kind and bytes."""
-    size, position = size_of(file), 0
-    while position < size:
-        head = read_at(file, position, HEAD.size + 4)
-        span = _span(head)
-        if span is None or position + span[1] > size:
-            cut = span is not None
-            dropped["truncated record" if cut else "stray bytes"] += 1
-            position = _next_start(file, position + 1, size)
-            continue
-        start, length = span
-        (word,) = struct.unpack_from(">I", head, 4)
-        if word & KIND in (HEADER, PING, PROFILE):
-            body = read_at(file, position + start, length - start)
-            if word & CHECKED and sum(body) & 0xFFFFFFFF != int.from_bytes(head[8:12], "big"):
-                dropped["damaged record"] += 1
-            else:
-                yield word & KIND, body
-        position += length
-
-
-def _span(head: bytes) -> tuple[int, int] | None:
-    """Where a record's bytes begin, and where they end, from its start; None where none begins."""
-    if len(head) < HEAD.size:
-        return None
-    size, word = HEAD.unpack_from(head)
-    start = HEAD.size + (4 if word & CHECKED else 0)
-    return (start, start + size) if 0 < size <= LARGEST and 0 < word & KIND <= KINDS else None
-
-
-def _next_start(file: BinaryIO, start: int, size: int) -> int:
-    """Where the next ping or profile begins that another record or the end follows, or the file's end."""
-    marks = [struct.pack(">I", flag | kind) for kind in (PING, PROFILE) for flag in (0, CHECKED)]
-    while start < size:
-        block = read_at(file, start, BLOCK + 8)
-        found = {at for mark in marks for at in _all_of(block, mark) if 4 <= at < BLOCK + 4}
-        for at in sorted(found):
-            if _is_record(file, start + at - 4, size):
-                return start + at - 4
-        start += BLOCK
-    return size
-
-
-def _all_of(block: bytes, mark: bytes) -> Iterator[int]:
-    at = block.find(mark)
-    while at >= 0:
-        yield at
-        at = block.find(mark, at + 1)
-
-
-def _is_record(file: BinaryIO, position: int, size: int) -> bool:
-    span = _span(read_at(file, position, HEAD.size))
-    if span is None or position + span[1] > size:
-        return False
-    following = position + span[1]
-    return following == size or _span(read_at(file, following, HEAD.size)) is not None
 
 
 def _version(body: bytes) -> int:

@@ -2,10 +2,8 @@
 
 pykmall decodes a datagram's heads, each from its own bytes. It does not lead through the file: its index and scan
 print, hold all of the file's index, end with whatever exception at the first damaged datagram, and may not end at all;
-and it makes a dictionary of each sounding, blind to the size that the datagram gives for one. So datagrams are found
-here, and the soundings of one are read at once. A datagram: u32 length, '#' and three letters, u8 version, u8 system,
-u16 sonar, u32 Unix seconds (UTC), u32 nanoseconds, its body, u32 length again; damaged ones are counted, and the next
-is searched.
+and it makes a dictionary of each sounding, blind to the size that the datagram gives for one. So datagrams are found by
+:mod:`pipeline.readers.kmall_datagrams`, and the soundings of one are read at once.
 
 Of a sounding, offsets in bytes: 2 u8 transmit sector, 3 u8 type (0 normal, 1 extra, 2 rejected), 72 f32 angle to the
 array [degrees], 80 f32 two-way travel time [s]; corrections at 76 and 84 are applied in them already. Time is the
@@ -25,25 +23,21 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.files import opened
+from pipeline.readers.kmall_datagrams import HEAD, LENGTH, datagrams
 from pipeline.readers.sieve import MBES_COLUMNS, Sieve, chunk, keep_possible_soundings, latency_ns, no_rows, possible_ns
 from pipeline.streams import Chunk
 from pipeline.times import NS, gps_ns_from_unix_utc
 
 SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 PINGS = 8_192
-HEAD = struct.Struct("<I4s2BH2I")
-LENGTH = struct.Struct("<I")
-SMALLEST, LARGEST = HEAD.size + LENGTH.size, 1 << 24
 LEAST_MRZ = 200  # its heads alone are longer
-BLOCK = 1 << 16
-MRZ = b"#MRZ"
 MAX_BEAMS = np.iinfo(np.int16).max
 SOUNDING = 88  # bytes of one that are needed
 NORMAL, EXTRA, REJECTED = 0, 1, 2
@@ -112,53 +106,6 @@ class KmallPart:
                 f"{self.name}: has soundings of several receivers (dual head), each with a mount of its own; "
                 "log one head alone"
             )
-
-
-def datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
-    """The whole #MRZ datagrams of a file, one after another."""
-    size, position = size_of(file), 0
-    while position < size:
-        length = _length_at(file, position, size)
-        if length is None:
-            dropped["truncated datagram" if _cut_off(file, position, size) else "stray bytes"] += 1
-            position = _next_start(file, position + 1, size)
-            continue
-        if read_at(file, position + 4, 4) == MRZ:
-            yield read_at(file, position, length)
-        position += length
-
-
-def _length_at(file: BinaryIO, position: int, size: int) -> int | None:
-    """The length of the datagram that begins here; None where none does, or its two lengths differ."""
-    head = read_at(file, position, 8)
-    length = int.from_bytes(head[:4], "little")
-    if not _is_head(head) or position + length > size:
-        return None
-    return length if read_at(file, position + length - 4, 4) == head[:4] else None
-
-
-def _is_head(head: bytes) -> bool:
-    letters = head[5:8]
-    sound = len(head) == 8 and head[4:5] == b"#" and letters.isalnum() and letters.isupper()
-    return sound and SMALLEST <= int.from_bytes(head[:4], "little") <= LARGEST
-
-
-def _cut_off(file: BinaryIO, position: int, size: int) -> bool:
-    head = read_at(file, position, 8)
-    return _is_head(head) and position + int.from_bytes(head[:4], "little") > size
-
-
-def _next_start(file: BinaryIO, start: int, size: int) -> int:
-    """Where the next whole datagram begins, or the file's end."""
-    while start < size:
-        block = read_at(file, start, BLOCK + 8)
-        found = block.find(b"#", 4)
-        while 0 <= found < BLOCK + 4:
-            if _length_at(file, start + found - 4, size) is not None:
-                return start + found - 4
-            found = block.find(b"#", found + 1)
-        start += BLOCK
-    return size
 
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of

@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.readers.crs import DEGREE_M, Frame, keep_placed, placing_of, refuse_another
+from pipeline.readers.crs import DEGREE_M, Frame, keep_placed, placing_of
+from pipeline.readers.declared import refuse_another
 from pipeline.readers.files import opened, read_at, size_of
 from pipeline.readers.laz import points_at_most, unpack
 from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, through_float32

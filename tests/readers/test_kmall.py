@@ -12,6 +12,7 @@ import pytest
 from pipeline.config import Mbes
 from pipeline.errors import RawDataError
 from pipeline.readers import kmall, raw_parts
+from pipeline.readers.kmall_datagrams import datagrams
 from tests.readers.build import GPS_2024, MOUNT, UTC_2024, read, rows
 from tests.readers.sonar_files import ANGLES_DEG, datagram, mrz, sounding
 from tests.readers.sonar_files import kmall as made
@@ -166,7 +167,7 @@ def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_only_mrz_is_looked_into(file: Path) -> None:
     content = datagram(b"#MWC", bytes(500)) + datagram(b"#SVP", bytes(10))
     dropped: Counter[str] = Counter()
-    assert list(kmall.datagrams(io.BytesIO(content), dropped)) == []
+    assert list(datagrams(io.BytesIO(content), dropped)) == []
     assert not dropped
 
 

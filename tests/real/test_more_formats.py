@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.readers import e57, gsf, kmall
+from pipeline.readers import e57, gsf
+from pipeline.readers.gsf_records import PING, records
+from pipeline.readers.kmall_datagrams import datagrams
 from pipeline.times import NS, unix_ns_from_gps
 from tests.real.conftest import Read
 
@@ -48,7 +50,7 @@ def test_kmall_against_its_library(data: Path, read: Read) -> None:
     reader = importlib.import_module("KMALL").kmall()
     dropped: Counter[str] = Counter()
     with (data / KMALL).open("rb") as file:
-        found = list(kmall.datagrams(file, dropped))
+        found = list(datagrams(file, dropped))
     assert len(found) == 5
     columns: dict[str, list[float]] = {"y": [], "angle": [], "time": []}
     for datagram in found:
@@ -75,7 +77,7 @@ def test_kmall_cut_in_the_middle(data: Path, read: Read) -> None:
 def pings_of(path: Path) -> list[Any]:
     scales: gsf.Scales = {}
     with path.open("rb") as file:
-        bodies = [body for kind, body in gsf.records(file, Counter()) if kind == gsf.PING]
+        bodies = [body for kind, body in records(file, Counter()) if kind == PING]
     return [gsf.decode(body, 3, scales) for body in bodies]
 
 
