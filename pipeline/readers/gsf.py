@@ -7,8 +7,9 @@ factors are those of the last ping that had any; a file begins with them.
 BEAM_ANGLE is, in the specification's words, the "incoming beam angle at transducer face" (table 4-3) and elsewhere the
 "rotation from vertical" (4.3.4.9). The writers looked at (CARIS HIPS, gsfu's own converter) put the former there, not
 roll corrected, whatever ROLL_COMPENSATED says, which is about depths; and positive to port, the first beam's side,
-which the specification leaves open; here starboard +. Where the fan lies along track is not told, so it must be fixed to the boat: files that say that pitch
-or yaw were stabilised, or that have several receivers or swaths (Kongsberg's newer sonars say so), are refused.
+which the specification leaves open; here starboard +. Where the fan lies along track is not told, so it must be fixed
+to the boat: files that say that pitch or yaw were stabilised, or that have several receivers or swaths (Kongsberg's
+newer sonars say so), are refused.
 
 Angles and times are 16-bit numbers in most files, and some writers overflow them: an angle then jumps by 65536 steps.
 Pings in which two neighbouring beams lie more than 20 degrees apart, and ten times as far as is usual in the ping, are
