@@ -175,6 +175,7 @@ def _inside(pattern: str) -> str:
 
 Pattern = Annotated[str, AfterValidator(_inside)]
 Files = Annotated[list[Pattern], Field(min_length=1)]
+Heights = Literal["ellipsoidal"] | None
 Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
 
 
@@ -285,9 +286,10 @@ class MountSigma(Model):
 class Laser(Model):
     instrument: InstrumentUsed | None = None
     files: Files
-    format: Literal["las", "table"]
+    format: Literal["las", "e57", "table"]
     gps_week: Week = None
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
+    heights: Heights = None  # above what, where frame is a CRS that does not say
     mount: Mount
     mount_sigma: MountSigma = MountSigma()  # of the fine calibration
     mount_origin: MountOrigin | None = None
@@ -298,11 +300,17 @@ class Laser(Model):
     latency_s: Latency = 0.0
     latency_sigma_s: SigmaS = 0.0002
 
+    @model_validator(mode="after")
+    def _heights_of_a_crs(self) -> "Laser":
+        if self.heights is not None and self.frame == "laser":
+            raise ValueError("heights is for points in a CRS, but frame is laser: leave it out, or name the CRS")
+        return self
+
 
 class Mbes(Model):
     instrument: InstrumentUsed | None = None
     files: Files
-    format: Literal["r2sonic", "table"]
+    format: Literal["r2sonic", "gsf", "kmall", "table"]
     mount: Mount
     mount_origin: MountOrigin | None = None
     mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
@@ -336,6 +344,8 @@ class Recording(Model):
     gps_week: Week = None
     latency_s: float
     frame: str = "laser"
+    heights: Heights = None
+    sound_speed_m_s: float | None = None  # of GSF alone, which may have none
 
 
 class Recordings(Model):
@@ -374,6 +384,8 @@ class SessionConfig(Model):
                 gps_week=getattr(sensor, "gps_week", None),
                 latency_s=sensor.latency_s,
                 frame=getattr(sensor, "frame", "laser"),
+                heights=getattr(sensor, "heights", None),
+                sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
             )
 
         return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))

@@ -12,7 +12,8 @@ from typing import Literal
 
 from pipeline.config import Ins, Laser, Mbes
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.readers import crs, detect
+from pipeline.readers import detect
+from pipeline.readers.crs import Frame, placing_of
 from pipeline.streams import Part
 from pipeline.times import NS, WEEK_NS
 
@@ -80,19 +81,19 @@ def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, .
     RawDataError
         A file cannot be read, or is not what session.yaml says it is.
     ConfigError
-        Something is missing or wrong in session.yaml: ``gps_week``, ``laser.frame``.
+        Something is missing or wrong in session.yaml: ``gps_week``, ``laser.frame``, ``laser.heights``.
     """
     if isinstance(settings, Laser):
-        crs.to_ecef(settings.frame)
+        placing_of(_frame(settings))
     files = _named(folder, _found(folder, settings.files, f"{sensor}.files"))
     for path, name in files:
         _check_kind(path, name, sensor, settings)
     if settings.format == "table":
         return _tables(files, sensor, settings)
     if isinstance(settings, Laser):
-        return _las(files, settings)
+        return _e57(files, settings) if settings.format == "e57" else _las(files, settings)
     if isinstance(settings, Mbes):
-        return _r2sonic(files, settings)
+        return _soundings(files, settings)
     if settings.format == "sbet":
         return _sbet(files, _named(folder, _accuracy_files(settings, folder)), settings)
     return _inertial_explorer(files, settings) if settings.format == "inertial_explorer" else _novatel(files, settings)
@@ -169,8 +170,18 @@ def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
     parts: list[Part] = []
     for (path, name), header in zip(files, headers, strict=True):
         week = None if header.adjusted_time else next(weeks)
-        parts += las.parts(path, name, header, week, settings.frame, settings.latency_s)
+        parts += las.parts(path, name, header, week, _frame(settings), settings.latency_s)
     return tuple(parts)
+
+
+def _e57(files: Files, settings: Laser) -> tuple[Part, ...]:
+    from pipeline.readers import e57
+
+    return tuple(part for file in files for part in e57.parts(*file, _frame(settings), settings.latency_s))
+
+
+def _frame(settings: Laser) -> Frame:
+    return Frame(settings.frame, settings.heights)
 
 
 def _weeks(first_seconds: list[float], gps_week: int | None, sensor: str, name: str) -> list[int]:
@@ -185,7 +196,15 @@ def _weeks(first_seconds: list[float], gps_week: int | None, sensor: str, name: 
     return [gps_week + (round(step) if abs(step) <= 1 else 0) for step in steps]
 
 
-def _r2sonic(files: Files, settings: Mbes) -> tuple[Part, ...]:
+def _soundings(files: Files, settings: Mbes) -> tuple[Part, ...]:
+    if settings.format == "gsf":
+        from pipeline.readers.gsf import GsfPart
+
+        return tuple(GsfPart(path, name, settings.sound_speed_m_s, settings.latency_s) for path, name in files)
+    if settings.format == "kmall":
+        from pipeline.readers.kmall import KmallPart
+
+        return tuple(KmallPart(path, name, settings.latency_s) for path, name in files)
     from pipeline.readers.r2sonic import R2sonicPart
 
     return tuple(
@@ -196,5 +215,5 @@ def _r2sonic(files: Files, settings: Mbes) -> tuple[Part, ...]:
 def _tables(files: Files, sensor: Sensor, settings: Settings) -> tuple[Part, ...]:
     from pipeline.readers.table import TablePart
 
-    frame = settings.frame if isinstance(settings, Laser) else crs.LASER
+    frame = _frame(settings) if isinstance(settings, Laser) else Frame()
     return tuple(TablePart(path, name, sensor, frame, settings.latency_s) for path, name in files)

@@ -25,11 +25,13 @@ class Kind:
 
 
 _EXPORT = "export it to LAS or LAZ with GPS time stamps"
-_BATHYMETRY = "log the R2Sonic's bathymetry packets (BTH0), or convert the soundings to a table"
 
 LAS = Kind("LAS or LAZ", "las", ("laser",))
 NOVATEL = Kind("a NovAtel log", "novatel", ("ins",))
 SBET = Kind("SBET", "sbet", ("ins",))
+E57 = Kind("E57", "e57", ("laser",))
+GSF = Kind("GSF", "gsf", ("mbes",))
+KMALL = Kind("Kongsberg .kmall", "kmall", ("mbes",))
 INERTIAL_EXPLORER = Kind("an Inertial Explorer export", "inertial_explorer", ("ins",))
 XTF = Kind("XTF", "r2sonic", ("mbes",))
 PACKETS = Kind("R2Sonic packets", "r2sonic", ("mbes",))
@@ -53,8 +55,8 @@ MAGICS: tuple[tuple[int, bytes, Kind], ...] = (
     (0, b"LASF", LAS),
     (0, b"PAR1", PARQUET),
     (8, b"RieglLMS", Kind("a RIEGL .rxp file", advice=f"{_EXPORT} (RiSCAN PRO, RiPROCESS, or RiVLib)")),
-    (0, b"ASTM-E57", Kind("an E57 file", advice=_EXPORT)),
-    (8, b"GSF-v", Kind("a GSF file", advice=_BATHYMETRY)),
+    (0, b"ASTM-E57", E57),
+    (8, b"GSF-v", GSF),
     (0, b"PK\x03\x04", Kind("a ZIP archive", advice="unpack it")),
     (0, b"\x1f\x8b", Kind("a gzip archive", advice="unpack it")),
     (0, b"ply\n", Kind("a PLY file", advice=_EXPORT)),
@@ -65,7 +67,6 @@ MAGICS: tuple[tuple[int, bytes, Kind], ...] = (
     (0, b"\x0a\x0d\x0d\x0a", Kind("a network capture", advice="extract the packets of the sonar's bathymetry port")),
 )
 RDBX = Kind("a RIEGL .rdbx file", advice=f"{_EXPORT} (RiSCAN PRO or RiPROCESS)")
-KMALL = Kind("a Kongsberg .kmall file", advice=_BATHYMETRY)
 NOVATEL_SYNCS = (b"\xaa\x44\x12\x1c", b"\xaa\x44\x13")
 _NOVATEL_TEXT = re.compile(rb"(?:^|[\r\n\]])[#%][A-Z][A-Z0-9_]+A,[^\r\n;]*;")
 

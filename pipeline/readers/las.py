@@ -22,15 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.readers.crs import to_ecef
+from pipeline.readers.crs import DEGREE_M, Frame, keep_placed, placing_of
+from pipeline.readers.declared import refuse_another
 from pipeline.readers.files import opened, read_at, size_of
-from pipeline.readers.laz import Points, points_at_most, unpack
+from pipeline.readers.laz import points_at_most, unpack
 from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, through_float32
+from pipeline.readers.worker import Numbers
 from pipeline.streams import BATCH_ROWS, Chunk
 from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS, gps_ns_from_week_seconds
 
 STRETCH = 4_000_000
 MAX_OFFSET = 1 << 26
+COARSEST_M = 0.01  # scale of coordinates; 1e-7 degrees are 11 mm
 TIMED_FORMATS = frozenset({1, 3, 4, 5, 6, 7, 8, 9, 10})
 LENGTHS = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # least record length by point format
 WEEK_S = WEEK_NS / NS
@@ -47,6 +50,7 @@ class Header:
     claimed: int
     present: int
     first_s: float  # GPS time of the first point
+    scales: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,8 @@ class LasPart:
     start: int
     stop: int
     missing: int
-    frame: str
+    frame: Frame
+    crs: str  # what the file itself says of its frame: WKT or nothing
     latency_s: float
     gps_week: int | None  # None: adjusted standard time
     first_s: float
@@ -76,7 +81,7 @@ class LasPart:
         if dropped["truncated"]:
             yield no_rows(LASER_COLUMNS, dropped)
 
-    def _points(self, file: BinaryIO) -> Iterator[Points]:
+    def _points(self, file: BinaryIO) -> Iterator[Numbers]:
         if self.stop <= self.start:
             return iter(())
         if self.compressed:
@@ -84,19 +89,17 @@ class LasPart:
         return _las_points(file, self.name, self.start, self.stop)
 
     @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-    def _chunk(self, points: Points, dropped: Counter[str], first: bool) -> Chunk:
+    def _chunk(self, points: Numbers, dropped: Counter[str], first: bool) -> Chunk:
         seconds, x_m, y_m, z_m = points
         if first:
             _refuse_useless_times(seconds, self.name, adjusted=self.gps_week is None)
         sieve = Sieve({"seconds": seconds, "x_m": x_m, "y_m": y_m, "z_m": z_m}, dropped)
         sieve.keep_finite()
         sieve.keep(sieve["seconds"] != 0, "no time")
-        transform = to_ecef(self.frame)
-        if transform is not None:
-            moved = transform(sieve["x_m"], sieve["y_m"], sieve["z_m"])
-            sieve.columns |= dict(zip(("x_m", "y_m", "z_m"), moved, strict=True))
-            sieve.keep_finite()
         sieve.columns["t_ns"] = self._gps_ns(sieve) - latency_ns(self.latency_s)
+        if first:
+            refuse_another(self.frame, self.crs, (sieve["x_m"], sieve["y_m"], sieve["z_m"]), self.name)
+        keep_placed(sieve, self.frame, self.name)
         return chunk(sieve.columns, LASER_COLUMNS, dropped)
 
     def _gps_ns(self, sieve: Sieve) -> NDArray[np.int64]:
@@ -142,25 +145,53 @@ def read_header(path: Path, name: str) -> Header:
         time_at = first + (22 if form >= 6 else 20)
         (first_s,) = struct.unpack("<d", read_at(file, time_at, 8).ljust(8, b"\0"))
         here = min(claimed, present)
-        return Header(bool(encoding & 1), compressed, claimed, here, first_s if here else 0.0)
+        return Header(bool(encoding & 1), compressed, claimed, here, first_s if here else 0.0, scales)
 
 
 def parts(
-    path: Path, name: str, header: Header, gps_week: int | None, frame: str, latency_s: float
+    path: Path, name: str, header: Header, gps_week: int | None, frame: Frame, latency_s: float
 ) -> tuple[LasPart, ...]:
     """A file's stretches. ``gps_week`` is None for adjusted standard time."""
+    _refuse_coarse(header.scales, frame, name)
+    crs = _crs_of(path, name) if frame != Frame() else ""
     starts = range(0, header.present, STRETCH) or range(1)
     made = []
     for k, start in enumerate(starts):
         stop = min(start + STRETCH, header.present)
         missing = header.claimed - header.present if k == len(starts) - 1 else 0
         label = name if len(starts) == 1 else f"{name}#{k}"
-        common = (frame, latency_s, gps_week, header.first_s)
+        common = (frame, crs, latency_s, gps_week, header.first_s)
         made.append(LasPart(path, label, header.compressed, start, stop, missing, *common))
     return tuple(made)
 
 
-def _las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[Points]:
+def _refuse_coarse(scales: tuple[float, ...], frame: Frame, name: str) -> None:
+    """Coordinates are whole numbers of a scale, which must not blur what is measured to millimetres."""
+    placing = placing_of(frame)
+    unit_m = 1.0 if placing is None else placing.unit_m
+    units_m = (unit_m, unit_m, 1.0 if unit_m == DEGREE_M else unit_m)
+    for axis, scale, axis_unit_m in zip("xyz", scales, units_m, strict=True):
+        if scale * axis_unit_m > COARSEST_M * 1.2:
+            raise RawDataError(
+                f"{name}: its {axis} are whole numbers of {scale:g}, steps of {scale * axis_unit_m:.3g} m; export it "
+                f"again with a scale of {0.1 * COARSEST_M / axis_unit_m:.1g} or finer"
+            )
+
+
+def _crs_of(path: Path, name: str) -> str:
+    """The CRS in the file's variable-length records; nothing where there is none that can be understood."""
+    import laspy
+    from pyproj.exceptions import ProjError
+
+    try:
+        with opened(path, name) as file:
+            crs = laspy.LasHeader.read_from(file, read_evlrs=False).parse_crs()
+    except (laspy.LaspyException, ProjError, ValueError, LookupError, OverflowError, struct.error, EOFError):
+        return ""
+    return "" if crs is None else str(crs.to_wkt())
+
+
+def _las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[Numbers]:
     """GPS time, x, y, z of points ``start`` to ``stop``, batch by batch."""
     import laspy
 

@@ -6,25 +6,19 @@ is (u32 version, u32 chunks, ...), then the chunks, each beginning with its firs
 """
 
 import struct
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, BinaryIO
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import BinaryIO
 
 from pipeline.errors import RawDataError
 from pipeline.readers.files import read_at
+from pipeline.readers.worker import ADVICE, Numbers, batches
 
 WORKER = Path(__file__).with_name("laz_worker.py")
-ADVICE = "copy or export it again"
 VLR_HEAD = 54
 VARIABLE = 0xFFFFFFFF
 MAX_POINTS_PER_BYTE = 1024  # what LASzip makes of points that are all the same
 MAX_CHUNK_POINTS = 10_000_000  # LASzip's own is 50,000
-Points = tuple[NDArray[np.float64], ...]
 
 
 def points_at_most(file: BinaryIO, name: str, records: int, header_size: int, offset: int, size: int) -> int:
@@ -62,38 +56,12 @@ def _chunk_points(file: BinaryIO, records: int, header_size: int) -> int | None:
     return None
 
 
-def unpack(path: Path, name: str, start: int, stop: int, batch: int) -> Iterator[Points]:
+def unpack(path: Path, name: str, start: int, stop: int, batch: int) -> Iterator[Numbers]:
     """GPS time, x, y, z of points ``start`` to ``stop``, batch by batch; fewer where the file ends before.
 
     Raises
     ------
     RawDataError
-        The file is damaged: the worker says so, or dies of it.
+        The file is damaged.
     """
-    command = [sys.executable, "-P", str(WORKER), str(path), str(start), str(stop), str(batch)]
-    with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-    ) as worker:
-        try:
-            assert worker.stdout is not None
-            while count := _count(worker.stdout, name, batch):
-                numbers = np.frombuffer(_exactly(worker.stdout, 4 * 8 * count, name), np.float64)
-                yield tuple(numbers.reshape(4, count))
-        finally:
-            worker.kill()
-
-
-def _count(stream: IO[bytes], name: str, batch: int) -> int:
-    (count,) = struct.unpack("=q", _exactly(stream, 8, name))
-    if 0 <= count <= batch:
-        return int(count)
-    (length,) = struct.unpack("=q", _exactly(stream, 8, name))
-    told = _exactly(stream, min(length, 4096), name).decode("utf-8", "replace")
-    raise RawDataError(f"{name}: is damaged ({told}); {ADVICE}")
-
-
-def _exactly(stream: IO[bytes], count: int, name: str) -> bytes:
-    data = stream.read(count)
-    if len(data) < count:
-        raise RawDataError(f"{name}: is damaged: unpacking it ended the unpacking program; {ADVICE}")
-    return data
+    return batches(WORKER, [str(path), str(start), str(stop), str(batch)], name, 4, batch)

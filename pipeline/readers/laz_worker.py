@@ -3,8 +3,7 @@
 lazrs 0.8 can die of a damaged file (segmentation fault, failed allocation, panic) instead of raising. Here only this
 process dies, and :mod:`pipeline.readers.laz` says which file it was. It imports nothing of the project.
 
-Standard output, native byte order: per batch an int64 count, then that many float64 GPS times, x, y and z; at the end a
-count of 0. An error: -1, an int64 length, and so many bytes of UTF-8.
+It writes what :mod:`pipeline.readers.worker` says.
 """
 
 import sys

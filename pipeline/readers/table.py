@@ -24,7 +24,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipeline.readers.crs import to_ecef
+from pipeline.readers.crs import Frame, keep_placed
 from pipeline.readers.files import opened
 from pipeline.readers.sieve import (
     INS_COLUMNS,
@@ -55,7 +55,7 @@ class TablePart:
     path: Path
     name: str
     sensor: Sensor
-    frame: str
+    frame: Frame
     latency_s: float
 
     def chunks(self) -> Iterator[Chunk]:
@@ -82,7 +82,8 @@ class TablePart:
             _to_poses(sieve)
             order.keep(sieve)
         elif self.sensor == "laser":
-            _to_points(sieve, self.frame)
+            sieve.keep_finite()
+            keep_placed(sieve, self.frame, self.name)
         else:
             _to_soundings(sieve)
         return chunk(sieve.columns, CANONICAL[self.sensor], dropped)
@@ -119,15 +120,6 @@ def _to_poses(sieve: Sieve) -> None:
         sieve.columns[f"{name}_rad"] = np.radians(sieve[f"{name}_deg"])
     sieve.columns["azimuth_rad"] = sieve["heading_rad"]
     keep_possible_poses(sieve)
-
-
-def _to_points(sieve: Sieve, frame: str) -> None:
-    sieve.keep_finite()
-    transform = to_ecef(frame)
-    if transform is not None:
-        moved = transform(sieve["x_m"], sieve["y_m"], sieve["z_m"])
-        sieve.columns |= dict(zip(("x_m", "y_m", "z_m"), moved, strict=True))
-        sieve.keep_finite()
 
 
 def _to_soundings(sieve: Sieve) -> None:

@@ -135,7 +135,6 @@ def test_content_decides(sensor: str, kind: str, name: str, tmp_path: Path) -> N
         (bytes(9999), "no known|no kind"),
         (b"Dear diary,\ntoday nothing.\n" * 99, "text"),
         (b"\x02\x00\x00\x00\x00\x00\x00\x00RieglLMS-VZ1000" + bytes(999), "rxp.*export.*LAS"),
-        (b"ASTM-E57" + bytes(999), "E57.*export.*LAS"),
         (b"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\n", "PCD.*export"),
         (b"\0\0\0\x14\0\0\0\1GSF-v03.08\0\0" + bytes(99), "GSF"),
         (b"\xa4\0\0\0#IIP\0" + bytes(999), "[Kk]ongsberg|KMALL"),

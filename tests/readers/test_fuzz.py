@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import PoolcalError
 from pipeline.readers.detect import HEAD, kind_of_bytes
-from tests.readers import build, ie_files
+from tests.readers import build, e57_files, ie_files, sonar_files
 
 WEEK_NS = 604_800 * 10**9
 OPTIONS = {"deadline": None, "suppress_health_check": list(HealthCheck), "derandomize": True, "database": None}
@@ -37,6 +37,14 @@ def _parquet() -> bytes:
     return out.getvalue()
 
 
+def _e57() -> bytes:
+    columns = {f"cartesian{axis}": [0.1 * k for k in range(40)] for axis in "XYZ"}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.e57"
+        e57_files.write(path, e57_files.Scan(columns | {"timeStamp": [0.01 * k for k in range(40)]}, 1.4e9))
+        return path.read_bytes()
+
+
 def _csv() -> bytes:
     return b"gps_ns,x_m,y_m,z_m\n" + b"".join(b"%d,1.5,2.5,-3.5\n" % (TIME + k) for k in range(40))
 
@@ -55,8 +63,11 @@ WHOLE: dict[str, tuple[str, str, bytes]] = {
     "csv": ("laser", "table", _csv()),
     "parquet": ("laser", "table", _parquet()),
     "laz": ("laser", "las", _laz()),
+    "e57": ("laser", "e57", _e57()),
+    "gsf": ("mbes", "gsf", sonar_files.gsf()),
+    "kmall": ("mbes", "kmall", sonar_files.kmall()),
 }
-EXAMPLES = {"laz": 15}  # each in a process of its own
+EXAMPLES = {"laz": 15, "e57": 10}  # each in a process of its own
 
 
 def check(sensor: str, kind: str, content: bytes) -> None:
@@ -86,6 +97,7 @@ def mutated(whole: bytes) -> st.SearchStrategy[bytes]:
     """A file with some bytes overwritten, some cut out, some put in."""
     place = st.integers(0, len(whole))
     marks = [bytes(8), b"\xff" * 8, b"BTH0", b"\xaaD\x12\x1c", b"\xaaD\x13", b"\n"]
+    marks += [b"#MRZ", b"\0\0\0\2"]
     piece = st.binary(max_size=40) | st.sampled_from(marks)
     edit = st.tuples(place, st.integers(0, 60), piece)
 
@@ -128,6 +140,7 @@ def test_damaged_files(form: str, how: Callable[[bytes], st.SearchStrategy[bytes
 
 STARTS = [b"", b"LASF", b"PAR1", b"\x7b" + bytes(1023), b"BTH0", b"\xaaD\x12\x1c", b"\xaaD\x13X", b"#INSPVAA,"]
 STARTS += [b"gps_ns,x_m\n", b"Week GPSTime Latitude Longitude H-Ell Roll Pitch Heading\n"]
+STARTS += [b"ASTM-E57\1\0\0\0", b"\0\0\0\x0c\0\0\0\1GSF-v03.06\0\0", b"\xff\0\0\0#MRZ"]
 FORMATS = sorted({pair[:2] for pair in WHOLE.values()})
 
 

@@ -212,7 +212,7 @@ def test_stretches_of_a_cut_file_count_its_loss_once(file: Path, monkeypatch: py
 
 # --- frames ----------------------------------------------------------------------------------------------------------
 def _one(file: Path, x: float, y: float, z: float) -> None:
-    file.write_bytes(las([(round(x * 1e6), round(y * 1e6), round(z * 1e6), ADJUSTED + 0.001)], scale=1e-6))
+    file.write_bytes(las([(round(x * 1e7), round(y * 1e7), round(z * 1e7), ADJUSTED + 0.001)], scale=1e-7))
 
 
 def test_geographic_frame_becomes_ecef(file: Path) -> None:
@@ -246,8 +246,8 @@ def test_frame_that_cannot_be_used(frame: str, words: str, file: Path) -> None:
 
 
 def test_points_that_the_frame_cannot_hold(file: Path) -> None:
-    points = [(0, 0, 1, ADJUSTED + 0.001), (0, 900_000_000, 1, ADJUSTED + 0.002)]  # latitude 900 degrees
-    file.write_bytes(las(points, scale=1e-6))
+    points = [(0, 0, 1, ADJUSTED + 0.001), (0, 2_000_000_000, 1, ADJUSTED + 0.002)]  # latitude 200 degrees
+    file.write_bytes(las(points, scale=1e-7))
     columns, dropped = read("laser", file, "las", frame="EPSG:4979")
     assert rows(columns) == 1
     assert sum(dropped.values()) == 1

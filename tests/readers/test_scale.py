@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import PoolcalError
-from tests.readers import build, ie_files
+from tests.readers import build, ie_files, sonar_files
 from tests.readers.build import read, rows
 
 MEGABYTE = 1 << 20
@@ -25,18 +25,24 @@ def sparse(path: Path, start: bytes, size: int, end: bytes = b"") -> None:
         file.write(end)
 
 
-@pytest.mark.parametrize("shell", ["bare", "xtf"])
+@pytest.mark.parametrize("shell", ["bare", "xtf", "gsf", "kmall"])
 def test_a_gap_of_zeros_costs_no_memory(shell: str, tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
     ends = build.ping(1), build.ping(2)
     if shell == "xtf":
         ends = build.xtf(ends[0]), build.xtf(ends[1])[1024:]
+    if shell in SONARS:
+        ends = SONARS[shell], SONARS[shell]
+    kind = shell if shell in SONARS else "r2sonic"
+    path.write_bytes(ends[0])
+    read("mbes", path, kind)  # not the imports
     sparse(path, ends[0], 64 * MEGABYTE, ends[1])
     tracemalloc.start()
-    columns, dropped = read("mbes", path, "r2sonic")
+    columns, dropped = read("mbes", path, kind)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert np.unique(columns["ping"]).tolist() == [1, 2]
+    assert np.unique(columns["ping"]).tolist() == {"gsf": [0, 1], "kmall": [500]}.get(shell, [1, 2])
+    assert rows(columns) == 10
     assert sum(dropped.values()) >= 1
     assert peak < 16 * MEGABYTE
 
@@ -55,11 +61,18 @@ def test_a_line_without_end_costs_no_memory(size: int, tmp_path: Path) -> None:
     assert peak < 96 * MEGABYTE
 
 
+SONARS = {"gsf": sonar_files.gsf(1), "kmall": sonar_files.kmall(1)}
 LIES = {  # what keeps a reader searching: starts of records that are none
     "names": (b"BTH0", "bare"),
     "packets that are too long": (b"BTH0\0\0\xff\xff", "bare"),
     "packets of nothing": (b"BTH0\0\0\0\x0c\0\0\0\0", "bare"),
     "marks": (b"\xce\xfa", "xtf"),
+    "hashes before letters": (b"#MRZ", "kmall"),
+    "datagrams of the least length": (b"\x18\0\0\0#MRZ" + bytes(12) + b"\x18\0\0\0", "kmall"),
+    "datagrams of another length at their end": (b"\xff\0\0\0#MRZ", "kmall"),
+    "pings of nothing": (b"\0\0\0\4\0\0\0\2\0\0\0\0", "gsf"),
+    "kinds of records": (b"\0\0\0\2", "gsf"),
+    "long records": (b"\0\7\xff\xff\0\0\0\2", "gsf"),
     "records of the least length": (b"\xce\xfa\x41\0\0\0\0\0\0\0\x0e\0\0\0", "xtf"),
     "long headers": (b"\xaaD\x12\x1c", "binary"),
     "short headers": (b"\xaaD\x13\xff\xfc\x01", "binary"),
@@ -67,6 +80,7 @@ LIES = {  # what keeps a reader searching: starts of records that are none
     "lines": (b"#INSPVAA,\n", "ascii"),
 }
 START = {
+    **SONARS,
     "bare": build.ping(1), "xtf": build.xtf(build.ping(1)), "binary": build.inspvas(9.0), "ascii": build.inspvasa(9.0),
 }  # fmt: skip
 
@@ -75,6 +89,8 @@ START = {
 def test_time_grows_with_the_file_and_not_faster(what: str, tmp_path: Path) -> None:
     lie, shell = LIES[what]
     sensor, kind = ("mbes", "r2sonic") if shell in ("bare", "xtf") else ("ins", "novatel")
+    if shell in SONARS:
+        sensor, kind = "mbes", shell
     path = tmp_path / "a.bin"
 
     def seconds(size: int) -> float:

@@ -11,6 +11,7 @@ import pytest
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, GPS_EPOCH_UNIX_S, NS, WEEK_NS
 from tests.real.conftest import Read
+from tests.real.test_more_formats import BUNNY, GSF, KMALL, MOVED
 
 XTF = "mbes/r2sonic2026_qinsy.xtf"
 PPP, PPP_ASCII = "ins/propak6-ins-ppp_payload.gps", "ins/propak6-ins-ppp_INSPVAXA.asc"
@@ -275,11 +276,7 @@ def test_laz(read: Read) -> None:
 # --- refused by what they hold ---------------------------------------------------------------------------------------
 REFUSED = {
     "laser/riegl_130501_232206_cut.rxp": ("RIEGL .rxp", "export it to LAS"),
-    "laser/bunnyInt32.e57": ("E57", "export it to LAS"),
-    "laser/translationWithoutRotation.e57": ("E57", "export it to LAS"),
     "laser/autzen-utm.pcd": ("PCD", "export it to LAS"),
-    "mbes/GSF3_08_test_file.gsf": ("GSF", "R2Sonic"),
-    "mbes/kongsberg_OS03_4033476991022010987.kmall": ("kmall", "R2Sonic"),
     "ins/sbet_ATLANS-20181023-accuracy.out": ("accurac", "give the SBET"),
     "georeferencing/PortDeQuebec_Sphere1_passage_1.txt": ("text", "README.md"),
     "georeferencing/q_25_passage_1_sphere1.bin": ("of no kind that is read", "README.md"),
@@ -290,8 +287,8 @@ REFUSED = {
     "georeferencing/q_25_passage_2_target1.bin": ("of no kind that is read", "README.md"),
 }
 FORMATS = {
-    "laser": ("las", "table"),
-    "mbes": ("r2sonic", "table"),
+    "laser": ("las", "e57", "table"),
+    "mbes": ("r2sonic", "gsf", "kmall", "table"),
     "ins": ("novatel", "sbet", "inertial_explorer", "table"),
 }
 
@@ -314,6 +311,10 @@ def test_refused_with_advice(name: str, read: Read) -> None:
         (PPP_ASCII, "ins", "table", ("NovAtel", "format")),
         (ATLANS, "ins", "novatel", ("SBET", "format")),
         ("laser/test1_4.las", "mbes", "r2sonic", ("LAS", "format")),
+        (GSF, "mbes", "r2sonic", ("GSF", "write mbes.format: gsf")),
+        (KMALL, "mbes", "table", ("kmall", "write mbes.format: kmall")),
+        (BUNNY, "laser", "las", ("E57", "write laser.format: e57")),
+        (BUNNY, "mbes", "gsf", ("E57", "list it under laser.files")),
     ],
 )
 def test_another_format_than_told(name: str, sensor: Any, kind: str, words: tuple[str, ...], read: Read) -> None:
@@ -324,7 +325,7 @@ def test_another_format_than_told(name: str, sensor: Any, kind: str, words: tupl
 
 def test_every_file_is_tried(data: Path) -> None:
     """Whatever is added to the folder is to be read or refused here."""
-    tried = {XTF, PPP, PPP_ASCII, ATLANS, *REFUSED} | {
+    tried = {XTF, PPP, PPP_ASCII, ATLANS, GSF, KMALL, BUNNY, MOVED, *REFUSED} | {
         "ins/oem7_ins2.gps", "ins/propak6-basic-fix_payload.gps", "ins/pdal_2-points.sbet", "ins/pdal_badfile.sbet",
         "ins/sbet_20181023.out", "laser/1.2-with-color.las", "laser/test1_4.las", "laser/laspy_fullwave.laz",
     }  # fmt: skip

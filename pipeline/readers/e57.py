@@ -1,0 +1,187 @@
+"""E57 (ASTM E2807), by pye57's libE57Format in a process of its own (:mod:`pipeline.readers.e57_worker`).
+
+pye57's own class reads a scan whole and knows no times, so the worker uses the library's reader beneath it, which fills
+buffers of a batch and looks at every page's checksum. That reader cannot seek: a scan is one part.
+
+A point's ``timeStamp`` is seconds since the scan's ``acquisitionStart``, which is seconds since the GPS epoch without
+leap seconds, if its clock was set by GPS (``isAtomicClockReferenced``). Both are optional in the format and needed
+here. Coordinates are metres, Cartesian or spherical (range, azimuth from x to y, elevation from the xy plane); the
+scan's pose brings them into the frame of the file, which ``laser.frame`` names. Points and times that are marked as
+invalid are left out.
+
+Header (little-endian): 8 u32 x 2 version, 16 u64 size of the file, 24 u64 where the XML part is, 32 u64 its length, 40
+u64 size of a page. Where integers of a constant take no bits, a damaged count of points would be endless: it is held
+against the file's size.
+"""
+
+import json
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import RawDataError
+from pipeline.maths.rotations import rotation_from_quaternion
+from pipeline.readers.crs import AXES, Array, Frame, keep_placed
+from pipeline.readers.declared import refuse_another
+from pipeline.readers.files import opened, size_of
+from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns, through_float32
+from pipeline.readers.worker import ADVICE, Numbers, batches, text
+from pipeline.streams import BATCH_ROWS, Chunk
+from pipeline.times import NS
+
+WORKER = Path(__file__).with_name("e57_worker.py")
+HEADER = struct.Struct("<8s2I4Q")
+MAX_XML = 1 << 26
+MAX_TEXT = 1 << 24
+MAX_SECONDS = 1e8  # of a time stamp: three years
+LATEST_S = 4e9  # GPS seconds: year 2106
+COARSEST_M = 0.001  # of coordinates in single precision
+RETIME = "export it again with a time stamp for each point, or as LAS or LAZ with GPS time"
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What a file says of one scan; rotation w, x, y, z."""
+
+    points: int
+    timed: bool
+    axes: str  # cartesian, spherical; "" where neither is there
+    single: bool
+    start_s: float
+    atomic: bool
+    rotation: list[float]
+    translation: list[float]
+
+
+@dataclass(frozen=True)
+class E57Part:
+    """One scan of a file; ``crs``: what the file itself says of its frame, WKT or nothing."""
+
+    path: Path
+    name: str
+    number: int
+    scan: Scan
+    crs: str
+    frame: Frame
+    latency_s: float
+
+    def chunks(self) -> Iterator[Chunk]:
+        dropped: Counter[str] = Counter()
+        done = 0
+        for numbers in points(self.path, self.name, self.number):
+            if not done:
+                refuse_another(self.frame, self.crs, placed(numbers, self.scan), self.name)
+            done += len(numbers[0])
+            yield self._chunk(numbers, dropped)
+        dropped["truncated"] += self.scan.points - done
+        if dropped["truncated"]:
+            yield no_rows(LASER_COLUMNS, dropped)
+
+    @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+    def _chunk(self, numbers: Numbers, dropped: Counter[str]) -> Chunk:
+        self._refuse_float32(numbers)
+        seconds, *_, invalid, untimed = numbers
+        columns = dict(zip(AXES, placed(numbers, self.scan), strict=True))
+        sieve = Sieve(columns | {"seconds": seconds, "invalid": invalid, "untimed": untimed}, dropped)
+        sieve.keep(sieve["invalid"] == 0, "point marked as invalid")
+        sieve.keep(sieve["untimed"] == 0, "no time")
+        sieve.keep_finite()
+        sieve.keep(np.abs(sieve["seconds"]) < MAX_SECONDS, "impossible time")
+        sieve.columns["t_ns"] = self._gps_ns(sieve["seconds"])
+        sieve.keep(possible_ns(sieve["t_ns"]), "impossible time")
+        sieve.columns["t_ns"] = sieve["t_ns"] - latency_ns(self.latency_s)
+        keep_placed(sieve, self.frame, self.name)
+        return chunk(sieve.columns, LASER_COLUMNS, dropped)
+
+    def _gps_ns(self, seconds: NDArray[np.float64]) -> NDArray[np.int64]:
+        whole = int(np.floor(self.scan.start_s))
+        fraction_s = self.scan.start_s - whole
+        return whole * NS + np.rint((seconds + fraction_s) * NS).astype(np.int64)
+
+    def _refuse_float32(self, numbers: Numbers) -> None:
+        largest = max(float(np.max(np.abs(values), initial=0.0)) for values in numbers[1:4])
+        step = float(np.spacing(np.float32(largest))) if self.scan.single and largest < 1e30 else 0.0
+        if through_float32(numbers[0]) or step > COARSEST_M:
+            raise RawDataError(
+                f"{self.name}: its times or coordinates went through float32; export it again in double precision"
+            )
+
+
+def parts(path: Path, name: str, frame: Frame, latency_s: float) -> tuple[E57Part, ...]:
+    """A file's scans.
+
+    Raises
+    ------
+    RawDataError
+        The file is damaged or cut off, has no points, or has points whose GPS time is not known.
+    """
+    scans, crs = scans_of(path, name)
+    for number, scan in enumerate(scans):
+        where = name if len(scans) == 1 else f"{name}, scan {number}"
+        if not scan.axes:
+            raise RawDataError(f"{where}: has no coordinates of points; {ADVICE}")
+        if not scan.timed:
+            raise RawDataError(f"{where}: has no times of points (timeStamp); {RETIME}")
+        if not scan.atomic:
+            raise RawDataError(
+                f"{where}: says that its clock was not set by GPS (acquisitionStart, isAtomicClockReferenced); {RETIME}"
+            )
+        if not 0 <= scan.start_s < LATEST_S or not _possible_pose(scan):
+            raise RawDataError(f"{where}: its pose or start of acquisition is damaged; {ADVICE}")
+    names = [name] if len(scans) == 1 else [f"{name}#{number}" for number in range(len(scans))]
+    return tuple(
+        E57Part(path, label, number, scan, crs, frame, latency_s)
+        for number, (label, scan) in enumerate(zip(names, scans, strict=True))
+    )
+
+
+def _possible_pose(scan: Scan) -> bool:
+    length = np.linalg.norm(scan.rotation)
+    return bool(np.all(np.isfinite(scan.translation)) and 0.5 < length < 2)
+
+
+def scans_of(path: Path, name: str) -> tuple[list[Scan], str]:
+    """The scans, and the CRS that the file gives for its frame."""
+    with opened(path, name) as file:
+        size = size_of(file)
+        head = file.read(HEADER.size).ljust(HEADER.size, b"\0")
+    _, _, _, claimed, xml_at, xml_length, page = HEADER.unpack(head)
+    if claimed > size:
+        raise RawDataError(f"{name}: is cut off: {size} of {claimed} bytes; {ADVICE}")
+    if page != 1024 or not 0 < xml_length <= min(MAX_XML, size) or xml_at >= size:
+        raise RawDataError(f"{name}: its E57 header is damaged; {ADVICE}")
+    try:
+        told: dict[str, Any] = json.loads(text(WORKER, [str(path)], name, MAX_TEXT))
+    except ValueError as error:
+        raise RawDataError(f"{name}: is damaged ({error}); {ADVICE}") from error
+    scans = [Scan(**scan) for scan in told["scans"]]
+    if not scans:
+        raise RawDataError(f"{name}: has no scans; {ADVICE}")
+    for scan in scans:
+        if not 0 <= scan.points <= 8 * size:
+            raise RawDataError(f"{name}: is damaged ({scan.points} points in {size} bytes); {ADVICE}")
+    return scans, told["crs"]
+
+
+def points(path: Path, name: str, number: int) -> Iterator[Numbers]:
+    """A scan's points as stored: seconds, three coordinates, marks of invalid points and of invalid times."""
+    return batches(WORKER, [str(path), str(number), str(BATCH_ROWS)], name, 6, BATCH_ROWS)
+
+
+@np.errstate(all="ignore")
+def placed(numbers: Numbers, scan: Scan) -> tuple[Array, Array, Array]:
+    """Coordinates in the frame of the file: Cartesian, through the scan's pose."""
+    x, y, z = numbers[1:4]
+    if scan.axes == "spherical":
+        distance, azimuth, elevation = x, y, z
+        level = distance * np.cos(elevation)
+        x, y, z = level * np.cos(azimuth), level * np.sin(azimuth), distance * np.sin(elevation)
+    quaternion = np.array(scan.rotation) / np.linalg.norm(scan.rotation)
+    x, y, z = rotation_from_quaternion(quaternion) @ np.array([x, y, z]) + np.array(scan.translation)[:, None]
+    return x, y, z

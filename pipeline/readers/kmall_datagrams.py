@@ -1,0 +1,66 @@
+"""Where #MRZ datagrams lie in Kongsberg's .kmall files (little-endian).
+
+A datagram: u32 length, '#' and three letters, u8 version, u8 system, u16 sonar, u32 Unix seconds (UTC), u32
+nanoseconds, its body, u32 length again. Where the two lengths differ, or no datagram begins, the next whole one is
+searched, and that is counted.
+"""
+
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from typing import BinaryIO
+
+from pipeline.readers.files import read_at, size_of
+
+HEAD = struct.Struct("<I4s2BH2I")
+LENGTH = struct.Struct("<I")
+SMALLEST, LARGEST = HEAD.size + LENGTH.size, 1 << 24
+BLOCK = 1 << 16
+MRZ = b"#MRZ"
+
+
+def datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
+    """The whole #MRZ datagrams of a file, one after another."""
+    size, position = size_of(file), 0
+    while position < size:
+        length = _length_at(file, position, size)
+        if length is None:
+            dropped["truncated datagram" if _cut_off(file, position, size) else "stray bytes"] += 1
+            position = _next_start(file, position + 1, size)
+            continue
+        if read_at(file, position + 4, 4) == MRZ:
+            yield read_at(file, position, length)
+        position += length
+
+
+def _length_at(file: BinaryIO, position: int, size: int) -> int | None:
+    """The length of the datagram that begins here; None where none does, or its two lengths differ."""
+    head = read_at(file, position, 8)
+    length = int.from_bytes(head[:4], "little")
+    if not _is_head(head) or position + length > size:
+        return None
+    return length if read_at(file, position + length - 4, 4) == head[:4] else None
+
+
+def _is_head(head: bytes) -> bool:
+    letters = head[5:8]
+    sound = len(head) == 8 and head[4:5] == b"#" and letters.isalnum() and letters.isupper()
+    return sound and SMALLEST <= int.from_bytes(head[:4], "little") <= LARGEST
+
+
+def _cut_off(file: BinaryIO, position: int, size: int) -> bool:
+    head = read_at(file, position, 8)
+    return _is_head(head) and position + int.from_bytes(head[:4], "little") > size
+
+
+def _next_start(file: BinaryIO, start: int, size: int) -> int:
+    """Where the next whole datagram begins, or the file's end."""
+    while start < size:
+        block = read_at(file, start, BLOCK + 8)
+        found = block.find(b"#", 4)
+        while 0 <= found < BLOCK + 4:
+            if _length_at(file, start + found - 4, size) is not None:
+                return start + found - 4
+            found = block.find(b"#", found + 1)
+        start += BLOCK
+    return size

@@ -1,0 +1,133 @@
+"""GSF and .kmall files made byte by byte from their published layouts, independent of readers and libraries."""
+
+import struct
+from collections.abc import Sequence
+
+from tests.readers.build import UTC_2024
+
+
+# --- GSF -------------------------------------------------------------------------------------------------------------
+def record(kind: int, body: bytes, checked: bool = False) -> bytes:
+    body += bytes(-len(body) % 4)
+    total = struct.pack(">I", sum(body) & 0xFFFFFFFF) if checked else b""
+    return struct.pack(">II", len(body), kind | (checked << 31)) + total + body
+
+
+def gsf_header() -> bytes:
+    return record(1, b"GSF-v03.06\0\0")
+
+
+def profile(*points: tuple[float, float]) -> bytes:
+    """A sound velocity profile: depth [m], speed [m/s]."""
+    body = struct.pack(">4I2iI", UTC_2024, 0, UTC_2024, 0, 0, 0, len(points))
+    return record(3, body + b"".join(struct.pack(">2I", round(d * 100), round(c * 100)) for d, c in points))
+
+
+def subrecord(number: int, body: bytes) -> bytes:
+    return struct.pack(">I", number << 24 | len(body)) + body
+
+
+def scale_factors(**factors: tuple[int, int]) -> bytes:
+    """Multiplier and offset of times and angles."""
+    numbers = {"time": 4, "angle": 5}
+    table = [struct.pack(">BBHIi", numbers[name], 0, 0, *pair) for name, pair in factors.items()]
+    return subrecord(100, struct.pack(">I", len(table)) + b"".join(table))
+
+
+def seabat(speed_m_s: float) -> bytes:
+    """A SeaBat's part of a ping: number, surface velocity in 0.1 m/s, mode, range, power, gain."""
+    return subrecord(110, struct.pack(">HHBBBB", 7, round(speed_m_s * 10), 0, 50, 3, 4))
+
+
+SCALES = scale_factors(time=(1_000_000, 0), angle=(100, 0))
+
+
+def gsf_ping(
+    k: int = 0,
+    times: Sequence[int] | None = (9000, 8000, 7000, 8000, 9000),
+    angles: Sequence[int] | None = (6000, 3000, 0, -3000, -6000),
+    extra: bytes = b"",
+    flags: Sequence[int] = (),
+    ping_flags: int = 0,
+    seconds: int = UTC_2024,
+    beams: int = 5,
+    checked: bool = False,
+    unix_ns: int | None = None,
+    wide: bool = False,
+) -> bytes:
+    """By SCALES times are in microseconds and angles in hundredths of a degree, port +. ``wide``: times in 4 bytes."""
+    place = (1_201_000_000, 360_000_000)
+    when = divmod(unix_ns, 10**9) if unix_ns is not None else (seconds + k, 250_000_000)
+    body = struct.pack(">2I2i4H", *when, *place, beams, beams // 2, ping_flags, 0)
+    body += struct.pack(">hiH3h2H3ih", 0, 0, 9000, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    body += extra
+    if times is not None:
+        body += subrecord(4, struct.pack(f">{len(times)}{'I' if wide else 'H'}", *times))
+    if angles is not None:
+        body += subrecord(5, struct.pack(f">{len(angles)}h", *angles))
+    if flags:
+        body += subrecord(16, bytes(flags))
+    return record(2, body, checked)
+
+
+def gsf(count: int = 6, speed_m_s: float = 1480.0) -> bytes:
+    """Pings a second apart; the first alone has the scale factors."""
+    pings = [gsf_ping(k, extra=(SCALES if not k else b"") + seabat(speed_m_s)) for k in range(count)]
+    return gsf_header() + b"".join(pings)
+
+
+# --- Kongsberg -------------------------------------------------------------------------------------------------------
+def datagram(kind: bytes, body: bytes, seconds: int = UTC_2024, nanoseconds: int = 0, version: int = 3) -> bytes:
+    size = 20 + len(body) + 4
+    head = struct.pack("<I4sBBHII", size, kind, version, 0, 2040, seconds, nanoseconds)
+    return head + body + struct.pack("<I", size)
+
+
+def sounding(index: int, angle_deg: float, time_s: float, sector: int = 0, kind: int = 0, size: int = 120) -> bytes:
+    """One of an #MRZ datagram; what the reader has no use for holds a number that would be seen."""
+    head = struct.pack("<H8BH", index, sector, kind, 1, 0, 0, 0, 0, 0, 0)
+    quality = struct.pack("<6f2H", *[77.0] * 6, 0, 0)
+    levels = struct.pack("<8f", *[88.0] * 8)
+    geometry = struct.pack("<4f", angle_deg, 0.0, time_s, 0.0)
+    place = struct.pack("<6f4H", *[99.0] * 6, 0, 0, 0, 0)
+    return (head + quality + levels + geometry + place).ljust(size, b"\0")
+
+
+def mrz(
+    ping: int,
+    soundings: Sequence[bytes],
+    delays_s: Sequence[float] = (0.0,),
+    speed_m_s: float = 1480.0,
+    mode: int = 0,
+    swath: int = 0,
+    receiver: int = 0,
+    parts: int = 1,
+    size: int = 120,
+    extra: int = 0,
+    **head: int,
+) -> bytes:
+    """``extra``: how many of the soundings are extra detections."""
+    common = struct.pack("<2H2H8B", parts, 1, 12, ping, 1, receiver, 1, swath, 0, receiver, 1, 0)
+    info = struct.pack("<2Hf6BH11f", 152, 0, 20.0, 0, 0, 0, 0, 0, 0, 0, *[55.0] * 11)
+    info += struct.pack("<2h2BHI3f2Hf2H", 0, 0, mode, 0, 0, 0, 1.0, 1.0, 0.0, 0, 0, 0.0, len(delays_s), 48)
+    info += struct.pack("<6f4B2df", 90.0, speed_m_s, 1.0, 0.0, 0.0, 0.0, 0, 0, 0, 0, 36.0, 120.1, 12.0)
+    info = info.ljust(152, b"\0")
+    sectors = [
+        struct.pack("<4B7f2BH3f", k, 0, 0, 0, delay, *[44.0] * 6, 0, 0, 0, *[33.0] * 3)
+        for k, delay in enumerate(delays_s)
+    ]
+    receive = struct.pack("<4H4f4H", 32, len(soundings) - extra, len(soundings), size, *[22.0] * 4, 0, extra, 1, 4)
+    body = common + info + b"".join(sectors) + receive + bytes(4) + b"".join(soundings)
+    return datagram(b"#MRZ", body, **head)
+
+
+ANGLES_DEG = (60.0, 30.0, 0.0, -30.0, -60.0)  # port +
+
+
+def kmall(count: int = 6) -> bytes:
+    """Pings a second apart, with other datagrams between them."""
+    found = [datagram(b"#IIP", b"\x10\0\0\0\0\0" + b"OSCV:Empty", version=0)]
+    for k in range(count):
+        fan = [sounding(n, angle, 0.007 + 1e-4 * n) for n, angle in enumerate(ANGLES_DEG)]
+        found += [mrz(500 + k, fan, seconds=UTC_2024 + k, nanoseconds=250_000_000), datagram(b"#SKM", bytes(40))]
+    return b"".join(found)
