@@ -16,6 +16,7 @@ from pipeline.maths.rotations import log_so3
 from pipeline.maths.snooping import LEVEL, SURVEY, MarkTest, Snooped, limit, snoop
 from pipeline.mounts import PARAMETERS, Mounted, change_of
 from pipeline.screen import signed
+from pipeline.session_edit import block_of
 
 Array = NDArray[np.float64]
 FARTHEST_M = 100.0  # of a lever arm that session.yaml takes
@@ -62,16 +63,9 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
     return Answer(placed, snooped, mounts, tuple(warnings))
 
 
-def blocks_of(answer: Answer, origin: Mapping[str, str]) -> dict[str, dict[str, Any]]:
-    """By sensor, what session.yaml is to say: numbers rounded as they will be written."""
-    return {
-        name: {
-            "mount": {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()},
-            "mount_origin": dict(origin),
-            "mount_covariance": [[float(f"{one:.9e}") for one in row] for row in covariance.tolist()],
-        }
-        for name, (mounted, covariance) in answer.mounts.items()
-    }
+def blocks_of(answer: Answer, origin: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """By sensor, what session.yaml is to say."""
+    return {name: block_of(mounted, covariance, origin) for name, (mounted, covariance) in answer.mounts.items()}
 
 
 # --- in words --------------------------------------------------------------------------------------------------------

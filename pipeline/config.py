@@ -70,8 +70,7 @@ class Segment(Model):
     search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
-    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # the same of the laser's, where it is calibrated
-    search_laser_m: Annotated[float, Field(gt=0, le=0.2)] = 0.05
+    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # the laser's angles, where it is calibrated
     ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # of the wall that a pose half a period off must lose
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
         0.02  # another mount that explains so nearly as many soundings
@@ -213,11 +212,12 @@ Covariance = Annotated[  # of (ε about body x, y, z; lever arm x, y, z), R_true
 class MountOrigin(Model):
     """Where a mount comes from: what poolcal has written beside it."""
 
-    method: Literal["coarse"]
+    method: Literal["coarse", "fine"]
     file: Annotated[str, Field(max_length=300)]
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
     software: Annotated[str, Field(max_length=100)]
+    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # of the six what a fine calibration left as it was
 
 
 class Drift(Model):

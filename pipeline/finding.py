@@ -183,15 +183,14 @@ def find_laser(
     coarse: Mounted,
     settings: config.Segment,
 ) -> tuple[FoundTarget, "FoundMount"]:
-    """Where the target stands and how the laser sits, from the pose found with the coarse mount.
+    """Where the target stands and how the laser is turned, from the pose found with the coarse mount.
 
-    The two are hard to tell apart (a laser mounted 3 cm too far starboard and a target 3 cm nearer look alike): what
-    the points leave open stays where prior knowledge has it. For labels that is enough.
+    Its lever arm stays: a laser mounted 3 cm too far starboard and a target 3 cm nearer look alike.
     """
-    angle, arm = np.radians(settings.search_laser_deg), settings.search_laser_m
-    sigmas = np.r_[target.pose_sigmas, [angle] * 3, [arm] * 3]
+    angle = np.radians(settings.search_laser_deg)
+    sigmas = np.r_[target.pose_sigmas, [angle] * 3]
     body = sample.points_laser_m @ coarse.R_body_from_sensor.T
-    start = np.r_[target.pose.parameters, np.zeros(6)]
+    start = np.r_[target.pose.parameters, np.zeros(3)]
     placement = LaserMount(sample.positions_m, sample.R_pool_from_body, body, coarse.lever_arm_body_m, sigmas)
     normals, distances = _planes(model)
 
@@ -208,12 +207,13 @@ def find_laser(
         origin_pool_m=pose.parameters[1:],
         azimuth_correction_rad=float(pose.parameters[0]),
         pose=pose,
+        tilt=replace(target.tilt, parameters=np.zeros(6)),  # it was the laser's
         gate_m=_gate(refined, settings),
     )
     off = refined.parameters[4:]
     score = refined.count / max(1, len(body))
-    within = bool(np.all(np.abs(off) <= FARTHEST * np.r_[[angle] * 3, [arm] * 3]))
-    return found, FoundMount(off[:3], off[3:], refined.scale_m, found.gate_m, score, 0.0, False, within)
+    within = bool(np.all(np.abs(off) <= FARTHEST * angle))
+    return found, FoundMount(off, np.zeros(3), refined.scale_m, found.gate_m, score, 0.0, False, within)
 
 
 @dataclass(frozen=True)

@@ -112,10 +112,14 @@ def holds_run(run: Path) -> bool:
 
 
 def refuse_other(run: Path, calibrated: config.Calibrated) -> None:
-    """A run folder is the sonar's or the laser's, not both in turn."""
-    if not holds_run(run):
+    """A run folder is the sonar's or the laser's, not both in turn. (Settings of an older program need not be read.)"""
+    try:
+        session = read_yaml(run / RUN_YAML)["session"] if holds_run(run) else None
+    except (ConfigError, KeyError):
         return
-    was = read_settings(run).session.calibrated
+    if not isinstance(session, dict):
+        return
+    was = "laser" if session.get("mbes") is None else "mbes"
     if was != calibrated:
         what = {"mbes": "the sonar", "laser": "the laser"}[was]
         raise ArtefactError(f"{run}: holds a calibration of {what}; name another folder")

@@ -11,6 +11,7 @@ from pipeline.maths.rigid_design import Design
 from pipeline.maths.solution import solve
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.unknowns import SIX
+from pipeline.mounts import PARAMETERS
 
 Array = NDArray[np.float64]
 VAGUE = 10.0  # rad or m: what is known of an unknown before any point, where nothing is
@@ -40,11 +41,20 @@ def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: config.La
 
 
 def coarse_covariance(laser: config.Laser, settings: config.LaserFit) -> Array:
-    """How sure the coarse mount is, (6, 6) in rad and m: as surveyed, else as the pool's config has it."""
-    if laser.mount_covariance is not None:
-        return np.array(laser.mount_covariance)
+    """How sure the coarse mount is, (6, 6) in rad and m: as surveyed, else as the pool's config has it.
+
+    Of a mount that a fine calibration has written only what that held is as surveyed: the rest is to be found anew.
+    """
     sigma = np.repeat([np.radians(settings.coarse_sigma_deg), settings.coarse_sigma_m], 3)
-    return np.diag(sigma**2)
+    found = np.diag(sigma**2)
+    if laser.mount_covariance is None:
+        return found
+    given, origin = np.array(laser.mount_covariance), laser.mount_origin
+    if origin is None or origin.method == "coarse":
+        return given
+    kept = [place for name, place, *_ in PARAMETERS if name in origin.held]
+    found[np.ix_(kept, kept)] = given[np.ix_(kept, kept)]
+    return found
 
 
 def bounds_of(coarse: Array, settings: config.LaserFit, limits: config.Verdict) -> Array:

@@ -9,20 +9,25 @@ import itertools
 import json
 import os
 from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
 
+import pipeline
 from pipeline import config
 from pipeline.errors import ConfigError
-from pipeline.files import write_bytes, writing
-from pipeline.mounts import SETTINGS
+from pipeline.files import sha256, write_bytes, writing
+from pipeline.instruments import applied
+from pipeline.mounts import SETTINGS, Mounted
 from pipeline.parsing import compose, content_of, parse, text_of
 
 SENSORS = ("laser", "mbes")
-ORIGIN = ("method", "file", "sha256", "date", "software")
 NOWHERE = dict.fromkeys(SETTINGS, 0.0)
+Array = NDArray[np.float64]
 Content = dict[str, Any]
 Edit = tuple[int, int, str]  # the text from here to there becomes this
 
@@ -34,16 +39,52 @@ def read_session(folder: Path) -> tuple[str, Content]:
     path = folder / "session.yaml"
     text = text_of(path)
     content = content_of(text, path)
-    _check(content, path)
+    _check(content, folder)
     return text, content
 
 
-def _check(content: Content, path: Path) -> config.SessionConfig:
-    filled = dict(content)
+def _check(content: Content, folder: Path) -> config.SessionConfig:
+    path = folder / "session.yaml"
+    filled, _ = applied(content, folder)
     for name in SENSORS:
         if isinstance(filled.get(name), dict):
             filled[name] = {"mount": NOWHERE} | filled[name]
     return parse(config.SessionConfig, {"name": "session"} | filled, str(path))
+
+
+def origin_of(method: str, file: Path, **more: Any) -> Content:
+    """Where a mount comes from, as it stands beside it."""
+    name = "".join(letter if letter.isprintable() else "?" for letter in file.name)[:300]
+    today = datetime.now(UTC).date().isoformat()
+    software = f"poolcal {pipeline.__version__}"
+    return {"method": method, "file": name, "sha256": sha256(file), "date": today, "software": software} | more
+
+
+def block_of(mounted: Mounted, covariance: Array, origin: Content) -> Content:
+    """What a sensor's block is to say: numbers rounded as they will be written; ``covariance`` (6, 6)."""
+    return {
+        "mount": {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()},
+        "mount_origin": origin,
+        "mount_covariance": [[float(f"{one:.9e}") for one in row] for row in covariance.tolist()],
+    }
+
+
+def written(folder: Path, text: str, content: Content, blocks: Mapping[str, Content]) -> str:
+    """The blocks into session.yaml, unless it says so already (the day and the version alone are no change); what was
+    done, in words."""
+    path = folder / "session.yaml"
+    if all(_same(content[name], block) for name, block in blocks.items()):
+        return f"{path}: has these mounts already; not written"
+    new = edited(text, blocks, path)
+    refuse_other(new, content, blocks, path)
+    kept = replace_session(folder, text, new)
+    return f"{path}: {' and '.join(f'{name}.mount' for name in blocks)} written; what was there is in {kept.name}"
+
+
+def _same(there: Content, block: Content) -> bool:
+    one, other = (side.get("mount_origin") or {} for side in (there, block))
+    origins = one.get("sha256") == other["sha256"] and one.get("method") == other["method"]
+    return origins and all(there.get(key) == block[key] for key in ("mount", "mount_covariance"))
 
 
 def edited(text: str, blocks: Mapping[str, Content], path: Path) -> str:
@@ -71,7 +112,7 @@ def refuse_other(text: str, content: Content, blocks: Mapping[str, Content], pat
         raise ConfigError(
             f"{path}: mount cannot be edited where it stands; write laser and mbes as plain blocks, one key a line"
         )
-    _check(found, path)
+    _check(found, path.parent)
 
 
 def _edits(text: str, sensor: str, block: Content, path: Path) -> Iterable[Edit]:
@@ -126,7 +167,7 @@ def in_yaml(key: str, value: Any, between: str) -> str:
     if key == "mount":
         return "{" + ", ".join(f"{name}: {number:.6f}" for name, number in value.items()) + "}"
     if key == "mount_origin":
-        return "{" + ", ".join(f"{name}: {json.dumps(value[name], ensure_ascii=False)}" for name in ORIGIN) + "}"
+        return "{" + ", ".join(f"{name}: {json.dumps(one, ensure_ascii=False)}" for name, one in value.items()) + "}"
     return "[" + between.join("[" + ", ".join(f"{one:.9e}" for one in row) + "]" for row in value) + "]"
 
 

@@ -119,9 +119,9 @@ def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
         )
     if not mount["within"] and settings.calibrated == "laser":
         found.append(
-            f"no mount of the laser within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings its points "
-            f"onto the target{_beyond(mount, farthest)}: laser.mount is farther off than segment.search_laser_deg and "
-            f"search_laser_m allow, or {shape} are wrong"
+            f"no mount of the laser within {farthest[0]:g}° of the coarse one brings its points onto the "
+            f"target{_beyond(mount, farthest)}: laser.mount is farther off than segment.search_laser_deg allows, or "
+            f"{shape} are wrong"
         )
     elif not mount["within"]:
         found.append(

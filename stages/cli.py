@@ -128,12 +128,18 @@ def laser(
     executor: Address = None,
     recordings: Recordings = True,
     report: Report = True,
+    write: Annotated[bool, typer.Option("--write/--no-write", help="an accepted mount into session.yaml")] = True,
 ) -> int:
     """Calibrate the laser itself, from its own passes at the target.
 
     Of its three angles and lever arm what this target and these passes can give; the rest is held, and said so.
     """
-    return _run(session, config, run_folder, jobs, executor, recordings, report, "laser")
+    from stages.laser.session import write as write_mount
+
+    status = _run(session, config, run_folder, jobs, executor, recordings, report, "laser")
+    if write and status == 0:
+        say(write_mount(session, run_folder), sys.stdout)
+    return status
 
 
 @app.command()

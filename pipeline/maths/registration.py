@@ -108,8 +108,8 @@ class MountCorrection:
 @dataclass(frozen=True)
 class LaserMount:
     """Laser points with poses (n, 3), (n, 3, 3) in the pool frame, m = R_body_from_laser(coarse) x_laser (n, 3);
-    parameters (azimuth correction β, origin o of the target in pool, rotation vector δ, lever arm correction): where
-    the target stands and how the laser sits: x_target = Rz(β) (p + T (Exp(δ) m + l + Δl) - o).
+    parameters (azimuth correction β, origin o of the target in pool, rotation vector δ): where the target stands and
+    how the laser is turned: x_target = Rz(β) (p + T (Exp(δ) m + l) - o).
     """
 
     positions_m: Array
@@ -122,7 +122,7 @@ class LaserMount:
         return (self._in_pool(parameters) - parameters[1:4]) @ rotation_z(parameters[0]).T
 
     def _in_pool(self, parameters: Array) -> Array:
-        body = self.points_body_m @ exp_so3(parameters[4:7]).T + self.lever_arm_m + parameters[7:]
+        body = self.points_body_m @ exp_so3(parameters[4:]).T + self.lever_arm_m
         return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_pool_from_body, body))
 
     def rows(self, parameters: Array, directions: Array) -> Array:
@@ -130,8 +130,8 @@ class LaserMount:
         turn = directions[:, 1] * placed[:, 0] - directions[:, 0] * placed[:, 1]
         in_pool = directions @ rotation_z(parameters[0])
         g = np.einsum("nij,ni->nj", self.R_pool_from_body, in_pool)
-        turned = self.points_body_m @ exp_so3(parameters[4:7]).T
-        return np.column_stack([turn, -in_pool, np.cross(turned, g), g])
+        turned = self.points_body_m @ exp_so3(parameters[4:]).T
+        return np.column_stack([turn, -in_pool, np.cross(turned, g)])
 
 
 def _some(count: int, most: int) -> NDArray[np.int64]:

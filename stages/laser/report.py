@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+import numpy as np
 import pandas as pd
 
 from pipeline import artefacts, config
@@ -19,6 +20,7 @@ from pipeline.blocks import (
     target_block,
 )
 from pipeline.built import as_found, by_design, oddities
+from pipeline.finding import FARTHEST
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.mounts import mount_of, target_of
 from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, pattern_tests, reasons, warnings
@@ -81,7 +83,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
     drift, level = drift_of(config.ins, inputs.ins_sigmas, inputs.passes), config.adjust.test_level
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
-    farthest = (3 * config.segment.search_laser_deg, 3 * config.segment.search_laser_m)
+    farthest = (FARTHEST * config.segment.search_laser_deg, np.inf)
     given = Settings(config.verdict, level, "adjustment", farthest, doubt, config.target.shape, "laser")
     found = reasons(evidence, {"adjustment": block}, given)
     built = as_found(inputs.planes, inputs.patterns, model)
