@@ -4,30 +4,34 @@ Two files are read: the pool's config (target, thresholds) and the session's (in
 Both keep the units of the contract (degrees, metres); code that computes converts at once to radians.
 """
 
-from itertools import pairwise
-from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Literal
 
-import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from pipeline.errors import ConfigError
 from pipeline.parsing import parse, read_yaml
 from pipeline.quantities import (
-    Angle,
-    BeamWidth,
-    Depth,
-    Latency,
-    Lever,
     Model,
     NotNegative,
     Positive,
-    RangeSigma,
     SigmaDeg,
     SigmaM,
-    SigmaS,
-    SoundSpeed,
 )
+from pipeline.session_settings import INSTRUMENT as INSTRUMENT
+from pipeline.session_settings import Calibrated as Calibrated
+from pipeline.session_settings import Drift as Drift
+from pipeline.session_settings import Ins as Ins
+from pipeline.session_settings import InstrumentTitle as InstrumentTitle
+from pipeline.session_settings import InstrumentUsed as InstrumentUsed
+from pipeline.session_settings import Laser as Laser
+from pipeline.session_settings import Mbes as Mbes
+from pipeline.session_settings import Mount as Mount
+from pipeline.session_settings import MountSigma as MountSigma
+from pipeline.session_settings import Recording as Recording
+from pipeline.session_settings import Recordings as Recordings
+from pipeline.session_settings import SessionConfig as SessionConfig
+from pipeline.session_settings import White as White
 from pipeline.target_settings import Faces as Faces
 from pipeline.target_settings import Letters as Letters
 from pipeline.target_settings import Origin as Origin
@@ -137,7 +141,6 @@ class Verdict(Model):
     max_sigma_m: Positive = 0.005
 
 
-Calibrated = Literal["mbes", "laser"]
 Method = Literal["patent_sequential", "patent_alternating", "adjustment"]
 
 
@@ -160,235 +163,6 @@ class PoolConfig(Model):
     @property
     def target_place(self) -> TargetPlace:
         return TargetPlace(origin=self.target.origin, azimuth_deg=self.target.azimuth_deg)
-
-
-# --- the session -----------------------------------------------------------------------------------------------------
-def _inside(pattern: str) -> str:
-    path = PurePosixPath(pattern)
-    if not pattern or path.is_absolute() or ".." in path.parts or "\\" in pattern or "\0" in pattern:
-        raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
-    if any("**" in part and part != "**" for part in path.parts):
-        raise ValueError("must have ** only as a whole part between two /")
-    return pattern
-
-
-Pattern = Annotated[str, AfterValidator(_inside)]
-Files = Annotated[list[Pattern], Field(min_length=1)]
-Heights = Literal["ellipsoidal"] | None
-Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
-
-
-class Mount(Model):
-    """Angles and lever arm of a sensor on the body: R_body_from_sensor = Rz(yaw) Rx(pitch) Ry(roll)."""
-
-    roll_deg: Angle
-    pitch_deg: Angle
-    yaw_deg: Angle
-    x_m: Lever
-    y_m: Lever
-    z_m: Lever
-
-
-def _covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    matrix = np.array(rows)
-    sigma = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    size = np.outer(sigma, sigma)
-    if np.any(np.abs(matrix - matrix.T) > 1e-6 * size) or np.any(np.abs(matrix) > (1 + 1e-6) * size):
-        raise ValueError("must be symmetric, with no covariance above the product of its two sigmas")
-    scale = np.where(sigma > 0, sigma, 1.0)
-    if np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0] < -1e-6:
-        raise ValueError("must be positive semidefinite, as a covariance is")
-    return rows
-
-
-Entry = Annotated[float, Field(ge=-100, le=100)]
-Covariance = Annotated[  # of (ε about body x, y, z; lever arm x, y, z), R_true = Exp(ε) R: rad and m
-    tuple[Annotated[tuple[Entry, ...], Field(min_length=6, max_length=6)], ...],
-    Field(min_length=6, max_length=6),
-    AfterValidator(_covariance),
-]
-
-
-class MountOrigin(Model):
-    """Where a mount comes from: what poolcal has written beside it."""
-
-    method: Literal["coarse", "fine"]
-    file: Annotated[str, Field(max_length=300)]
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
-    software: Annotated[str, Field(max_length=100)]
-    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # of the six what a fine calibration left as it was
-
-
-class Drift(Model):
-    """First-order Gauss-Markov errors of the INS: standard deviations and correlation time."""
-
-    horizontal_m: SigmaM = 0.015
-    vertical_m: SigmaM = 0.02
-    roll_pitch_deg: SigmaDeg = 0.01
-    heading_deg: SigmaDeg = 0.03
-    time_constant_s: Annotated[float, Field(ge=1, le=1e6)] = 200.0
-
-
-class White(Model):
-    """White noise of the INS, per record."""
-
-    position_m: SigmaM = 0.002
-    attitude_deg: SigmaDeg = 0.002
-
-
-INSTRUMENT = "[a-z0-9_]{1,100}"
-InstrumentTitle = Annotated[str, Field(min_length=1, max_length=100)]
-
-
-class InstrumentUsed(Model):
-    """A preset as applied; session.yaml has its name alone (pipeline/instruments.py), run.yaml all of this."""
-
-    name: Annotated[str, Field(pattern=f"^{INSTRUMENT}$")]
-    title: InstrumentTitle
-    unverified: tuple[str, ...]  # keys of the preset that were taken from no document
-    origins: dict[str, Literal["session", "preset", "default"]]  # where the sensor's figures come from
-    rates: dict[str, int | float | tuple[float, float]]  # for poolcal plan
-
-
-class Ins(Model):
-    instrument: InstrumentUsed | None = None
-    files: Files
-    format: Literal["novatel", "sbet", "inertial_explorer", "table"]
-    accuracy: list[Pattern] = Field(default_factory=list)  # SMRMSG files beside an SBET
-    gps_week: Week = None
-    latency_s: Latency = 0.0
-    drift: Drift = Drift()
-    drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, where they tell; else those of drift
-    white: White = White()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _given_drift_goes_first(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "drift" in given and "drift_from" not in given:
-            return given | {"drift_from": "settings"}
-        return given
-
-    @model_validator(mode="after")
-    def _accuracy_of_sbet(self) -> "Ins":
-        if self.accuracy and self.format != "sbet":
-            raise ValueError(f"accuracy files belong to an SBET, but format is {self.format}: take accuracy out")
-        return self
-
-
-class MountSigma(Model):
-    """Of each of the three angles and of each component of the lever arm."""
-
-    angle_deg: SigmaDeg = 0.005
-    lever_arm_m: SigmaM = 0.0015
-
-
-class Laser(Model):
-    instrument: InstrumentUsed | None = None
-    files: Files
-    format: Literal["las", "e57", "table"]
-    gps_week: Week = None
-    frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
-    heights: Heights = None  # above what, where frame is a CRS that does not say
-    mount: Mount
-    mount_sigma: MountSigma = MountSigma()  # of the fine calibration
-    mount_origin: MountOrigin | None = None
-    mount_covariance: Covariance | None = None  # goes before mount_sigma
-    range_sigma_m: RangeSigma = 0.005
-    range_bias_sigma_m: SigmaM = 0.002  # common to all ranges
-    angle_sigma_deg: SigmaDeg = 0.003
-    latency_s: Latency = 0.0
-    latency_sigma_s: SigmaS = 0.0002
-
-    @model_validator(mode="after")
-    def _heights_of_a_crs(self) -> "Laser":
-        if self.heights is not None and self.frame == "laser":
-            raise ValueError("heights is for points in a CRS, but frame is laser: leave it out, or name the CRS")
-        return self
-
-
-class Mbes(Model):
-    instrument: InstrumentUsed | None = None
-    files: Files
-    format: Literal["r2sonic", "gsf", "kmall", "table"]
-    mount: Mount
-    mount_origin: MountOrigin | None = None
-    mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
-    sound_speed_m_s: SoundSpeed | None = None
-    svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
-    sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2
-    sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m: 0.03 °C per metre
-    projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
-    range_sigma_m: RangeSigma = 0.008
-    range_bias_sigma_m: SigmaM = 0.002  # common to all detections
-    angle_sigma_deg: SigmaDeg = 0.06
-    beam_deg: tuple[BeamWidth, BeamWidth] = (0.5, 1.0)  # width across track, along track
-    latency_s: Latency = 0.0
-    latency_sigma_s: SigmaS = 0.0005
-
-    @model_validator(mode="after")
-    def _deeper_and_deeper(self) -> "Mbes":
-        depths = [depth for depth, _ in self.svp or ()]
-        for number, (one, other) in enumerate(pairwise(depths)):
-            if other <= one:
-                raise ValueError(f"svp has depth {other} after {one}, in row {number + 2}: depths must grow")
-        return self
-
-
-class Recording(Model):
-    """Of a sensor, what its readers need: trying another mount or sigma must not read the files again."""
-
-    files: tuple[str, ...]
-    accuracy: tuple[str, ...] = ()
-    format: str
-    gps_week: Week = None
-    latency_s: float
-    frame: str = "laser"
-    heights: Heights = None
-    sound_speed_m_s: float | None = None  # of GSF alone, which may have none
-
-
-class Recordings(Model):
-    ins: Recording
-    laser: Recording
-    mbes: Recording | None
-
-
-class SessionConfig(Model):
-    """SESSION/session.yaml"""
-
-    name: Annotated[str, Field(min_length=1, max_length=300)]  # left out: the session folder's name
-    ins: Ins
-    laser: Laser
-    mbes: Mbes | None = None  # none: only the laser can be calibrated
-
-    @property
-    def calibrated(self) -> Calibrated:
-        """What is calibrated: the laser, where there is no sonar."""
-        return "laser" if self.mbes is None else "mbes"
-
-    @property
-    def sonar(self) -> Mbes:
-        """The sonar, where one is needed."""
-        if self.mbes is None:
-            raise ConfigError("session.yaml: mbes is missing: there is no sonar to be calibrated; add its block")
-        return self.mbes
-
-    @property
-    def recordings(self) -> Recordings:
-        def of(sensor: Ins | Laser | Mbes) -> Recording:
-            return Recording(
-                files=tuple(sensor.files),
-                accuracy=tuple(getattr(sensor, "accuracy", ())),
-                format=sensor.format,
-                gps_week=getattr(sensor, "gps_week", None),
-                latency_s=sensor.latency_s,
-                frame=getattr(sensor, "frame", "laser"),
-                heights=getattr(sensor, "heights", None),
-                sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
-            )
-
-        return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------

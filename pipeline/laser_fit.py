@@ -64,13 +64,13 @@ def bounds_of(coarse: Array, settings: config.LaserFit, limits: config.Verdict) 
     return np.asarray(np.minimum(wanted, settings.hold_share * np.sqrt(np.diag(coarse))))
 
 
-def held_of(normal: Array, free: Sequence[int], bounds: Array) -> list[int]:
+def held_of(normal: Array, free: Sequence[int], bounds: Array) -> dict[int, float]:
     """Which of the six to hold: those whose sigma would be above its bound (6,), the worst first, until the others'
-    are not.
+    are not; with that sigma.
 
     What is held is no longer in the others' way: two that only together cannot be told apart are one too many.
     """
-    held: list[int] = []
+    held: dict[int, float] = {}
     while len(held) < SIX:
         left = [number for number in free if number not in held]
         prior = np.zeros(len(normal))
@@ -81,5 +81,5 @@ def held_of(normal: Array, free: Sequence[int], bounds: Array) -> list[int]:
         worst = int(np.argmax(sigma / bounds[six]))
         if sigma[worst] <= bounds[six[worst]]:
             break
-        held.append(six[worst])
-    return sorted(held)
+        held[six[worst]] = float(sigma[worst])
+    return held

@@ -115,7 +115,7 @@ def _geometry_table(
     seen = Seen(distances, soundings, level, speed, swing)
     geometry = geometry_of(setting, seen, found.equations.normal, found.solution)
     rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
-    return pd.DataFrame(rows, columns=["kind", "words"])
+    return pd.DataFrame(rows, columns=["kind", "words"]).assign(sigma=np.nan)
 
 
 def _or(measured: float, otherwise: float) -> float:

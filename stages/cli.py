@@ -5,7 +5,6 @@ import signal
 import sys
 import traceback
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,11 +15,10 @@ from pipeline.errors import ConfigError, PoolcalError
 from pipeline.progress import say
 from stages import ORDER, calibrated_in, load
 from stages.comparing import comparison, save_pair
-from stages.saying import answer_of, say_failures, say_where
+from stages.saying import answer_of, say_failures
 
 if TYPE_CHECKING:
 
-    from pipeline.config import Calibrated
     from stages.drawing import Painters
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
@@ -92,31 +90,9 @@ def run(
     report: Report = True,
 ) -> int:
     """Run all stages that are out of date, and say why each is."""
-    return _run(session, config, run_folder, jobs, executor, recordings, report, "mbes")
+    from stages.calibrating import calibrate
 
-
-def _run(
-    session: Path,
-    config: Path,
-    run_folder: Path,
-    jobs: int | None,
-    executor: str | None,
-    recordings: bool,
-    report: bool,
-    calibrated: "Calibrated",
-) -> int:
-    from pipeline import runner
-    from pipeline.executor import workers
-    from pipeline.progress import Progress
-    from stages.drawing import painters
-
-    with workers(jobs, executor) as pool, painters(report, recordings, pool.jobs > 1) as drawing:
-        finished = partial(_go_on, drawing, run_folder)
-        runner.run(load(calibrated), session, config, run_folder, pool, Progress(), finished, calibrated)
-        status = answer_of(run_folder)
-        say_failures(drawing.draw(run_folder), "; the calibration is complete")
-    say_where(run_folder)
-    return status
+    return calibrate("mbes", session, config, run_folder, _go_on, jobs, executor, (report, recordings))
 
 
 @app.command()
@@ -134,9 +110,10 @@ def laser(
 
     Of its three angles and lever arm what this target and these passes can give; the rest is held, and said so.
     """
+    from stages.calibrating import calibrate
     from stages.laser.session import write as write_mount
 
-    status = _run(session, config, run_folder, jobs, executor, recordings, report, "laser")
+    status = calibrate("laser", session, config, run_folder, _go_on, jobs, executor, (report, recordings))
     if write and status == 0:
         say(write_mount(session, run_folder), sys.stdout)
     return status

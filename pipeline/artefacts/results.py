@@ -24,7 +24,11 @@ COVARIANCE = Artefact(
 )
 GEOMETRY = Artefact(
     "adjust", "geometry", "table", "what the passes cannot tell, and what would cure it",
-    (Column("kind", TEXT, "", "gap or remedy"), Column("words", TEXT, "", "in words")),
+    (
+        Column("kind", TEXT, "", "gap or remedy; of a laser that is calibrated: held"),
+        Column("words", TEXT, "", "in words; of what is held its name"),
+        Column("sigma", F64, "deg or m", "of what is held: its standard deviation, had it not been (else NaN)"),
+    ),
 )
 DRIFT = Artefact(
     "adjust", "drift", "table", "slow errors of the recorded poses, at knots: to be added to the recorded ones",

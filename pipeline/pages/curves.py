@@ -16,18 +16,20 @@ from pipeline.residuals import FEWEST
 from pipeline.times import NS
 
 WORDS = {"angle": "swath angle", "range": "distance"}
-LABELS = {"angle": "angle across track in the sonar's frame, degrees", "range": "distance from the sonar, m"}
+LABELS = {"angle": "angle across track in the {}'s frame, degrees", "range": "distance from the {}, m"}
 
 
 def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, families: Sequence[str]) -> Markup:
-    """Mean residuals of the sonar by face, angle and distance, and of both sensors over time."""
+    """Mean residuals of the sonar (or of the laser, where it is calibrated) by angle and distance, and of both sensors
+    by face and over time."""
     colours, marks = shown_as(families, FAMILY), shown_as(families, MARKS)
     figure = Figure(figsize=(7.2, 6.0))
     grid = figure.add_gridspec(3, 2, left=0.08, right=0.98, bottom=0.05, top=0.91, wspace=0.2, hspace=0.55)
     by_face, by_angle, by_range = (figure.add_subplot(grid[place]) for place in ((0, 0), (0, 1), (1, 0)))
     _by_face(by_face, cells, marks)
     shown = bins[(bins["count"] >= FEWEST) & np.isfinite(bins["mean_m"])]
-    sonar = shown[shown["sensor"] == "mbes"]
+    sensor = "mbes" if (shown["sensor"] == "mbes").any() else "laser"
+    word, sonar = {"mbes": "sonar", "laser": "laser"}[sensor], shown[shown["sensor"] == sensor]
     for axis, by in ((by_angle, "angle"), (by_range, "range")):
         for name, colour in colours.items():
             rows = sonar[(sonar["by"] == by) & (sonar["family"] == name)]
@@ -35,13 +37,14 @@ def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, fam
             mean, sigma = 1000 * rows["mean_m"], 1000 * scatter / np.sqrt(rows["count"])
             bars: dict[str, Any] = {"markersize": 3, "linewidth": 0.8, "color": colour}
             axis.errorbar(rows["low"] + rows["width"] / 2, mean, WITHIN_95 * sigma, fmt=f"{marks[name]}-", **bars)
-        axis.set(title=f"sonar, by {WORDS[by]}", xlabel=LABELS[by], ylabel="mean residual, mm")
+        axis.set(title=f"{word}, by {WORDS[by]}", xlabel=LABELS[by].format(word), ylabel="mean residual, mm")
     spread = figure.add_subplot(grid[1, 1])
     for name, colour in colours.items():
         rows = sonar[(sonar["by"] == "angle") & (sonar["family"] == name)]
         spread.plot(rows["low"] + rows["width"] / 2, 1000 * rows["rms_m"], f"{marks[name]}-", color=colour, label=name)
         spread.lines[-1].set(markersize=3, linewidth=0.8)
-    spread.set(title="sonar, scatter by swath angle", xlabel=LABELS["angle"], ylabel="RMS residual, mm", ylim=(0, None))
+    label = LABELS["angle"].format(word)
+    spread.set(title=f"{word}, scatter by swath angle", xlabel=label, ylabel="RMS residual, mm", ylim=(0, None))
     figure.legend(*spread.get_legend_handles_labels(), loc="upper center", ncols=6, frameon=False)
     _over_time(figure.add_subplot(grid[2, :]), shown[shown["by"] == "time"], passes)
     for axis in (by_face, by_angle, by_range):

@@ -5,7 +5,7 @@ them; nothing else is computed here but the pictures' scales and the intervals o
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,7 +71,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         result=result,
         run=tables.run.absolute().name,
         date=str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
-        six=_six(calibrations, result["result"], settings.pool.verdict),
+        six=_six(calibrations, result["result"], settings.pool.verdict, result.get("held", {})),
         frame=tables.table(artefacts.POOL_FRAME).to_dict("records")[0],
         largest=_largest(tables.table(artefacts.CELLS)),
         tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
@@ -122,13 +122,13 @@ class _Value:
         return f"{round(self.number, 4) + 0.0:{sign}.4f} {'°' if self.unit == 'deg' else self.unit}"
 
 
-def _six(table: pd.DataFrame, method: str, limits: config.Verdict) -> list[dict[str, Any]]:
+def _six(table: pd.DataFrame, method: str, limits: config.Verdict, held: Collection[str]) -> list[dict[str, Any]]:
     rows = table[table["method"] == method].to_dict("records")
     bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
     values = ("coarse", "total", "change", "correction", "sigma_random", "sigma_total", "low_95", "high_95")
     return [
         {"name": row["parameter"], "limit": _Value(bounds[row["unit"]], row["unit"])}
-        | {"sigma_in": "°" if row["unit"] == "deg" else "mm"}
+        | {"sigma_in": "°" if row["unit"] == "deg" else "mm", "held": row["parameter"] in held}
         | {key: _Value(row[key], row["unit"]) for key in values}
         for row in rows
     ]

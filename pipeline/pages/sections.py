@@ -24,11 +24,15 @@ DOTS = 6000  # a cloud in one panel, at most
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SECTIONS = ("sensor", "face", *XYZ, *(f"coarse_{name}" for name in XYZ))  # columns of residuals
 DISTANCES = ("sensor", "face", "residual_m", "coarse_residual_m", "z_target_m", "coarse_z_target_m")
-CLOUDS = (  # sensor, prefix of the columns, words, colour; in the order in which they are drawn
-    ("mbes", "coarse_", "sonar, coarse mount", COARSE),
-    ("laser", "", "laser", LASER),
-    ("mbes", "", "sonar, calibrated", SONAR),
-)
+Cloud = tuple[str, str, str, str]  # sensor, prefix of the columns, words, colour
+CLOUDS: Mapping[str, tuple[Cloud, ...]] = {  # by what is calibrated, in the order in which they are drawn
+    "mbes": (
+        ("mbes", "coarse_", "sonar, coarse mount", COARSE),
+        ("laser", "", "laser", LASER),
+        ("mbes", "", "sonar, calibrated", SONAR),
+    ),
+    "laser": (("laser", "coarse_", "laser, coarse mount", COARSE), ("laser", "", "laser, calibrated", LASER)),
+}
 
 
 def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Markup:
@@ -42,7 +46,8 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Mark
     cut = np.array([bool(_cut(points, depth)) for points in corners])
     slope = _slopes(faces)
     face = residuals["face"].to_numpy().astype(int)
-    for sensor, prefix, label, colour in CLOUDS[: None if solved else -1]:  # without a result nothing is calibrated
+    calibrated = _calibrated(residuals)
+    for sensor, prefix, label, colour in CLOUDS[calibrated][: None if solved else -1]:  # else nothing is calibrated
         of_sensor = (residuals["sensor"] == sensor).to_numpy()
         columns = [prefix + name for name in XYZ]
         cloud = residuals.loc[of_sensor & ~level[face], columns].to_numpy()
@@ -61,9 +66,9 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Mark
                 axis.plot(one[:, 1], one[:, 2], color=INK, linewidth=0.7)
     above.set(title="from above", xlabel="x, m", ylabel="y, along the target, m", aspect="equal")
     ahead.set(title=f"section at x = {100 * depth:.0f} cm", ylabel="z, height, m", aspect="equal")
-    near.set(title="one wet face of it", aspect="equal")
-    of_sonar = (residuals["sensor"] == "mbes").to_numpy() & (cut & ~level)[face]
-    _near(near, residuals[of_sonar], corners, depth)
+    near.set(title="one face of it", aspect="equal")
+    seen = (residuals["sensor"] == calibrated).to_numpy() & (cut & ~level)[face]
+    _near(near, residuals[seen], corners, depth)
     for axis in (ahead, near):
         axis.invert_xaxis()  # seen from the boat, looking along x, y grows to the left
         axis.set_xlabel("y, m")
@@ -86,16 +91,21 @@ def _slopes(faces: pd.DataFrame) -> Array:
     return np.asarray(np.where(aslant, -x / np.where(aslant, y, 1.0), 0.0))
 
 
-def _near(axis: Axes, soundings: pd.DataFrame, corners: Sequence[Array], depth: float) -> None:
-    """Set the panel to the face with the most soundings."""
-    if len(soundings) >= FEWEST:
-        (cut,) = _cut(corners[int(soundings["face"].mode().iloc[0])], depth)
+def _calibrated(residuals: pd.DataFrame) -> str:
+    """The sensor of which there are two mounts to show."""
+    return "mbes" if (residuals["sensor"] == "mbes").any() else "laser"
+
+
+def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], depth: float) -> None:
+    """Set the panel to the face with the most points."""
+    if len(points) >= FEWEST:
+        (cut,) = _cut(corners[int(points["face"].mode().iloc[0])], depth)
         low, high = cut[:, 1:].min(axis=0), cut[:, 1:].max(axis=0)
         middle, half = (low + high) / 2, max(high - low) * 1.1
         axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
     else:
         axis.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
-        axis.text(0.5, 0.5, "too few soundings", transform=axis.transAxes, ha="center", color=QUIET)
+        axis.text(0.5, 0.5, "too few points", transform=axis.transAxes, ha="center", color=QUIET)
 
 
 def _cut(corners: Array, x: float) -> list[Array]:
@@ -111,12 +121,13 @@ def _cut(corners: Array, x: float) -> list[Array]:
 def distances(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any], solved: bool) -> Markup:
     """Each family's points by their distance from the adjusted surface, in mm; ``family``: of each residual."""
     names, level = families_of(faces)[:MOST_PANELS], level_families(faces)
+    clouds = CLOUDS[_calibrated(residuals)][: None if solved else -1]  # without a result nothing is calibrated
     figure = Figure(figsize=(7.2, 3.2))
     where = {"left": 0.07, "right": 0.97, "bottom": 0.23, "top": 0.92, "wspace": 0.16}
     panels = figure.subplots(1, len(names), sharey=True, gridspec_kw=where, squeeze=False)[0]
     for axis, name in zip(panels, names, strict=True):
         largest = 5.0
-        for sensor, prefix, label, colour in CLOUDS[: None if solved else -1]:  # without a result nothing is calibrated
+        for sensor, prefix, label, colour in clouds:
             points = residuals[(residuals["sensor"] == sensor).to_numpy() & (family == name)]
             away = 1000 * points[prefix + "residual_m"].to_numpy()
             _dots(axis, away, points[prefix + "z_target_m"].to_numpy(), colour, label)

@@ -1,5 +1,6 @@
 """The laser's own fine calibration: its points lie on the target's planes, which stand as designed, or surveyed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -7,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline import artefacts, config
-from pipeline.adjusting import Adjusted, Given, adjust, free_unknowns, noise_of
+from pipeline.adjusting import Given, adjust, free_unknowns, noise_of
 from pipeline.considered import considered_of
 from pipeline.ins_sigmas import drift_of
 from pipeline.laser_fit import bounds_of, coarse_covariance, design_of, held_of
@@ -55,8 +56,11 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     scene = laser_scene_of(*given, ins, config.laser, config.as_built.faces)
     free = free_unknowns(scene.coarse, settings.free)
 
+    refused: dict[int, float] = {}
+
     def held(normal: np.ndarray) -> list[int]:
-        return held_of(normal, free, bounds_of(coarse, fit, config.verdict))
+        refused.update(held_of(normal, free, bounds_of(coarse, fit, config.verdict)))
+        return list(refused)
 
     streams = {"laser": inputs.laser_labelled}
     known = Given(noise_of(ins), design_of(model, inputs.target_pose, fit), held)
@@ -69,7 +73,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     mount = mount_of(config.laser.mount)
     return Outputs(
         **tables(found, seen.cells, sigmas, blocks, mount, settings, inputs.poses, inputs.passes),
-        geometry=_geometry_table(found),
+        geometry=_geometry_table(refused),
         patterns=seen.patterns,
         residuals=seen.residuals,
         residual_bins=bins_table(seen.residuals, inputs.faces),
@@ -77,7 +81,11 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
 
 
-def _geometry_table(found: Adjusted) -> pd.DataFrame:
-    """Which of the six are held."""
-    kept = [name for name, place, *_ in PARAMETERS if place not in found.solution.free]
-    return pd.DataFrame([("held", name) for name in kept], columns=["kind", "words"])
+def _geometry_table(refused: Mapping[int, float]) -> pd.DataFrame:
+    """Which of the six are held, and with which sigma they would have come out."""
+    rows = [
+        ("held", name, float(np.degrees(refused[place])) if unit == "deg" else refused[place])
+        for name, place, _, unit in PARAMETERS
+        if place in refused
+    ]
+    return pd.DataFrame(rows, columns=["kind", "words", "sigma"])

@@ -1,5 +1,6 @@
 """The answer of a laser's own calibration: its mount, what is held of it, and the verdict."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ from pipeline.blocks import (
 from pipeline.built import as_found, by_design, oddities
 from pipeline.finding import FARTHEST
 from pipeline.ins_sigmas import drift_of, told
-from pipeline.mounts import mount_of, target_of
+from pipeline.mounts import PARAMETERS, mount_of, target_of
 from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, pattern_tests, reasons, warnings
 
 
@@ -68,7 +69,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     coarse, model = mount_of(config.laser.mount), target_of(config.target)
     summary = inputs.summary.iloc[0]
     block = adjustment_block(inputs.estimate, inputs.covariance, dict(summary), coarse, "laser")
-    held = inputs.geometry.loc[inputs.geometry["kind"] == "held", "words"].tolist()
+    rows = inputs.geometry[inputs.geometry["kind"] == "held"]
+    held = dict(zip(rows["words"].tolist(), rows["sigma"].tolist(), strict=True))
     evidence = Evidence(
         inputs.faces,
         inputs.target_pose,
@@ -120,13 +122,15 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     return Outputs(calibration_table(methods, coarse), *documents(result))
 
 
-def _advice(held: list[str]) -> str:
+def _advice(held: Mapping[str, float]) -> str:
     """What keeps its coarse value, and what would help."""
     if not held:
         return ""
     are, them, values = ("is", "it", "value") if len(held) == 1 else ("are", "them", "values")
+    of_angle = [name for name, _, _, unit in PARAMETERS if unit == "deg"]
+    each = [f"{name} (±{s:.3f}°)" if name in of_angle else f"{name} (±{1000 * s:.0f} mm)" for name, s in held.items()]
     return (
-        f"{', '.join(held)} {are} held at the coarse {values}: this target and these passes cannot give {them} within "
+        f"{', '.join(each)} {are} held at the coarse {values}: this target and these passes cannot give {them} within "
         "the verdict's limits; a surveyed target (laser_fit.origin_sigma_m, azimuth_sigma_deg), more passes at other "
         "distances, or a less drifting INS would"
     )

@@ -13,6 +13,6 @@ def write(session: Path, run: Path) -> str:
     """An accepted result into SESSION/session.yaml; what was done, in words."""
     result = calibration(run)
     block = result["laser"]
-    origin = origin_of("fine", run / "report" / "calibration.json", held=result["held"])
+    origin = origin_of("fine", run / "report" / "calibration.json", held=list(result["held"]))
     blocks = {"laser": block_of(mounted_of(block), np.array(block["covariance_total"]), origin)}
     return written(session, *read_session(session), blocks)

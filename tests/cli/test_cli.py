@@ -83,7 +83,7 @@ def test_bad_usage_is_one_line(
     words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("stages.cli.load", lambda: ())
+    monkeypatch.setattr("stages.cli.load", lambda *_: ())
     assert call(words) == 2
     out, err = capsys.readouterr()
     assert said in err

@@ -1,0 +1,33 @@
+"""A whole run: stages, answer, pictures."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from pipeline import runner
+from pipeline.config import Calibrated
+from pipeline.executor import workers
+from pipeline.progress import Progress
+from stages import load
+from stages.drawing import Painters, painters
+from stages.saying import answer_of, say_failures, say_where
+
+
+def calibrate(
+    calibrated: Calibrated,
+    session: Path,
+    config: Path,
+    run: Path,
+    after: Callable[[Painters, Path, str], None],
+    jobs: int | None,
+    executor: str | None,
+    wanted: tuple[bool, bool],
+) -> int:
+    """The exit status; ``after`` each stage; ``wanted``: the report's page, the recordings."""
+    with workers(jobs, executor) as pool, painters(*wanted, pool.jobs > 1) as drawing:
+        finished = partial(after, drawing, run)
+        runner.run(load(calibrated), session, config, run, pool, Progress(), finished, calibrated)
+        status = answer_of(run)
+        say_failures(drawing.draw(run), "; the calibration is complete")
+    say_where(run)
+    return status
