@@ -15,7 +15,7 @@ from pipeline import artefacts, manifest
 from pipeline.drawn import agreeing
 from pipeline.errors import ArtefactError
 from pipeline.families import families_of, level_families
-from pipeline.folder import Settings, calibration, read_settings
+from pipeline.folder import Settings, calibration, read_settings, refuse_other
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.planes import angle_between
 from pipeline.mounts import PARAMETERS
@@ -42,6 +42,7 @@ class RunRead:
     def read(cls, path: Path, stages: tuple[str, ...]) -> "RunRead":
         if not path.is_dir():
             raise ArtefactError(f"{path}: there is no such folder; name a run folder")
+        refuse_other(path, "mbes")
         for stage in stages:
             if manifest.read(path / stage) is None:
                 raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")

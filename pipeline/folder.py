@@ -122,7 +122,7 @@ def refuse_other(run: Path, calibrated: config.Calibrated) -> None:
     was = "laser" if session.get("mbes") is None else "mbes"
     if was != calibrated:
         what = {"mbes": "the sonar", "laser": "the laser"}[was]
-        raise ArtefactError(f"{run}: holds a calibration of {what}; name another folder")
+        raise ArtefactError(f"{run}: holds a calibration of {what}; name another run folder")
 
 
 # --- run.yaml --------------------------------------------------------------------------------------------------------

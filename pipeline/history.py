@@ -60,6 +60,9 @@ def read_history(folder: Path, chosen: Filter) -> History:
         run = path.parent.parent
         try:
             result = calibration(run)
+            if result.get("calibrated") == "laser":
+                unreadable.append(f"{run}: calibrates the laser")
+                continue
             row, estimate = _row(run.relative_to(folder).as_posix(), result), estimate_of(result)
         except PoolcalError as error:
             unreadable.append(str(error))

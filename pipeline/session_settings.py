@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 from pathlib import PurePosixPath
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -124,12 +124,11 @@ class Ins(Model):
     drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, where they tell; else those of drift
     white: White = White()
 
-    @model_validator(mode="before")
-    @classmethod
-    def _given_drift_goes_first(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "drift" in given and "drift_from" not in given:
-            return given | {"drift_from": "settings"}
-        return given
+    @model_validator(mode="after")
+    def _given_drift_goes_first(self) -> "Ins":
+        if "drift" in self.model_fields_set and "drift_from" not in self.model_fields_set:
+            object.__setattr__(self, "drift_from", "settings")  # frozen from here on
+        return self
 
     @model_validator(mode="after")
     def _accuracy_of_sbet(self) -> "Ins":

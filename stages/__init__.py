@@ -18,8 +18,11 @@ def load(calibrated: "Calibrated" = "mbes") -> tuple[ModuleType, ...]:
 
 
 def names_in(run: Path) -> tuple[str, ...]:
-    """The stages of what a run folder calibrates, by their folders' names."""
-    return ORDER if calibrated_in(run) == "mbes" else tuple(name.rpartition(".")[2] for name in LASER)
+    """The stages of what a run folder calibrates, by their folders' names; of no run folder the sonar's."""
+    from pipeline.folder import holds_run
+
+    of_laser = holds_run(run) and calibrated_in(run) == "laser"
+    return tuple(name.rpartition(".")[2] for name in LASER) if of_laser else ORDER
 
 
 def calibrated_in(run: Path) -> "Calibrated":

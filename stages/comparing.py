@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import Any
 
-from stages import names_in
+from stages import ORDER
 
 
 def comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
     from pipeline.diff import RunRead, diff
 
-    return diff(RunRead.read(first, names_in(first)), RunRead.read(second, names_in(second)), *tolerances)
+    return diff(RunRead.read(first, ORDER), RunRead.read(second, ORDER), *tolerances)
 
 
 def save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from scipy.stats import chi2
 
 from pipeline import config
-from pipeline.adjusting import Adjusted, adjust, free_unknowns, noise_of
+from pipeline.adjusting import Adjusted, Given, adjust, free_unknowns, noise_of
 from pipeline.considered import considered_of, correlated
 from pipeline.maths.adjustment import Body
 from pipeline.maths.solution import freed, solve
@@ -145,7 +145,7 @@ def error_of(found: Adjusted) -> np.ndarray:
 
 def solved(seed: int, ins: config.Ins = QUIET, settings: Any = None, **options: Any) -> Adjusted:
     streams, scene = made(seed, ins, **options)
-    return adjust(streams, scene, noise_of(ins), settings or config.Adjust(), 5.0)
+    return adjust(streams, scene, Given(noise_of(ins)), settings or config.Adjust(), 5.0)
 
 
 def test_without_noise_the_truth_comes_back() -> None:
@@ -176,7 +176,7 @@ def test_errors_are_as_large_as_the_covariance_says(ins: config.Ins) -> None:
 def test_drift_taken_for_granted_would_be_seen() -> None:
     """The same data with an INS said to be perfect: errors of many sigmas, and a sum of squares that is too large."""
     streams, scene = made(7, NOISY)
-    trusting = adjust(streams, scene, noise_of(QUIET), config.Adjust(), 5.0)
+    trusting = adjust(streams, scene, Given(noise_of(QUIET)), config.Adjust(), 5.0)
     e = error_of(trusting)
     assert e @ np.linalg.solve(trusting.solution.covariance[:6, :6], e) > 100
     assert trusting.equations.squares / trusting.redundancy > 1.2
@@ -268,7 +268,7 @@ def test_the_wall_alone_leaves_directions_open() -> None:
         Stream((MemoryPart(part.name, {k: v[part.columns["face"] == 1] for k, v in part.columns.items()}),))
         for part in (laser, mbes)
     ]
-    found = adjust(dict(zip(streams, walls, strict=True)), scene, noise_of(QUIET), config.Adjust(), 5.0)
+    found = adjust(dict(zip(streams, walls, strict=True)), scene, Given(noise_of(QUIET)), config.Adjust(), 5.0)
     assert found.solution.deficiency > 0
     assert not found.converged
     assert np.all(np.isfinite(found.solution.step))

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from pipeline import config, instruments, planned
+from pipeline.blocks import instruments_block
 from pipeline.config import SessionConfig, load_session
 from pipeline.errors import ConfigError
 from pipeline.folder import Settings, read_settings, write_settings
@@ -17,7 +18,6 @@ from pipeline.instruments import PRESETS, applied, load_instrument
 from pipeline.pages import render
 from pipeline.pages.figures import figures_used
 from pipeline.parsing import parse, read_yaml
-from stages import report
 from tests.end_to_end.pages import Page
 
 FILES = sorted(PRESETS.glob("*.yaml"))
@@ -240,11 +240,11 @@ def test_a_plan_takes_the_rates_that_it_leaves_out(tmp_path: Path) -> None:
 def test_calibration_json_names_them(tmp_path: Path) -> None:
     preset = SONAR | {"unverified": ["range_sigma_m"]}
     found = session(tmp_path, {"mine": preset}, mbes={"instrument": "mine"})
-    shown = report._instruments({"ins": found.ins, "laser": found.laser, "mbes": found.mbes})
+    shown = instruments_block({"ins": found.ins, "laser": found.laser, "mbes": found.mbes})
     assert shown == {"instruments": {"mbes": {"name": "mine", "title": FOREIGN, "unverified": ["range_sigma_m"]}}}
     assert json.loads(json.dumps(shown)) == shown
     plain = session(tmp_path)
-    assert report._instruments({"ins": plain.ins, "laser": plain.laser, "mbes": plain.mbes}) == {}
+    assert instruments_block({"ins": plain.ins, "laser": plain.laser, "mbes": plain.mbes}) == {}
 
 
 def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
