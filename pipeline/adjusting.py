@@ -12,7 +12,7 @@ from pipeline.maths.design import of_poses
 from pipeline.maths.drift import Eliminated
 from pipeline.maths.epochs import EpochSums
 from pipeline.maths.knots import Drift, PoseNoise, knots_of
-from pipeline.maths.rigid_design import Design, of_design
+from pipeline.maths.rigid_design import Known
 from pipeline.maths.solution import Solution, solve
 from pipeline.maths.unknowns import SIX, State
 from pipeline.maths.variance import Common, Scatter, common, scatter
@@ -78,11 +78,11 @@ def free_unknowns(state: State, further: Sequence[str] = ()) -> list[int]:
 
 @dataclass(frozen=True)
 class Given:
-    """What is known beside the observations: noise of the poses, the target's design (where it takes part), and which
-    of the six may be held, from the normal equations of all unknowns at the first reading."""
+    """What is known beside the observations: noise of the poses, what the surfaces are known to be (at a state), and
+    which of the six are to be held, from the normal equations of all unknowns at the first reading."""
 
     noise: PoseNoise
-    design: Design | None = None
+    surfaces: Callable[[State], Known] | None = None
     held: Callable[[Array], Sequence[int]] | None = None
 
 
@@ -97,7 +97,7 @@ def adjust(
     for iteration in range(1, settings.max_iterations + 1):
         reading, weighting = refactored(read(streams, scene, state, known, weighting), state, weighting)
         drift = known or _no_drift(reading, scene, noise, gap_s)
-        before = _Point(state, drift, reading.sums, given.design)
+        before = _Point(state, drift, reading.sums, given.surfaces)
         if iteration == 1 and given.held is not None:
             held = given.held(before.equations(scene, noise).normal)
             free = np.setdiff1d(free, np.array(held, dtype=np.int64))
@@ -131,14 +131,14 @@ class _Point:
     state: State
     drift: Drift
     sums: Mapping[str, EpochSums]
-    design: Design | None
+    surfaces: Callable[[State], Known] | None
 
     def equations(self, scene: Scene, noise: PoseNoise, wanted: Integers | None = None) -> Eliminated:
-        """Normal equations of all unknowns, or of those ``wanted``, with what the design says of the surfaces."""
+        """Normal equations of all unknowns, or of those ``wanted``, with what is known of the surfaces."""
         found = normal_equations(self.sums, self.state, scene.body, noise, self.drift, wanted)
-        if self.design is None:
+        if self.surfaces is None:
             return found
-        more = of_design(self.design, self.state)
+        more = self.surfaces(self.state)
         places = np.arange(self.state.size) if wanted is None else wanted
         return replace(
             found,

@@ -1,6 +1,8 @@
 """The rigorous solution: both sensors observe shared surfaces from one moving body; unknowns and their covariance."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -11,6 +13,10 @@ from pipeline.adjusting import Adjusted, Given, adjust, noise_of
 from pipeline.considered import considered_of, correlated
 from pipeline.ins_sigmas import drift_of
 from pipeline.looking import Cells, look
+from pipeline.maths.rigid_design import Known
+from pipeline.maths.targets import TargetModel
+from pipeline.maths.ties import of_ties
+from pipeline.maths.unknowns import State
 from pipeline.mounts import mount_of, target_of
 from pipeline.observability import Seen, geometry_of
 from pipeline.outcome import tables
@@ -21,6 +27,7 @@ from pipeline.scene import scene_of
 from pipeline.streams import Stream
 
 SHOWN = 100_000  # points of a sensor in the table residuals, at most
+LEAST_RAD = 1e-7  # nothing is known better
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     ins = config.ins.model_copy(update={"drift": drift_of(config.ins, inputs.ins_sigmas, inputs.passes)})
     scene = scene_of(*given, ins, config.laser, config.mbes, config.as_built.faces)
     streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
-    found = adjust(streams, scene, Given(noise_of(ins)), settings, config.ingest.max_gap_s)
+    known = Given(noise_of(ins), _ties(model, config.as_built))
+    found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
     sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
     together = correlated(found.state.names, config.laser)
@@ -85,6 +93,14 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         residual_bins=bins_table(seen.residuals, inputs.faces),
         residual_map=map_table(seen.residuals, inputs.faces),
     )
+
+
+def _ties(model: TargetModel, as_built: config.AsBuilt) -> Callable[[State], Known] | None:
+    """Families that are parallel, within what they may be turned as built."""
+    if not model.parallel:
+        return None
+    sigma = max(float(np.radians(as_built.angle_sigma_deg)), LEAST_RAD)
+    return partial(of_ties, model.parallel, sigma)
 
 
 def _geometry_table(

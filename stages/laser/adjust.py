@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -13,6 +14,7 @@ from pipeline.considered import considered_of
 from pipeline.ins_sigmas import drift_of
 from pipeline.laser_fit import bounds_of, coarse_covariance, design_of, held_of
 from pipeline.looking import look
+from pipeline.maths.rigid_design import of_design
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
 from pipeline.outcome import tables
@@ -63,7 +65,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         return list(refused)
 
     streams = {"laser": inputs.laser_labelled}
-    known = Given(noise_of(ins), design_of(model, inputs.target_pose, fit), held)
+    known = Given(noise_of(ins), partial(of_design, design_of(model, inputs.target_pose, fit)), held)
     found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
     sigmas = considered_of(found.state.names, config.laser, None, config.as_built)

@@ -1,0 +1,26 @@
+"""The patent's target by its faces, through files and the command line: the same bytes."""
+
+import yaml
+
+from tests.end_to_end.places import Place, digests
+from tests.targets import as_faces
+
+
+def test_faces_give_the_same_bytes_as_the_letters(place: Place, right: dict[str, str]) -> None:
+    content = yaml.safe_load(place.config.read_text(encoding="utf-8"))
+    content["target"] = as_faces(content["target"])
+    place.config.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    told = place.calibrate()
+    assert told.status == 0, told.err
+    assert digests(place.run) == right
+
+
+def test_a_face_that_makes_no_sense_is_one_line(place: Place) -> None:
+    content = yaml.safe_load(place.config.read_text(encoding="utf-8"))
+    content["target"] = as_faces(content["target"])
+    content["target"]["faces"]["P2"]["corners"].reverse()
+    place.config.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    told = place.calibrate()
+    assert told.status == 2
+    (line,) = told.complaints
+    assert "pool.yaml: target.faces.P2: corners: the face looks away from the boat" in line

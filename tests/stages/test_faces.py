@@ -1,0 +1,74 @@
+"""Targets by their faces, through all stages: other shapes calibrate, and the patent's is one of them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.parsing import parse, read_yaml
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.session import simulate
+from pipeline.streams import Stream
+from tests.end_to_end.places import errors, sigmas
+from tests.stages.conftest import THIN, calibrated, made, merged
+from tests.targets import as_faces
+
+SCENARIOS = Path(__file__).parents[2] / "configs" / "scenarios"
+
+
+def same(one: Any, other: Any) -> bool:
+    if isinstance(one, Stream):
+        return all(
+            all(np.array_equal(a[name], b[name], equal_nan=a[name].dtype.kind == "f") for name in a)
+            for a, b in zip(one.batches(), other.batches(), strict=True)
+        )
+    if isinstance(one, pd.DataFrame):
+        pd.testing.assert_frame_equal(one, other, check_exact=True)
+        return True
+    return bool(one == other)
+
+
+def test_the_patents_target_by_its_faces_gives_what_its_letters_give() -> None:
+    session = made({"target": {"a": 6.0, "b": 2.4, "c": 0.8, "e": 0.4, "low_side": "north", "azimuth_deg": 47.0,
+                               "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}}}, seed=4)
+    by_letters = calibrated(session)
+    faces = json.loads(json.dumps(as_faces(session.pool["target"])))
+    by_faces = calibrated(replace(session, pool={"target": faces}))
+    assert by_letters.keys() == by_faces.keys()
+    for name, value in by_letters.items():
+        assert same(value, by_faces[name]), name
+
+
+@pytest.mark.parametrize(("name", "front"), [("dock", "fronts"), ("caisson", "left")])
+def test_other_targets_calibrate(name: str, front: str) -> None:
+    content = merged(read_yaml(SCENARIOS / f"{name}.yaml"), THIN)
+    session = simulate(parse(Scenario, content, name), 3)
+    found = calibrated(session)
+    result = json.loads(found["report/calibration.json"])
+    assert result["verdict"] == "accepted", result["reasons"]
+    assert np.all(np.abs(errors(result["mbes"], session.truth)) < 4 * sigmas(result["mbes"]))
+    assert front in found["adjust/surfaces"]["family"].tolist()
+    for method in ("patent_sequential", "patent_alternating"):
+        assert "roles P1, P2, P3" in result["methods"][method]["no_result"]
+        assert result["methods"][method]["mount"] is None
+    assert "roles P1, P2, P3" in found["angle_iterate/angles"]["reason"].iloc[0]
+
+
+def test_a_wet_foot_is_parallel_to_its_wall_and_seen_by_the_sonar_alone() -> None:
+    content = merged(read_yaml(SCENARIOS / "caisson.yaml"), THIN)
+    found = calibrated(simulate(parse(Scenario, content, "caisson"), 3), "adjust")
+    surfaces = found["adjust/surfaces"].set_index("family")
+    normals = surfaces[[f"normal_{axis}_target_1" for axis in "xyz"]]
+    for wall, foot in (("left", "toe-left"), ("right", "toe-right")):
+        turned = np.degrees(np.linalg.norm(np.cross(normals.loc[wall], normals.loc[foot])))
+        assert turned < 0.03  # as_built.angle_sigma_deg is 0.005
+        assert surfaces.loc[foot, "laser_points"] == 0
+        assert surfaces.loc[foot, "soundings"] > 300
+    assert surfaces.loc["toe-left", "distance_m"] == pytest.approx(0.85 * np.sqrt(0.5), abs=0.01)
+    labelled = next(found["segment/soundings_labelled"].batches())
+    names = found["segment/faces"]["name"].to_numpy()[labelled["face"].astype(int)]
+    assert "cope" not in names
