@@ -1,0 +1,158 @@
+"""The laser's own calibration through its stages: what comes back, what is held, what is refused."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pipeline.config import PoolConfig, SessionConfig
+from pipeline.laser_fit import bounds_of, coarse_covariance, held_of
+from pipeline.parsing import parse, read_yaml
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.session import SimulatedSession, simulate
+from stages.campaign import calibrate_in_memory
+from tests.stages.conftest import THIN, made, merged
+from tests.stages.test_faces import SCENARIOS
+
+OFF = {"laser": {"coarse_angle_deg": 0.3, "coarse_lever_m": 0.03}, "mbes": {"ping_rate_hz": 0.5}}
+DRIFT = {
+    "ins": {
+        "drift": {
+            "horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03,
+            "time_constant_s": 200.0,
+        }
+    }
+}
+EXACT = {"face_sigma_deg": 0.001, "plumb_sigma_deg": 0.001, "face_sigma_m": 0.0002}
+WIDE = {"max_sigma_deg": 1.0, "max_sigma_m": 0.1}
+
+
+def calibrated(session: SimulatedSession, more: dict[str, Any] | None = None, **pool: Any) -> dict[str, Any]:
+    """Every artefact; ``more``: of session.yaml's laser."""
+    settings = {name: value for name, value in session.session.items() if name != "mbes"}
+    settings["laser"] = settings["laser"] | (more or {})
+    raw = {"ins": session.ins, "laser": session.laser}
+    given = parse(SessionConfig, settings, "session"), parse(PoolConfig, session.pool | pool, "pool")
+    return calibrate_in_memory(*given, raw)
+
+
+def result_of(found: dict[str, Any]) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(found["report/calibration.json"])
+    return content
+
+
+def errors(result: dict[str, Any], truth: dict[str, Any]) -> np.ndarray:
+    """(6,) true minus found: rotation vector about body x, y, z (rad), lever arm (m)."""
+    block, true = result["laser"], truth["laser"]
+    turn = Rotation.from_matrix(true["R_body_from_laser"]) * Rotation.from_matrix(block["R_body_from_laser"]).inv()
+    return np.concatenate([turn.as_rotvec(), np.subtract(true["lever_arm_m"], block["lever_arm_m"])])
+
+
+@pytest.mark.parametrize("drift", [{}, DRIFT], ids=["white noise", "drift"])
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_mount_wrong_by_three_tenths_of_a_degree_and_3_cm_comes_back(drift: dict[str, Any], seed: int) -> None:
+    session = made(OFF, drift, seed=seed)
+    fit = EXACT | {"hold_share": 1.0}
+    result = result_of(calibrated(session, laser_fit=fit, verdict=WIDE))
+    assert result["verdict"] == "accepted", result["reasons"]
+    assert result["held"] == {}
+    sigma = np.sqrt(np.diag(result["laser"]["covariance_total"]))
+    error = errors(result, session.truth)
+    assert np.all(np.abs(error) < 3.5 * sigma)
+    assert np.all(sigma[:2] < np.radians(0.02))
+    if not drift:
+        assert np.all(np.abs(error) < np.r_[[np.radians(0.01)] * 3, [0.01] * 3])  # of 0.3° and 3 cm
+
+
+def test_what_cannot_be_given_is_held_at_its_coarse_value_and_named() -> None:
+    session = made(OFF, DRIFT, seed=2)
+    found = calibrated(session, laser_fit=EXACT)
+    result = result_of(found)
+    assert result["verdict"] == "accepted", result["reasons"]
+    assert list(result["held"]) == ["yaw", "x", "y", "z"]
+    assert 0.05 < result["held"]["yaw"] < 0.2
+    assert all(0.005 < result["held"][name] < 0.05 for name in "xyz")
+    assert "yaw (±" in result["geometry"]["advice"]
+    coarse, total = session.session["laser"]["mount"], result["laser"]["mount"]
+    for key in ("x_m", "y_m", "z_m"):
+        assert total[key] == pytest.approx(coarse[key], abs=1e-12)
+    sigma = np.sqrt(np.diag(result["laser"]["covariance_total"]))
+    assert sigma[2] == pytest.approx(np.radians(0.5))
+    assert sigma[3:] == pytest.approx([0.05] * 3)
+    covariance = np.array(result["laser"]["covariance"])
+    assert not covariance[2:].any()
+    error = errors(result, session.truth)
+    assert np.all(np.abs(error[:2]) < 3.5 * sigma[:2])
+
+
+def test_a_surveyed_target_and_a_steady_ins_give_all_six() -> None:
+    session = made(OFF, seed=2)
+    fit = EXACT | {"origin_sigma_m": 0.001, "azimuth_sigma_deg": 0.002}
+    result = result_of(calibrated(session, laser_fit=fit))
+    assert result["held"] == {}
+    assert result["verdict"] == "accepted", result["reasons"]
+    sigma = np.sqrt(np.diag(result["laser"]["covariance"]))
+    assert np.all(sigma[3:] < 0.0015)
+    assert np.all(np.abs(errors(result, session.truth)) < 3.5 * np.sqrt(np.diag(result["laser"]["covariance_total"])))
+
+
+def test_a_surveyed_origin_that_is_wrong_is_seen_in_the_lever_arm() -> None:
+    """The sign: a target believed 2 cm farther along +x than it stands draws the laser by as much to starboard."""
+    session = made(OFF | {"surroundings": {"origin_error_m": [0.02, 0.0, 0.0]}}, seed=2)
+    result = result_of(calibrated(session, laser_fit=EXACT | {"origin_sigma_m": 0.001, "azimuth_sigma_deg": 0.002}))
+    assert errors(result, session.truth)[3] == pytest.approx(-0.02, abs=0.004)
+
+
+def test_a_target_out_of_plumb_within_what_is_conceded_keeps_its_sigma() -> None:
+    session = made(OFF, DRIFT, {"surroundings": {"tilt_deg": [0.03, -0.03]}}, seed=2)
+    honest = result_of(calibrated(session, laser_fit={"plumb_sigma_deg": 0.03}))
+    assert np.all(np.abs(errors(honest, session.truth)[:2]) < 3.5 * np.sqrt(np.diag(honest["laser"]["covariance"]))[:2])
+
+
+def test_a_mount_far_off_is_refused() -> None:
+    session = made({"laser": {"coarse_angle_deg": 2.0, "coarse_lever_m": 0.0}, "mbes": {"ping_rate_hz": 0.5}}, seed=2)
+    result = result_of(calibrated(session, laser_fit=EXACT))
+    assert result["verdict"] == "rejected"
+
+
+def test_what_a_fine_calibration_held_keeps_its_surveyed_sigma() -> None:
+    session = made(OFF, DRIFT, seed=2)
+    six = np.diag([1e-6, 1e-6, 1e-6, 4e-6, 4e-6, 4e-6]).tolist()
+    origin = {"file": "a", "sha256": "0" * 64, "date": "2026-05-12", "software": "poolcal"}
+    laser = parse(SessionConfig, session.session, "session").laser
+    fit = parse(PoolConfig, session.pool, "pool").laser_fit
+    for more, expected in (
+        ({"method": "coarse"}, [1e-6] * 3 + [4e-6] * 3),
+        ({"method": "fine", "held": ["x", "y", "z"]}, [np.radians(0.5) ** 2] * 3 + [4e-6] * 3),
+    ):
+        content = laser.model_dump(mode="json") | {"mount_covariance": six, "mount_origin": origin | more}
+        told = parse(type(laser), content, "laser")
+        assert np.diag(coarse_covariance(told, fit)) == pytest.approx(expected)
+    result = result_of(calibrated(session, {"mount_covariance": six, "mount_origin": origin | {"method": "coarse"}}))
+    assert {"x", "y", "z"} <= set(result["held"])
+    assert np.sqrt(np.diag(result["laser"]["covariance_total"]))[3:] == pytest.approx([0.002] * 3)
+
+
+def test_the_worst_is_held_first_and_what_is_left_is_surer() -> None:
+    normal = np.diag([1e8, 1e8, 1e8, 1e6, 1e6, 1e6]).astype(float)
+    normal[3, 4] = normal[4, 3] = 0.999999999e6  # x and y nearly the same
+    held = held_of(normal, range(6), np.repeat([1e-3, 0.005], 3))
+    assert len(held) == 1
+    assert next(iter(held)) in (3, 4)
+    assert held_of(np.diag([1e8] * 3 + [1e6] * 3), range(6), np.repeat([1e-3, 0.005], 3)) == {}
+
+
+def test_bounds_are_the_stricter_of_verdict_and_coarse() -> None:
+    config = parse(PoolConfig, made(OFF, seed=2).pool, "pool")
+    bounds = bounds_of(np.diag([1e-8] * 3 + [1.0] * 3), config.laser_fit, config.verdict)
+    assert bounds == pytest.approx([0.5e-4] * 3 + [0.005] * 3)
+
+
+def test_the_dock_gives_the_lasers_angles_as_well() -> None:
+    session = simulate(parse(Scenario, merged(read_yaml(SCENARIOS / "dock.yaml"), THIN, OFF), "dock"), 3)
+    result = result_of(calibrated(session, laser_fit=EXACT, verdict=WIDE))
+    error, sigma = errors(result, session.truth), np.sqrt(np.diag(result["laser"]["covariance_total"]))
+    assert result["verdict"] == "accepted", result["reasons"]
+    assert np.all(np.abs(error) < 3.5 * sigma)
