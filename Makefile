@@ -19,7 +19,7 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help setup setup-visual demo calibrate stages diff view test lint format bench pictures montecarlo clean
+.PHONY: help setup setup-visual demo calibrate stages diff view test thorough lint format bench pictures montecarlo clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
@@ -92,6 +92,9 @@ format: $(SETUP) ## what ruff can mend by itself
 
 test: lint ## lint, then every test
 	$(PY) -m pytest -n 2 -q
+
+thorough: lint ## every test, with more draws, kills and damaged files than a usual run has
+	POOLCAL_THOROUGH=1 $(PY) -m pytest -n 2 -q
 
 bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare decoding
 	$(PY) -m tools.bench

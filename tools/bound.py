@@ -15,6 +15,9 @@ information matrix is
 
 and the bound the first 6 x 6 of its inverse.
 
+Of a laser that is calibrated itself (:func:`laser_bound`) the six are its own, there is no sonar, and x has in place of
+the families' turns and shifts one displacement of the whole target, plumb within a sigma.
+
     python -m tools.bound [SCENARIO.yaml] [--seeds 4]
 """
 
@@ -168,8 +171,8 @@ class World:
         body = turned + lever_arm_m(mount) + six[3:]
         return np.asarray(pose.position_target_m + error[:3] + np.einsum("nij,nj->ni", R, body))
 
-    def equations(self, rays: Rays) -> tuple[Array, Array, Array]:
-        """Jx (n, 18), derivatives by the pose's errors (n, 6), weights (n,)."""
+    def equations(self, rays: Rays, calibrated: str = "mbes") -> tuple[Array, Array, Array]:
+        """Jx (n, 18), or (n, 12) of the laser; derivatives by the pose's errors (n, 6), weights (n,)."""
         normal, none, steps = self.normals[rays.plane], np.zeros(6), np.diag(STEP)
 
         def difference(six: Array, error: Array) -> Array:
@@ -180,7 +183,7 @@ class World:
         here = self.placed(rays, rays.points_m, none, none)
         pose = np.stack([difference(none, step) for step in steps], axis=1) / STEP
         of_x = np.zeros((len(here), 6 + 3 * len(NORMALS)))
-        if rays.sensor == "mbes":
+        if rays.sensor == calibrated:
             of_x[:, :6] = np.stack([difference(step, none) for step in steps], axis=1) / STEP
         family = self.family[rays.plane]
         sign = np.einsum("ni,ni->n", normal, NORMALS[family])  # tops and bottoms turn together
@@ -189,6 +192,8 @@ class World:
             turns = here[rows] @ np.linalg.svd(plane[None])[2][1:].T
             of_x[rows, 6 + 3 * k : 9 + 3 * k] = sign[rows, None] * np.column_stack([turns, np.ones(len(turns))])
         ends = [self.placed(rays, rays.points_m + moved, none, none) for moved in np.moveaxis(rays.noise_m, 2, 0)]
+        if calibrated == "laser":
+            of_x = np.hstack([of_x[:, :6], normal, np.cross(here, normal)])
         variance = sum(np.einsum("ni,ni->n", normal, end - here) ** 2 for end in ends)
         return of_x, pose, rays.clean / variance
 
@@ -197,9 +202,21 @@ def bound(scenario: Scenario, seed: int) -> Array:
     """(6, 6): rotation about body x, y, z in rad and lever arm in m, as in calibration.json."""
     world = World(scenario, seed)
     seen = [world.laser(k) for k in world.movement.passes] + [world.mbes(k) for k in world.movement.passes]
-    found = [world.equations(rays) for rays in seen]
+    return _bound(scenario, seen, [world.equations(rays) for rays in seen], np.zeros(18))
+
+
+def laser_bound(scenario: Scenario, seed: int, plumb_deg: float) -> Array:
+    """(6, 6) of the laser's mount; the target exactly as designed, out of plumb by a sigma."""
+    world = World(scenario, seed)
+    seen = [world.laser(k) for k in world.movement.passes]
+    known = np.r_[np.zeros(9), [np.radians(plumb_deg) ** -2.0] * 2, 0.0]
+    return _bound(scenario, seen, [world.equations(rays, "laser") for rays in seen], known)
+
+
+def _bound(scenario: Scenario, seen: list[Rays], found: list[tuple[Array, Array, Array]], known: Array) -> Array:
+    """(6, 6); ``known`` (x,): what is known of the unknowns beforehand, 1 / variance."""
     of_x, of_pose, weight = (np.concatenate([one[i] for one in found]) for i in range(3))
-    normal = of_x.T @ (weight[:, None] * of_x)
+    normal = of_x.T @ (weight[:, None] * of_x) + np.diag(known)
     of_errors, prior = ins_errors(scenario, np.concatenate([rays.t_ns for rays in seen]) / NS, of_pose)
     if of_errors.shape[1]:
         inner = csc_matrix(of_errors.T @ diags(weight) @ of_errors + prior)

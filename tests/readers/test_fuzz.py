@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import PoolcalError
 from pipeline.readers.detect import HEAD, kind_of_bytes
+from tests.effort import often
 from tests.readers import build, e57_files, ie_files, sonar_files
 
 WEEK_NS = 604_800 * 10**9
@@ -130,7 +131,7 @@ def overwritten(whole: bytes) -> st.SearchStrategy[bytes]:
 def test_damaged_files(form: str, how: Callable[[bytes], st.SearchStrategy[bytes]]) -> None:
     sensor, kind, whole = WHOLE[form]
 
-    @settings(max_examples=EXAMPLES.get(form, 80), **OPTIONS)
+    @settings(max_examples=often(EXAMPLES.get(form, 80) // 3, EXAMPLES.get(form, 80)), **OPTIONS)
     @given(how(whole))
     def damaged(content: bytes) -> None:
         check(sensor, kind, content)
@@ -144,13 +145,13 @@ STARTS += [b"ASTM-E57\1\0\0\0", b"\0\0\0\x0c\0\0\0\1GSF-v03.06\0\0", b"\xff\0\0\
 FORMATS = sorted({pair[:2] for pair in WHOLE.values()})
 
 
-@settings(max_examples=150, **OPTIONS)
+@settings(max_examples=often(60, 150), **OPTIONS)
 @given(st.sampled_from(FORMATS), st.sampled_from(STARTS), st.binary(max_size=3000))
 def test_random_bytes(how: tuple[str, str], start: bytes, content: bytes) -> None:
     check(*how, start + content)
 
 
-@settings(max_examples=300, **OPTIONS)
+@settings(max_examples=often(120, 300), **OPTIONS)
 @given(st.sampled_from(STARTS), st.binary(max_size=600) | st.text(max_size=300).map(str.encode), st.integers(1, 2**40))
 def test_every_content_is_of_some_kind(start: bytes, content: bytes, size: int) -> None:
     head = (start + content)[:HEAD]
@@ -159,7 +160,7 @@ def test_every_content_is_of_some_kind(start: bytes, content: bytes, size: int) 
     assert kind.advice or (kind.format and kind.sensors)
 
 
-@settings(max_examples=100, **OPTIONS)
+@settings(max_examples=often(40, 100), **OPTIONS)
 @given(st.sampled_from(sorted(WHOLE)), st.integers(0, 20_000))
 def test_beginnings_are_recognised_or_refused(form: str, length: int) -> None:
     """A file cut anywhere is of its own kind or of none; never of another format."""

@@ -1,0 +1,114 @@
+"""The laser's own calibration by the command line: its run folder, session.yaml, page and recordings."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.config import load_session
+from tests.end_to_end.pages import page_of
+from tests.end_to_end.places import Place, Told, poolcal, simulate
+
+STAGES = ("ingest", "georeference", "segment", "fit_planes", "adjust", "report")
+EXACT = {"face_sigma_deg": 0.001, "plumb_sigma_deg": 0.001, "face_sigma_m": 0.0002}
+SURVEYED = EXACT | {"origin_sigma_m": 0.001, "azimuth_sigma_deg": 0.002}
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    off = {"coarse_angle_deg": 0.3, "coarse_lever_m": 0.03}
+    return simulate(tmp_path_factory.mktemp("laser") / "session", laser=off)
+
+
+@pytest.fixture
+def laser(template: Path, tmp_path: Path) -> Place:
+    made = Place(template, tmp_path)
+    made.mend()
+    made.edit_config("laser_fit", **SURVEYED)
+    return made
+
+
+def calibrate(place: Place, *more: object) -> Told:
+    words = ("laser", place.session, "--config", place.config, "--run", place.run, "--jobs", 1)
+    pictures = () if "--report" in more else ("--no-report", "--no-recordings")
+    return poolcal(*words, *pictures, *more)
+
+
+def mount(place: Place) -> dict[str, float]:
+    return load_session(place.session).laser.mount.model_dump()
+
+
+def test_the_mount_found_goes_into_the_session_and_from_there_into_the_sonars_total(laser: Place) -> None:
+    truth = json.loads(laser.template.with_name("session.truth.json").read_text())["laser"]["mount"]
+    before = (laser.session / "session.yaml").read_bytes()
+    told = calibrate(laser)
+    assert told.status == 0, told.err + told.out
+    assert "laser mount" in told.out
+    assert "session.yaml: laser.mount written; what was there is in session.1.yaml" in told.out
+    assert (laser.session / "session.1.yaml").read_bytes() == before
+    after = mount(laser)
+    for key, value in truth.items():
+        assert after[key] == pytest.approx(value, abs=0.03 if key.endswith("_deg") else 0.006), key
+    given = load_session(laser.session).laser
+    assert given.mount_origin is not None
+    assert (given.mount_origin.method, given.mount_origin.held) == ("fine", ())
+    block = json.loads((laser.run / "report" / "calibration.json").read_text())["laser"]
+    np.testing.assert_allclose(given.mount_covariance, block["covariance_total"], rtol=1e-8)
+    sonar = Place(laser.session, laser.folder / "sonar")
+    sonar.folder.mkdir()
+    sonar.mend()
+    assert sonar.calibrate().status in (0, 1)
+    total = np.array(sonar.result()["mbes"]["covariance_total"])
+    random = np.array(sonar.result()["mbes"]["covariance"])
+    laser_alone = np.array(block["covariance_total"])
+    for k in (0, 2, 3, 4, 5):  # the laser's errors are the sonar's: roll's is lost among the sound speed's
+        assert total[k, k] - random[k, k] >= 0.8 * laser_alone[k, k]
+
+
+def test_nothing_is_written_where_it_is_only_looked_at_or_rejected(laser: Place) -> None:
+    before = (laser.session / "session.yaml").read_bytes()
+    assert calibrate(laser, "--no-write").status == 0
+    laser.edit_config("verdict", max_sigma_deg=1e-6, max_sigma_m=1e-7)
+    told = calibrate(laser)
+    assert told.status == 1
+    assert "none of the six can be found" in told.out
+    assert (laser.session / "session.yaml").read_bytes() == before
+    assert not (laser.session / "session.1.yaml").exists()
+
+
+def test_without_a_sonar_and_a_run_folder_of_its_own(laser: Place) -> None:
+    content = yaml.safe_load((laser.session / "session.yaml").read_text())
+    with_sonar = laser.calibrate()
+    assert with_sonar.status in (0, 1)
+    told = calibrate(laser)
+    assert told.status == 2
+    assert "holds a calibration of the sonar; name another run folder" in told.complaints[0]
+    del content["mbes"]
+    (laser.session / "session.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+    alone = Place(laser.session, laser.folder / "alone")
+    alone.folder.mkdir()
+    alone.mend()
+    alone.edit_config("laser_fit", **SURVEYED)
+    assert calibrate(alone, "--no-write").status == 0
+    assert sorted(path.name for path in alone.run.iterdir() if path.is_dir()) == sorted(STAGES)
+    again = calibrate(alone, "--no-write")
+    assert [f"{name}: up to date" in again.err for name in STAGES] == [True] * len(STAGES)
+    assert poolcal("verify", alone.run).status == 0
+    assert "mbes: is missing" in poolcal("run", alone.session, "--config", alone.config, "--run", alone.run).err
+    assert "holds a calibration of the laser" in poolcal("diff", alone.run, laser.run).err
+    assert poolcal("stage", "offsets", alone.run).status == 2
+
+
+def test_its_page_and_recordings_show_the_laser_alone(laser: Place) -> None:
+    laser.edit_config("laser_fit", origin_sigma_m=None, azimuth_sigma_deg=None)
+    told = calibrate(laser, "--report", "--recordings", "--no-write")
+    assert told.status == 0, told.err
+    assert "not drawn" not in told.err
+    page = page_of(laser.run)
+    assert "The laser's mount" in page.text
+    assert "held at the coarse value" in page.text
+    for word in ("Three ways", "How the planes close", "soundings on"):
+        assert word not in page.text
+    assert sorted(path.stem for path in laser.run.glob("*/*.rrd")) == sorted(STAGES)

@@ -1,0 +1,162 @@
+"""Campaign of the laser's own calibration, and of the sonar's from it.
+
+Each number is two sessions under INS drift. In the first the laser's mount is wrong by 0.3° and 3 cm on every axis, in
+all combinations of signs; with wide limits all six are found, with the usual ones some are held. The second has the
+mount found, with its covariance, and calibrates the sonar: its errors against the body, by a total covariance in which
+nothing is considered but the laser's mount.
+
+    python -m tools.laser [--sessions 240] [--first 0] [--jobs 2] [--rows docs/accuracy/laser.parquet]
+"""
+
+import argparse
+import json
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+Array = NDArray[np.float64]
+NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about body x, y, z; lever arm
+UNITS = np.r_[[np.pi / 180] * 3, [1e-3] * 3]
+FIRST_SEED, SECOND_SEED = 40_000, 50_000
+DRIFT = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
+PLUMB_DEG = 0.001
+FIT = {"face_sigma_deg": 0.001, "plumb_sigma_deg": PLUMB_DEG, "face_sigma_m": 0.0002}  # the target is as designed
+WIDE = {"max_sigma_deg": 1.0, "max_sigma_m": 1.0}
+SURE = {"range_bias_sigma_m": 0.0, "latency_sigma_s": 0.0}
+BOUNDS = 12  # sessions of which the bound is taken
+
+
+def scenario_of(number: int) -> dict[str, Any]:
+    signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
+    keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
+    error = {key: sign * size for key, sign, size in zip(keys, signs, [0.3] * 3 + [0.03] * 3, strict=True)}
+    return {
+        "name": "laser",
+        "ins": {"drift": DRIFT},
+        "laser": {"point_rate_hz": 5000.0, "coarse_error": error},
+        "mbes": {"ping_rate_hz": 10.0},
+    }
+
+
+def calibrate(session: dict[str, Any], pool: dict[str, Any], made: Any) -> dict[str, Any]:
+    from pipeline.config import PoolConfig, SessionConfig
+    from pipeline.parsing import parse
+    from stages.campaign import calibrate_in_memory
+
+    raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
+    found = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
+    content: dict[str, Any] = json.loads(found["report/calibration.json"])
+    return content
+
+
+def error_of(R_true: Array, lever_true: Array, R_found: Array, lever_found: Array) -> Array:
+    turn = (Rotation.from_matrix(R_true) * Rotation.from_matrix(R_found).inv()).as_rotvec()
+    return np.concatenate([turn, np.subtract(lever_true, lever_found)])
+
+
+def one(number: int) -> dict[str, Any]:
+    """A row: errors and sigmas of the laser, of the sonar, and what is held with the usual limits."""
+    from pipeline.parsing import parse
+    from pipeline.simulation.scenario import Scenario
+    from pipeline.simulation.session import simulate
+
+    scenario = parse(Scenario, scenario_of(number), "laser")
+    made = simulate(scenario, FIRST_SEED + number)
+    alone = {name: value for name, value in made.session.items() if name != "mbes"}
+    usual = calibrate(alone, made.pool | {"laser_fit": FIT}, made)
+    wide = calibrate(alone, made.pool | {"laser_fit": FIT | {"hold_share": 1.0}, "verdict": WIDE}, made)
+    block, truth = wide["laser"], made.truth["laser"]
+    R, lever = np.array(block["R_body_from_laser"]), np.array(block["lever_arm_m"])
+    error = error_of(np.array(truth["R_body_from_laser"]), np.array(truth["lever_arm_m"]), R, lever)
+    row: dict[str, Any] = {"number": number, "accepted": usual["verdict"] == "accepted"}
+    row |= {"held": " ".join(usual["held"]), "held_wide": " ".join(wide["held"])}
+    random, total = np.array(block["covariance"]), np.array(block["covariance_total"])
+    row |= _columns("laser", error, random)
+    # the sonar, in another session, on the laser as it was found
+    made = simulate(parse(Scenario, scenario_of(number), "laser"), SECOND_SEED + number)
+    session = dict(made.session)
+    session["laser"] = session["laser"] | SURE | {"mount": block["mount"], "mount_covariance": total.tolist()}
+    session["mbes"] = session["mbes"] | SURE | {"sound_speed_sigma_m_s": 0.0, "sound_speed_gradient_sigma_1_s": 0.0}
+    pool = made.pool | {"as_built": {"offset_sigma_m": 0.0, "angle_sigma_deg": 0.0}, "verdict": WIDE}
+    sonar = calibrate(session, pool, made)["mbes"]
+    R_true, lever_true = (np.array(made.truth["mbes"][key]) for key in ("R_body_from_mbes", "lever_arm_m"))
+    error = error_of(R_true, lever_true, np.array(sonar["R_body_from_mbes"]), np.array(sonar["lever_arm_m"]))
+    row |= _columns("sonar", error, np.array(sonar["covariance_total"]))
+    without = np.sqrt(np.diag(sonar["covariance"])) / UNITS
+    return row | {f"sonar_random_{name}": value for name, value in zip(NAMES, without, strict=True)}
+
+
+def _columns(whose: str, error: Array, covariance: Array) -> dict[str, float]:
+    sigma = np.sqrt(np.diag(covariance))
+    row = {f"{whose}_nse": float(error @ np.linalg.solve(covariance, error))}
+    for k, name in enumerate(NAMES):
+        row |= {f"{whose}_error_{name}": error[k] / UNITS[k], f"{whose}_sigma_{name}": sigma[k] / UNITS[k]}
+    return row
+
+
+def laser_bound_of(number: int) -> Array:
+    from pipeline.parsing import parse
+    from pipeline.simulation.scenario import Scenario
+    from tools.bound import laser_bound
+
+    return laser_bound(parse(Scenario, scenario_of(number), "laser"), FIRST_SEED + number, PLUMB_DEG)
+
+
+def report(table: pd.DataFrame, bound: Array) -> str:
+    """RMS errors against the bound; the sonar's against its total sigmas; what was held."""
+    n = len(table)
+    low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
+    least = np.sqrt(np.diag(bound)) / UNITS
+    lines = [f"{n} pairs of sessions (degrees, millimetres)", " " * 30 + "".join(f"{name:>10}" for name in NAMES)]
+
+    def line(words: str, values: Any, digits: int = 4) -> None:
+        lines.append(f"{words:<30}" + "".join(f"{value:10.{digits}f}" for value in values))
+
+    def rms(stem: str) -> Array:
+        return np.array([np.sqrt(np.mean(table[f"{stem}_{name}"] ** 2)) for name in NAMES])
+
+    line("laser: RMS error", rms("laser_error"))
+    line("laser: mean sigma", rms("laser_sigma"))
+    line("laser: Cramér–Rao bound", least)
+    line("laser: RMS ÷ bound", rms("laser_error") / least, 2)
+    line("sonar: RMS error", rms("sonar_error"))
+    line("sonar: mean total sigma", rms("sonar_sigma"))
+    line("sonar: mean random sigma", rms("sonar_random"))
+    line("sonar: RMS ÷ total sigma", rms("sonar_error") / rms("sonar_sigma"), 2)
+    for whose in ("laser", "sonar"):
+        mean = table[f"{whose}_nse"].mean()
+        lines.append(f"{whose}: mean normalised squared error {mean:.2f} (99 % band {low:.2f}-{high:.2f})")
+    lines.append(f"with the usual limits: accepted {int(table['accepted'].sum())}; held, and how often:")
+    lines += [f"  {names or 'none'}: {count}" for names, count in table["held"].value_counts().items()]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sessions", type=int, default=240)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--rows", type=Path, default=Path("runs/montecarlo/laser.parquet"), help="where rows go")
+    parser.add_argument("--report", action="store_true", help="of the rows that are there, without making any")
+    options = parser.parse_args()
+    numbers = range(options.first, options.first + options.sessions)
+    with get_context("spawn").Pool(options.jobs, maxtasksperchild=8) as pool:
+        if not options.report:
+            options.rows.parent.mkdir(parents=True, exist_ok=True)
+            rows: list[dict[str, Any]] = []
+            for row in pool.imap(one, numbers):
+                rows.append(row)
+                pd.DataFrame(rows).to_parquet(options.rows, index=False)
+        table = pd.read_parquet(options.rows)
+        bound = np.mean(pool.map(laser_bound_of, table["number"].tolist()[:BOUNDS]), axis=0)
+    print(report(table, np.asarray(bound)))
+
+
+if __name__ == "__main__":
+    main()
