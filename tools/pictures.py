@@ -44,7 +44,7 @@ def _says(*command: str) -> bool:
     return shutil.which(command[0]) is not None and bool(subprocess.run(command, capture_output=True).stdout.strip())
 
 
-def chromium(*options: str, timeout: float = 60) -> subprocess.CompletedProcess[str]:
+def chromium(*options: str, timeout: float = 150) -> subprocess.CompletedProcess[str]:
     """Headless Chromium with a home of its own; what pages write to the console goes to standard error."""
     program = next(path for name in CHROMIUM if (path := shutil.which(name)))
     with tempfile.TemporaryDirectory() as home:
