@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from stages import ORDER
+from tests.effort import often
 from tests.end_to_end.places import ROOT, Place, Told, digests, poolcal_process
 
 
 # --- the same bytes --------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize(("jobs", "threads"), [(1, "1"), (2, "2")])
+@pytest.mark.parametrize(("jobs", "threads"), often([(2, "2")], [(1, "1"), (2, "2")]))
 def test_jobs_processes_and_threads(place: Place, right: dict[str, str], jobs: int, threads: str) -> None:
     """Another process, another folder, other numbers of workers and of BLAS threads: every table byte for byte."""
     limits = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), threads)
