@@ -13,7 +13,7 @@ import typer
 import pipeline
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.progress import say
-from stages import ORDER, calibrated_in, load
+from stages import ORDER, calibrated_in, load, names_in
 from stages.comparing import comparison, save_pair
 from stages.saying import answer_of, say_failures
 
@@ -139,8 +139,9 @@ def stage(
     from pipeline.progress import Progress
     from stages.drawing import Painters
 
-    if name not in ORDER:
-        raise ConfigError(f"NAME {name!r}: is no stage; the stages are {', '.join(ORDER)}")
+    names = names_in(run_folder)
+    if name not in names:
+        raise ConfigError(f"NAME {name!r}: is no stage; the stages are {', '.join(names)}")
     if (session is None) != (config is None):
         raise ConfigError("--session and --config: give both, or neither to use those in RUN/run.yaml")
     calibrated = calibrated_in(run_folder) if folder.holds_run(run_folder) else "mbes"
@@ -149,7 +150,7 @@ def stage(
         settings = folder.load_settings(session, config, calibrated)
     with workers(jobs, executor) as pool:
         runner.run_stage(load(calibrated), name, run_folder, settings, pool, Progress())
-    status = answer_of(run_folder) if name == ORDER[-1] else 0
+    status = answer_of(run_folder) if name == names[-1] else 0
     say_failures(Painters(report, recordings).draw(run_folder))
     return status
 

@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config import PoolConfig, SessionConfig
 from pipeline.laser_fit import bounds_of, coarse_covariance, held_of
+from pipeline.maths.rotations import exp_so3, log_so3
+from pipeline.mounts import Mounted, mount_of
 from pipeline.parsing import parse, read_yaml
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
@@ -156,3 +158,32 @@ def test_the_dock_gives_the_lasers_angles_as_well() -> None:
     error, sigma = errors(result, session.truth), np.sqrt(np.diag(result["laser"]["covariance_total"]))
     assert result["verdict"] == "accepted", result["reasons"]
     assert np.all(np.abs(error) < 3.5 * sigma)
+
+
+def test_the_sonars_total_takes_the_lasers_covariance_as_whole_calibrations_do() -> None:
+    """It grows by (G v)(G v)ᵀ for a covariance v vᵀ; G v from calibrations with the laser moved by v and by -v.
+
+    v: a turn about body x, y, z (rad) and a shift along them (m), R = Exp(v[:3]) R₀, as mount_covariance has it.
+    """
+    session = made({"ins": DRIFT["ins"], "laser": {"point_rate_hz": 1500.0}, "mbes": {"ping_rate_hz": 4.0}}, seed=4)
+    raw = {"ins": session.ins, "laser": session.laser, "mbes": session.mbes}
+    pool = parse(PoolConfig, session.pool, "pool")
+    v = np.array([2e-4, 2e-4, -2e-4, 3e-3, -3e-3, 3e-3])
+    mounted = mount_of(parse(SessionConfig, session.session, "session").laser.mount)
+
+    def found(side: float, share: float) -> dict[str, Any]:
+        R = exp_so3(side * v[:3]) @ mounted.R_body_from_sensor
+        moved = Mounted(R, mounted.lever_arm_body_m + side * v[3:]).settings()
+        block = (share * np.outer(v, v) + 1e-14 * np.eye(6)).tolist()
+        laser = session.session["laser"] | {"mount": moved, "mount_covariance": block}
+        given = parse(SessionConfig, session.session | {"laser": laser}, "session")
+        content: dict[str, Any] = result_of(calibrate_in_memory(given, pool, raw))["mbes"]
+        return content
+
+    less, more = (np.array(found(0.0, share)["covariance_total"]) for share in (1.0, 4.0))
+    growth = (more - less) / 3.0
+    one, other = found(1.0, 1.0), found(-1.0, 1.0)
+    turn = log_so3(np.array(one["R_body_from_mbes"]) @ np.array(other["R_body_from_mbes"]).T)
+    Gv = np.concatenate([turn, np.subtract(one["lever_arm_m"], other["lever_arm_m"])]) / 2.0
+    unit = np.repeat([np.abs(Gv[:3]).max(), np.abs(Gv[3:]).max()], 3)
+    np.testing.assert_allclose(growth / np.outer(unit, unit), np.outer(Gv, Gv) / np.outer(unit, unit), atol=0.15)
