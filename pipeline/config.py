@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from pipeline.errors import ConfigError
+from pipeline.meshes import with_mesh
 from pipeline.parsing import parse, read_yaml
 from pipeline.quantities import (
     Model,
@@ -168,7 +169,7 @@ class PoolConfig(Model):
 # --- reading ---------------------------------------------------------------------------------------------------------
 def load_pool(path: Path) -> PoolConfig:
     """The pool's config, checked."""
-    return parse(PoolConfig, read_yaml(path), str(path))
+    return parse(PoolConfig, with_mesh(read_yaml(path), path), str(path))
 
 
 def load_session(folder: Path) -> SessionConfig:

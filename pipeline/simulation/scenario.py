@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config import Drift, Letters, Mount, Origin, Target, White
+from pipeline.meshes import with_mesh
 from pipeline.parsing import parse, read_yaml
 from pipeline.quantities import Angle, Latency, Length, Lever, Model, NotNegative, Positive, SoundSpeed
 
@@ -182,4 +183,4 @@ class Scenario(Model):
 
 def load_scenario(path: Path | None) -> Scenario:
     """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario."""
-    return Scenario() if path is None else parse(Scenario, read_yaml(path), str(path))
+    return Scenario() if path is None else parse(Scenario, with_mesh(read_yaml(path), path), str(path))
