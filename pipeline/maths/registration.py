@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Closest = Callable[[Array], tuple[Array, NDArray[np.int64]]]  # points -> nearest points on the model, face numbers
 ROUGH = 2000  # points with which starts are scored and settle at first
 WIDE_M, FINE_M = (0.4, 0.3, 0.2, 0.15), (0.1, 0.07, 0.05)  # reaches while roughly settling, and then
+SAME_M = 0.03  # poses that put no point farther apart are one: less than the finest reach
 
 
 class Placement(Protocol):
@@ -211,7 +212,8 @@ def search(
 ) -> Found:
     """Best pose from many starts: all are scored with a wide reach, the best settle and are judged.
 
-    Scored, and settled within the wide reaches, with ROUGH of the points: more do not tell starts apart any better.
+    Scored, and settled within the wide reaches, with ROUGH of the points: more do not tell starts apart any better. Of
+    those that settle together one goes on.
 
     ``starts`` come in groups, of each of which the ``each`` best settle: where blocks repeat, the best of all may lie
     round one wrong height. ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells
@@ -221,9 +223,14 @@ def search(
     chosen = [
         start for group in starts for start in sorted(group, key=lambda p: -score(rough, p, closest, 0.25))[:each]
     ]
-    settled = [
-        settle(placement, settle(rough, start, closest, normals, WIDE_M), closest, normals, FINE_M) for start in chosen
-    ]
+    settled: list[Array] = []
+    placed: list[Array] = []
+    for start in chosen:
+        wide = settle(rough, start, closest, normals, WIDE_M)
+        points = rough.points(wide)
+        if all(np.max(np.abs(points - other)) > SAME_M for other in placed):
+            placed.append(points)
+            settled.append(settle(placement, wide, closest, normals, FINE_M))
     allowed = [p for p in settled if np.all(np.abs(p) <= limits)]
     scored = [(judge(p), p) for p in allowed or settled]
     best_score, best = max(scored, key=lambda one: one[0])
