@@ -16,6 +16,7 @@ from pipeline.maths.trajectory import Trajectory
 from pipeline.maths.unknowns import State, Surface
 from pipeline.scene import Scene
 from pipeline.streams import MemoryPart, Stream
+from tests.effort import often
 
 R_TRUE = Rotation.from_euler("ZXY", np.radians([-2.0, 1.2, -48.8])).as_matrix()
 LEVER_TRUE = np.array([0.3, 0.2, -2.0])
@@ -158,19 +159,21 @@ def test_without_noise_the_truth_comes_back() -> None:
 
 @pytest.mark.parametrize("ins", [QUIET, NOISY], ids=["sensors alone", "INS white noise and drift"])
 def test_errors_are_as_large_as_the_covariance_says(ins: config.Ins) -> None:
-    """Mean normalised squared error of the six over 40 repeats within its 99.9 % band, and each factor near one."""
+    """Mean normalised squared error of the six over repeats within its 99.9 % band, and each factor near one."""
+    repeats = often(16, 40)
     squared, factors, left = [], [], []
-    for seed in range(100, 140):
+    for seed in range(100, 100 + repeats):
         found = solved(seed, ins)
         assert found.converged
         e = error_of(found)
         squared.append(e @ np.linalg.solve(found.solution.covariance[:6, :6], e))
         factors.append(list(found.weighting.factors.values()))
         left.append(found.equations.squares / found.redundancy)
-    low, high = chi2.ppf([0.0005, 0.9995], 6 * 40) / 40
+    low, high = chi2.ppf([0.0005, 0.9995], 6 * repeats) / repeats
     assert low < np.mean(squared) < high
-    np.testing.assert_allclose(np.mean(factors, axis=0), 1.0, atol=0.03)
-    assert np.mean(left) == pytest.approx(1.0, abs=0.01)  # the whole model, poses and all, explains what is there
+    np.testing.assert_allclose(np.mean(factors, axis=0), 1.0, atol=often(0.05, 0.03))
+    # the whole model, poses and all, explains what is there
+    assert np.mean(left) == pytest.approx(1.0, abs=often(0.016, 0.01))
 
 
 def test_drift_taken_for_granted_would_be_seen() -> None:

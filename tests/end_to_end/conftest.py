@@ -46,6 +46,13 @@ def place(small: Path, tmp_path: Path) -> Place:
     return made
 
 
+@pytest.fixture
+def done(place: Place, undisturbed: tuple[Path, Told]) -> Place:
+    """A place whose run is complete; nothing is drawn."""
+    shutil.copytree(undisturbed[0], place.run, ignore=shutil.ignore_patterns("*.html"))
+    return place
+
+
 @pytest.fixture(scope="session")
 def drawn(undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The undisturbed run with its page and recordings. Nobody changes it."""

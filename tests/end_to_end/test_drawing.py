@@ -83,33 +83,31 @@ def test_painters_beside_the_run(place: Place, right: dict[str, str], drawn: Pat
     np.testing.assert_array_equal(points(here), points(there))
 
 
-def test_nothing_is_started_where_nothing_is_to_be_drawn(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert place.calibrate("--report", "--recordings").status == 0
+def test_nothing_is_started_where_nothing_is_to_be_drawn(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert done.calibrate("--report", "--recordings").status == 0
     monkeypatch.setattr(subprocess, "Popen", None)
-    assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").complaints == []
+    assert poolcal(*done.words()[:-1], 2, "--report", "--recordings").complaints == []
 
 
-def test_recordings_are_prepared_as_stages_finish_and_written_after_the_verdict(place: Place) -> None:
+def test_recordings_are_prepared_as_stages_finish_and_written_after_the_verdict(done: Place) -> None:
     """So that they never take the room on the disk that a stage needs."""
-    assert place.calibrate().status == 0
     with painters(report=True, recordings=True, beside=True) as found:
         for stage in ORDER:
-            found.begin(place.run, stage)
+            found.begin(done.run, stage)
         time.sleep(2.0)  # long enough to have prepared some
-        assert not list(place.run.glob("*/*.rrd"))
-        assert not (place.run / "report" / "report.html").exists()
-        assert found.draw(place.run) == []
-    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
-    assert (place.run / "report" / "report.html").is_file()
+        assert not list(done.run.glob("*/*.rrd"))
+        assert not (done.run / "report" / "report.html").exists()
+        assert found.draw(done.run) == []
+    assert sorted(path.stem for path in done.run.glob("*/*.rrd")) == sorted(ORDER)
+    assert (done.run / "report" / "report.html").is_file()
 
 
-def test_what_was_prepared_is_written_only_beside_the_tables_that_it_shows(place: Place) -> None:
-    assert place.calibrate().status == 0
-    shown = (place.run / "ingest" / "manifest.json").read_bytes()
+def test_what_was_prepared_is_written_only_beside_the_tables_that_it_shows(done: Place) -> None:
+    shown = (done.run / "ingest" / "manifest.json").read_bytes()
     current, stale = Prepared(shown, b"prepared"), Prepared(shown + b" ", b"of tables that are gone")
-    assert paint(place.run, ["ingest", "offsets"], prepared={"ingest": current, "offsets": stale}) == []
-    assert (place.run / "ingest" / "ingest.rrd").read_bytes() == b"prepared"
-    assert "/curves/turns/angles" in read(place.run, "offsets")
+    assert paint(done.run, ["ingest", "offsets"], prepared={"ingest": current, "offsets": stale}) == []
+    assert (done.run / "ingest" / "ingest.rrd").read_bytes() == b"prepared"
+    assert "/curves/turns/angles" in read(done.run, "offsets")
 
 
 def test_what_fails_while_stages_run_is_drawn_after_them(place: Place) -> None:
@@ -120,48 +118,45 @@ def test_what_fails_while_stages_run_is_drawn_after_them(place: Place) -> None:
     assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
 
 
-def test_a_painter_that_dies_is_said(place: Place) -> None:
-    assert place.calibrate().status == 0
+def test_a_painter_that_dies_is_said(done: Place) -> None:
     with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(place.run, "adjust")
+        found.begin(done.run, "adjust")
         assert found._process is not None
         found._process.kill()
-        failed = found.draw(place.run)
+        failed = found.draw(done.run)
     assert_all_end()
     assert [(one.what, one.trace) for one in failed] == [("report.html and recordings", "")]
-    assert not list(place.run.rglob("*.new"))
-    assert not list(place.run.rglob("*.partial"))
+    assert not list(done.run.rglob("*.new"))
+    assert not list(done.run.rglob("*.partial"))
 
 
 @pytest.mark.parametrize("wait_s", often([0.3], [0.0, 0.3, 1.0]))
-def test_without_its_copies_it_draws_all_the_same(place: Place, wait_s: float) -> None:
+def test_without_its_copies_it_draws_all_the_same(done: Place, wait_s: float) -> None:
     """They may be killed at any moment, by a system short of memory: while they load, or with a picture half done."""
-    assert place.calibrate().status == 0
     with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(place.run, "georeference")
+        found.begin(done.run, "georeference")
         deadline = time.monotonic() + 60
         while len(copies := _children(found)) < 2 and time.monotonic() < deadline:
             time.sleep(0.005)
         time.sleep(wait_s)
         for copy in copies:
             os.kill(copy, signal.SIGKILL)
-        assert found.draw(place.run) == []
-    assert (place.run / "report" / "report.html").is_file()
-    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
+        assert found.draw(done.run) == []
+    assert (done.run / "report" / "report.html").is_file()
+    assert sorted(path.stem for path in done.run.glob("*/*.rrd")) == sorted(ORDER)
 
 
 @pytest.mark.parametrize("wait_s", often([0.001], [0.0, 0.001, 0.01]))
-def test_a_painter_killed_while_it_forks_leaves_nothing(place: Place, wait_s: float) -> None:
-    assert place.calibrate().status == 0
+def test_a_painter_killed_while_it_forks_leaves_nothing(done: Place, wait_s: float) -> None:
     with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(place.run, "georeference")
+        found.begin(done.run, "georeference")
         assert found._process is not None
         deadline = time.monotonic() + 60
         while not _children(found) and time.monotonic() < deadline:
             pass
         time.sleep(wait_s)
         found._process.kill()
-        assert [one.trace for one in found.draw(place.run)] == [""]
+        assert [one.trace for one in found.draw(done.run)] == [""]
     assert_all_end()
 
 
@@ -206,17 +201,16 @@ def test_nothing_in_the_working_directory_is_run(place: Place) -> None:
     assert not (place.folder / "run by mistake").exists()
 
 
-def test_a_full_disk_is_one_line_and_no_stump(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert place.calibrate().status == 0
+def test_a_full_disk_is_one_line_and_no_stump(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
 
     def full(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    failed = Painters(report=False, recordings=True).draw(place.run)
+    failed = Painters(report=False, recordings=True).draw(done.run)
     assert [one.trace for one in failed] == [""]
     assert "make room" in failed[0].reason
-    assert not [path for path in place.run.rglob("*") if path.suffix in (".rrd", ".new", ".partial")]
+    assert not [path for path in done.run.rglob("*") if path.suffix in (".rrd", ".new", ".partial")]
 
 
 def test_no_room_for_another_process(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -228,13 +222,13 @@ def test_no_room_for_another_process(place: Place, monkeypatch: pytest.MonkeyPat
     assert (place.run / "report" / "report.html").is_file()
 
 
-def test_nothing_missing_nothing_said(place: Place) -> None:
+def test_nothing_missing_nothing_said(done: Place) -> None:
     """A folder that is in use, or that cannot be written, is looked at all the same."""
-    assert place.calibrate("--recordings").status == 0
-    with locked(place.run, ORDER):
-        assert Painters(report=False, recordings=True).draw(place.run) == []
-        (place.run / "adjust" / "adjust.rrd").unlink()
-        (failed,) = Painters(report=False, recordings=True).draw(place.run)
+    assert done.calibrate("--recordings").status == 0
+    with locked(done.run, ORDER):
+        assert Painters(report=False, recordings=True).draw(done.run) == []
+        (done.run / "adjust" / "adjust.rrd").unlink()
+        (failed,) = Painters(report=False, recordings=True).draw(done.run)
     assert "is in use" in failed.reason
 
 

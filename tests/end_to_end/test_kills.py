@@ -1,4 +1,4 @@
-"""Two kills, one of a first run and one over an earlier result: a few of the campaign of tools/kill_campaign.py."""
+"""A kill of a first run, and one over an earlier result: a few of the campaign of tools/kill_campaign.py."""
 
 from pathlib import Path
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.effort import often
 from tests.end_to_end.places import Place, digests, poolcal, poolcal_process
 
 NAMES = [
@@ -16,7 +17,7 @@ NAMES = [
 ]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", often(NAMES[:2], NAMES))
 def test_names(name: str, small: Path, tmp_path: Path, right: dict[str, str]) -> None:
     """Session folder, session, raw files and run folder all called so: the same tables, the name in the result."""
     place = Place(small, tmp_path)

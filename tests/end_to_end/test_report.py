@@ -141,80 +141,78 @@ def test_names_stay_names(place: Place) -> None:
     assert all(attributes.keys() == {"class", "alt", "src"} for attributes in page.named("img"))
 
 
-def test_a_rejected_session_says_why_and_what_is_not_there(place: Place) -> None:
+def test_a_rejected_session_says_why_and_what_is_not_there(done: Place) -> None:
     """One pass alone, and limits that nothing keeps."""
-    place.edit_config("verdict", max_sigma_deg=1e-6)
-    told = place.calibrate("--report")
+    done.edit_config("verdict", max_sigma_deg=1e-6)
+    told = done.calibrate("--report")
     assert told.status == 1
-    page, result = page_of(place.run), result_of(place.run)
+    page, result = page_of(done.run), result_of(done.run)
     assert page.text.index("rejected") < page.text.index("coarse")
     for reason in result["reasons"]:
         assert reason in page.text
     assert "must not be used" in page.text
 
 
-def test_drawn_again_only_with_cause(place: Place) -> None:
-    assert place.calibrate("--report").status == 0
-    path = place.run / "report" / "report.html"
+def test_drawn_again_only_with_cause(done: Place) -> None:
+    assert done.calibrate("--report").status == 0
+    path = done.run / "report" / "report.html"
     before = path.read_bytes()
     written = path.stat().st_mtime_ns
-    assert place.calibrate("--report").status == 0
+    assert done.calibrate("--report").status == 0
     assert path.stat().st_mtime_ns == written
     path.unlink()
-    assert Painters(report=True, recordings=False).draw(place.run) == []
+    assert Painters(report=True, recordings=False).draw(done.run) == []
     assert path.read_bytes() == before  # the same run, the same page
-    place.edit_config("ingest", max_gap_s=4.9)  # changes no pass here, and no input of the report
-    assert place.calibrate("--report").status == 0
-    changed = {row[1]: row[2] for row in page_of(place.run).table("file", "key")}
+    done.edit_config("ingest", max_gap_s=4.9)  # changes no pass here, and no input of the report
+    assert done.calibrate("--report").status == 0
+    changed = {row[1]: row[2] for row in page_of(done.run).table("file", "key")}
     assert changed["ingest.max_gap_s"] == "4.9"
-    assert poolcal("verify", place.run).status == 0
+    assert poolcal("verify", done.run).status == 0
 
 
-def test_stages_that_do_not_agree_are_not_drawn_together(place: Place) -> None:
-    assert place.calibrate("--report").status == 0
-    path = place.run / "report" / "report.html"
+def test_stages_that_do_not_agree_are_not_drawn_together(done: Place) -> None:
+    assert done.calibrate("--report").status == 0
+    path = done.run / "report" / "report.html"
     before = path.read_bytes()
-    place.edit_config("segment", margin_m=0.06)
-    words = ("--session", place.session, "--config", place.config)
-    assert poolcal("stage", "segment", place.run, *words, "--report").status == 0
+    done.edit_config("segment", margin_m=0.06)
+    words = ("--session", done.session, "--config", done.config)
+    assert poolcal("stage", "segment", done.run, *words, "--report").status == 0
     assert path.read_bytes() == before
     for name in ORDER[ORDER.index("segment") + 1 :]:
-        assert poolcal("stage", name, place.run, "--report").status == 0
+        assert poolcal("stage", name, done.run, "--report").status == 0
     assert path.read_bytes() != before
 
 
-def test_settings_that_were_not_used_are_not_shown(place: Place) -> None:
+def test_settings_that_were_not_used_are_not_shown(done: Place) -> None:
     """run.yaml may be newer than the results: then nothing is drawn, and nothing is compared."""
-    assert place.calibrate().status == 0
-    place.edit_session("mbes", mount={"roll_deg": -20.0})
-    words = ("--session", place.session, "--config", place.config, "--report", "--recordings")
-    assert poolcal("stage", "ingest", place.run, *words).status == 0
-    assert not (place.run / "report" / "report.html").exists()
-    assert [path.stem for path in place.run.glob("*/*.rrd")] == ["ingest"]
-    told = poolcal("diff", place.run, place.run)
+    done.edit_session("mbes", mount={"roll_deg": -20.0})
+    words = ("--session", done.session, "--config", done.config, "--report", "--recordings")
+    assert poolcal("stage", "ingest", done.run, *words).status == 0
+    assert not (done.run / "report" / "report.html").exists()
+    assert [path.stem for path in done.run.glob("*/*.rrd")] == ["ingest"]
+    told = poolcal("diff", done.run, done.run)
     assert (told.status, len(told.err.splitlines())) == (2, 1)
     assert "was made from other settings or results" in told.err
 
 
-def test_what_lies_in_the_pages_place_is_no_matter(place: Place) -> None:
-    assert place.calibrate().status == 0
-    path = place.run / "report" / "report.html"
+def test_what_lies_in_the_pages_place_is_no_matter(done: Place) -> None:
+    path = done.run / "report" / "report.html"
     for content in (b"\xff\xfe", b"", "·".encode()[:1]):
         path.write_bytes(content)
-        told = place.calibrate("--report")
+        told = done.calibrate("--report")
         assert (told.status, told.complaints) == (0, [])
-        assert "accepted" in page_of(place.run).text
-    outside = place.folder / "outside.txt"
+        assert "accepted" in page_of(done.run).text
+    outside = done.folder / "outside.txt"
     outside.write_text("mine")
     path.unlink()
     path.with_name("report.html.new").symlink_to(outside)
-    assert place.calibrate("--report").complaints == []
+    assert done.calibrate("--report").complaints == []
     assert outside.read_text() == "mine"
     assert not path.is_symlink()
 
 
 def test_a_page_that_cannot_be_drawn_spoils_nothing(
-    place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch
+    done: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import pipeline.pages.report
 
@@ -222,15 +220,15 @@ def test_a_page_that_cannot_be_drawn_spoils_nothing(
         raise ValueError("no ink")
 
     monkeypatch.setattr(pipeline.pages.report, "page", fails)
-    told = place.calibrate("--report")
+    told = done.calibrate("--report")
     assert told.status == 0
     assert told.complaints[-1] == "report.html: not drawn (ValueError: no ink); the calibration is complete"
     assert "Traceback" in told.err
-    assert digests(place.run) == right
-    assert not (place.run / "report" / "report.html").exists()
+    assert digests(done.run) == right
+    assert not (done.run / "report" / "report.html").exists()
     assert "report.html" not in told.out
     monkeypatch.undo()
-    assert f"Report: {place.run / 'report' / 'report.html'}" in place.calibrate("--report").out
+    assert f"Report: {done.run / 'report' / 'report.html'}" in done.calibrate("--report").out
 
 
 def test_compared_as_a_page(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:

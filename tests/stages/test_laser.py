@@ -15,6 +15,7 @@ from pipeline.parsing import parse, read_yaml
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
 from stages.campaign import calibrate_in_memory
+from tests.effort import often
 from tests.stages.conftest import THIN, made, merged
 from tests.stages.test_faces import SCENARIOS
 
@@ -53,7 +54,7 @@ def errors(result: dict[str, Any], truth: dict[str, Any]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("drift", [{}, DRIFT], ids=["white noise", "drift"])
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", often([2], [2, 3]))
 def test_a_mount_wrong_by_three_tenths_of_a_degree_and_3_cm_comes_back(drift: dict[str, Any], seed: int) -> None:
     session = made(OFF, drift, seed=seed)
     fit = EXACT | {"hold_share": 1.0}

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.effort import often
 from tests.stages.conftest import QUIET, calibrated, made
 
 ORIGIN = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}
@@ -29,7 +30,7 @@ def test_without_noise_the_truth_comes_back_and_the_sequential_form_is_biased(qu
     assert sequential[4] > 1.0
 
 
-@pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.parametrize("seed", often([12], [11, 12, 13]))
 def test_with_noise_the_errors_are_as_the_sigmas_say(seed, errors_of):
     session = made(seed=seed)
     result = blocks(calibrated(session))
@@ -45,11 +46,14 @@ def test_with_noise_the_errors_are_as_the_sigmas_say(seed, errors_of):
 
 @pytest.mark.parametrize(
     ("azimuth_deg", "low_side", "letters"),
-    [
-        (47.0, "south", (8.0, 3.0, 1.0, 0.5)),
-        (-163.0, "north", (8.0, 3.0, 1.0, 0.5)),
-        (0.0, "north", (6.0, 2.4, 0.8, 0.4)),
-    ],
+    often(
+        [(-163.0, "north", (6.0, 2.4, 0.8, 0.4))],
+        [
+            (47.0, "south", (8.0, 3.0, 1.0, 0.5)),
+            (-163.0, "north", (8.0, 3.0, 1.0, 0.5)),
+            (0.0, "north", (6.0, 2.4, 0.8, 0.4)),
+        ],
+    ),
 )
 def test_other_pools(azimuth_deg, low_side, letters, errors_of):
     a, b, c, e = letters
@@ -62,7 +66,7 @@ def test_other_pools(azimuth_deg, low_side, letters, errors_of):
     assert error[3:].max() < 0.01
 
 
-@pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=6))[::9])
+@pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=6))[:: often(27, 9)])
 def test_coarse_values_wrong_on_every_axis_at_once(noisy, noisy_found, signs):
     """2.5 degrees and 0.25 m: 0.6 m at 8 m, with blocks every metre. Every ninth combination; the rest in campaigns."""
     truth = noisy.truth["mbes"]["mount"]
