@@ -263,6 +263,20 @@ def history(
 
 
 @app.command()
+def check(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", help="folder with session.yaml and the raw files")],
+    config: Annotated[Path | None, typer.Option(metavar="CONFIG", help="the pool's YAML file: where it is")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON, for programs")] = False,
+) -> int:
+    """Look into a session's files before calibrating, in seconds. Status 1 if something is wrong."""
+    from stages.check import check as check_of
+
+    said, wrong = check_of(session, config, as_json)
+    say(said, sys.stdout)
+    return 1 if wrong else 0
+
+
+@app.command()
 def plan(
     file: Annotated[Path, typer.Argument(metavar="PLAN", help="YAML file: passes, and what else README.md says")],
     session: Annotated[Path, typer.Option("--session", metavar="SESSION", help="folder with session.yaml")],

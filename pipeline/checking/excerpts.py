@@ -1,0 +1,83 @@
+"""Large files read in pieces: parts over evenly spread stretches, or over a short copy made of head, pieces and tail.
+
+LAS is read at any point. The readers of binary logs find their next record after a cut, so that a copy of some pieces
+in order is a log with holes; pieces of SBET are cut between records, of texts between lines. Other files (E57, Parquet)
+are read from their start for as long as allowed: of those the end stays unseen.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from pipeline.config import Ins, Laser, Mbes
+from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.las import LasPart
+from pipeline.readers.sbet import RECORD
+from pipeline.streams import Part
+
+POINTS = 4_000_000  # of a laser, over all its files
+STRETCH = 8_192  # points read at one place
+PACKED_STRETCH, PACKED_PLACES = 50_000, 24  # of LAZ each place costs a process
+BYTES = {"ins": 64 << 20, "mbes": 24 << 20}  # of a sensor, over all its files
+PLACES = 128
+HEAD = 1 << 18  # at least so much of a file's start
+LOGS = ("novatel", "r2sonic", "gsf", "kmall")
+TEXTS = ("inertial_explorer",)
+
+
+def stretches(parts: Sequence[LasPart], files: int) -> tuple[list[Part], float]:
+    """Parts over some stretches of one LAS file, and the share of its points in them."""
+    total = sum(part.stop - part.start for part in parts)
+    packed = any(part.compressed for part in parts)
+    if total <= POINTS // files:
+        return list(parts), 1.0
+    each = PACKED_STRETCH if packed else STRETCH
+    places = max(3, (PACKED_PLACES if packed else POINTS // STRETCH) // files)
+    if places * each >= total:
+        return list(parts), 1.0
+    found: list[Part] = []
+    for start in np.linspace(0, total - each, places).astype(int).tolist():
+        part = next(part for part in parts if part.start <= start < part.stop)
+        last = start + each >= total
+        found.append(replace(part, start=start, stop=min(start + each, part.stop), missing=part.missing * last))
+    return found, places * each / total
+
+
+def excerpt(
+    path: Path, name: str, sensor: str, settings: Ins | Laser | Mbes, files: int, folder: Path
+) -> tuple[Path, float]:
+    """A short copy in ``folder``, and the share of the file in it; the file itself where it is short, or cannot be cut.
+    """
+    allowed = BYTES.get(sensor, 0) // files
+    with opened(path, name) as file:
+        size = size_of(file)
+        if size <= max(allowed, 2 * HEAD) or settings.format not in (*LOGS, *TEXTS, "sbet"):
+            return path, 1.0
+        copy = folder / f"{sensor}{len(list(folder.iterdir()))}"
+        each = max(allowed // PLACES, HEAD // 4)
+        with copy.open("wb") as out:
+            for piece in _pieces(file, size, each, max(2, allowed // each), settings.format):
+                out.write(piece)
+        return copy, copy.stat().st_size / size
+
+
+def _pieces(file: BinaryIO, size: int, each: int, places: int, form: str) -> Iterator[bytes]:
+    yield from _cut(file, 0, HEAD, form)
+    for start in np.linspace(HEAD, size - each, places).astype(int).tolist():
+        yield from _cut(file, start, each, form)
+
+
+def _cut(file: BinaryIO, start: int, count: int, form: str) -> Iterator[bytes]:
+    if form == "sbet":
+        start, count = -(-start // RECORD) * RECORD, count // RECORD * RECORD
+        data = read_at(file, start, count)
+        yield data[: len(data) // RECORD * RECORD]
+    elif form in TEXTS:
+        data = read_at(file, start, count)
+        first = data.find(b"\n") + 1 if start else 0
+        yield data[first : data.rfind(b"\n") + 1]
+    else:
+        yield read_at(file, start, count)

@@ -1,0 +1,145 @@
+"""Questions to the files by themselves: can they be read, do they hold what they should, is one there twice."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from pipeline.checking.finding import Finding, plural
+from pipeline.checking.survey import SENSORS, Seen
+from pipeline.config import SessionConfig
+from pipeline.times import utc_text
+
+SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock
+TWICE = 0.5  # of a file's time in another one: recorded twice
+CUT = ("truncated", "truncated message", "truncated packet", "truncated record", "truncated datagram")
+FAR_M = 10_000.0  # from a scanner: coordinates of a CRS
+SPEEDS_M_S = (1400.0, 1560.0)
+DIFFERENT_M_S = 5.0
+
+
+def unreadable(files: Sequence[Seen], wrong: Sequence[str]) -> Iterator[Finding]:
+    """Lists that name nothing, files that a reader refuses, that are cut off, or hold nothing of use."""
+    for words in wrong:
+        yield Finding("files", words)
+    for seen in files:
+        if seen.complaint:
+            yield Finding("file", seen.complaint)
+            continue
+        cut = {reason: seen.dropped[reason] for reason in CUT if seen.dropped[reason]}
+        if cut and seen.share == 1.0:
+            lost = ", ".join(f"{number} x {reason}" for reason, number in cut.items())
+            yield Finding("cut off", f"{seen.name}: ends in the middle of a record ({lost}); copy it again")
+        if not seen.records:
+            why = ", ".join(f"{n} x {reason}" for reason, n in sorted(seen.dropped.items()) if n) or "it is empty"
+            yield Finding("no records", f"{seen.name}: no usable {seen.sensor} record ({why}); log or export it again")
+
+
+def twice(files: Sequence[Seen]) -> Iterator[Finding]:
+    """Files of one sensor that hold the same time."""
+    for one, other in combinations([seen for seen in files if len(seen.epochs_ns) > 1], 2):
+        if one.sensor != other.sensor:
+            continue
+        first = max(one.span_ns[0], other.span_ns[0])
+        last = min(one.span_ns[1], other.span_ns[1])
+        inside = [int(np.count_nonzero((s.epochs_ns >= first) & (s.epochs_ns <= last))) for s in (one, other)]
+        shares = [count / len(s.epochs_ns) for count, s in zip(inside, (one, other), strict=True)]
+        if first >= last or max(shares) < TWICE:
+            continue
+        same = one.records == other.records and np.array_equal(one.epochs_ns, other.epochs_ns)
+        what = "is the same recording" if same else f"holds {max(shares):.0%} of the same time"
+        advice = f"take one of them out of {one.sensor}.files"
+        yield Finding("twice", f"{other.name}: {what} as {one.name}, from {utc_text(first)}; {advice}")
+
+
+def ins_rate(files: Sequence[Seen]) -> Iterator[Finding]:
+    for seen in files:
+        if seen.sensor == "ins" and seen.rate_hz < SLOWEST_HZ:
+            yield Finding(
+                "ins rate",
+                f"{seen.name}: the INS was logged at {seen.rate_hz:.1f} Hz, which is too slow for a boat that rolls; "
+                "log it at 100 Hz or more",
+            )
+
+
+def alignment(files: Sequence[Seen]) -> Iterator[Finding]:
+    """An INS without a solution for most of its log."""
+    of_ins = [seen for seen in files if seen.sensor == "ins" and seen.records]
+    dropped = sum((seen.dropped for seen in of_ins), Counter[str]())
+    bad = {reason: number for reason, number in dropped.items() if reason.startswith("ins status")}
+    used = sum(round(seen.records * seen.share) for seen in of_ins)
+    if sum(bad.values()) > used:
+        why = ", ".join(f"{number} x {reason.removeprefix('ins status ')}" for reason, number in sorted(bad.items()))
+        yield Finding(
+            "alignment",
+            f"{of_ins[0].name}: the INS has no solution in most of its records ({why}; {used} are usable); "
+            "let it align before the first pass",
+        )
+
+
+def frames(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
+    """Points in a CRS that are declared as the scanner's own, and the reverse."""
+    for seen in files:
+        if seen.sensor != "laser" or not len(seen.columns.get("x_m", ())):
+            continue
+        away = float(np.median(np.sqrt(sum(seen.columns[axis] ** 2 for axis in ("x_m", "y_m", "z_m")))))
+        if session.laser.frame == "laser" and away > FAR_M:
+            yield Finding(
+                "frame",
+                f"{seen.name}: its points lie {away:.4g} m from their origin, but laser.frame is laser: they are "
+                "georeferenced, or in mm; write their CRS into laser.frame, or export them in the scanner's own frame",
+            )
+        elif session.laser.frame == "EPSG:4978" and away < FAR_M:
+            yield Finding(
+                "frame",
+                f"{seen.name}: its points lie {away:.4g} m from their origin, but laser.frame is EPSG:4978 (from the "
+                "earth's centre): write laser.frame: laser if they are in the scanner's own frame",
+            )
+
+
+def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
+    """Recorded sound speeds that no pool has, that differ from file to file, or that look like a default."""
+    if session.mbes is None:
+        return
+    speeds = {seen.name: seen.columns["sound_speed_m_s"] for seen in files if seen.sensor == "mbes" and seen.columns}
+    medians = {name: float(np.median(values)) for name, values in speeds.items() if len(values)}
+    low, high = SPEEDS_M_S
+    for name, speed in medians.items():
+        if not low <= speed <= high and session.mbes.sound_speed_m_s is None:
+            yield Finding(
+                "sound speed",
+                f"{name}: the sonar worked with a sound speed of {speed:.1f} m/s, outside {low:.0f} to {high:.0f}: "
+                "give the measured one as mbes.sound_speed_m_s",
+            )
+    yield from _differing(medians)
+    cast = session.mbes.svp
+    if cast is not None and session.mbes.sound_speed_m_s is None and medians:
+        measured = float(np.median([speed for _, speed in cast]))
+        worked = float(np.median(list(medians.values())))
+        if abs(measured - worked) > DIFFERENT_M_S:
+            yield Finding(
+                "sound speed",
+                f"mbes: the sonar worked with {worked:.1f} m/s, the cast in mbes.svp has {measured:.1f} m/s: see that "
+                "it is this day's cast",
+                "look",
+            )
+
+
+def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:
+    if medians and max(medians.values()) - min(medians.values()) > DIFFERENT_M_S:
+        slow, fast = min(medians, key=lambda name: medians[name]), max(medians, key=lambda name: medians[name])
+        yield Finding(
+            "sound speed",
+            f"{fast}: sound speed {medians[fast]:.1f} m/s, but {medians[slow]:.1f} m/s in {slow}: one water has one "
+            "sound speed; give the measured one as mbes.sound_speed_m_s",
+        )
+
+
+def missing_sensors(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
+    """A sensor of which no file at all can be used."""
+    for sensor in SENSORS:
+        if getattr(session, sensor) is not None and not any(s.records for s in files if s.sensor == sensor):
+            many = plural(sum(s.sensor == sensor for s in files), "file")
+            yield Finding("no records", f"{sensor}: none of its {many} can be used; mend or replace them")
+

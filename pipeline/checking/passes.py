@@ -1,0 +1,128 @@
+"""Questions to the track: is the boat where the target is, does it pass it as it should, did everything run."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.checking.finding import Finding, plural
+from pipeline.checking.survey import Columns, Seen
+from pipeline.checking.track import Track
+from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
+from pipeline.maths.targets import TargetModel
+from pipeline.times import NS, utc_text
+
+Times = NDArray[np.int64]
+ASTRAY_M = 1_000.0
+NEARBY_M = 60.0
+HIGHEST_M = 15.0  # of the INS above the target's upper end, or below its lower one
+ALIKE_M = 0.5  # passes whose distances differ by less tell yaw and lever arm badly apart
+RAN, NOT = 0.6, 0.2  # of a pass: a sensor ran, or did not
+HOLE_S = 0.3  # without the INS while a sensor saw the target
+
+
+def place(ins: Columns, pool: config.PoolConfig, model: TargetModel) -> Iterator[Finding]:
+    """The track against target.origin; a finding here leaves nothing to ask about the target."""
+    origin = pool.target.origin
+    away = _away_m(ins, origin.latitude_deg, origin.longitude_deg)
+    if away > ASTRAY_M:
+        given = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
+        middle = np.degrees([np.median(ins["latitude_rad"]), np.median(ins["longitude_rad"])])
+        track = f"the INS's track ({middle[0]:.5f}, {middle[1]:.5f})"
+        words = f"target.origin ({given}) is {away / 1000:.4g} km from {track}: {_why_astray(ins, origin)}"
+        yield Finding("origin", words)
+    elif away > NEARBY_M:
+        yield Finding("origin", f"the INS never comes nearer to target.origin than {away:.0f} m; check target.origin")
+    above = float(np.median(ins["height_m"])) - origin.height_m
+    low, high = model.bounds()
+    if away <= ASTRAY_M and not low[2] - HIGHEST_M <= above <= high[2] + HIGHEST_M:
+        yield Finding(
+            "height",
+            f"the INS runs {abs(above):.1f} m {'above' if above > 0 else 'below'} target.origin.height_m = "
+            f"{origin.height_m:g}: one of the two is above sea level, not above the ellipsoid (the undulation would be "
+            f"{abs(above):.0f} m, less the INS's height above the origin); give both ellipsoidal",
+        )
+
+
+def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
+    """Nearest horizontal distance of the track from a place."""
+    if not -90 <= latitude_deg <= 90:
+        return np.inf
+    frame = PoolFrame.at(np.radians(latitude_deg), np.radians(longitude_deg), 0.0, 0.0)
+    level = ecef_from_geodetic(ins["latitude_rad"], ins["longitude_rad"], np.zeros(len(ins["t_ns"])))
+    return float(np.linalg.norm(frame.points_from_ecef(level), axis=1).min())
+
+
+def _why_astray(ins: Columns, origin: config.Origin) -> str:
+    latitude, longitude = origin.latitude_deg, origin.longitude_deg
+    for words, place in (
+        ("latitude and longitude are exchanged", (longitude, latitude)),
+        ("latitude_deg has the wrong sign", (-latitude, longitude)),
+        ("longitude_deg has the wrong sign", (latitude, -longitude)),
+        ("latitude_deg and longitude_deg have the wrong sign", (-latitude, -longitude)),
+    ):
+        if _away_m(ins, *place) < ASTRAY_M:
+            return f"{words}; mend it"
+    return "check target.origin, and that these are this pool's files"
+
+
+def sailing(track: Track) -> Iterator[Finding]:
+    """Passes on the wrong side, none at all, all at one distance."""
+    sounded = [leg for leg in track.legs if max(leg.ran.values()) > NOT]
+    if not track.legs:
+        yield Finding("passes", "the boat never passes the target: check target.origin and target.azimuth_deg")
+    elif not any(leg.good for leg in track.legs):
+        why = "behind the target" if all(leg.distance_m < 0 for leg in track.legs) else "with the target to port"
+        yield Finding(
+            "side",
+            f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')} the boat sails {why}: sail with its "
+            "front to starboard, or turn target.azimuth_deg by 180°",
+        )
+    distances = [leg.distance_m for leg in sounded if leg.good]
+    if distances and np.ptp(distances) < ALIKE_M:
+        yield Finding(
+            "distances",
+            f"all passes are {np.mean(distances):.1f} m from the wall (within {np.ptp(distances):.1f} m): yaw and "
+            "lever arm y are told apart by different distances; sail some more, 2 m nearer or farther",
+            "look",
+        )
+
+
+def missing(track: Track, files: Sequence[Seen]) -> Iterator[Finding]:
+    """A pass of which one sensor has nothing, or not all."""
+    there = {seen.sensor for seen in files if seen.records and seen.ended}
+    for leg in track.legs:
+        if not leg.good or not {"laser", "mbes"} <= there:
+            continue
+        for one, other in (("laser", "mbes"), ("mbes", "laser")):
+            when = f"{utc_text(leg.start_ns)}, at {leg.distance_m:.1f} m"
+            if leg.ran[one] >= RAN and leg.ran[other] < RAN:
+                part = "did not run" if leg.ran[other] < NOT else f"ran for only {leg.ran[other]:.0%} of the time"
+                yield Finding(
+                    "missing pass",
+                    f"{other}: {part} in the pass of {when}, while {one} did: find its file, or sail the pass again",
+                )
+
+
+def holes(track: Track, epochs: dict[str, Times], max_interval_s: float, coarse_ns: float) -> Iterator[Finding]:
+    """Holes in the INS's log while the boat was by the target and a sensor ran."""
+    t_ns, y = track.trajectory.t_ns, track.trajectory.positions_m[:, 1]
+    by = [np.abs(y[(t_ns >= leg.start_ns) & (t_ns <= leg.end_ns)]).max() for leg in track.legs]
+    reach = float(max(by, default=0.0))
+    first = np.flatnonzero(np.diff(t_ns) > max(max_interval_s * NS, 1.5 * coarse_ns))
+    runs = np.unique(np.concatenate([np.empty(0, np.int64), *epochs.values()]))
+    lost = []
+    for k in first.tolist():
+        ran = np.count_nonzero((runs > t_ns[k]) & (runs < t_ns[k + 1]))
+        beside = min(y[k], y[k + 1]) < reach and max(y[k], y[k + 1]) > -reach and y[k + 1] >= y[k]
+        if ran and beside and (t_ns[k + 1] - t_ns[k]) / NS >= HOLE_S:
+            lost.append((int(t_ns[k]), (t_ns[k + 1] - t_ns[k]) / NS))
+    if lost:
+        longest = max(lost, key=lambda hole: hole[1])
+        yield Finding(
+            "ins hole",
+            f"ins: {plural(len(lost), 'hole')} in its log while the boat passed the target, "
+            f"{sum(s for _, s in lost):.1f} s together, the longest {longest[1]:.1f} s from {utc_text(longest[0])}: "
+            "points in them are lost; log without pause, or give the files that are missing",
+        )

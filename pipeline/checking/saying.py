@@ -1,0 +1,79 @@
+"""What was seen and found, for people and for programs."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from pipeline.checking.examine import Examined
+from pipeline.checking.survey import Seen
+from pipeline.times import utc_text
+
+
+def text(examined: Examined) -> str:
+    """Files, passes, findings."""
+    width = max([4, *(len(seen.name) for seen in examined.files)])
+    lines = [f"{'sensor':<7}{'file':<{width + 2}}{'kind':<24}{'records':>11}  {'from (UTC)':<21}{'to':<10}{'rate':>9}"]
+    lines += [_file_line(seen, width) for seen in examined.files]
+    if any(seen.share < 1 or not seen.ended for seen in examined.files):
+        lines.append("~: read in part")
+    if examined.legs:
+        head = f"{'pass':<6}{'from (UTC)':<22}{'seconds':>8}{'distance':>10}{'speed':>10}{'laser':>8}{'sonar':>8}"
+        lines += ["", head]
+    for number, leg in enumerate(examined.legs):
+        seconds = (leg.end_ns - leg.start_ns) / 1e9
+        side = "" if leg.good else "  the wall is not to starboard"
+        lines.append(
+            f"{number:<6}{utc_text(leg.start_ns):<22}{seconds:>8.1f}{leg.distance_m:>8.2f} m{leg.speed_m_s:>6.2f} m/s"
+            f"{leg.ran['laser']:>8.0%}{leg.ran['mbes']:>8.0%}{side}"
+        )
+    lines.append("")
+    for severity, head in (("fault", "Wrong"), ("look", "But look")):
+        lines += [f"{head}: {one.words}." for one in examined.findings if one.severity == severity]
+    if not examined.findings:
+        lines.append("Nothing found.")
+    return "\n".join(lines)
+
+
+def _file_line(seen: Seen, width: int) -> str:
+    about = "" if seen.share == 1.0 and seen.ended else "~"
+    first, last = (utc_text(t) for t in seen.span_ns) if len(seen.epochs_ns) else ("-", "-")
+    last = last[11:] if last[:10] == first[:10] else last
+    rate = f"{seen.rate_hz:.4g} Hz" if np.isfinite(seen.rate_hz) else "-"
+    records = f"{about}{seen.records}"
+    return f"{seen.sensor:<7}{seen.name:<{width + 2}}{seen.kind:<24}{records:>11}  {first:<21}{last:<10}{rate:>9}"
+
+
+def as_json(examined: Examined) -> str:
+    """The same, times as GPS nanoseconds."""
+    content: dict[str, Any] = {
+        "faulty": examined.faulty,
+        "findings": [{"question": f.question, "severity": f.severity, "words": f.words} for f in examined.findings],
+        "files": [
+            {
+                "sensor": seen.sensor,
+                "file": seen.name,
+                "kind": seen.kind,
+                "bytes": seen.size,
+                "share_read": seen.share if seen.ended else None,
+                "records": seen.records,
+                "dropped": {reason: number for reason, number in sorted(seen.dropped.items()) if number},
+                "first_ns": seen.span_ns[0] if len(seen.epochs_ns) else None,
+                "last_ns": seen.span_ns[1] if len(seen.epochs_ns) else None,
+                "rate_hz": seen.rate_hz if np.isfinite(seen.rate_hz) else None,
+            }
+            for seen in examined.files
+        ],
+        "passes": [
+            {
+                "start_ns": leg.start_ns,
+                "end_ns": leg.end_ns,
+                "distance_m": leg.distance_m,
+                "speed_m_s": leg.speed_m_s,
+                "good": leg.good,
+                "ran": dict(leg.ran),
+            }
+            for leg in examined.legs
+        ],
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False)

@@ -1,0 +1,191 @@
+"""Every file of a session looked into: what it is, when it begins and ends, how fast it runs, samples of its rows."""
+
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.checking.excerpts import excerpt, stretches
+from pipeline.errors import ConfigError, RawDataError
+from pipeline.readers import Sensor, Settings, detect, raw_files, raw_parts
+from pipeline.readers.las import LasPart
+from pipeline.sampling import every_nth
+from pipeline.streams import Part
+from pipeline.times import NS
+
+Columns = dict[str, NDArray[Any]]
+Times = NDArray[np.int64]
+SENSORS: tuple[Sensor, ...] = ("ins", "laser", "mbes")
+MOST_ROWS = 6_000_000  # read of one file that cannot be cut
+KEPT = 200_000  # rows kept of a file of points or soundings
+TICK_NS = NS // 20  # of the laser's times one in each such interval is kept
+
+
+@dataclass(frozen=True)
+class Seen:
+    """One file. ``share``: how much of it was read; ``ended``: its end was among that; ``epochs_ns``: times of records
+    or pings, of a laser one a tick; ``columns``: sampled rows, of an INS all; ``complaint``: why it could not be read.
+    """
+
+    sensor: Sensor
+    name: str
+    size: int
+    kind: str = "unreadable"
+    share: float = 1.0
+    ended: bool = True
+    records: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+    epochs_ns: Times = field(default_factory=lambda: np.empty(0, np.int64))
+    columns: Columns = field(default_factory=dict)
+    complaint: str = ""
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        return int(self.epochs_ns[0]), int(self.epochs_ns[-1])
+
+    @property
+    def step_ns(self) -> float:
+        """Usual time from one epoch to the next."""
+        return float(np.median(np.diff(self.epochs_ns))) if len(self.epochs_ns) > 1 else np.nan
+
+    @property
+    def rate_hz(self) -> float:
+        """Records of the INS, pings, points."""
+        if self.sensor != "laser":
+            return NS / self.step_ns
+        seconds = (self.epochs_ns[-1] - self.epochs_ns[0]) / NS if len(self.epochs_ns) > 1 else 0.0
+        return self.records / seconds if seconds > 0 else np.nan
+
+    @property
+    def coarseness_ns(self) -> float:
+        """A longer time without an epoch is a hole, not one between two pieces that were read."""
+        steps = np.diff(self.epochs_ns)
+        between = steps[steps > 5 * np.median(steps)] if self.share < 1.0 and len(steps) else steps[:0]
+        return 3 * float(np.median(between)) if len(between) else 0.0
+
+
+def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], list[str]]:
+    """All files, those that cannot be read with their refusal; and what is wrong with the lists themselves."""
+    found: list[Seen] = []
+    wrong: list[str] = []
+    with tempfile.TemporaryDirectory() as place:
+        for sensor in SENSORS:
+            settings: Settings | None = getattr(session, sensor)
+            if settings is None:
+                continue
+            names, complaints = _listed(settings, folder)
+            wrong += complaints
+            for name, parts in _parts(sensor, settings, folder, names):
+                found.append(_look(sensor, settings, folder, name, parts, len(names), Path(place)))
+    return found, wrong
+
+
+def _listed(settings: Settings, folder: Path) -> tuple[list[str], list[str]]:
+    """Names of the files that the patterns match, and of patterns that match none the refusals."""
+    names: list[str] = []
+    wrong = []
+    for pattern in settings.files:
+        try:
+            alone = settings.model_copy(update={"files": [pattern]} | _without_accuracy(settings))
+            names += [path.relative_to(folder).as_posix() for path in raw_files(alone, folder)]
+        except RawDataError as error:
+            wrong.append(str(error))
+    return sorted(dict.fromkeys(names)), wrong
+
+
+def _without_accuracy(settings: Settings) -> dict[str, Any]:
+    return {"accuracy": []} if isinstance(settings, config.Ins) else {}
+
+
+def _parts(
+    sensor: Sensor, settings: Settings, folder: Path, names: Sequence[str]
+) -> Iterator[tuple[str, Sequence[Part] | RawDataError]]:
+    """By file its parts, or why there are none. All files together where that goes: weeks follow from the first one."""
+    without = _without_accuracy(settings)
+
+    def parts_of(some: Sequence[str]) -> tuple[Part, ...]:
+        escaped = [_escaped(name) for name in some]
+        return raw_parts(sensor, settings.model_copy(update={"files": escaped} | without), folder)
+
+    good, bad = list(names), dict[str, RawDataError]()
+    parts: tuple[Part, ...] = ()
+    try:
+        parts = parts_of(good) if good else ()
+    except RawDataError:
+        for name in names:
+            try:
+                parts_of([name])
+            except RawDataError as error:
+                bad[name] = error
+        good = [name for name in names if name not in bad]
+        parts = parts_of(good) if good else ()
+    for name in names:
+        yield name, bad[name] if name in bad else [part for part in parts if part.name.split("#")[0] == name]
+
+
+def _escaped(name: str) -> str:
+    return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
+
+
+def _look(
+    sensor: Sensor, settings: Settings, folder: Path, name: str, parts: Sequence[Part] | RawDataError, files: int,
+    place: Path,
+) -> Seen:
+    path = folder / name
+    seen = Seen(sensor, name, path.stat().st_size)
+    if isinstance(parts, RawDataError):
+        return replace(seen, complaint=str(parts))
+    try:
+        seen = replace(seen, kind=detect.kind_of(path, name).title)
+        las = [part for part in parts if isinstance(part, LasPart)]
+        if las:
+            some, share = stretches(las, files)
+            total = sum(part.stop - part.start for part in las)
+            read = _read(seen, some)
+            return read if share == 1.0 else replace(read, share=share, records=total)
+        copy, share = excerpt(path, name, sensor, settings, files, place)
+        if copy == path:
+            return _read(seen, parts)
+        read = _read(seen, [_over(part, copy) for part in parts])
+        copy.unlink()
+        return replace(read, share=share, records=round(read.records / share))
+    except (RawDataError, ConfigError) as error:
+        return replace(seen, complaint=str(error))
+
+
+def _over(part: Part, path: Path) -> Part:
+    moved: Part = replace(part, path=path)  # type: ignore[type-var]  # every part of a raw file is a dataclass with one
+    return moved
+
+
+def _read(seen: Seen, parts: Sequence[Part]) -> Seen:
+    """The rows of some parts: counted, and thinned until few enough remain."""
+    epochs: list[Times] = []
+    kept: list[Columns] = []
+    dropped: Counter[str] = Counter()
+    records, ended, one_in = 0, True, 1.0
+    for chunk in (chunk for part in parts for chunk in part.chunks()):
+        if records >= MOST_ROWS:
+            ended = False
+            break
+        dropped.update(chunk.dropped)
+        rows = len(chunk.columns["t_ns"]) if chunk.columns else 0
+        records += rows
+        if rows:
+            t_ns = chunk.columns["t_ns"]
+            epochs.append(np.unique(t_ns if seen.sensor != "laser" else t_ns // TICK_NS * TICK_NS))
+            while seen.sensor != "ins" and records / one_in > KEPT:
+                one_in *= 2
+            kept.append(dict(every_nth(chunk.columns, one_in)))
+    times = np.unique(np.concatenate(epochs)) if epochs else np.empty(0, np.int64)
+    columns = {}
+    if kept:
+        joined = {name: np.concatenate([one[name] for one in kept]) for name in kept[0]}
+        columns = dict(every_nth(joined, one_in))
+    return replace(seen, records=records, dropped=dropped, epochs_ns=times, columns=columns, ended=ended)
