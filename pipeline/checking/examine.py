@@ -7,12 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from pipeline import config
-from pipeline.checking import clocks, files, passes
+from pipeline.checking import clocks, files, hits, passes
 from pipeline.checking.finding import Finding
+from pipeline.checking.latency import latencies
+from pipeline.checking.placed import sample
 from pipeline.checking.survey import SENSORS, Seen, Times, survey
-from pipeline.checking.track import Leg, frame_of, joined, track_of
+from pipeline.checking.track import Leg, Track, frame_of, joined, track_of
+from pipeline.clouds import ClosestSurface
 from pipeline.mounts import target_of
 from pipeline.times import NS
+
+ROUGHLY, FINELY = 4_000, 60_000  # rows of a sensor: to ask whether they hit the target, and how it sways
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,20 @@ def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: config.Sessio
     yield from files.sound_speed(seen, session)
 
 
+def _of_points(
+    seen: Sequence[Seen], session: config.SessionConfig, pool: config.PoolConfig, track: Track, asked: Sequence[str]
+) -> Iterator[Finding]:
+    """Where the points fall; of sensors whose points miss the target nothing finer is asked."""
+    model = target_of(pool.target)
+    closest = ClosestSurface(model)
+    few = [sample(seen, session, sensor, track, ROUGHLY) for sensor in asked]
+    findings = list(hits.off_target(track, [one for one in few if one is not None], closest, pool.segment))
+    yield from findings
+    if not findings:
+        many = [sample(seen, session, sensor, track, FINELY) for sensor in asked]
+        yield from latencies(track, [one for one in many if one is not None], model, pool.segment)
+
+
 def _epochs(seen: Sequence[Seen]) -> dict[str, Times]:
     found: dict[str, Times] = {}
     for sensor in SENSORS:
@@ -82,7 +101,12 @@ def _of_target(
         return [Finding("side", f"{words}; give azimuth_deg, or check target.origin")], ()
     track = track_of(ins, frame, model, seen, pool.ingest)
     findings += passes.sailing(track)
-    if not clocked:
+    asked = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in clocked]
+    missed: list[Finding] = []
+    if not findings or all(finding.severity == "look" for finding in findings):
+        missed = list(_of_points(seen, session, pool, track, asked))
+    findings += missed
+    if not clocked and not any(finding.question == "clock" for finding in missed):
         findings += passes.missing(track, seen)
         coarse = max(s.coarseness_ns for s in seen if s.sensor == "ins")
         sounded = {sensor: t_ns for sensor, t_ns in epochs.items() if sensor != "ins"}

@@ -1,0 +1,74 @@
+"""Samples of a sensor's points, and where a mount, a clock and a scale put them in the pool."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.checking.survey import Seen, Times
+from pipeline.checking.track import Track
+from pipeline.maths.soundings import points_in_mbes
+from pipeline.mounts import mount_of
+from pipeline.sampling import every_nth
+from pipeline.streams import xyz
+from pipeline.times import NS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Rows of a sensor, points (n, 3) m in its own frame; ``georeferenced``: in the pool frame, placed by others."""
+
+    sensor: str
+    t_ns: Times
+    points_m: Array
+    mount: config.Mount
+    georeferenced: bool = False
+
+    def near(self, track: Track) -> "Sample":
+        """The rows of legs as a session wants them."""
+        rows = np.zeros(len(self.t_ns), dtype=bool)
+        for leg in track.legs:
+            if leg.good:
+                rows |= (self.t_ns >= leg.start_ns) & (self.t_ns <= leg.end_ns)
+        return Sample(self.sensor, self.t_ns[rows], self.points_m[rows], self.mount, self.georeferenced)
+
+
+def sample(
+    files: Sequence[Seen], session: config.SessionConfig, sensor: str, track: Track, rows: int
+) -> Sample | None:
+    """About so many rows of a sensor, evenly over its files; None where it has none."""
+    pieces = [seen.columns for seen in files if seen.sensor == sensor and seen.records and seen.columns]
+    if not pieces:
+        return None
+    columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    columns = dict(every_nth(columns, len(columns["t_ns"]) / rows))
+    if sensor == "laser":
+        placed = session.laser.frame != "laser"
+        points = xyz(columns, "m")
+        if placed:
+            points = track.frame.points_from_ecef(points)
+        return Sample(sensor, columns["t_ns"], points, session.laser.mount, placed)
+    mbes = session.sonar
+    offset = None if mbes.projector_offset_m is None else np.array(mbes.projector_offset_m)
+    time_s, angle_rad, speed = (columns[name] for name in ("two_way_time_s", "angle_rad", "sound_speed_m_s"))
+    points, valid = points_in_mbes(time_s, angle_rad, speed, mbes.sound_speed_m_s, offset)
+    return Sample(sensor, columns["t_ns"][valid], points[valid], mbes.mount)
+
+
+def put(
+    track: Track, some: Sample, mount: config.Mount | None = None, ahead_s: float = 0.0, scale: float = 1.0
+) -> Array:
+    """Points (n, 3) m in the pool frame; NaN where the INS has no pose. ``ahead_s``: of the sensor's clock."""
+    if some.georeferenced:
+        return some.points_m * scale
+    mounted = mount_of(mount or some.mount)
+    body = scale * some.points_m @ mounted.R_body_from_sensor.T + mounted.lever_arm_body_m
+    t_ns = some.t_ns - round(ahead_s * NS)
+    covered = track.trajectory.covers(t_ns, NS)
+    placed = np.full(body.shape, np.nan)
+    placed[covered] = track.trajectory.place(t_ns[covered], body[covered])
+    return placed

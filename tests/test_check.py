@@ -1,0 +1,218 @@
+"""poolcal check: good sessions stay clean, each planted fault is named, and nothing else beside it."""
+
+import json
+import shutil
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.end_to_end.places import SCENARIOS, edit, poolcal, simulate
+
+FINE: dict[str, Any] = {"ins": {"rate_hz": 100.0}, "mbes": {"ping_rate_hz": 10.0}}
+Spoilt = Callable[[Path], None]
+
+
+@pytest.fixture(scope="session")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Sessions by scenario and changed blocks, each simulated once. Nobody changes them."""
+    place = tmp_path_factory.mktemp("checked")
+    made: dict[str, Path] = {}
+
+    def session(scenario: str = "default", **blocks: Any) -> Path:
+        key = json.dumps([scenario, blocks])
+        if key not in made:
+            made[key] = simulate(place / f"{len(made)}", base=SCENARIOS / f"{scenario}.yaml", **(FINE | blocks))
+        return made[key]
+
+    return session
+
+
+@pytest.fixture
+def spoilt(good: Callable[..., Path], tmp_path: Path) -> Callable[..., Path]:
+    """A copy of one's own."""
+
+    def copy(*words: str, **blocks: Any) -> Path:
+        folder = tmp_path / "session"
+        shutil.copytree(good(*words, **blocks), folder)
+        return folder
+
+    return copy
+
+
+def checked(session: Path) -> tuple[int, list[dict[str, Any]]]:
+    told = poolcal("check", session, "--config", session / "pool.yaml", "--json")
+    assert told.status in (0, 1), told.err
+    return told.status, json.loads(told.out)["findings"]
+
+
+def only(session: Path, question: str, *words: str, severity: str = "fault") -> None:
+    """One kind of finding alone, in these words."""
+    status, found = checked(session)
+    assert {one["question"] for one in found} == {question}, found
+    assert {one["severity"] for one in found} == {severity}
+    assert status == (severity == "fault")
+    said = " ".join(one["words"] for one in found)
+    for word in words:
+        assert word in said, said
+    assert all("\n" not in one["words"] for one in found)
+
+
+@pytest.mark.parametrize("scenario", ["default", "drift", "messy", "small_target", "azimuth_163"])
+def test_a_good_session_is_clean(good: Callable[..., Path], scenario: str) -> None:
+    assert checked(good(scenario)) == (0, [])
+
+
+def test_people_see_files_passes_and_that_nothing_was_found(good: Callable[..., Path]) -> None:
+    told = poolcal("check", good(), "--config", good() / "pool.yaml")
+    lines = told.out.splitlines()
+    assert [line.split()[:2] for line in lines[1:4]] == [
+        ["ins", "ins/ins.gps"], ["laser", "laser/pass_0.las"], ["laser", "laser/pass_1.las"],
+    ]
+    assert "100 Hz" in lines[1]
+    assert lines[-1] == "Nothing found."
+    assert sum("100%    100%" in line for line in lines) == 2
+
+
+def test_without_a_config_nothing_is_asked_of_the_target(good: Callable[..., Path]) -> None:
+    told = poolcal("check", good(), "--json")
+    assert told.status == 0
+    assert json.loads(told.out)["passes"] == []
+
+
+def _shift_ins(session: Path, seconds: float) -> None:
+    """SBET: the first of 17 doubles is the time."""
+    path = session / "ins" / "ins.sbet"
+    records = np.fromfile(path, "<f8").reshape(-1, 17)
+    records[:, 0] += seconds
+    records.tofile(path)
+
+
+SBET = {"ins": {"rate_hz": 100.0, "format": "sbet"}}
+
+
+def test_utc_taken_for_gps_shows_in_when_sensors_ran(spoilt: Callable[..., Path]) -> None:
+    session = spoilt(**SBET)
+    _shift_ins(session, -18.0)  # the INS in UTC: both others are ahead
+    only(session, "clock", "laser: its clock is 18 s ahead of", "mbes: its clock is 18 s ahead of", "UTC taken for GPS")
+
+
+def test_a_clock_is_told_from_the_target_where_all_ran_on(spoilt: Callable[..., Path]) -> None:
+    """With sensors that run without pause when they ran tells nothing."""
+    session = spoilt("messy")
+    edit(session / "session.yaml", "mbes", latency_s=18.015)  # taken off: the sonar is 18 s behind
+    only(session, "clock", "mbes:", "18 s: UTC taken for GPS", "behind")
+
+
+@pytest.mark.parametrize(("weeks", "said"), [(-1, "1 week ahead"), (2, "2 weeks behind")])
+def test_a_wrong_week(spoilt: Callable[..., Path], weeks: int, said: str) -> None:
+    session = spoilt(**SBET)
+    edit(session / "session.yaml", "ins", gps_week=2418 + weeks)
+    only(session, "clock", f"laser: its clock is {said}", f"mbes: its clock is {said}", "gps_week")
+
+
+def test_a_time_zone(spoilt: Callable[..., Path]) -> None:
+    session = spoilt(**SBET)
+    _shift_ins(session, 8 * 3600.0)
+    only(session, "clock", "8 hours behind", "time zone")
+
+
+@pytest.mark.parametrize(("sensor", "sign"), [("mbes", 1), ("laser", -1)])
+def test_a_clock_off_by_milliseconds(spoilt: Callable[..., Path], sensor: str, sign: int) -> None:
+    session = spoilt(**FINE)
+    edit(session / "session.yaml", sensor, latency_s=-sign * 0.04)
+    only(session, "latency", f"{sensor}: its clock is", "ahead of" if sign > 0 else "behind", " ms ")
+    said = checked(session)[1][0]["words"]
+    assert abs(float(said.split(" is ")[1].split(" ms")[0]) - 40) < 15
+
+
+def test_one_recording_twice(spoilt: Callable[..., Path]) -> None:
+    session = spoilt()
+    shutil.copy(session / "mbes" / "pass_1.xtf", session / "mbes" / "pass_9.xtf")
+    only(session, "twice", "mbes/pass_9.xtf: is the same recording as mbes/pass_1.xtf")
+
+
+@pytest.mark.parametrize("sensor", ["mbes", "laser"])
+def test_a_missing_pass(spoilt: Callable[..., Path], sensor: str) -> None:
+    session = spoilt()
+    sorted((session / sensor).iterdir())[1].unlink()
+    only(session, "missing pass", f"{sensor}: did not run in the pass of 2026-05-12T08:01", "at 7.0 m")
+
+
+def test_a_slow_ins(spoilt: Callable[..., Path]) -> None:
+    only(spoilt(ins={"rate_hz": 20.0}), "ins rate", "logged at 20.0 Hz", "100 Hz or more")
+
+
+def test_a_hole_in_the_ins(spoilt: Callable[..., Path]) -> None:
+    session = spoilt(**SBET)
+    path = session / "ins" / "ins.sbet"
+    records = np.fromfile(path, "<f8").reshape(-1, 17)
+    np.delete(records, np.s_[1000:1200], axis=0).tofile(path)  # 10 s after it began, in the first pass: 2 s
+    only(session, "ins hole", "1 hole", "2.0 s")
+
+
+def _keep_half(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2 + 7])
+
+
+FILES: Iterable[tuple[str, Spoilt, str, str]] = (
+    ("truncated", lambda s: _keep_half(s / "laser/pass_0.las"), "cut off", "laser/pass_0.las"),
+    ("empty", lambda s: (s / "mbes/pass_1.xtf").write_bytes(b"") and None, "file", "mbes/pass_1.xtf: is empty"),
+    ("kind", lambda s: shutil.copy(s / "ins/ins.gps", s / "mbes/pass_1.xtf") and None, "file", "is a NovAtel log"),
+)
+
+
+@pytest.mark.parametrize(("spoil", "question", "words"), [pytest.param(*one[1:], id=one[0]) for one in FILES])
+def test_a_bad_file_does_not_end_the_look(
+    spoilt: Callable[..., Path], spoil: Spoilt, question: str, words: str
+) -> None:
+    session = spoilt()
+    spoil(session)
+    status, found = checked(session)
+    assert status == 1
+    assert [one for one in found if one["question"] == question and words in one["words"]]
+    assert {one["question"] for one in found} <= {question, "missing pass"}  # without the file its pass is missing
+
+
+ORIGINS = (
+    ({"height_m": 36.5}, "height", "below target.origin.height_m"),
+    ({"latitude_deg": -36.0}, "origin", "latitude_deg has the wrong sign"),
+    ({"latitude_deg": 36.0, "longitude_deg": -120.1}, "origin", "longitude_deg has the wrong sign"),
+)
+
+
+@pytest.mark.parametrize(("origin", "question", "words"), ORIGINS)
+def test_a_wrong_origin(spoilt: Callable[..., Path], origin: dict[str, float], question: str, words: str) -> None:
+    session = spoilt()
+    edit(session / "pool.yaml", "target", origin=origin)
+    only(session, question, words)
+
+
+def test_a_target_turned_round(spoilt: Callable[..., Path]) -> None:
+    session = spoilt()
+    edit(session / "pool.yaml", "target", azimuth_deg=180.0)
+    only(session, "side", "behind the target", "180")
+
+
+def test_a_wrong_sign_of_the_mount(spoilt: Callable[..., Path]) -> None:
+    session = spoilt()
+    edit(session / "session.yaml", "mbes", mount={"roll_deg": 48.0})
+    only(session, "target", "mbes.mount.roll_deg = -48 in place of 48")
+
+
+def test_passes_at_one_distance(spoilt: Callable[..., Path]) -> None:
+    track = {"distances_m": [5.0, 5.1], "half_length_m": 3.6}
+    only(spoilt(track=track), "distances", "5.0 m from the wall", severity="look")
+
+
+def test_different_sound_speeds(spoilt: Callable[..., Path]) -> None:
+    slow = {"sound_speed_true_m_s": 1380.0, "sound_speed_recorded_m_s": 1380.0, "ping_rate_hz": 10.0}
+    only(spoilt(mbes=slow), "sound speed", "1380.0 m/s", "outside 1400 to 1560")
+
+
+def test_a_session_that_cannot_be_looked_at(tmp_path: Path) -> None:
+    told = poolcal("check", tmp_path)
+    assert told.status == 2
+    assert "session.yaml" in told.err
