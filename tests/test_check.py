@@ -1,6 +1,7 @@
 """poolcal check: good sessions stay clean, each planted fault is named, and nothing else beside it."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -102,7 +103,12 @@ def test_utc_taken_for_gps_shows_in_when_sensors_ran(spoilt: Callable[..., Path]
 def test_a_clock_is_told_from_the_target_where_all_ran_on(spoilt: Callable[..., Path]) -> None:
     """With sensors that run without pause when they ran tells nothing."""
     session = spoilt("messy")
-    edit(session / "session.yaml", "mbes", latency_s=18.015)  # taken off: the sonar is 18 s behind
+    for path in (session / "mbes").iterdir():
+        packets = bytearray(path.read_bytes())
+        for found in re.finditer(b"BTH0", bytes(packets)):  # Unix seconds: 28 bytes into the first section
+            seconds = int.from_bytes(packets[found.start() + 40 : found.start() + 44], "big")
+            packets[found.start() + 40 : found.start() + 44] = (seconds - 18).to_bytes(4, "big")
+        path.write_bytes(packets)
     only(session, "clock", "mbes:", "18 s: UTC taken for GPS", "behind")
 
 
@@ -204,12 +210,41 @@ def test_a_wrong_sign_of_the_mount(spoilt: Callable[..., Path]) -> None:
 
 def test_passes_at_one_distance(spoilt: Callable[..., Path]) -> None:
     track = {"distances_m": [5.0, 5.1], "half_length_m": 3.6}
-    only(spoilt(track=track), "distances", "5.0 m from the wall", severity="look")
+    only(spoilt(track=track), "distances", "5.1 m from the wall (within 0.1 m)", severity="look")
 
 
 def test_different_sound_speeds(spoilt: Callable[..., Path]) -> None:
     slow = {"sound_speed_true_m_s": 1380.0, "sound_speed_recorded_m_s": 1380.0, "ping_rate_hz": 10.0}
     only(spoilt(mbes=slow), "sound speed", "1380.0 m/s", "outside 1400 to 1560")
+
+
+def test_points_in_millimetres(spoilt: Callable[..., Path]) -> None:
+    import laspy
+
+    session = spoilt()
+    for path in (session / "laser").iterdir():
+        cloud = laspy.read(path)
+        cloud.header.scales = cloud.header.scales * 1000  # the same whole numbers, in steps a thousand times as large
+        path.unlink()
+        with laspy.open(path, mode="w", header=cloud.header) as out:
+            raw = laspy.ScaleAwarePointRecord(
+                cloud.points.array, cloud.point_format, cloud.header.scales, cloud.header.offsets
+            )
+            out.write_points(raw)
+    status, found = checked(session)
+    assert status == 1
+    assert any("0.001" in one["words"] or "millimetres" in one["words"] or "steps of" in one["words"] for one in found)
+
+
+def test_georeferenced_points_declared_as_the_scanners_own(spoilt: Callable[..., Path]) -> None:
+    session = spoilt(laser={"frame": "EPSG:4978", "format": "las", "point_rate_hz": 2000.0})
+    edit(session / "session.yaml", "laser", frame="laser")
+    only(session, "frame", "laser.frame is laser", "georeferenced")
+
+
+def test_an_ins_that_never_aligned(spoilt: Callable[..., Path]) -> None:
+    session = spoilt(ins={"rate_hz": 50.0, "aligning_s": 300.0})
+    only(session, "alignment", "no solution in most of its records", "INS_ALIGNING")
 
 
 def test_a_session_that_cannot_be_looked_at(tmp_path: Path) -> None:

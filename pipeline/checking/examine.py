@@ -44,7 +44,8 @@ def examine(folder: Path, session: config.SessionConfig, pool: config.PoolConfig
         coarse = max(s.coarseness_ns for s in seen if s.sensor == "ins")
         findings += clocks.apart(epochs, max(round(max_gap_s * NS), round(coarse)), seen)
         if pool is not None:
-            clocked = {f.words.split(":")[0] for f in findings if f.question in ("clock", "frame")}
+            clocked = {f.words.split(":")[0] for f in findings if f.question == "clock"}
+            clocked |= {"laser" for f in findings if f.question == "frame"}
             of_target, legs = _of_target(seen, epochs, session, pool, clocked)
             findings += of_target
     return Examined(tuple(seen), legs, tuple(findings))
