@@ -212,6 +212,12 @@ def test_different_sound_speeds(spoilt: Callable[..., Path]) -> None:
     only(spoilt(mbes=slow), "sound speed", "1380.0 m/s", "outside 1400 to 1560")
 
 
+def test_a_fan_that_does_not_reach_the_lower_blocks(spoilt: Callable[..., Path]) -> None:
+    """4.3 m reach from the nearer pass (the head 3.7 m from the wall, 0.7 m deep) to 2.2 m below the head."""
+    short = {"ping_rate_hz": 10.0, "max_range_m": 4.3}
+    only(spoilt(mbes=short), "faces", "lower half of the water", "the fan does not reach them")
+
+
 def test_points_in_millimetres(spoilt: Callable[..., Path]) -> None:
     import laspy
 

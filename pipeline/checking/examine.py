@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline import config
 from pipeline.checking import clocks, files, hits, passes
+from pipeline.checking.expected import faces
 from pipeline.checking.finding import Finding
 from pipeline.checking.latency import latencies
 from pipeline.checking.placed import sample
@@ -71,8 +72,12 @@ def _of_points(
     findings = list(hits.off_target(track, [one for one in few if one is not None], closest, pool.segment))
     yield from findings
     if not findings:
-        many = [sample(seen, session, sensor, track, FINELY) for sensor in asked]
-        yield from latencies(track, [one for one in many if one is not None], model, pool.segment)
+        many = [one for sensor in asked if (one := sample(seen, session, sensor, track, FINELY)) is not None]
+        yield from latencies(track, many, model, pool.segment)
+        rows = sum(one.records for one in seen if one.sensor == "mbes")
+        for some in many:
+            if some.sensor == "mbes":
+                yield from faces(track, some, rows, seen, model, pool, session)
 
 
 def _epochs(seen: Sequence[Seen]) -> dict[str, Times]:
