@@ -121,13 +121,15 @@ def test_a_time_zone(spoilt: Callable[..., Path]) -> None:
     only(session, "clock", "8 hours behind", "time zone")
 
 
-@pytest.mark.parametrize(("sensor", "sign"), [("mbes", 1), ("laser", -1)])
-def test_a_clock_off_by_milliseconds(spoilt: Callable[..., Path], sensor: str, sign: int) -> None:
+@pytest.mark.parametrize(("sensor", "latency_ms"), [("mbes", -16), ("laser", 12), ("ins", 20), ("mbes", 100)])
+def test_a_clock_off_by_milliseconds(spoilt: Callable[..., Path], sensor: str, latency_ms: int) -> None:
+    """Latency is taken off: a clock of which too much is taken off is behind."""
     session = spoilt(**FINE)
-    edit(session / "session.yaml", sensor, latency_s=-sign * 0.04)
-    only(session, "latency", f"{sensor}: its clock is", "ahead of" if sign > 0 else "behind", " ms ")
+    edit(session / "session.yaml", sensor, latency_s=latency_ms / 1000)
+    only(session, "latency", f"{sensor}: its clock is", "ahead of" if latency_ms < 0 else "behind", " ms ")
     said = checked(session)[1][0]["words"]
-    assert abs(float(said.split(" is ")[1].split(" ms")[0]) - 40) < 15
+    assert abs(float(said.split(" is ")[1].split(" ms")[0]) - abs(latency_ms)) < 8
+    assert abs(float(said.split("add ")[1].split()[0]) + latency_ms / 1000) < 0.008
 
 
 def test_one_recording_twice(spoilt: Callable[..., Path]) -> None:

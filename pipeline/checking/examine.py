@@ -10,15 +10,15 @@ from pipeline import config
 from pipeline.checking import clocks, files, hits, passes
 from pipeline.checking.expected import faces
 from pipeline.checking.finding import Finding
-from pipeline.checking.latency import latencies
-from pipeline.checking.placed import sample
+from pipeline.checking.latency import Adjusted, latencies
+from pipeline.checking.placed import rows_of, sample
 from pipeline.checking.survey import SENSORS, Seen, Times, survey
 from pipeline.checking.track import Leg, Track, frame_of, joined, track_of
 from pipeline.clouds import ClosestSurface
 from pipeline.mounts import target_of
 from pipeline.times import NS
 
-ROUGHLY, FINELY = 4_000, 60_000  # rows of a sensor: to ask whether they hit the target, and how it sways
+ROUGHLY, ADJUSTED, FINELY = 4_000, 20_000, 60_000  # rows of a sensor: to hit the target, adjust, count faces
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,10 @@ class Examined:
         return any(finding.severity == "fault" for finding in self.findings)
 
 
-def examine(folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None) -> Examined:
-    """``pool``: where the target is; without it nothing is asked about the target."""
+def examine(
+    folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None, adjusted: Adjusted
+) -> Examined:
+    """``pool``: where the target is; without it nothing is asked about the target. ``adjusted`` calibrates samples."""
     seen, wrong = survey(session, folder)
     findings = list(_of_files(seen, wrong, session))
     epochs = _epochs(seen)
@@ -47,7 +49,7 @@ def examine(folder: Path, session: config.SessionConfig, pool: config.PoolConfig
         if pool is not None:
             clocked = {f.words.split(":")[0] for f in findings if f.question == "clock"}
             clocked |= {"laser" for f in findings if f.question == "frame"}
-            of_target, legs = _of_target(seen, epochs, session, pool, clocked)
+            of_target, legs = _of_target(seen, epochs, session, pool, clocked, adjusted)
             findings += of_target
     return Examined(tuple(seen), legs, tuple(findings))
 
@@ -63,7 +65,12 @@ def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: config.Sessio
 
 
 def _of_points(
-    seen: Sequence[Seen], session: config.SessionConfig, pool: config.PoolConfig, track: Track, asked: Sequence[str]
+    seen: Sequence[Seen],
+    session: config.SessionConfig,
+    pool: config.PoolConfig,
+    track: Track,
+    asked: Sequence[str],
+    adjusted: Adjusted,
 ) -> Iterator[Finding]:
     """Where the points fall; of sensors whose points miss the target nothing finer is asked."""
     model = target_of(pool.target)
@@ -71,13 +78,17 @@ def _of_points(
     few = [sample(seen, session, sensor, track, ROUGHLY) for sensor in asked]
     findings = list(hits.off_target(track, [one for one in few if one is not None], closest, pool.segment))
     yield from findings
-    if not findings:
-        many = [one for sensor in asked if (one := sample(seen, session, sensor, track, FINELY)) is not None]
-        yield from latencies(track, many, model, pool.segment)
-        rows = sum(one.records for one in seen if one.sensor == "mbes")
-        for some in many:
-            if some.sensor == "mbes":
-                yield from faces(track, some, rows, seen, model, pool, session)
+    soundings = sample(seen, session, "mbes", track, FINELY) if "mbes" in asked and not findings else None
+    if soundings is None:
+        return
+    yield from faces(
+        track, soundings, sum(one.records for one in seen if one.sensor == "mbes"), seen, model, pool, session
+    )
+    if "laser" in asked:
+        raw = {"ins": joined(seen)} | {sensor: rows_of(seen, sensor, ADJUSTED) for sensor in ("laser", "mbes")}
+        freed = adjusted(session, pool, raw)
+        if freed is not None:
+            yield from latencies(freed)
 
 
 def _epochs(seen: Sequence[Seen]) -> dict[str, Times]:
@@ -95,6 +106,7 @@ def _of_target(
     session: config.SessionConfig,
     pool: config.PoolConfig,
     clocked: set[str],
+    adjusted: Adjusted,
 ) -> tuple[list[Finding], tuple[Leg, ...]]:
     """``clocked``: sensors of which nothing more is asked."""
     model, ins = target_of(pool.target), joined(seen)
@@ -110,7 +122,7 @@ def _of_target(
     asked = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in clocked]
     missed: list[Finding] = []
     if not findings or all(finding.severity == "look" for finding in findings):
-        missed = list(_of_points(seen, session, pool, track, asked))
+        missed = list(_of_points(seen, session, pool, track, asked, adjusted))
     findings += missed
     if not clocked and not any(finding.question == "clock" for finding in missed):
         findings += passes.missing(track, seen)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import config
-from pipeline.checking.survey import Seen, Times
+from pipeline.checking.survey import Columns, Seen, Times
 from pipeline.checking.track import Track
 from pipeline.maths.soundings import points_in_mbes
 from pipeline.mounts import mount_of
@@ -37,15 +37,22 @@ class Sample:
         return Sample(self.sensor, self.t_ns[rows], self.points_m[rows], self.mount, self.georeferenced)
 
 
+def rows_of(files: Sequence[Seen], sensor: str, rows: int) -> Columns:
+    """About so many rows of a sensor as they were read, evenly over its files; nothing where it has none."""
+    pieces = [seen.columns for seen in files if seen.sensor == sensor and seen.records and seen.columns]
+    if not pieces:
+        return {}
+    columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    return dict(every_nth(columns, max(1.0, len(columns["t_ns"]) / rows)))
+
+
 def sample(
     files: Sequence[Seen], session: config.SessionConfig, sensor: str, track: Track, rows: int
 ) -> Sample | None:
-    """About so many rows of a sensor, evenly over its files; None where it has none."""
-    pieces = [seen.columns for seen in files if seen.sensor == sensor and seen.records and seen.columns]
-    if not pieces:
+    """About so many points of a sensor; None where it has none."""
+    columns = rows_of(files, sensor, rows)
+    if not columns:
         return None
-    columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
-    columns = dict(every_nth(columns, len(columns["t_ns"]) / rows))
     if sensor == "laser":
         placed = session.laser.frame != "laser"
         points = xyz(columns, "m")
