@@ -106,6 +106,7 @@ pictures: $(DEMO)/.simulated ## the README's pictures, anew (after make setup-vi
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.montecarlo
 	$(PY) -m tools.mistakes --seeds 27
+	$(PY) -m tools.laser
 	$(PY) -m tools.accuracy
 
 clean: ## remove the demo and the tools' caches; results of other runs stay

@@ -1,15 +1,16 @@
 """``poolcal check``: what a session's files are, and what is wrong with them, before it is calibrated."""
 
+from contextlib import suppress
 from pathlib import Path
-
-import pandas as pd
+from typing import Any
 
 from pipeline.checking import saying
+from pipeline.checking.calibrated import Calibrated, Raw
 from pipeline.checking.examine import examine
-from pipeline.checking.latency import Raw
 from pipeline.config import PoolConfig, SessionConfig, load_session
 from pipeline.errors import PoolcalError
 from pipeline.folder import load_settings
+from pipeline.streams import EMPTY
 from stages.campaign import calibrate_in_memory
 
 
@@ -17,14 +18,17 @@ def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]
     """What the screen says, and whether something is wrong."""
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session), None) if settings is None else (settings.session, settings.pool)
-    found = examine(session, content, pool, _freed)
+    found = examine(session, content, pool, _calibrated)
     return saying.as_json(found) if as_json else saying.text(found), found.faulty
 
 
-def _freed(session: SessionConfig, pool: PoolConfig, raw: Raw) -> pd.DataFrame | None:
-    """What the held parameters would rather be, by a sample of the session; None where that cannot be calibrated."""
-    try:
-        found: pd.DataFrame = calibrate_in_memory(session, pool, raw, "adjust")["adjust/freed"]
-    except PoolcalError:
-        return None
-    return found
+def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrated:
+    found: dict[str, Any] = {}
+
+    def kept(key: str, value: Any) -> Any:
+        found[key] = value
+        return value
+
+    with suppress(PoolcalError):
+        calibrate_in_memory(session, pool, raw, "adjust", kept)
+    return Calibrated(found.get("segment/soundings_labelled", EMPTY), found.get("adjust/freed"))

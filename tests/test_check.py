@@ -76,6 +76,17 @@ def test_people_see_files_passes_and_that_nothing_was_found(good: Callable[..., 
     assert sum("100%    100%" in line for line in lines) == 2
 
 
+def test_soundings_are_as_many_as_the_passes_should_give(good: Callable[..., Path]) -> None:
+    told = poolcal("check", good("small_target"), "--config", good("small_target") / "pool.yaml", "--json")
+    faces = json.loads(told.out)["soundings"]
+    assert {face["family"] for face in faces} == {"P1", "P2", "P3", "H"}
+    by_family = {name: [face for face in faces if face["family"] == name] for name in ("P1", "P2", "P3")}
+    for name, some in by_family.items():
+        expected, found = (sum(face[key] for face in some) for key in ("expected", "found"))
+        assert expected > 300
+        assert found == pytest.approx(expected, rel=0.3), name
+
+
 def test_without_a_config_nothing_is_asked_of_the_target(good: Callable[..., Path]) -> None:
     told = poolcal("check", good(), "--json")
     assert told.status == 0

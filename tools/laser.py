@@ -109,31 +109,36 @@ def laser_bound_of(number: int) -> Array:
 
 
 def report(table: pd.DataFrame, bound: Array) -> str:
-    """RMS errors against the bound; the sonar's against its total sigmas; what was held."""
+    """In README's form: RMS errors against the bound; the sonar's against its total sigmas; what was held."""
     n = len(table)
     low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
     least = np.sqrt(np.diag(bound)) / UNITS
-    lines = [f"{n} pairs of sessions (degrees, millimetres)", " " * 30 + "".join(f"{name:>10}" for name in NAMES)]
+    lines = ["| | pitch ° | roll ° | yaw ° | x mm | y mm | z mm |", "|---|---:|---:|---:|---:|---:|---:|"]
 
-    def line(words: str, values: Any, digits: int = 4) -> None:
-        lines.append(f"{words:<30}" + "".join(f"{value:10.{digits}f}" for value in values))
+    def line(words: str, values: Array, places: int | None = None) -> None:
+        digits = [4, 4, 4, 1, 1, 1] if places is None else [places] * 6
+        lines.append(f"| {words} | " + " | ".join(f"{v:.{d}f}" for v, d in zip(values, digits, strict=True)) + " |")
 
     def rms(stem: str) -> Array:
         return np.array([np.sqrt(np.mean(table[f"{stem}_{name}"] ** 2)) for name in NAMES])
 
-    line("laser: RMS error", rms("laser_error"))
-    line("laser: mean sigma", rms("laser_sigma"))
-    line("laser: Cramér–Rao bound", least)
-    line("laser: RMS ÷ bound", rms("laser_error") / least, 2)
-    line("sonar: RMS error", rms("sonar_error"))
-    line("sonar: mean total sigma", rms("sonar_sigma"))
-    line("sonar: mean random sigma", rms("sonar_random"))
-    line("sonar: RMS ÷ total sigma", rms("sonar_error") / rms("sonar_sigma"), 2)
-    for whose in ("laser", "sonar"):
-        mean = table[f"{whose}_nse"].mean()
-        lines.append(f"{whose}: mean normalised squared error {mean:.2f} (99 % band {low:.2f}-{high:.2f})")
-    lines.append(f"with the usual limits: accepted {int(table['accepted'].sum())}; held, and how often:")
-    lines += [f"  {names or 'none'}: {count}" for names, count in table["held"].value_counts().items()]
+    def head(whose: str) -> None:
+        nse = table[f"{whose}_nse"].mean()
+        lines.append(f"| **{whose}**: {n} sessions, mean NSE {nse:.2f} ({low:.2f}–{high:.2f}) |  |  |  |  |  |  |")
+
+    head("laser")
+    line("RMS error", rms("laser_error"))
+    line("RMS of the sigmas", rms("laser_sigma"))
+    line("Cramér–Rao bound", least)
+    line("RMS ÷ bound", rms("laser_error") / least, 2)
+    head("sonar")
+    line("RMS error", rms("sonar_error"))
+    line("RMS of the total sigmas", rms("sonar_sigma"))
+    line("the same without the laser's covariance", rms("sonar_random"))
+    line("RMS error ÷ RMS total sigma", rms("sonar_error") / rms("sonar_sigma"), 2)
+    kinds = [f"{names or 'none'} in {count}" for names, count in table["held"].value_counts().items()]
+    lines.append("")
+    lines.append(f"With the usual limits {int(table['accepted'].sum())} accepted; held: {'; '.join(kinds)}.")
     return "\n".join(lines)
 
 

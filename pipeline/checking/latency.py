@@ -5,17 +5,13 @@ With a wrong clock the target's planes sway with the boat. The adjustment frees 
 clock is off.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.finding import Finding
 
-Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by sensor
-Adjusted = Callable[[config.SessionConfig, config.PoolConfig, Raw], pd.DataFrame | None]  # table freed, if there is one
 SIGMAS, LEAST_S = 4.0, 0.005  # far enough from zero, and worth a word
 SAME = 3.0  # sigmas within which two offsets are one, of the INS
 

@@ -27,12 +27,38 @@ def text(examined: Examined) -> str:
             f"{number:<6}{utc_text(leg.start_ns):<22}{seconds:>8.1f}{leg.distance_m:>8.2f} m{leg.speed_m_s:>6.2f} m/s"
             f"{leg.ran['laser']:>8.0%}{leg.ran['mbes']:>8.0%}{side}"
         )
+    lines += _soundings_lines(examined)
     lines.append("")
     for severity, head in (("fault", "Wrong"), ("look", "But look")):
         lines += [f"{head}: {one.words}." for one in examined.findings if one.severity == severity]
     if not examined.findings:
         lines.append("Nothing found.")
     return "\n".join(lines)
+
+
+def _by_face(examined: Examined) -> list[dict[str, Any]]:
+    """Wet faces with the soundings expected and found on them; none where they were not counted."""
+    if examined.model is None or examined.soundings is None:
+        return []
+    both = zip(examined.model.faces, examined.soundings.expected, examined.soundings.found, strict=True)
+    wet = examined.model.water_level_m
+    return [
+        {"face": face.name, "family": face.family, "expected": round(float(expected)), "found": round(float(found))}
+        for face, expected, found in both
+        if face.seen != "dry" and face.vertices_m[:, 2].min() < wet
+    ]
+
+
+def _soundings_lines(examined: Examined) -> list[str]:
+    """By family; by face they are in the JSON."""
+    faces = _by_face(examined)
+    if not faces:
+        return []
+    lines = ["", f"{'soundings on':<14}{'expected':>10}{'found':>10}"]
+    for family in dict.fromkeys(str(face["family"]) for face in faces):
+        expected, found = (sum(f[key] for f in faces if f["family"] == family) for key in ("expected", "found"))
+        lines.append(f"{family:<14}{'~' + str(expected):>10}{'~' + str(found):>10}")
+    return lines
 
 
 def _file_line(seen: Seen, width: int) -> str:
@@ -64,6 +90,7 @@ def as_json(examined: Examined) -> str:
             }
             for seen in examined.files
         ],
+        "soundings": _by_face(examined),
         "passes": [
             {
                 "start_ns": leg.start_ns,

@@ -72,6 +72,7 @@ def test_a_sonar_moved_by_little_is_found_and_named(undisturbed: tuple[Path, Tol
     assert "the rest within noise" in found["sentence"]
 
 
+@pytest.mark.thorough
 def test_another_target_compares_the_mount_alone(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
     origin = {"latitude_deg": 36.1, "longitude_deg": 120.3, "height_m": 20.0}
     target = {"a": 6.0, "b": 2.4, "c": 0.8, "e": 0.4, "azimuth_deg": 30.0, "origin": origin}

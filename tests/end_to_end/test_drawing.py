@@ -213,6 +213,7 @@ def test_a_full_disk_is_one_line_and_no_stump(done: Place, monkeypatch: pytest.M
     assert not [path for path in done.run.rglob("*") if path.suffix in (".rrd", ".new", ".partial")]
 
 
+@pytest.mark.thorough
 def test_no_room_for_another_process(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     def none(*_: object, **__: object) -> None:
         raise OSError(errno.EAGAIN, "Resource temporarily unavailable")

@@ -9,6 +9,7 @@ import pytest
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import simulate as simulate_in_memory
 from pipeline.times import NS, WEEK_NS
+from tests.effort import often
 from tests.end_to_end.places import Place, errors, poolcal, result_of, sigmas, simulate
 from tests.end_to_end.tables import write_tables
 from tests.readers import ie_files
@@ -56,7 +57,7 @@ def same(one: dict[str, Any], other: dict[str, Any], of_sigma: float) -> None:
         assert np.all(difference <= allowed * (1 if method == "adjustment" else 10)), (method, difference / allowed)
 
 
-@pytest.mark.parametrize("what", FILES)
+@pytest.mark.parametrize("what", often(list(FILES)[::2], list(FILES)))
 def test_files(what: str, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None:
     """Rounding differs (ASCII to 1e-9 deg, ECEF to 0.1 mm): a hundredth of a sigma.
 
@@ -68,6 +69,7 @@ def test_files(what: str, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None
     same(result_of(undisturbed[0]), run(session), tolerance)
 
 
+@pytest.mark.thorough
 def test_equidistant_beams(tmp_path: Path, truth: dict[str, Any]) -> None:
     bare, in_xtf = (run(simulate(tmp_path / f"session_{k}", **EQUIDISTANT[k])) for k in EQUIDISTANT)
     same(bare, in_xtf, 1e-6)

@@ -38,6 +38,7 @@ def test_noise_free(seed: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.thorough
 def test_default_noise(seed: int, tmp_path: Path) -> None:
     settings = {"track": {"distances_m": [4.0, 8.0, 5.0, 7.0]}, "laser": {"point_rate_hz": 3000.0}}
     result, truth = calibrated(tmp_path, seed, SCENARIOS / "default.yaml", mbes={"ping_rate_hz": 20.0}, **settings)

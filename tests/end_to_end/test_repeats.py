@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from stages import ORDER
-from tests.effort import THOROUGH, often
+from tests.effort import often
 from tests.end_to_end.places import ROOT, Place, digests, poolcal_process
 
 
@@ -138,7 +138,7 @@ def test_make_calibrate_twice(place: Place, right: dict[str, str]) -> None:
     assert digests(place.run) == right
 
 
-@pytest.mark.skipif(not THOROUGH, reason="make thorough: half a minute; `poolcal stage` is tested by itself")
+@pytest.mark.thorough
 def test_make_stages_twice(place: Place, right: dict[str, str]) -> None:
     first = make(place, "stages")
     assert all(f"poolcal stage {name} " in first for name in ORDER)

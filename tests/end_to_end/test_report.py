@@ -11,6 +11,7 @@ import pytest
 
 from stages import ORDER
 from stages.drawing import Painters
+from tests.effort import often
 from tests.end_to_end.pages import Page, assert_self_contained
 from tests.end_to_end.places import Place, Told, digests, poolcal, result_of
 
@@ -197,7 +198,7 @@ def test_settings_that_were_not_used_are_not_shown(done: Place) -> None:
 
 def test_what_lies_in_the_pages_place_is_no_matter(done: Place) -> None:
     path = done.run / "report" / "report.html"
-    for content in (b"\xff\xfe", b"", "·".encode()[:1]):
+    for content in often((b"\xff\xfe",), (b"\xff\xfe", b"", "·".encode()[:1])):
         path.write_bytes(content)
         told = done.calibrate("--report")
         assert (told.status, told.complaints) == (0, [])

@@ -3,9 +3,12 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from tests.end_to_end.places import ROOT, Place, digests, poolcal_process
 
 
+@pytest.mark.thorough
 def test_without_the_truth_the_result_is_the_same(small: Path, tmp_path: Path, right: dict[str, str]) -> None:
     """The session alone, copied to where no truth is beside it, calibrated by a process of its own."""
     place = Place(small, tmp_path)

@@ -32,6 +32,7 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
+@pytest.mark.thorough
 def test_the_patents_target_by_its_faces_gives_what_its_letters_give() -> None:
     session = made({"target": {"a": 6.0, "b": 2.4, "c": 0.8, "e": 0.4, "low_side": "north", "azimuth_deg": 47.0,
                                "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}}}, seed=4)

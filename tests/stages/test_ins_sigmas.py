@@ -32,6 +32,7 @@ def session_with(ins: dict[str, Any]) -> SimulatedSession:
     return replace(session, session=session.session | {"ins": about | ins})
 
 
+@pytest.mark.thorough
 def test_files_say_what_the_session_would_have_said() -> None:
     session = session_with({})
     t_ns = session.ins["t_ns"][:: len(session.ins["t_ns"]) // 300]

@@ -53,7 +53,7 @@ def errors(result: dict[str, Any], truth: dict[str, Any]) -> np.ndarray:
     return np.concatenate([turn.as_rotvec(), np.subtract(true["lever_arm_m"], block["lever_arm_m"])])
 
 
-@pytest.mark.parametrize("drift", [{}, DRIFT], ids=["white noise", "drift"])
+@pytest.mark.parametrize("drift", often([DRIFT], [{}, DRIFT]))
 @pytest.mark.parametrize("seed", often([2], [2, 3]))
 def test_a_mount_wrong_by_three_tenths_of_a_degree_and_3_cm_comes_back(drift: dict[str, Any], seed: int) -> None:
     session = made(OFF, drift, seed=seed)
@@ -181,8 +181,8 @@ def test_the_sonars_total_takes_the_lasers_covariance_as_whole_calibrations_do()
         content: dict[str, Any] = result_of(calibrate_in_memory(given, pool, raw))["mbes"]
         return content
 
-    less, more = (np.array(found(0.0, share)["covariance_total"]) for share in (1.0, 4.0))
-    growth = (more - less) / 3.0
+    share = 1e4  # so much that all else is nothing beside it
+    growth = np.array(found(0.0, share)["covariance_total"]) / share
     one, other = found(1.0, 1.0), found(-1.0, 1.0)
     turn = log_so3(np.array(one["R_body_from_mbes"]) @ np.array(other["R_body_from_mbes"]).T)
     Gv = np.concatenate([turn, np.subtract(one["lever_arm_m"], other["lever_arm_m"])]) / 2.0

@@ -66,7 +66,7 @@ def test_other_pools(azimuth_deg, low_side, letters, errors_of):
     assert error[3:].max() < 0.01
 
 
-@pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=6))[:: often(27, 9)])
+@pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=6))[:: often(63, 9)])
 def test_coarse_values_wrong_on_every_axis_at_once(noisy, noisy_found, signs):
     """2.5 degrees and 0.25 m: 0.6 m at 8 m, with blocks every metre. Every ninth combination; the rest in campaigns."""
     truth = noisy.truth["mbes"]["mount"]
@@ -154,6 +154,7 @@ def test_latency_is_subtracted(errors_of):
     assert error[3:].max() < 0.02
 
 
+@pytest.mark.thorough
 def test_drift_is_estimated_and_its_uncertainty_true(errors_of):
     """What took the yaw 0.1° and the offsets centimetres away, while the sigmas said nothing of it."""
     drift = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
@@ -168,6 +169,7 @@ def test_drift_is_estimated_and_its_uncertainty_true(errors_of):
     assert max(block["sigma"]["lever_arm_m"]) < 0.002
 
 
+@pytest.mark.thorough
 def test_a_cast_takes_out_what_a_gradient_does(errors_of):
     """0.3 (m/s)/m, noise-free: 0.07° of roll and millimetres without the cast. With it what is left comes of tracing
     with the coarse mount, which is 0.8° off: a seventieth of 6 mm."""

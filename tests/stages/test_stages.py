@@ -162,6 +162,7 @@ def test_the_pose_found_is_right_within_its_sigma(wrong_deg):
         assert abs(pose[name] - true) < 6 * pose[sigma], (name, pose[name], pose[sigma])
 
 
+@pytest.mark.thorough
 def test_good_laser_points_on_a_tilted_target_keep_their_weight():
     found = calibrated(made({"surroundings": {"tilt_deg": [0.3, 0.0]}}, seed=6))
     laser = found["adjust/groups"].set_index("group").loc["laser"]
@@ -196,6 +197,7 @@ def test_sigma_limits_reject_and_name_the_parameter(noisy):
     assert result["mbes"]["covariance"] is not None
 
 
+@pytest.mark.thorough
 def test_wrong_sigmas_alone_reject_nothing(noisy, noisy_found, errors_of):
     """Five times too small, five times too large: the variance factors say so, and the result moves by less than a
     sigma (beams that are said to stray more keep further from the edges: other points)."""

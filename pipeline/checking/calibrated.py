@@ -1,0 +1,25 @@
+"""What calibrating a sample of the session gives, as far as it gets."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline import config
+from pipeline.streams import EMPTY, Stream
+
+Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by sensor
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """Soundings, each with the face that it is on, and the adjustment's table ``freed``: none where it got no farther.
+    """
+
+    soundings: Stream = EMPTY
+    freed: pd.DataFrame | None = None
+
+
+Calibrate = Callable[[config.SessionConfig, config.PoolConfig, Raw], Calibrated]
