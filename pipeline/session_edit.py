@@ -62,9 +62,10 @@ def origin_of(method: str, file: Path, **more: Any) -> Content:
 
 def block_of(mounted: Mounted, covariance: Array, origin: Content) -> Content:
     """What a sensor's block is to say: numbers rounded as they will be written; ``covariance`` (6, 6)."""
+    six = {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()}
     return {
-        "mount": {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()},
-        "mount_origin": origin,
+        "mount": six,
+        "mount_origin": origin | {"mount": six},
         "mount_covariance": [[float(f"{one:.9e}") for one in row] for row in covariance.tolist()],
     }
 
@@ -167,7 +168,9 @@ def in_yaml(key: str, value: Any, between: str) -> str:
     if key == "mount":
         return "{" + ", ".join(f"{name}: {number:.6f}" for name, number in value.items()) + "}"
     if key == "mount_origin":
-        return "{" + ", ".join(f"{name}: {json.dumps(one, ensure_ascii=False)}" for name, one in value.items()) + "}"
+        words = {name: in_yaml(name, one, between) if name == "mount" else json.dumps(one, ensure_ascii=False)
+                 for name, one in value.items()}
+        return "{" + ", ".join(f"{name}: {one}" for name, one in words.items()) + "}"
     return "[" + between.join("[" + ", ".join(f"{one:.9e}" for one in row) + "]" for row in value) + "]"
 
 

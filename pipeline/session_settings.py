@@ -80,6 +80,7 @@ class MountOrigin(Model):
     date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
     software: Annotated[str, Field(max_length=100)]
     held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # of the six what a fine calibration left as it was
+    mount: Mount | None = None  # as it was written: mount_covariance belongs to no other
 
 
 class Drift(Model):
@@ -165,6 +166,16 @@ class Laser(Model):
     def _heights_of_a_crs(self) -> "Laser":
         if self.heights is not None and self.frame == "laser":
             raise ValueError("heights is for points in a CRS, but frame is laser: leave it out, or name the CRS")
+        return self
+
+    @model_validator(mode="after")
+    def _covariance_of_this_mount(self) -> "Laser":
+        written = None if self.mount_origin is None else self.mount_origin.mount
+        if self.mount_covariance is not None and written not in (None, self.mount):
+            raise ValueError(
+                "mount is not the one in mount_origin, to which mount_covariance belongs: take mount_origin and "
+                "mount_covariance out, or put that mount back"
+            )
         return self
 
 

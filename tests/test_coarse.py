@@ -580,6 +580,18 @@ def test_a_covariance_that_is_none_is_refused(change: Any, words: str) -> None:
     assert words in line
 
 
+def test_a_covariance_of_another_mount_is_refused() -> None:
+    """As where the mount is entered by hand, and what poolcal wrote beside it stays."""
+    six = {key: float(value) for key, value in LASER["mount"].items()}
+    origin = {"method": "fine", "file": "a", "sha256": "0" * 64, "date": "2026-05-12", "software": "p", "mount": six}
+    written = LASER | {"mount_covariance": (np.eye(6) * 1e-6).tolist(), "mount_origin": origin}
+    assert parse(Laser, written, "s").mount_origin is not None
+    by_hand = {"mount": six | {"z_m": six["z_m"] + 0.000001}}
+    with pytest.raises(ConfigError, match="mount is not the one in mount_origin, to which mount_covariance belongs"):
+        parse(Laser, written | by_hand, "s")
+    assert parse(Laser, {key: one for key, one in (written | by_hand).items() if "_" not in key}, "s")
+
+
 def test_a_covariance_without_rank_is_one() -> None:
     for matrix in (np.zeros((6, 6)), np.ones((6, 6)) * 1e-6, np.diag([1e-6, 0, 0, 1e-6, 0, 0])):
         assert parse(Laser, LASER | {"mount_covariance": matrix.tolist()}, "s").mount_covariance is not None
