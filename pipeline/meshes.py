@@ -4,18 +4,22 @@ trimesh reads the files. A group's polygons make one face, their common outline,
 if they stood there, so that everything after knows polygons only and a run's settings hold what was used.
 """
 
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from pipeline.errors import ConfigError
 
 Array = NDArray[np.float64]
 Polygon = Sequence[int]
-MOST_BYTES = 20_000_000
+MOST_BYTES, MOST_GROUPS = 20_000_000, 500
 SAME_M = 1e-4  # vertices nearer to each other are one: an exporter writes them once for every face
 STRAIGHT = 1e-4  # sine of the bend at a corner that is none
 GROUP = "group"
@@ -31,7 +35,7 @@ def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
         return content
     mesh, given = target["mesh"], target.get("faces") or {}
     where = f"{path}: target.mesh = {mesh!r}"
-    if not isinstance(mesh, str) or Path(mesh).is_absolute() or ".." in Path(mesh).parts or "\\" in mesh:
+    if not isinstance(mesh, str) or Path(mesh).is_absolute() or ".." in Path(mesh).parts or set(mesh) & {"\\", "\0"}:
         raise ConfigError(f"{where}: must name a file beside this one, or in a folder beside it")
     if not isinstance(given, dict) or not all(isinstance(value, dict) for value in given.values()):
         raise ConfigError(f"{path}: target.faces: must be a mapping of names to what is said of each; mend it")
@@ -48,50 +52,51 @@ def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
     return content | {"target": {key: value for key, value in target.items() if key != "mesh"} | {"faces": faces}}
 
 
+Groups = Mapping[str, tuple[Array, Sequence[Polygon]]]
+
+
 def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
     """By group its outline's corners (k, 3), in the polygons' sense of turning."""
+    read = {".obj": _obj, ".ply": _ply}.get(path.suffix.lower())
+    if read is None:
+        raise ConfigError(f"{where}: is neither .obj nor .ply; export it as one of them")
     try:
         if path.stat().st_size > MOST_BYTES:
             raise ConfigError(f"{where}: {path.stat().st_size} bytes; give the target's faces alone")
-        groups = {".obj": _obj, ".ply": _ply}[path.suffix.lower()](path)
+        groups = read(path)
     except OSError as error:
         raise ConfigError(f"{where}: cannot be read ({error.strerror}); check the path") from error
-    except KeyError as error:
-        raise ConfigError(f"{where}: is neither .obj nor .ply; export it as one of them") from error
-    if not groups:
-        raise ConfigError(f"{where}: has no faces; export it with its polygons")
+    except ConfigError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of the library
+        reason = " ".join(str(error).split())[:100] or type(error).__name__
+        raise ConfigError(f"{where}: holds no faces that can be read ({reason}); export it again") from error
+    if not 0 < len(groups) <= MOST_GROUPS:
+        raise ConfigError(f"{where}: has {len(groups)} groups of faces, of 1 to {MOST_GROUPS}; export the target alone")
     for name, (vertices, polygons) in groups.items():
-        if not np.all(np.isfinite(vertices)) or not all(0 <= k < len(vertices) for one in polygons for k in one):
+        used = np.unique([number for one in polygons for number in one])
+        if not len(used) or used[0] < 0 or used[-1] >= len(vertices) or not np.all(np.isfinite(vertices[used])):
             raise ConfigError(f"{where}: group {name!r}: a polygon's vertex is not there; export it again")
-        yield name, _outline(vertices, polygons, f"{where}: group {name!r}")
-
-
-Groups = Mapping[str, tuple[Array, Sequence[Polygon]]]
+        own = [np.searchsorted(used, one).tolist() for one in polygons]
+        yield name, _outline(vertices[used], own, f"{where}: group {name!r}")
 
 
 def _obj(path: Path) -> Groups:
     from trimesh.exchange.obj import load_obj
 
     with path.open(encoding="utf-8", errors="replace") as file:
-        try:
-            scene = load_obj(file, skip_materials=True, split_groups=True, split_objects=True)
-        except Exception as error:  # whatever a damaged file makes of it
-            raise ConfigError(f"{path}: is no OBJ ({_reason(error)}); export it again") from error
+        scene = load_obj(file, skip_materials=True, split_groups=True, split_objects=True)
     meshes = scene.get("geometry", {"mesh": scene})
-    return {name: (np.asarray(one["vertices"]), np.asarray(one["faces"]).tolist()) for name, one in meshes.items()}
+    return {name: (_array(one["vertices"]), np.asarray(one["faces"]).tolist()) for name, one in meshes.items()}
 
 
 def _ply(path: Path) -> Groups:
     from trimesh.exchange.ply import load_ply
 
     with path.open("rb") as file:
-        try:
-            mesh = load_ply(file)
-            elements = mesh["metadata"]["_ply_raw"]["face"]
-            columns, vertices = elements["data"], np.asarray(mesh["vertices"], dtype=np.float64)
-            names = list(elements["properties"])
-        except Exception as error:  # whatever a damaged file makes of it
-            raise ConfigError(f"{path}: is no PLY with faces ({_reason(error)}); export it again") from error
+        mesh = load_ply(file)
+    elements = mesh["metadata"]["_ply_raw"]["face"]
+    columns, names = elements["data"], list(elements["properties"])
     if GROUP not in names:
         known = ", ".join(names)
         raise ConfigError(f"{path}: its faces have no property {GROUP!r}, only {known}; export it as OBJ with groups")
@@ -100,19 +105,25 @@ def _ply(path: Path) -> Groups:
         if np.any(polygons["f0"] != polygons["f0"][0]):
             raise ConfigError(f"{path}: triangles and other polygons, in binary; export it as text, or as triangles")
         polygons = polygons["f1"]
-    groups = np.ravel(np.asarray(columns[GROUP])).astype(np.int64)
-    found = {f"group-{number}": np.flatnonzero(groups == number) for number in np.unique(groups).tolist()}
-    return {name: (vertices, [np.asarray(polygons[k]).tolist() for k in rows]) for name, rows in found.items()}
+    found: dict[str, list[list[int]]] = {}
+    for number, polygon in zip(np.ravel(_array(columns[GROUP])).tolist(), polygons, strict=True):
+        if not abs(number) < MOST_BYTES:
+            raise ConfigError(f"{path}: its faces' property {GROUP!r} is {number:g}; give each group a whole number")
+        found.setdefault(f"group-{int(number)}", []).append([operator.index(k) for k in np.asarray(polygon).tolist()])
+    vertices = _array(mesh["vertices"])
+    return {name: (vertices, found[name]) for name in sorted(found, key=lambda name: (len(name), name))}
 
 
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split())[:100] or type(error).__name__
+def _array(values: Any) -> Array:
+    return np.asarray(values, dtype=np.float64)
 
 
 def _outline(vertices: Array, polygons: Sequence[Polygon], where: str) -> Array:
     """The one closed line around some polygons: their edges that no neighbour runs the other way."""
-    _, one_of, place = np.unique(np.round(vertices / SAME_M), axis=0, return_index=True, return_inverse=True)
-    place = place.ravel()
+    pairs = cKDTree(vertices).query_pairs(SAME_M, output_type="ndarray")
+    count = len(vertices)
+    _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count)))
+    one_of = np.unique(place, return_index=True)[1]
     edges = {(int(place[a]), int(place[b])) for one in polygons for a, b in zip(one, [*one[1:], one[0]], strict=True)}
     around = {a: b for a, b in edges if a != b and (b, a) not in edges}
     if len(around) != sum(a != b and (b, a) not in edges for a, b in edges) or not around:

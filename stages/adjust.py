@@ -114,7 +114,7 @@ def _geometry_table(
         update={
             "ins_rate_hz": max(10.0, _or(rates["ins"], figures.ins_rate_hz)),
             "laser": LaserFigures(point_rate_hz=_or(rates["laser"], figures.laser.point_rate_hz)),
-            "mbes": MbesFigures(ping_rate_hz=_or(rates["mbes"], figures.mbes.ping_rate_hz)),
+            "mbes": MbesFigures(ping_rate_hz=float(np.clip(_or(rates["mbes"], figures.mbes.ping_rate_hz), 0.1, 200.0))),
         }
     )
     model = target_of(config.target)

@@ -13,6 +13,7 @@ from pipeline.errors import RawDataError
 from pipeline.ins_sigmas import thinned
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.passes import estimate_azimuth, find_passes, pass_of, split_at_gaps
+from pipeline.rates import rate_hz
 from pipeline.streams import EMPTY, Chunk, Piece, Stream
 from pipeline.times import NS, WEEK_NS, utc_text
 
@@ -261,12 +262,7 @@ def _files(partials: dict[str, list[tuple[str, Seen]]]) -> pd.DataFrame:
             accuracy = any(seen.accuracy for seen in seen_list)
             if accuracy:
                 records = len(epochs)
-            seconds = (epochs.max() - epochs.min()) / NS if len(epochs) else 0.0
-            if sensor == "laser":
-                rate = records / seconds if seconds > 0 else np.nan
-            else:
-                steps = np.diff(np.unique(epochs))
-                rate = NS / float(np.median(steps)) if len(steps) else np.nan
+            rate = rate_hz(sensor, epochs, records)
             rows.append(
                 {
                     "sensor": "accuracy" if accuracy else sensor,

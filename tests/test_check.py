@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.checking import excerpts
 from tests.end_to_end.places import SCENARIOS, edit, poolcal, simulate
 
 FINE: dict[str, Any] = {"ins": {"rate_hz": 100.0}, "mbes": {"ping_rate_hz": 10.0}}
@@ -65,6 +66,45 @@ def test_a_good_session_is_clean(good: Callable[..., Path], scenario: str) -> No
     assert checked(good(scenario)) == (0, [])
 
 
+def test_a_good_session_of_which_only_pieces_are_read(
+    good: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = good()
+    monkeypatch.setattr(excerpts, "POINTS", 40_000)
+    monkeypatch.setattr(excerpts, "STRETCH", 500)
+    monkeypatch.setattr(excerpts, "BYTES", {"ins": 150_000, "mbes": 200_000})
+    monkeypatch.setattr(excerpts, "LEAST", {"ins": 10_000, "mbes": 20_000})
+    monkeypatch.setattr(excerpts, "HEAD", 20_000)
+    told = poolcal("check", session, "--config", session / "pool.yaml", "--json")
+    content = json.loads(told.out)
+    assert content["findings"] == []
+    assert all(file["share_read"] < 1.0 for file in content["files"]), content["files"]
+    assert all(passed["ran"] == {"laser": 1.0, "mbes": 1.0} for passed in content["passes"])
+
+
+def test_a_good_session_with_points_in_a_crs_and_odd_names(spoilt: Callable[..., Path]) -> None:
+    session = spoilt(laser={"frame": "EPSG:4978", "format": "las", "point_rate_hz": 2000.0})
+    path = session / "laser" / "pass_0.las"
+    path.rename(path.with_name("pass #0.las"))
+    assert checked(session) == (0, [])
+
+
+@pytest.mark.parametrize(("ins_s", "severity"), [((2.0, 100.0), "look"), ((40.0, 100.0), "fault")])
+def test_sensors_that_ran_before_the_ins_are_no_clocks(
+    spoilt: Callable[..., Path], ins_s: tuple[float, float], severity: str
+) -> None:
+    """Switched on a little sooner: nothing lost. A pass without it: its file is missing."""
+    session = spoilt(**SBET)
+    path = session / "ins" / "ins.sbet"
+    records = np.fromfile(path, "<f8").reshape(-1, 17)
+    since = records[:, 0] - records[0, 0]
+    records[(since >= ins_s[0] + 8.0) & (since <= ins_s[1])].tofile(path)
+    status, found = checked(session)
+    assert {one["severity"] for one in found if one["question"] == "ins missing"} <= {severity}
+    assert not [one for one in found if one["question"] == "clock"], found
+    assert status == (severity == "fault")
+
+
 def test_people_see_files_passes_and_that_nothing_was_found(good: Callable[..., Path]) -> None:
     told = poolcal("check", good(), "--config", good() / "pool.yaml")
     lines = told.out.splitlines()
@@ -107,7 +147,8 @@ SBET = {"ins": {"rate_hz": 100.0, "format": "sbet"}}
 def test_utc_taken_for_gps_shows_in_when_sensors_ran(spoilt: Callable[..., Path]) -> None:
     session = spoilt(**SBET)
     _shift_ins(session, -18.0)  # the INS in UTC: both others are ahead
-    only(session, "clock", "laser: its clock is 18 s ahead of", "mbes: its clock is 18 s ahead of", "UTC taken for GPS")
+    said = ("laser: its clock is 18 s ahead of", "mbes: its clock is 18 s ahead of", "UTC and GPS time are mixed up")
+    only(session, "clock", *said)
 
 
 def test_a_clock_is_told_from_the_target_where_all_ran_on(spoilt: Callable[..., Path]) -> None:

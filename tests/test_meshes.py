@@ -107,7 +107,7 @@ def triangles(corners: list[list[float]]) -> list[list[list[float]]]:
 def test_triangles_and_others_in_one_text_ply(tmp_path: Path) -> None:
     pieces = [(7, piece) for piece in cut(CORNERS["wall"])]
     assert same_outline(faces_in(pool(tmp_path, mesh=ply(tmp_path, pieces, False)))["group-7"], CORNERS["wall"])
-    with pytest.raises(ConfigError, match=r"triangles and other polygons, in binary|is no PLY"):
+    with pytest.raises(ConfigError, match=r"triangles and other polygons, in binary|holds no faces that can be read"):
         load_pool(pool(tmp_path, mesh=ply(tmp_path, pieces, True)))
 
 
@@ -136,6 +136,9 @@ REFUSED: Iterable[tuple[str, Polygons, dict[str, Any], str]] = (
     ("absent", {"wall": [WALL]}, {"mesh": "targets.obj"}, "cannot be read"),
     ("kind", {"wall": [WALL]}, {"mesh": "target.stl"}, "neither .obj nor .ply"),
     ("list", {"wall": [WALL]}, {"mesh": ["target.obj"]}, "must name a file"),
+    ("nul", {"wall": [WALL]}, {"mesh": "a\0.obj"}, "must name a file"),
+    ("empty", {"wall": []}, {}, "faces"),
+    ("many", {f"w{k}": [WALL] for k in range(501)}, {}, "has 501 groups of faces, of 1 to 500"),
     ("faces", {"wall": [WALL]}, {"faces": ["wall"]}, "must be a mapping"),
 )
 
@@ -148,6 +151,22 @@ def test_refused(tmp_path: Path, polygons: Polygons, more: dict[str, Any], words
         load_pool(pool(tmp_path, **({"mesh": mesh} | more)))
     assert words in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_vertices_written_anew_for_every_polygon_are_one(tmp_path: Path) -> None:
+    """To a tenth of a millimetre, wherever they lie."""
+    near = [[[x + 4e-5 * (k % 2), y, z] for x, y, z in piece] for k, piece in enumerate(cut(CORNERS["wall"]))]
+    (found,) = faces_in(pool(tmp_path, mesh=obj(tmp_path, {"wall": near}))).values()
+    assert same_outline(np.round(found, 3), CORNERS["wall"])
+
+
+def test_a_ply_whose_groups_are_no_numbers(tmp_path: Path) -> None:
+    ply(tmp_path, [(1, WALL)], False)
+    text = (tmp_path / "target.ply").read_text()
+    for old, new in (("0 1 2 3 1", "0 1 2 3 nan"), ("int group", "list uchar int group")):
+        (tmp_path / "target.ply").write_text(text.replace(old, new))
+        with pytest.raises(ConfigError, match=r"holds no faces that can be read|a whole number"):
+            load_pool(pool(tmp_path, mesh="target.ply"))
 
 
 def test_a_face_not_flat_and_one_not_convex_are_the_targets_to_refuse(tmp_path: Path) -> None:

@@ -12,10 +12,10 @@ from pipeline.times import NS, WEEK_NS, utc_text
 
 Times = NDArray[np.int64]
 LEAPS = {  # s
-    18: "UTC taken for GPS time",
-    37: "TAI taken for UTC",
-    19: "TAI taken for GPS time",
-    17: "leap seconds of 2015",
+    18: "UTC and GPS time are mixed up",
+    37: "TAI and UTC are mixed up",
+    19: "TAI and GPS time are mixed up",
+    17: "the leap seconds are those of 2015",
 }
 HOUR_NS = 3_600 * NS
 FARTHEST_H = 14
@@ -25,16 +25,10 @@ ENOUGH, MOST = 0.9, 0.99  # of a sensor's time in which the INS runs: as it is, 
 def named(offset_s: float, within_s: float = 0.3) -> str:
     """What an offset of clocks is known as; nothing where it has no name.
 
-    >>> named(18.1), named(-18.0), named(7200.0), named(5.0)
-    ('UTC taken for GPS time', 'UTC taken for GPS time', '2 hours: a time zone', '')
+    >>> named(18.1), named(-18.0), named(5.0)
+    ('UTC and GPS time are mixed up', 'UTC and GPS time are mixed up', '')
     """
-    for leap, words in LEAPS.items():
-        if abs(abs(offset_s) - leap) <= within_s:
-            return words
-    hours = round(abs(offset_s) / 1800) / 2
-    if hours and hours <= FARTHEST_H and abs(abs(offset_s) - 3600 * hours) <= max(within_s, 30.0):
-        return f"{hours:g} hour{'s' * (hours != 1)}: a time zone"
-    return ""
+    return next((words for leap, words in LEAPS.items() if abs(abs(offset_s) - leap) <= within_s), "")
 
 
 def covered(t_ns: Times, stretches: Sequence[tuple[int, int]]) -> float:
@@ -52,20 +46,22 @@ def apart(epochs: Mapping[str, Times], max_gap_ns: int, files: Sequence[Seen]) -
         share = covered(t_ns, running) if len(t_ns) else 1.0
         if share >= ENOUGH:
             continue
-        offset_ns, words = _offset(t_ns, running)
-        own = [seen for seen in files if seen.sensor == sensor and len(seen.epochs_ns)]
-        outside = [seen.name for seen in own if covered(seen.epochs_ns, running) < 1 - ENOUGH]
         spans = f"ins {utc_text(ins[0])} to {utc_text(ins[-1])}, {sensor} {utc_text(t_ns[0])} to {utc_text(t_ns[-1])}"
+        words = _offset(t_ns, running, share < 1 - ENOUGH, len(split_at_gaps(t_ns, max_gap_ns)) > 1)
         if words:
-            yield Finding("clock", f"{sensor}: its clock is {_amount(offset_ns)} the INS's: {words} ({spans})")
+            yield Finding("clock", f"{sensor}: its clock is {words} ({spans})")
         elif share < 1 - ENOUGH:
             yield Finding("clock", f"{sensor}: has no time in common with the INS ({spans}); check the clocks")
         else:
+            own = [seen for seen in files if seen.sensor == sensor and len(seen.epochs_ns)]
+            outside = [seen.name for seen in own if covered(seen.epochs_ns, running) < 1 - ENOUGH]
             which = f" ({', '.join(outside[:3])} wholly)" if outside else ""
+            between = np.count_nonzero((t_ns > ins[0]) & (t_ns < ins[-1])) / len(t_ns)
             yield Finding(
                 "ins missing",
                 f"{sensor}: ran for {1 - share:.0%} of its time without the INS{which}: {spans}; add the INS's other "
                 "files, or check the clocks",
+                "fault" if outside or between - share > 1 - ENOUGH else "look",  # on before it, or longer than it
             )
 
 
@@ -81,19 +77,28 @@ def _amount(offset_ns: int) -> str:
     return f"{how} {'ahead of' if offset_ns > 0 else 'behind'}"
 
 
-def _offset(t_ns: Times, running: Sequence[tuple[int, int]]) -> tuple[int, str]:
-    """By how much the sensor's clock is ahead, if an offset that has a name brings it into the INS's time."""
-    middle = (running[0][0] + running[-1][1]) // 2
-    away = int((t_ns[0] + t_ns[-1]) // 2) - middle
+def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses: bool) -> str:
+    """By how much the sensor's clock is off, if an offset that has a name brings it into the INS's time; else nothing.
+
+    Weeks and hours only where nothing was in common; leap seconds there, and where the sensor paused: one that did not,
+    and was switched on before the INS, looks the same.
+    """
+    away = int((t_ns[0] + t_ns[-1]) // 2) - (running[0][0] + running[-1][1]) // 2
     weeks = round(away / WEEK_NS)
-    tried: list[tuple[int, str]] = []
-    if weeks:
-        tried.append((weeks * WEEK_NS, "check gps_week, and the GPS time flag of the export"))
-    zone = "a time zone; export in UTC or GPS time"
-    tried += [(sign * half * HOUR_NS // 2, zone) for half in range(1, 2 * FARTHEST_H + 1) for sign in (1, -1)]
-    scale = "set the clock's time scale"
-    tried += [(sign * leap * NS, f"{words}; {scale}") for leap, words in LEAPS.items() for sign in (1, -1)]
-    for offset_ns, words in tried:
-        if covered(t_ns - offset_ns, running) >= MOST:
-            return offset_ns, words
-    return 0, ""
+
+    def fits(offset_ns: int) -> bool:
+        return covered(t_ns - offset_ns, running) >= MOST
+
+    if apart and weeks and fits(weeks * WEEK_NS):
+        return f"{_amount(weeks * WEEK_NS)} the INS's: check gps_week, and the GPS time flag of the export"
+    leaps = [sign * leap * NS for leap in LEAPS for sign in (1, -1)] if apart or pauses else []
+    for offset_ns in leaps:
+        if fits(offset_ns):
+            return f"{_amount(offset_ns)} the INS's: {named(offset_ns / NS)}; set the clock's time scale"
+    if apart:
+        hours = [h for h in range(-FARTHEST_H, FARTHEST_H + 1) if h and fits(h * HOUR_NS)]
+        if hours:
+            least, most = min(hours, key=abs), max(hours, key=abs)
+            amount = _amount(most * HOUR_NS) if least == most else f"{abs(least)} to {_amount(most * HOUR_NS)}"
+            return f"{amount} the INS's: a time zone; export in UTC or GPS time"
+    return ""

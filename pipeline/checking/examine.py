@@ -12,7 +12,7 @@ from pipeline.checking.calibrated import Calibrate, Calibrated
 from pipeline.checking.expected import Soundings, missed, soundings
 from pipeline.checking.finding import Finding
 from pipeline.checking.latency import latencies
-from pipeline.checking.placed import rows_of, sample
+from pipeline.checking.placed import placeable, rows_of, sample
 from pipeline.checking.survey import SENSORS, Seen, Times, survey
 from pipeline.checking.track import Leg, Track, frame_of, joined, track_of
 from pipeline.clouds import ClosestSurface
@@ -114,7 +114,9 @@ def _of_points(given: _Given, track: Track, asked: Sequence[str]) -> tuple[list[
     some = sample(seen, session, "mbes", track, FINELY) if "mbes" in asked and not found else None
     if some is None:
         return found, None
-    raw = {"ins": joined(seen)} | {sensor: rows_of(seen, sensor, SAMPLED) for sensor in ("laser", "mbes")}
+    some = some.placeable(track)
+    raw = {sensor: placeable(rows_of(seen, sensor, SAMPLED), track) for sensor in ("laser", "mbes")}
+    raw["ins"] = joined(seen)
     tried = given.calibrate(session, pool, raw) if "laser" in asked else Calibrated()
     counted = soundings(track, some, tried.soundings, len(raw["mbes"]["t_ns"]), seen, model, pool, session)
     found += missed(model, counted) if counted is not None else []

@@ -21,8 +21,9 @@ from pipeline.streams import Part
 POINTS = 4_000_000  # of a laser, over all its files
 STRETCH = 8_192  # points read at one place
 PACKED_STRETCH, PACKED_PLACES = 50_000, 24  # of LAZ each place costs a process
-BYTES = {"ins": 64 << 20, "mbes": 24 << 20}  # of a sensor, over all its files
+BYTES = {"ins": 64 << 20, "mbes": 48 << 20}  # of a sensor, over all its files
 PLACES = 128
+LEAST = {"ins": 1 << 16, "mbes": 1 << 19}  # read at one place: some records at least, of which a sonar's are large
 HEAD = 1 << 18  # at least so much of a file's start
 LOGS = ("novatel", "r2sonic", "gsf", "kmall")
 TEXTS = ("inertial_explorer",)
@@ -48,23 +49,26 @@ def stretches(parts: Sequence[LasPart], files: int) -> tuple[list[Part], float]:
 
 def excerpt(
     path: Path, name: str, sensor: str, settings: Ins | Laser | Mbes, files: int, folder: Path
-) -> tuple[Path, float]:
-    """A short copy in ``folder``, and the share of the file in it; the file itself where it is short, or cannot be cut.
-    """
+) -> tuple[Path, float, int]:
+    """A short copy in ``folder``, the share of the file in it, and from how many places that comes; the file itself
+    where it is short, or cannot be cut."""
     allowed = BYTES.get(sensor, 0) // files
     with opened(path, name) as file:
         size = size_of(file)
-        if size <= max(allowed, 2 * HEAD) or settings.format not in (*LOGS, *TEXTS, "sbet"):
-            return path, 1.0
+        least = LEAST.get(sensor, HEAD)
+        if size <= 2 * max(allowed, HEAD + 2 * least) or settings.format not in (*LOGS, *TEXTS, "sbet"):
+            return path, 1.0, 1
         copy = folder / f"{sensor}{len(list(folder.iterdir()))}"
-        each = max(allowed // PLACES, HEAD // 4)
+        each = max(allowed // PLACES, least)
+        places = max(2, allowed // each)
         with copy.open("wb") as out:
-            for piece in _pieces(file, size, each, max(2, allowed // each), settings.format):
+            for piece in _pieces(file, size, each, places, settings.format):
                 out.write(piece)
-        return copy, copy.stat().st_size / size
+        return copy, copy.stat().st_size / size, places
 
 
 def _pieces(file: BinaryIO, size: int, each: int, places: int, form: str) -> Iterator[bytes]:
+    """Of a file that is at least twice as long as they are together: they do not overlap."""
     yield from _cut(file, 0, HEAD, form)
     for start in np.linspace(HEAD, size - each, places).astype(int).tolist():
         yield from _cut(file, start, each, form)

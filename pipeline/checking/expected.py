@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 RAN = 0.3  # of a pass; in less of it the sonar was not on
 SHARE, FEWEST = 0.12, 200  # of what is expected: echoes and beams spaced otherwise cost two thirds; too few to tell
 NEAR_M = 0.35  # a sounding with the coarse mount belongs to the face it is nearest to
+MOST_PASSES = 40  # predicted; more are taken for their like
 THIN_HZ, INS_HZ = 2.0, 20.0  # of the prediction, which is scaled up
 
 
@@ -86,10 +87,11 @@ def _predicted(
 ) -> Array:
     """Soundings by face of these passes together, of a sonar as usual."""
     passes = tuple(
-        Pass(distance_m=min(leg.distance_m, 100.0), speed_m_s=float(np.clip(leg.speed_m_s, 0.01, 10))) for leg in legs
+        Pass(distance_m=min(leg.distance_m, 100.0), speed_m_s=float(np.clip(leg.speed_m_s, 0.01, 10)))
+        for leg in legs[:MOST_PASSES]
     )
     plan = Plan(ins_height_m=height_m, ins_rate_hz=INS_HZ, mbes=MbesFigures(ping_rate_hz=THIN_HZ), passes=passes)
     state = state_by_design(model, session.sonar)
     setting = Setting(model, state, plan, pool.segment, session.ins, session.laser, session.sonar)
     points = predict(setting, plan.passes, phases=1).points
-    return np.asarray(sum(one["mbes"] for one in points))
+    return np.asarray(sum(one["mbes"] for one in points)) * (len(legs) / len(passes))

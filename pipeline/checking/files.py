@@ -28,12 +28,16 @@ def unreadable(files: Sequence[Seen], wrong: Sequence[str]) -> Iterator[Finding]
             yield Finding("file", seen.complaint)
             continue
         cut = {reason: seen.dropped[reason] for reason in CUT if seen.dropped[reason]}
-        if cut and seen.share == 1.0:
+        if cut and (seen.share == 1.0 or "truncated" in cut):  # pieces of a log end within a record
             lost = ", ".join(f"{number} x {reason}" for reason, number in cut.items())
-            yield Finding("cut off", f"{seen.name}: ends in the middle of a record ({lost}); copy it again")
+            words = f"{seen.name}: ends in the middle of a record ({lost}); copy it again, unless it was logged so"
+            yield Finding("cut off", words, "look" if sum(cut.values()) == 1 and "truncated" not in cut else "fault")
         if not seen.records:
             why = ", ".join(f"{n} x {reason}" for reason, n in sorted(seen.dropped.items()) if n) or "it is empty"
-            yield Finding("no records", f"{seen.name}: no usable {seen.sensor} record ({why}); log or export it again")
+            words = f"{seen.name}: no usable {seen.sensor} record ({why}); log or export it again"
+            aligning = any(reason.startswith("ins status") for reason in seen.dropped)
+            others = any(other.records for other in files if other.sensor == seen.sensor)
+            yield Finding("no records", words, "look" if aligning and others else "fault")
 
 
 def twice(files: Sequence[Seen]) -> Iterator[Finding]:
@@ -42,15 +46,19 @@ def twice(files: Sequence[Seen]) -> Iterator[Finding]:
         if one.sensor != other.sensor:
             continue
         first = max(one.span_ns[0], other.span_ns[0])
-        last = min(one.span_ns[1], other.span_ns[1])
-        inside = [int(np.count_nonzero((s.epochs_ns >= first) & (s.epochs_ns <= last))) for s in (one, other)]
-        shares = [count / len(s.epochs_ns) for count, s in zip(inside, (one, other), strict=True)]
-        if first >= last or max(shares) < TWICE:
+        if first >= min(one.span_ns[1], other.span_ns[1]):
             continue
-        same = one.records == other.records and np.array_equal(one.epochs_ns, other.epochs_ns)
-        what = "is the same recording" if same else f"holds {max(shares):.0%} of the same time"
-        advice = f"take one of them out of {one.sensor}.files"
-        yield Finding("twice", f"{other.name}: {what} as {one.name}, from {utc_text(first)}; {advice}")
+        common = np.count_nonzero(np.isin(one.epochs_ns, other.epochs_ns, assume_unique=True))
+        share = float(common / min(len(one.epochs_ns), len(other.epochs_ns)))
+        if share < TWICE:
+            continue
+        same = one.records == other.records and len(one.epochs_ns) == len(other.epochs_ns) == common
+        what = "is the same recording" if same else f"has {share:.0%} of its times in common"
+        what += f" as {one.name}" if same else f" with {one.name}"
+        advice = f"take one of them out of {one.sensor}.files, unless they are parts of one scan"
+        tiles = one.sensor == "laser" and not same
+        words = f"{other.name}: {what}, from {utc_text(first)}; {advice}"
+        yield Finding("twice", words, "look" if tiles else "fault")
 
 
 def ins_rate(files: Sequence[Seen]) -> Iterator[Finding]:
@@ -105,14 +113,16 @@ def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Findi
     speeds = {seen.name: seen.columns["sound_speed_m_s"] for seen in files if seen.sensor == "mbes" and seen.columns}
     medians = {name: float(np.median(values)) for name, values in speeds.items() if len(values)}
     low, high = SPEEDS_M_S
+    recorded = session.mbes.sound_speed_m_s is None and session.mbes.svp is None  # what is recorded is used
     for name, speed in medians.items():
-        if not low <= speed <= high and session.mbes.sound_speed_m_s is None:
+        if not low <= speed <= high and recorded:
             yield Finding(
                 "sound speed",
                 f"{name}: the sonar worked with a sound speed of {speed:.1f} m/s, outside {low:.0f} to {high:.0f}: "
                 "give the measured one as mbes.sound_speed_m_s",
             )
-    yield from _differing(medians)
+    if recorded:
+        yield from _differing(medians)
     cast = session.mbes.svp
     if cast is not None and session.mbes.sound_speed_m_s is None and medians:
         measured = float(np.median([speed for _, speed in cast]))

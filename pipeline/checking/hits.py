@@ -51,13 +51,13 @@ def hypotheses(track: Track, some: Sample, closest: ClosestSurface) -> list[Hit]
         return score(closest, placing(**changed))
 
     tried = [Hit(judge())]
+    if some.georeferenced:
+        return tried
     if some.sensor == "laser":
         tried += [
             Hit(judge(scale=scale), words=f"if they are in {unit}: export them in metres")
             for unit, scale in UNITS.items()
         ]
-    if some.georeferenced:
-        return tried
     for key in SIGNS:
         value = getattr(some.mount, key)
         turned = some.mount.model_copy(update={key: -value})
@@ -117,7 +117,7 @@ def _clocks(clocks: Mapping[str, float], sensors: int) -> Iterator[Finding]:
 def _said(ahead_s: float) -> str:
     """
     >>> _said(18.4), _said(-5.0)
-    ('18.4 s (likely 18 s: UTC taken for GPS time) ahead of', '5.0 s behind')
+    ('18.4 s (likely 18 s: UTC and GPS time are mixed up) ahead of', '5.0 s behind')
     """
     words = named(ahead_s, LEAP_WITHIN_S)
     leap = next((s for s in (18, 37, 19, 17) if abs(abs(ahead_s) - s) <= LEAP_WITHIN_S), 0)

@@ -91,7 +91,7 @@ def sailing(track: Track) -> Iterator[Finding]:
 
 def missing(track: Track, files: Sequence[Seen]) -> Iterator[Finding]:
     """A pass of which one sensor has nothing, or not all."""
-    there = {seen.sensor for seen in files if seen.records and seen.ended}
+    there = {seen.sensor for seen in files if seen.records} - {seen.sensor for seen in files if not seen.ended}
     for leg in track.legs:
         if not leg.good or not {"laser", "mbes"} <= there:
             continue

@@ -28,12 +28,19 @@ class Sample:
     mount: config.Mount
     georeferenced: bool = False
 
+    def placeable(self, track: Track) -> "Sample":
+        """The rows for which the INS, which may have been read in part, has a pose."""
+        return self._of(track.trajectory.covers(self.t_ns, NS))
+
     def near(self, track: Track) -> "Sample":
         """The rows of legs as a session wants them."""
         rows = np.zeros(len(self.t_ns), dtype=bool)
         for leg in track.legs:
             if leg.good:
                 rows |= (self.t_ns >= leg.start_ns) & (self.t_ns <= leg.end_ns)
+        return self._of(rows)
+
+    def _of(self, rows: NDArray[np.bool_]) -> "Sample":
         return Sample(self.sensor, self.t_ns[rows], self.points_m[rows], self.mount, self.georeferenced)
 
 
@@ -44,6 +51,12 @@ def rows_of(files: Sequence[Seen], sensor: str, rows: int) -> Columns:
         return {}
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     return dict(every_nth(columns, max(1.0, len(columns["t_ns"]) / rows)))
+
+
+def placeable(columns: Columns, track: Track) -> Columns:
+    """The same of rows as they were read."""
+    rows = track.trajectory.covers(columns["t_ns"], NS) if columns else slice(None)
+    return {name: values[rows] for name, values in columns.items()}
 
 
 def sample(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.checking.excerpts import excerpt, stretches
 from pipeline.errors import ConfigError, RawDataError
+from pipeline.rates import rate_hz
 from pipeline.readers import Sensor, Settings, detect, raw_files, raw_parts
 from pipeline.readers.las import LasPart
 from pipeline.sampling import every_nth
@@ -22,22 +23,23 @@ from pipeline.times import NS
 Columns = dict[str, NDArray[Any]]
 Times = NDArray[np.int64]
 SENSORS: tuple[Sensor, ...] = ("ins", "laser", "mbes")
-MOST_ROWS = 6_000_000  # read of one file that cannot be cut
+MOST_ROWS = 12_000_000  # read of the files of a sensor that cannot be cut
 KEPT = 200_000  # rows kept of a file of points or soundings
 TICK_NS = NS // 20  # of the laser's times one in each such interval is kept
 
 
 @dataclass(frozen=True)
 class Seen:
-    """One file. ``share``: how much of it was read; ``ended``: its end was among that; ``epochs_ns``: times of records
-    or pings, of a laser one a tick; ``columns``: sampled rows, of an INS all; ``complaint``: why it could not be read.
-    """
+    """One file. ``share``: how much of it was read, ``places``: in how many evenly spread ones; ``ended``: its end was
+    among that; ``epochs_ns``: times of records or pings, of a laser one a tick; ``columns``: sampled rows, of an INS
+    all; ``complaint``: why it could not be read."""
 
     sensor: Sensor
     name: str
     size: int
     kind: str = "unreadable"
     share: float = 1.0
+    places: int = 1
     ended: bool = True
     records: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
@@ -50,24 +52,16 @@ class Seen:
         return int(self.epochs_ns[0]), int(self.epochs_ns[-1])
 
     @property
-    def step_ns(self) -> float:
-        """Usual time from one epoch to the next."""
-        return float(np.median(np.diff(self.epochs_ns))) if len(self.epochs_ns) > 1 else np.nan
-
-    @property
     def rate_hz(self) -> float:
         """Records of the INS, pings, points."""
-        if self.sensor != "laser":
-            return NS / self.step_ns
-        seconds = (self.epochs_ns[-1] - self.epochs_ns[0]) / NS if len(self.epochs_ns) > 1 else 0.0
-        return self.records / seconds if seconds > 0 else np.nan
+        return rate_hz(self.sensor, self.epochs_ns, self.records)
 
     @property
     def coarseness_ns(self) -> float:
-        """A longer time without an epoch is a hole, not one between two pieces that were read."""
-        steps = np.diff(self.epochs_ns)
-        between = steps[steps > 5 * np.median(steps)] if self.share < 1.0 and len(steps) else steps[:0]
-        return 3 * float(np.median(between)) if len(between) else 0.0
+        """A longer time without an epoch is a hole, not one between two places that were read."""
+        if self.places < 2 or len(self.epochs_ns) < 2:
+            return 0.0
+        return 3 * float(self.epochs_ns[-1] - self.epochs_ns[0]) / (self.places - 1)
 
 
 def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], list[str]]:
@@ -126,7 +120,7 @@ def _parts(
         good = [name for name in names if name not in bad]
         parts = parts_of(good) if good else ()
     for name in names:
-        yield name, bad[name] if name in bad else [part for part in parts if part.name.split("#")[0] == name]
+        yield name, bad[name] if name in bad else [part for part in parts if _path_of(part) == folder / name]
 
 
 def _escaped(name: str) -> str:
@@ -147,16 +141,20 @@ def _look(
         if las:
             some, share = stretches(las, files)
             total = sum(part.stop - part.start for part in las)
-            read = _read(seen, some)
-            return read if share == 1.0 else replace(read, share=share, records=total)
-        copy, share = excerpt(path, name, sensor, settings, files, place)
+            read = _read(seen, some, files)
+            return read if share == 1.0 else replace(read, share=share, places=len(some), records=total)
+        copy, share, places = excerpt(path, name, sensor, settings, files, place)
         if copy == path:
-            return _read(seen, parts)
-        read = _read(seen, [_over(part, copy) for part in parts])
+            return _read(seen, parts, files)
+        read = _read(seen, [_over(part, copy) for part in parts], files)
         copy.unlink()
-        return replace(read, share=share, records=round(read.records / share))
+        return replace(read, share=share, places=places, records=round(read.records / share))
     except (RawDataError, ConfigError) as error:
         return replace(seen, complaint=str(error))
+
+
+def _path_of(part: Part) -> Path | None:
+    return getattr(part, "path", None)
 
 
 def _over(part: Part, path: Path) -> Part:
@@ -164,14 +162,14 @@ def _over(part: Part, path: Path) -> Part:
     return moved
 
 
-def _read(seen: Seen, parts: Sequence[Part]) -> Seen:
-    """The rows of some parts: counted, and thinned until few enough remain."""
+def _read(seen: Seen, parts: Sequence[Part], files: int) -> Seen:
+    """The rows of some parts of one of so many files: counted, and thinned until few enough remain."""
     epochs: list[Times] = []
     kept: list[Columns] = []
     dropped: Counter[str] = Counter()
     records, ended, one_in = 0, True, 1.0
     for chunk in (chunk for part in parts for chunk in part.chunks()):
-        if records >= MOST_ROWS:
+        if records >= MOST_ROWS // files:
             ended = False
             break
         dropped.update(chunk.dropped)
