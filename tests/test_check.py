@@ -70,7 +70,7 @@ def test_a_good_session_of_which_only_pieces_are_read(
     good: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = good()
-    monkeypatch.setattr(excerpts, "POINTS", 40_000)
+    monkeypatch.setattr(excerpts, "POINTS", 16_000)
     monkeypatch.setattr(excerpts, "STRETCH", 500)
     monkeypatch.setattr(excerpts, "BYTES", {"ins": 150_000, "mbes": 200_000})
     monkeypatch.setattr(excerpts, "LEAST", {"ins": 10_000, "mbes": 20_000})
