@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+import stages.check
 from pipeline.checking import excerpts
+from pipeline.checking.calibrated import Calibrated
 from tests.end_to_end.places import SCENARIOS, edit, poolcal, simulate
 
 FINE: dict[str, Any] = {"ins": {"rate_hz": 100.0}, "mbes": {"ping_rate_hz": 10.0}}
@@ -43,6 +45,13 @@ def spoilt(good: Callable[..., Path], tmp_path: Path) -> Callable[..., Path]:
     return copy
 
 
+@pytest.fixture(autouse=True)
+def _calibrated(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seconds are spent on calibrating a sample only where it is asked what that tells."""
+    if not request.node.get_closest_marker("calibrates"):
+        monkeypatch.setattr(stages.check, "_calibrated", lambda *_: Calibrated())
+
+
 def checked(session: Path) -> tuple[int, list[dict[str, Any]]]:
     told = poolcal("check", session, "--config", session / "pool.yaml", "--json")
     assert told.status in (0, 1), told.err
@@ -61,11 +70,13 @@ def only(session: Path, question: str, *words: str, severity: str = "fault") -> 
     assert all("\n" not in one["words"] for one in found)
 
 
+@pytest.mark.calibrates
 @pytest.mark.parametrize("scenario", ["default", "drift", "messy", "small_target", "azimuth_163"])
 def test_a_good_session_is_clean(good: Callable[..., Path], scenario: str) -> None:
     assert checked(good(scenario)) == (0, [])
 
 
+@pytest.mark.calibrates
 def test_a_good_session_of_which_only_pieces_are_read(
     good: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,6 +127,7 @@ def test_people_see_files_passes_and_that_nothing_was_found(good: Callable[..., 
     assert sum("100%    100%" in line for line in lines) == 2
 
 
+@pytest.mark.calibrates
 def test_soundings_are_as_many_as_the_passes_should_give(good: Callable[..., Path]) -> None:
     told = poolcal("check", good("small_target"), "--config", good("small_target") / "pool.yaml", "--json")
     faces = json.loads(told.out)["soundings"]
@@ -173,6 +185,7 @@ def test_a_time_zone(spoilt: Callable[..., Path]) -> None:
     only(session, "clock", "8 hours behind", "time zone")
 
 
+@pytest.mark.calibrates
 @pytest.mark.parametrize(("sensor", "latency_ms"), [("mbes", -16), ("laser", 12), ("ins", 20), ("mbes", 100)])
 def test_a_clock_off_by_milliseconds(spoilt: Callable[..., Path], sensor: str, latency_ms: int) -> None:
     """Latency is taken off: a clock of which too much is taken off is behind."""
@@ -268,6 +281,7 @@ def test_different_sound_speeds(spoilt: Callable[..., Path]) -> None:
     only(spoilt(mbes=slow), "sound speed", "1380.0 m/s", "outside 1400 to 1560")
 
 
+@pytest.mark.calibrates
 def test_a_fan_that_does_not_reach_the_lower_blocks(spoilt: Callable[..., Path]) -> None:
     """4.3 m reach from the nearer pass (the head 3.7 m from the wall, 0.7 m deep) to 2.2 m below the head."""
     short = {"ping_rate_hz": 10.0, "max_range_m": 4.3}

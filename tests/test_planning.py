@@ -108,6 +108,7 @@ def test_what_a_plan_lacks_is_said_with_its_cure(
     assert "above the limit" in said
 
 
+@pytest.mark.thorough
 def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, SessionConfig]) -> None:
     candidates = [{"distance_m": d} for d in (3.0, 5.5, 6.0, 9.0)]
     budget = {"seconds": 200.0, "turn_s": 60.0}
@@ -190,6 +191,7 @@ def test_what_is_not_to_be_planned_or_written_over(tmp_path: Path) -> None:
         assert "should be less than or equal to" in refused(**content)
 
 
+@pytest.mark.thorough
 def test_what_is_freed_is_freed_in_the_prediction_too(configs: tuple[PoolConfig, SessionConfig]) -> None:
     pool, session = configs
     freed = pool.model_copy(update={"adjust": pool.adjust.model_copy(update={"free": ("mbes_latency",)})})

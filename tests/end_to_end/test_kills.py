@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
-from tests.effort import often
+import pytest
+
 from tools.kill_campaign import campaign
 
-KILLS = often(1, 2)
+KILLS = 2
 
 
+@pytest.mark.thorough
 def test_killed_and_run_again(small: Path, tmp_path: Path) -> None:
     told = campaign(small, tmp_path, kills=KILLS, seed=7)
     assert told.kills == KILLS

@@ -171,6 +171,7 @@ def test_drawn_again_only_with_cause(done: Place) -> None:
     assert poolcal("verify", done.run).status == 0
 
 
+@pytest.mark.thorough
 def test_stages_that_do_not_agree_are_not_drawn_together(done: Place) -> None:
     assert done.calibrate("--report").status == 0
     path = done.run / "report" / "report.html"

@@ -13,7 +13,7 @@ from pipeline.maths.rigid import FORWARD, STARBOARD, Axes, Frame, Survey
 from tests.effort import often
 from tests.maths.surveys import ALONG, ON_BODY, PLACE, World, attitude_rotation, error
 
-DRAWS = often(120, 500)
+DRAWS = often(60, 500)
 LOPSIDED = np.array([0.0006, 0.0012, 0.003])  # m, along the survey's x, y, z
 TURNED = Rotation.from_euler("xyz", [20, 35, 50], degrees=True).as_matrix()
 

@@ -78,6 +78,7 @@ def test_the_target_is_measured_and_what_differs_is_said(quiet, quiet_found):
     assert any("the laser finds b = 3.0000 m where the config has 3.02 m" in words for words in wrong["warnings"])
 
 
+@pytest.mark.thorough
 def test_a_leaning_target_is_said():
     leaning = result(calibrated(made(QUIET, {"surroundings": {"tilt_deg": [0.0, 0.3]}}, seed=6)))
     lean = leaning["target"]["as_found"]["lean_deg"]

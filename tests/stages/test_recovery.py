@@ -115,6 +115,7 @@ def test_an_azimuth_left_open_is_estimated(errors_of):
     assert np.abs(errors_of(blocks(found)["methods"]["adjustment"], session.truth))[:3].max() < 1e-4
 
 
+@pytest.mark.thorough
 def test_wrong_sound_speed_is_put_right_in_range_and_steering(errors_of):
     """1 % looks like a roll of a quarter of a degree; given the true speed, both range and angle are recomputed."""
     speed = {"mbes": {"sound_speed_true_m_s": 1500.0, "sound_speed_recorded_m_s": 1485.0}}
