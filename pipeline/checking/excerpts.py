@@ -40,11 +40,19 @@ def stretches(parts: Sequence[LasPart], files: int) -> tuple[list[Part], float]:
     if places * each >= total:
         return list(parts), 1.0
     found: list[Part] = []
-    for start in np.linspace(0, total - each, places).astype(int).tolist():
+    for start in _starts(total - each, places):
         part = next(part for part in parts if part.start <= start < part.stop)
         last = start + each >= total
         found.append(replace(part, start=start, stop=min(start + each, part.stop), missing=part.missing * last))
     return found, places * each / total
+
+
+def _starts(last: int, places: int) -> list[int]:
+    """The first, the last, and between them one somewhere in each step: at even steps always the same part of a scan's
+    line might be read."""
+    steps = np.linspace(0.0, 1.0, places)
+    steps[1:-1] += np.random.default_rng(0).uniform(-0.45, 0.45, places - 2) / (places - 1)
+    return [int(step * last) for step in steps]
 
 
 def excerpt(
