@@ -167,5 +167,10 @@ def changes(model: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any, Any]
         default = None if field.is_required() else field.get_default(call_default_factory=True)
         if isinstance(value, BaseModel):
             yield from changes(value, f"{prefix}{name}.")
+        elif isinstance(value, dict) and value and all(isinstance(one, BaseModel) for one in value.values()):
+            for key, one in value.items():
+                yield from changes(one, f"{prefix}{name}.{key}.")
+        elif isinstance(value, tuple) and any(isinstance(one, BaseModel) for one in value):
+            yield f"{prefix}{name}", default, [one.model_dump(mode="json", exclude_none=True) for one in value]
         elif field.is_required() or value != default:
             yield f"{prefix}{name}", default, value

@@ -2,6 +2,7 @@
 
 import yaml
 
+from stages import ORDER
 from tests.end_to_end.places import Place, digests
 from tests.targets import as_faces
 
@@ -10,9 +11,11 @@ def test_faces_give_the_same_bytes_as_the_letters(place: Place, right: dict[str,
     content = yaml.safe_load(place.config.read_text(encoding="utf-8"))
     content["target"] = as_faces(content["target"])
     place.config.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    told = place.calibrate()
-    assert told.status == 0, told.err
+    told = place.calibrate("--report", "--recordings")
+    assert (told.status, told.complaints) == (0, []), told.err
     assert digests(place.run) == right
+    assert "target.faces.P2.corners" in (place.run / "report" / "report.html").read_text(encoding="utf-8")
+    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
 
 
 def test_a_face_that_makes_no_sense_is_one_line(place: Place) -> None:
