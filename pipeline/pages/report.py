@@ -79,6 +79,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         speeds=_speeds(files),
         methods=METHODS,
         laser=laser,
+        letters=isinstance(settings.pool.target, config.Letters),
         by_method=[] if laser else list(_by_method(calibrations)),
         closing=[] if laser else tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
         shares=list(_shares(tables.table(artefacts.FREED), tables.table(artefacts.ESTIMATE), settings.session)),

@@ -104,6 +104,8 @@ def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], depth: flo
         middle, half = (low + high) / 2, max(high - low) * 1.1
         axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
     else:
+        for drawn in (*axis.lines, *axis.collections):
+            drawn.set_visible(False)
         axis.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
         axis.text(0.5, 0.5, "too few points", transform=axis.transAxes, ha="center", color=QUIET)
 
