@@ -80,8 +80,7 @@ def campaign(session: Path, folder: Path, kills: int, seed: int) -> Campaign:
     other.write_text(yaml.safe_dump(text), encoding="utf-8")
     seconds = [calibrate(session, config, folder / "undisturbed")] * 2  # a run's duration: afresh, over a result
     right = digests(folder / "undisturbed")
-    if kills > 1:
-        calibrate(session, other, folder / "earlier")
+    calibrate(session, other, folder / "earlier")
     while told.kills < kills:
         run, over = folder / f"run_{told.runs}", told.kills % 2
         if over:

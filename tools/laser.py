@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
+
+from tools.montecarlo import DRIFT, errors_of
 
 Array = NDArray[np.float64]
 NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about body x, y, z; lever arm
 UNITS = np.r_[[np.pi / 180] * 3, [1e-3] * 3]
 FIRST_SEED, SECOND_SEED = 40_000, 50_000
-DRIFT = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
 PLUMB_DEG = 0.001
 FIT = {"face_sigma_deg": 0.001, "plumb_sigma_deg": PLUMB_DEG, "face_sigma_m": 0.0002}  # the target is as designed
 WIDE = {"max_sigma_deg": 1.0, "max_sigma_m": 1.0}
@@ -38,7 +38,7 @@ def scenario_of(number: int) -> dict[str, Any]:
     error = {key: sign * size for key, sign, size in zip(keys, signs, [0.3] * 3 + [0.03] * 3, strict=True)}
     return {
         "name": "laser",
-        "ins": {"drift": DRIFT},
+        "ins": DRIFT,
         "laser": {"point_rate_hz": 5000.0, "coarse_error": error},
         "mbes": {"ping_rate_hz": 10.0},
     }
@@ -55,11 +55,6 @@ def calibrate(session: dict[str, Any], pool: dict[str, Any], made: Any) -> dict[
     return content
 
 
-def error_of(R_true: Array, lever_true: Array, R_found: Array, lever_found: Array) -> Array:
-    turn = (Rotation.from_matrix(R_true) * Rotation.from_matrix(R_found).inv()).as_rotvec()
-    return np.concatenate([turn, np.subtract(lever_true, lever_found)])
-
-
 def one(number: int) -> dict[str, Any]:
     """A row: errors and sigmas of the laser, of the sonar, and what is held with the usual limits."""
     from pipeline.parsing import parse
@@ -71,9 +66,8 @@ def one(number: int) -> dict[str, Any]:
     alone = {name: value for name, value in made.session.items() if name != "mbes"}
     usual = calibrate(alone, made.pool | {"laser_fit": FIT}, made)
     wide = calibrate(alone, made.pool | {"laser_fit": FIT | {"hold_share": 1.0}, "verdict": WIDE}, made)
-    block, truth = wide["laser"], made.truth["laser"]
-    R, lever = np.array(block["R_body_from_laser"]), np.array(block["lever_arm_m"])
-    error = error_of(np.array(truth["R_body_from_laser"]), np.array(truth["lever_arm_m"]), R, lever)
+    block = wide["laser"]
+    error = errors_of(np.array(block["R_body_from_laser"]), np.array(block["lever_arm_m"]), made.truth, "laser")
     row: dict[str, Any] = {"number": number, "accepted": usual["verdict"] == "accepted"}
     row |= {"held": " ".join(usual["held"]), "held_wide": " ".join(wide["held"])}
     random, total = np.array(block["covariance"]), np.array(block["covariance_total"])
@@ -85,8 +79,7 @@ def one(number: int) -> dict[str, Any]:
     session["mbes"] = session["mbes"] | SURE | {"sound_speed_sigma_m_s": 0.0, "sound_speed_gradient_sigma_1_s": 0.0}
     pool = made.pool | {"as_built": {"offset_sigma_m": 0.0, "angle_sigma_deg": 0.0}, "verdict": WIDE}
     sonar = calibrate(session, pool, made)["mbes"]
-    R_true, lever_true = (np.array(made.truth["mbes"][key]) for key in ("R_body_from_mbes", "lever_arm_m"))
-    error = error_of(R_true, lever_true, np.array(sonar["R_body_from_mbes"]), np.array(sonar["lever_arm_m"]))
+    error = errors_of(np.array(sonar["R_body_from_mbes"]), np.array(sonar["lever_arm_m"]), made.truth)
     row |= _columns("sonar", error, np.array(sonar["covariance_total"]))
     without = np.sqrt(np.diag(sonar["covariance"])) / UNITS
     return row | {f"sonar_random_{name}": value for name, value in zip(NAMES, without, strict=True)}

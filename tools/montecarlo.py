@@ -126,11 +126,11 @@ def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
     return merged
 
 
-def errors_of(R_body_from_mbes: Array, lever_arm_m: Array, truth: Mapping[str, Any]) -> Array:
-    """(6,): ε of R_true = Exp(ε) R_body_from_mbes in rad, then the lever arm's error in m."""
-    R_true = np.array(truth["mbes"]["R_body_from_mbes"])
-    rotation = Rotation.from_matrix(R_true @ R_body_from_mbes.T).as_rotvec()
-    return np.concatenate([rotation, np.array(truth["mbes"]["lever_arm_m"]) - lever_arm_m])
+def errors_of(R_body_from_sensor: Array, lever_arm_m: Array, truth: Mapping[str, Any], sensor: str = "mbes") -> Array:
+    """(6,): ε of R_true = Exp(ε) R_body_from_sensor in rad, then the lever arm's error in m."""
+    R_true = np.array(truth[sensor][f"R_body_from_{sensor}"])
+    rotation = Rotation.from_matrix(R_true @ R_body_from_sensor.T).as_rotvec()
+    return np.concatenate([rotation, np.array(truth[sensor]["lever_arm_m"]) - lever_arm_m])
 
 
 def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:

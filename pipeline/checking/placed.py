@@ -82,9 +82,12 @@ def sample(
 def put(
     track: Track, some: Sample, mount: config.Mount | None = None, ahead_s: float = 0.0, scale: float = 1.0
 ) -> Array:
-    """Points (n, 3) m in the pool frame; NaN where the INS has no pose. ``ahead_s``: of the sensor's clock."""
+    """Points (n, 3) m in the pool frame; NaN where the INS has no pose. ``ahead_s``: of the sensor's clock.
+
+    Of points that others placed none of the three changes anything.
+    """
     if some.georeferenced:
-        return some.points_m * scale
+        return some.points_m
     mounted = mount_of(mount or some.mount)
     body = scale * some.points_m @ mounted.R_body_from_sensor.T + mounted.lever_arm_body_m
     t_ns = some.t_ns - round(ahead_s * NS)

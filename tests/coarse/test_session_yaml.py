@@ -1,0 +1,253 @@
+"""What ``poolcal coarse`` and ``laser`` write into session.yaml, and how little of it changes."""
+
+import errno
+import os
+import random
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.config import Laser, load_session
+from pipeline.errors import ConfigError
+from pipeline.parsing import parse
+from pipeline.session_edit import edited, refuse_other
+from tests.coarse.conftest import KEYS, PLAIN, marks_of, mounts_in, run
+from tests.maths.surveys import World
+
+
+# --- session.yaml as text --------------------------------------------------------------------------------------------
+def _only_mounts_changed(before: str, after: str) -> None:
+    """Every line but numbers of mounts and the new keys is as it was."""
+    lines = iter(after.splitlines(keepends=True))
+    for line in before.splitlines(keepends=True):
+        pattern = re.sub(r"((?:roll|pitch|yaw)_deg: |[xyz]_m: )[-+.e0-9]+", r"\1NUMBER", line)
+        wanted = re.escape(pattern).replace("NUMBER", r"-?[0-9]+\.[0-9]{6}")
+        found = next(lines)
+        while not re.fullmatch(wanted, found):
+            ours = r"  (mount_origin: \{.*\}|mount_covariance: \[.*,|  \[.*\][,\]])\r?\n"
+            assert re.fullmatch(ours, found), (found, wanted)
+            found = next(lines)
+    assert next(lines, None) is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [PLAIN, PLAIN.replace("\n", "\r\n"), "\ufeff" + PLAIN, PLAIN.rstrip("\n"), PLAIN + "\n\n"],
+    ids=["plain", "CRLF", "BOM", "no end of line", "blank lines"],
+)
+def test_nothing_but_mounts_is_changed(text: str, session: Path) -> None:
+    path = session / "session.yaml"
+    path.write_bytes(text.encode("utf-8"))
+    assert run(session, marks_of(World(), None)).status == 0
+    after = path.read_bytes().decode("utf-8")
+    _only_mounts_changed(text, after)
+    assert ("\r\n" in after) == ("\r\n" in text)
+    assert after.count("\n") == text.count("\n") + 2 * 7
+    for name, found in mounts_in(session).items():
+        np.testing.assert_allclose(found, World().mounts[name], atol=3e-6)
+    assert (session / "session.1.yaml").read_bytes() == text.encode("utf-8")
+
+
+FLOW = (
+    "{name: a, ins: {files: [i], format: table}, laser: {files: [l], format: las,\n"
+    "  mount: {roll_deg: 0, pitch_deg: 0, yaw_deg: 0, x_m: 0, y_m: 0, z_m: 0}},  # 激光\n"
+    " mbes: {files: [m], format: table}}\n"
+)
+
+
+def test_flow_style_and_a_missing_mount(session: Path) -> None:
+    (session / "session.yaml").write_text(FLOW, encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"mbes\.mount: is missing"):
+        load_session(session)
+    told = run(session, marks_of(World(), None))
+    assert told.status == 0, told.err
+    for name, found in mounts_in(session).items():
+        np.testing.assert_allclose(found, World().mounts[name], atol=3e-6)
+    assert "},  # 激光\n" in (session / "session.yaml").read_text(encoding="utf-8")
+
+
+def test_a_missing_mount_of_what_was_not_surveyed_is_said(session: Path) -> None:
+    (session / "session.yaml").write_text(FLOW, encoding="utf-8")
+    marks = marks_of(World(), None)
+    del marks["mbes"]
+    told = run(session, marks)
+    assert told.status == 0, told.err
+    assert "But mbes still has no mount there." in told.out
+    assert "mbes mount" not in told.out
+
+
+def test_twice_is_once_and_another_survey_is_kept_apart(session: Path) -> None:
+    marks = marks_of(World())
+    assert run(session, marks).status == 0
+    first = (session / "session.yaml").read_bytes()
+    told = run(session, marks)
+    assert told.status == 0
+    assert "has these mounts already; not written" in told.out
+    assert (session / "session.yaml").read_bytes() == first
+    assert sorted(path.name for path in session.iterdir()) == ["session.1.yaml", "session.yaml"]
+    (session / "session.3.yaml").write_text("mine")
+    for number, seed in ((2, 5), (4, 6)):
+        before = (session / "session.yaml").read_bytes()
+        assert f"session.{number}.yaml" in run(session, marks_of(World(), seed)).out
+        assert (session / f"session.{number}.yaml").read_bytes() == before
+    assert (session / "session.3.yaml").read_text() == "mine"
+    assert (session / "session.yaml").read_bytes().count(b"mount_origin") == 2
+
+
+def test_what_it_wrote_is_replaced_in_any_style(session: Path) -> None:
+    """As blocks, as other programs write it, and between them comments and a key of ours alone."""
+    assert run(session, marks_of(World())).status == 0
+    path = session / "session.yaml"
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    del content["mbes"]["mount_covariance"]
+    path.write_text(yaml.safe_dump(content, sort_keys=False) + "# end\n", encoding="utf-8")
+    assert run(session, marks_of(World(), None)).status == 0
+    for name, found in mounts_in(session).items():
+        np.testing.assert_allclose(found, World().mounts[name], atol=3e-6)
+    text = path.read_text(encoding="utf-8")
+    assert [text.count(f"mount_{key}:") for key in ("origin", "covariance")] == [2, 2]
+    assert text.endswith("# end\n")
+
+
+@pytest.mark.parametrize("step", ["open", "fsync", "replace"])
+def test_a_full_disk_leaves_everything_as_it_was(step: str, session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    marks, calls = marks_of(World()), []
+
+    def fails(*_: object, **__: object) -> None:
+        calls.append(1)
+        raise full
+
+    with monkeypatch.context() as patched:
+        if step == "open":
+            real = Path.open
+            patched.setattr(Path, "open", lambda self, *a, **k: fails() if "xb" in a else real(self, *a, **k))
+        else:
+            patched.setattr(*{"fsync": (os, "fsync"), "replace": (Path, "replace")}[step], fails)
+        told = run(session, marks)
+    assert calls
+    assert told.status == 2
+    assert "No space left on device" in told.err
+    assert "make room" in told.err
+    assert len(told.err.splitlines()) == 1
+    assert sorted(path.name for path in session.iterdir()) == ["session.yaml"]
+    assert (session / "session.yaml").read_text(encoding="utf-8") == PLAIN
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN.replace("    roll_deg: 0.3\n", "    ? roll_deg\n    : 0.3\n"),
+        PLAIN.replace("roll_deg: 0.3", '"roll_deg": !!float "0.3"'),
+        PLAIN.replace("laser:\n", "laser: !!map\n"),
+        PLAIN.replace("  format: las ", "  'format' : \"las\" "),
+        "---\n" + PLAIN + "...\n",
+        PLAIN.partition("  files: [mbes")[0].replace("mbes:\n", "mbes:\n  files: [m]\n  format: table\n").rstrip("\n"),
+    ],
+)
+def test_odd_yaml_is_edited_rightly(text: str, session: Path) -> None:
+    (session / "session.yaml").write_text(text, encoding="utf-8")
+    told = run(session, marks_of(World(), None))
+    assert told.status == 0, told.err
+    np.testing.assert_allclose(mounts_in(session)["laser"], World().mounts["laser"], atol=3e-6)
+
+
+@pytest.mark.parametrize("after", ["", "# end\n", "ins: {files: [i], format: table}\n"])
+def test_a_mount_comes_after_a_format_however_that_is_written(after: str, session: Path) -> None:
+    block = "mbes:\n  files: [m]\n  format: >-\n    r2sonic\n\n"
+    text = PLAIN.replace("ins: {files: [ins/*.gps], format: novatel}\n", "").partition("mbes:")[0]
+    text += block + after if "ins" in after else "ins: {files: [i], format: table}\n" + block + after
+    (session / "session.yaml").write_text(text, encoding="utf-8")
+    told = run(session, marks_of(World(), None))
+    assert told.status == 0, told.err
+    np.testing.assert_allclose(mounts_in(session)["mbes"], World().mounts["mbes"], atol=3e-6)
+
+
+def test_what_cannot_be_edited_in_place_is_refused() -> None:
+    """What comes of an edit must say what was meant."""
+    content = yaml.safe_load(PLAIN)
+    refuse_other(PLAIN, content, {"laser": {"format": "las"}}, Path("session.yaml"))
+    with pytest.raises(ConfigError, match="cannot be edited where it stands"):
+        refuse_other(PLAIN, content, {"laser": {"format": "table"}}, Path("session.yaml"))
+    with pytest.raises(ConfigError, match="cannot be edited where it stands"):
+        refuse_other(PLAIN + "  {", content, {"laser": {}}, Path("session.yaml"))
+    with pytest.raises(ConfigError, match=r"mbes: has no format"):
+        edited("mbes: {files: [m]}\n", {"mbes": {"mount": {}}}, Path("session.yaml"))
+
+
+def test_hostile_text_never_ends_otherwise(session: Path) -> None:
+    """Marks and session.yaml with bytes changed, cut or doubled: one line, or a result; and a whole session.yaml."""
+    rng = random.Random(3)
+    right = yaml.safe_dump(marks_of(World()), sort_keys=False).encode()
+    file = session.parent / "m.yaml"
+    for turn in range(60):
+        broken = bytearray(right if turn % 2 else PLAIN.encode())
+        for _ in range(rng.randint(1, 4)):
+            place = rng.randrange(len(broken))
+            kind = rng.randrange(4)
+            if kind == 0:
+                broken[place] = rng.choice(b"\0\xff:-[]{}&*!|>'\"%@#\n\t 0e")
+            elif kind == 1:
+                del broken[place : place + rng.randint(1, 30)]
+            elif kind == 2:
+                broken[place:place] = broken[place : place + rng.randint(1, 30)]
+            else:
+                broken[place:place] = rng.choice([b"\n", b": ", b"- ", b"[[", b"1e999", b"*a", b"? ", b"!!python/x "])
+        file.write_bytes(broken if turn % 2 else right)
+        (session / "session.yaml").write_bytes(PLAIN.encode() if turn % 2 else broken)
+        before = (session / "session.yaml").read_bytes()
+        told = run(session, file)
+        assert told.status in (0, 1, 2), told.err
+        assert len(told.err.splitlines()) == (told.status == 2), told.err
+        if told.status:
+            assert (session / "session.yaml").read_bytes() == before
+        else:
+            assert load_session(session).laser.mount_origin is not None
+
+
+# --- the covariance in session.yaml ----------------------------------------------------------------------------------
+LASER: dict[str, Any] = {"files": ["a"], "format": "las", "mount": dict.fromkeys(KEYS, 0.0)}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ((0, 1, 0.5), "must be symmetric"),
+        ((0, 0, -1.0), "must be"),
+        (None, "has too few entries"),
+        ("indefinite", "must be positive semidefinite"),
+    ],
+)
+def test_a_covariance_that_is_none_is_refused(change: Any, words: str) -> None:
+    matrix = np.eye(6)
+    if isinstance(change, tuple):
+        matrix[change[:2]] = change[2]
+    elif change == "indefinite":
+        matrix[:3, :3] = [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]]
+    rows = matrix.tolist()[: 5 if change is None else 6]
+    with pytest.raises(ConfigError) as refused:
+        parse(Laser, LASER | {"mount_covariance": rows}, "session.yaml")
+    (line,) = str(refused.value).splitlines()
+    assert line.startswith("session.yaml: mount_covariance")
+    assert words in line
+
+
+def test_a_covariance_of_another_mount_is_refused() -> None:
+    """As where the mount is entered by hand, and what poolcal wrote beside it stays."""
+    six = {key: float(value) for key, value in LASER["mount"].items()}
+    origin = {"method": "fine", "file": "a", "sha256": "0" * 64, "date": "2026-05-12", "software": "p", "mount": six}
+    written = LASER | {"mount_covariance": (np.eye(6) * 1e-6).tolist(), "mount_origin": origin}
+    assert parse(Laser, written, "s").mount_origin is not None
+    by_hand = {"mount": six | {"z_m": six["z_m"] + 0.000001}}
+    with pytest.raises(ConfigError, match="mount is not the one in mount_origin, to which mount_covariance belongs"):
+        parse(Laser, written | by_hand, "s")
+    assert parse(Laser, {key: one for key, one in (written | by_hand).items() if "_" not in key}, "s")
+
+
+def test_a_covariance_without_rank_is_one() -> None:
+    for matrix in (np.zeros((6, 6)), np.ones((6, 6)) * 1e-6, np.diag([1e-6, 0, 0, 1e-6, 0, 0])):
+        assert parse(Laser, LASER | {"mount_covariance": matrix.tolist()}, "s").mount_covariance is not None
