@@ -136,6 +136,7 @@ def _chunk(pings: list[Ping], latency_s: float, dropped: Counter[str]) -> Chunk:
             "beam": np.concatenate([np.arange(count, dtype=np.int16) for count in counts]),
             "two_way_time_s": two_way_time_s,
             "angle_rad": angle_rad,
+            "transmit_tilt_rad": np.zeros_like(angle_rad),
             "sound_speed_m_s": spread([ping.sound_speed_m_s for ping in pings], np.float64),
         },
         dropped,

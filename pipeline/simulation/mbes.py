@@ -94,6 +94,7 @@ class _Pass:
             "beam": beam.astype(np.int16),
             "two_way_time_s": 2 * paths[ping, beam] / s.sound_speed_true_m_s,
             "angle_rad": self.angles_rad[beam],
+            "transmit_tilt_rad": np.zeros(len(beam)),
             "sound_speed_m_s": np.full(len(ping), float(np.float32(s.sound_speed_recorded_m_s))),
         }
 
