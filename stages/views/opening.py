@@ -25,7 +25,7 @@ def show(paths: Sequence[Path], instead: str) -> int:
     places = [str(path.absolute()) for path in paths]
     try:
         with silent() as environment, tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as told:
-            command = [viewer, "--bind", "127.0.0.1", *places]
+            command = [str(viewer), "--bind", "127.0.0.1", *places]
             status = subprocess.run(command, check=False, env=environment, stderr=told).returncode
             told.seek(0)
             said = told.read()
