@@ -20,8 +20,9 @@ from pipeline.evaluate import declared, evaluate, is_stream, name_of, sources
 from pipeline.executor import SERIAL, Stopped, Workers
 from pipeline.files import Digests, remove, write_text, writing
 from pipeline.folder import Settings
-from pipeline.freshness import SENSORS, Run, key_of, out_of_date, raw_digests
+from pipeline.freshness import Run, all_raw, key_of, out_of_date, raw_digests, raw_of
 from pipeline.progress import Progress
+from pipeline.run import provenance
 from pipeline.sinks import FolderSink
 from pipeline.streams import EMPTY, Chunk, ParquetPart, Part, Stream
 
@@ -130,7 +131,7 @@ def _execute(this: Run, stage: ModuleType) -> None:
         sink = FolderSink(partial, streams)
         outputs = evaluate(stage, inputs, config, sink, this.workers.map, lambda: this.progress.begin(total))
         rows = _write(partial, stage, outputs)
-        if key_of(this, stage).raw != key.raw:
+        if _raw_has_changed(this, stage):
             raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")
         entries = _entries(this, partial)
         counts = getattr(outputs, "counts", None)
@@ -140,13 +141,19 @@ def _execute(this: Run, stage: ModuleType) -> None:
             outputs=entries,
             rows=rows,
             counts=[] if counts is None else counts.to_dict("records"),
-            git_commit=manifest.git_commit(),
+            git_commit=provenance.git_commit(),
             wall_s=round(time.perf_counter() - start, 3),
         ).write(partial)
         folder.swap_in(target)
     except BaseException:
         _remove_quietly(partial)
         raise
+
+
+def _raw_has_changed(this: Run, stage: ModuleType) -> bool:
+    """Whether a raw file is not what it was when this run first looked at it, of those that the stage has read."""
+    sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, Raw)]
+    return any(raw_digests(this, sensor) != raw_of(this, sensor) for sensor in sensors)
 
 
 def _remove_quietly(partial: Path) -> None:
@@ -181,8 +188,7 @@ def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
 
 def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
     if isinstance(marker, Provenance):
-        raw = {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
-        return {"inputs": raw, "software": manifest.versions()}
+        return {"inputs": all_raw(this), "software": provenance.versions()}
     if isinstance(marker, Raw):
         settings = getattr(this.settings.session, marker.sensor)
         if settings is None:
