@@ -23,6 +23,8 @@ from pipeline.folder import Settings
 from pipeline.freshness import Run, all_raw, key_of, out_of_date, raw_digests, raw_of
 from pipeline.progress import Progress
 from pipeline.run import provenance
+from pipeline.run.another import refuse_another
+from pipeline.run.kept import keep_accepted
 from pipeline.sinks import FolderSink
 from pipeline.streams import EMPTY, Chunk, ParquetPart, Part, Stream
 
@@ -36,14 +38,20 @@ def run(
     progress: Progress | None = None,
     finished: Callable[[str], object] = lambda _: None,
     calibrated: Calibrated = "mbes",
+    overwrite: bool = False,
 ) -> list[str]:
-    """Bring every stage up to date; the names of those that had to be run, each told to ``finished`` in its turn."""
+    """Bring every stage up to date; the names of those that had to be run, each told to ``finished`` in its turn.
+
+    A run folder with another session's results is refused, unless they may be replaced (``overwrite``).
+    """
     settings = folder.load_settings(session_folder, config_path, calibrated)
     folder.refuse_folders(run_folder, session_folder)
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
         folder.refuse_other(run_folder, calibrated)
-        folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
+        if not overwrite:
+            refuse_another(this, [name_of(stage) for stage in stages])
+        folder.write_settings(run_folder, settings)
         first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)
         had_to_run = []
         for stage in stages:
@@ -63,12 +71,15 @@ def run_stage(
 ) -> bool:
     """Bring one stage up to date; those before it must be. ``settings``: new ones, else those in run.yaml."""
     names = [name_of(stage) for stage in stages]
+    new = settings is not None
     if settings is None:
         settings = folder.read_settings(run_folder)
     folder.refuse_folders(run_folder, settings.session_folder)
     with folder.locked(run_folder, names):
-        folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
+        if new:
+            refuse_another(this, names)
+        folder.write_settings(run_folder, settings)
         for stage in stages[: names.index(name)]:
             if why := out_of_date(this, stage):
                 raise ArtefactError(f"{run_folder}: {name_of(stage)}: {why[0]}; run stage {name_of(stage)} first")
@@ -144,7 +155,10 @@ def _execute(this: Run, stage: ModuleType) -> None:
             git_commit=provenance.git_commit(),
             wall_s=round(time.perf_counter() - start, 3),
         ).write(partial)
+        kept = keep_accepted(target)
         folder.swap_in(target)
+        if kept is not None:
+            this.progress.note(f"{name_of(stage)}: the accepted result that was there is kept in {kept}")
     except BaseException:
         _remove_quietly(partial)
         raise
