@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from pipeline.checking.finding import plural
+from pipeline.screen import plural
 from pipeline.times import NS, WEEK_NS
 
 DAY_NS = 86_400 * NS

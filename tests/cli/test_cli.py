@@ -127,7 +127,7 @@ def test_another_sessions_run_is_replaced_only_when_asked(pool: Pool) -> None:
     done = _toy(*_words(pool))
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
-    assert f"poolcal: {pool.run_folder}: holds the run of another session, 'toy' in {pool.session.parent}" in done.stderr
+    assert f"{pool.run_folder}: holds the run of another session, 'toy' in {pool.session.parent}" in done.stderr
     assert "poolcal run --overwrite" in done.stderr
     assert (pool.run_folder / "report" / "calibration.json").read_bytes() == before
     done = _toy(*_words(pool), "--overwrite")
