@@ -266,6 +266,15 @@ def calibration(run: Path) -> dict[str, Any]:
     return content
 
 
+@contextlib.contextmanager
+def as_written(run: Path) -> Iterator[None]:
+    """Where values are taken out of a run's calibration.json: one that somebody changed is an ArtefactError."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
+        raise ArtefactError(f"{run}: its calibration.json is not as poolcal writes it; run it again") from error
+
+
 def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b"") -> None:
     """A file of its kind, never among a run's results or a session's files (``runs``). One that is there is replaced if
     it ``begins`` as we write it: a plan or a config never."""

@@ -31,6 +31,8 @@ def _inside(pattern: str) -> str:
         raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
     if any("**" in part and part != "**" for part in path.parts):
         raise ValueError("must have ** only as a whole part between two /")
+    if path.parts.count("**") > 2 or len(pattern) > 300:  # each more takes several times as long to search
+        raise ValueError("must have ** twice at most, and no more than 300 letters")
     return pattern
 
 

@@ -1,28 +1,22 @@
 """The command line: thin. Imports what computes only inside the command that computes."""
 
-import os
-import signal
 import sys
-import traceback
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import pipeline
-from pipeline.errors import ConfigError, PoolcalError
+from pipeline.errors import ConfigError
 from pipeline.progress import say
-from stages import ORDER, calibrated_in, load, names_in
+from stages import ORDER, calibrated_in, ending, load, names_in
 from stages.comparing import comparison, save_pair
 from stages.saying import answer_of, say_failures
 
 if TYPE_CHECKING:
 
     from stages.drawing import Painters
-
-INTERRUPTED = 130  # what typer makes of Ctrl-C
-STOPPED = "poolcal: interrupted; what was complete is kept"
 
 app = typer.Typer(
     name="poolcal",
@@ -188,9 +182,8 @@ def view(
 
     Nothing is served beyond this machine.
     """
-    import tempfile
-
     from pipeline import folder
+    from pipeline.files import temporary_folder
     from stages.drawing import Painters
     from stages.views import recordings_of
     from stages.views.opening import show
@@ -204,8 +197,8 @@ def view(
         return show(recordings_of(first, stage), copy)
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
-    with tempfile.TemporaryDirectory() as place:
-        path = Path(place) / "pair.rrd"
+    with temporary_folder() as place:
+        path = place / "pair.rrd"
         save_pair(first, second, comparison(first, second), path)
         copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
         return show([path], copy)
@@ -340,65 +333,21 @@ def compare(
 def call(arguments: list[str]) -> int:
     """The exit status of a command line; nothing is raised."""
     debug = "--debug" in arguments  # accepted anywhere on the line
-    words = [word for word in arguments if word != "--debug"]
-    try:
-        status = int(app(words or ["--help"], prog_name="poolcal", standalone_mode=False) or 0)
-        if status == INTERRUPTED:
-            say(STOPPED, sys.stderr)
-        return status
-    except PoolcalError as error:
-        if debug:
-            traceback.print_exc()
-        say(f"poolcal: {error}", sys.stderr)
-        return 2
-    except typer.TyperException as error:
-        usage = " ".join(error.format_message().split())
-        say(f"poolcal: {usage or 'nothing to do'}; see poolcal --help", sys.stderr)
-        return 2
-    except Exception:
-        if _interrupts:  # a library that was being loaded has made another error of it
-            say(STOPPED, sys.stderr)
-            return INTERRUPTED
-        say(traceback.format_exc().rstrip(), sys.stderr)
-        say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
-        return 3
-
-
-_interrupts: list[int] = []
-
-
-def _interrupted(number: int, _: object) -> None:
-    _interrupts.append(number)
-    raise KeyboardInterrupt
+    words = [word for word in arguments if word != "--debug"] or ["--help"]
+    return ending.status_of(lambda: app(words, prog_name="poolcal", standalone_mode=False), debug)
 
 
 def _go_on(drawing: "Painters", run_folder: Path, stage: str) -> None:
     """After a stage; not where somebody interrupted it in a place in which Python ignores that."""
-    if _interrupts:
+    if ending.interrupts:
         raise KeyboardInterrupt
     drawing.begin(run_folder, stage)
 
 
 def main() -> None:
     """The console script."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupted)
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the shell; open to the end
-            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        reconfigure: Any = getattr(stream, "reconfigure", None)
-        if reconfigure is not None:
-            reconfigure(errors="backslashreplace")
-    status = call(sys.argv[1:])
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:  # nobody listens any more: leave without Python's own complaint
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    if status == INTERRUPTED:
-        sys.stderr.flush()
-        os._exit(status)  # a library left in the middle of its work would end with a status of its own
-    sys.exit(status)
+    ending.prepare()
+    ending.leave(call(sys.argv[1:]))
 
 
 if __name__ == "__main__":

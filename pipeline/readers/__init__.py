@@ -6,8 +6,10 @@ roll starboard down +, pitch bow up +, azimuth clockwise from north) together wi
 Damaged files give RawDataError or fewer rows, never another exception.
 """
 
+import os
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from itertools import takewhile
+from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from pipeline.config import Ins, Laser, Mbes
@@ -66,11 +68,26 @@ def _matches(folder: Path, pattern: str, key: str) -> list[tuple[Path, Path]]:
             if not real.is_relative_to(root):
                 raise RawDataError(f"{path}: leads out of the session folder, to {real}; copy the file into it")
             files.append((path, real))
+        _refuse_unreadable(folder, pattern)
     except (ValueError, NotImplementedError) as error:
         raise ConfigError(f"session.yaml: {key}: {pattern} is no pattern ({error}); mend it") from error
     except (OSError, RuntimeError) as error:
         raise RawDataError(f"{folder}: {pattern} cannot be searched ({error}); check the folder") from error
     return files
+
+
+def _refuse_unreadable(folder: Path, pattern: str) -> None:
+    """Python passes over folders that it may not read, and so over their files: OSError instead."""
+    parts = PurePosixPath(pattern).parts
+    fixed = list(takewhile(lambda part: not set(part) & set("*?["), parts[:-1]))
+
+    def refuse(error: OSError) -> None:
+        if not isinstance(error, FileNotFoundError):
+            raise error
+
+    for _ in os.walk(folder.joinpath(*fixed), onerror=refuse):
+        if len(fixed) == len(parts) - 1:  # all that can match lies in this one
+            break
 
 
 def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, ...]:
