@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import Seen
 from pipeline.passes import pass_of, split_at_gaps
+from pipeline.screen import plural
 from pipeline.times import NS, WEEK_NS, utc_text
 
 Times = NDArray[np.int64]

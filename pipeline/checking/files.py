@@ -6,9 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
+from pipeline.screen import plural
 from pipeline.times import utc_text
 
 SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock

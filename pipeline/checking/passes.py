@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import config
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import Columns, Seen
 from pipeline.checking.track import Track
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.targets import TargetModel
+from pipeline.screen import plural
 from pipeline.times import NS, utc_text
 
 Times = NDArray[np.int64]
