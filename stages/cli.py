@@ -37,6 +37,9 @@ app = typer.Typer(
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")]
 Jobs = Annotated[int | None, typer.Option("--jobs", metavar="N", help="workers; default: one a core, at most 4")]
 Recordings = Annotated[bool, typer.Option("--recordings/--no-recordings", help="draw recordings for the Rerun viewer")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="replace another session's run in RUN; its accepted result is kept")
+]
 Report = Annotated[bool, typer.Option("--report/--no-report", help="draw RUN/report/report.html")]
 Address = Annotated[
     str | None, typer.Option("--executor", metavar="ADDRESS", help="dask scheduler; its workers must see these folders")
@@ -88,11 +91,12 @@ def run(
     executor: Address = None,
     recordings: Recordings = True,
     report: Report = True,
+    overwrite: Overwrite = False,
 ) -> int:
     """Run all stages that are out of date, and say why each is."""
     from stages.calibrating import calibrate
 
-    return calibrate("mbes", session, config, run_folder, _go_on, jobs, executor, (report, recordings))
+    return calibrate("mbes", session, config, run_folder, _go_on, jobs, executor, (report, recordings), overwrite)
 
 
 @app.command()
@@ -105,6 +109,7 @@ def laser(
     recordings: Recordings = True,
     report: Report = True,
     write: Annotated[bool, typer.Option("--write/--no-write", help="an accepted mount into session.yaml")] = True,
+    overwrite: Overwrite = False,
 ) -> int:
     """Calibrate the laser itself, from its own passes at the target.
 
@@ -113,7 +118,7 @@ def laser(
     from stages.calibrating import calibrate
     from stages.laser.session import write as write_mount
 
-    status = calibrate("laser", session, config, run_folder, _go_on, jobs, executor, (report, recordings))
+    status = calibrate("laser", session, config, run_folder, _go_on, jobs, executor, (report, recordings), overwrite)
     if write and status == 0:
         say(write_mount(session, run_folder), sys.stdout)
     return status
@@ -187,20 +192,23 @@ def view(
 
     from pipeline import folder
     from stages.drawing import Painters
-    from stages.views import recordings_of, show
+    from stages.views import recordings_of
+    from stages.views.opening import show
 
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
         folder.read_settings(first)
         say_failures(Painters(report=False, recordings=True).draw(first))
-        return show(recordings_of(first, stage))
+        copy = f"copy {first}/*/*.rrd to a machine with one, or open {first}/report/report.html"
+        return show(recordings_of(first, stage), copy)
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "pair.rrd"
         save_pair(first, second, comparison(first, second), path)
-        return show([path])
+        copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
+        return show([path], copy)
 
 
 @app.command()

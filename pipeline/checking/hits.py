@@ -11,6 +11,7 @@ from pipeline import config
 from pipeline.checking.clocks import named
 from pipeline.checking.finding import Finding
 from pipeline.checking.heights import wrong_height
+from pipeline.checking.passes import heading
 from pipeline.checking.placed import NAMES, Sample, put
 from pipeline.checking.track import Track
 from pipeline.clouds import ClosestSurface
@@ -94,10 +95,12 @@ def off_target(
             else:
                 clocks[some.sensor] = best.clock_s
         elif _misses(track, some, closest):
+            check = f"check {some.sensor}.mount, target.origin and target.azimuth_deg"
+            askew = heading(track, pool.target_place)
             yield Finding(
                 "target",
                 f"{some.sensor}: hardly any of its {NAMES[some.sensor]} falls onto the target in its passes, nor would "
-                f"with another sign, clock or height: check {some.sensor}.mount, target.origin and target.azimuth_deg",
+                f"with another sign, clock or height: {f'the boat: {askew}' if askew else check}",
             )
     yield from _clocks(clocks, len(samples))
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.checking.finding import Finding
 from pipeline.checking.survey import Columns, Seen
-from pipeline.checking.track import Track, azimuth_sailed
+from pipeline.checking.track import Track, askew_deg
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.targets import TargetModel
 from pipeline.screen import plural
@@ -76,9 +76,9 @@ def sailing(track: Track, place: config.TargetPlace) -> Iterator[Finding]:
     if not track.legs:
         yield Finding("passes", f"the boat never passes the target: {heading(track, place) or 'check target.origin'}")
     elif all(leg.distance_m < 0 for leg in track.legs):
-        given = f"{place.azimuth_deg:g}" if place.azimuth_deg is not None else "the heading"
-        turned = f"{(np.degrees(track.frame.azimuth_rad) + 180) % 360:.0f} in place of {given}"
-        words = f"{legs} the boat sails behind the target (x > 0): turn target.azimuth_deg by 180° ({turned})"
+        given = place.azimuth_deg
+        turned = "" if given is None else f" ({(given + 180) % 360:g} in place of {given:g})"
+        words = f"{legs} the boat sails behind the target (x > 0): turn target.azimuth_deg by 180°{turned}"
         yield Finding("side", f"{words}, or check target.origin")
     elif not any(leg.good for leg in track.legs):
         astern = [leg for leg in track.legs if leg.astern]
@@ -99,12 +99,10 @@ def sailing(track: Track, place: config.TargetPlace) -> Iterator[Finding]:
 
 def heading(track: Track, place: config.TargetPlace) -> str:
     """What to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
-    sailed = azimuth_sailed(track)
-    if sailed is None or place.azimuth_deg is None:
+    turn = askew_deg(track)
+    if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:
         return ""
-    turn = (sailed - place.azimuth_deg + 180.0) % 360.0 - 180.0
-    if abs(turn) < ASKEW_DEG:
-        return ""
+    sailed = (place.azimuth_deg + turn) % 360.0
     return (
         f"it heads {sailed:.0f}° with target.origin to starboard, but target.azimuth_deg is {place.azimuth_deg:g} (the "
         f"direction of the target's +y, along which it is sailed): write {sailed:.0f}, or check target.origin"

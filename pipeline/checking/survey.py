@@ -1,6 +1,5 @@
 """Every file of a session looked into: what it is, when it begins and ends, how fast it runs, samples of its rows."""
 
-import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.checking.excerpts import excerpt, stretches
 from pipeline.errors import ConfigError, RawDataError
+from pipeline.files import temporary_folder
 from pipeline.rates import rate_hz
 from pipeline.readers import Sensor, Settings, detect, raw_files, raw_parts
 from pipeline.readers.las import LasPart
@@ -68,7 +68,7 @@ def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], lis
     """All files, those that cannot be read with their refusal; and what is wrong with the lists themselves."""
     found: list[Seen] = []
     wrong: list[str] = []
-    with tempfile.TemporaryDirectory() as place:
+    with temporary_folder() as place:
         for sensor in SENSORS:
             settings: Settings | None = getattr(session, sensor)
             if settings is None:
@@ -76,7 +76,7 @@ def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], lis
             names, complaints = _listed(settings, folder)
             wrong += complaints
             for name, parts in _parts(sensor, settings, folder, names):
-                found.append(_look(sensor, settings, folder, name, parts, len(names), Path(place)))
+                found.append(_look(sensor, settings, folder, name, parts, len(names), place))
     return found, wrong
 
 

@@ -25,8 +25,8 @@ NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "
 
 @dataclass(frozen=True)
 class Leg:
-    """The boat past the target once: while it is abeam of it. ``astern``: against its own heading; ``ran``: by sensor the
-    share of that time in which it ran."""
+    """The boat past the target once: while it is abeam of it. ``astern``: against its own heading; ``ran``: by sensor
+    the share of that time in which it ran."""
 
     start_ns: int
     end_ns: int
@@ -107,13 +107,13 @@ def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[Seen]) -> Leg:
     )
 
 
-def azimuth_sailed(track: Track) -> float | None:
-    """How the boat headed while it had target.origin to starboard and near, degrees clockwise from north; None where it
-    never had."""
+def askew_deg(track: Track) -> float | None:
+    """By how much the boat headed to the right of the target's +y while it had target.origin to starboard and near,
+    within ±180 degrees; None where it never had."""
     x, y = track.trajectory.positions_m[:, :2].T
     ahead = track.trajectory.R_frame_from_body[:, :2, 1]
     turn = estimate_azimuth(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
-    return None if turn is None else float(np.degrees(track.frame.azimuth_rad + turn) % 360.0)
+    return None if turn is None else float(np.degrees(turn))
 
 
 def _ran(start: int, end: int, files: Sequence[Seen]) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline import config
 from pipeline.checking.finding import Finding
-from pipeline.checking.heights import way, profile
+from pipeline.checking.heights import profile, way
 from pipeline.checking.placed import Sample, put
 from pipeline.checking.track import Track
 from pipeline.clouds import ClosestSurface
@@ -19,7 +19,7 @@ from pipeline.mounts import Mounted, mount_of
 
 Array = NDArray[np.float64]
 REACH_M = 0.15  # in the pose found, whose place along x and y is known
-SHIFTS_M = np.linspace(-2.5, 2.5, 101)
+SHIFTS_M = np.linspace(-5.0, 5.0, 101)
 CLEARLY = 0.95  # of the best agreement: what has less is another
 SMALLEST_M = 0.15  # a height within it is right, as near as this tells
 ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
@@ -50,10 +50,11 @@ def other_pose(
     how = f"{way(-shift, 'higher', 'lower')} ({height - shift:.1f} in place of {height:g})"
     another = bool(exchanged) or abs(SHIFTS_M[place]) > SMALLEST_M
     if found["ambiguous"] and len(alike) > 1:
+        ways = ", or ".join(_said(*one) for one in alike)
         yield Finding(
             "target",
-            f"target: the laser's points fit it as well {', or '.join(_said(*one) for one in alike)}: its upper end was "
-            "not seen clearly enough to tell; let the laser see it, and check target.origin.height_m",
+            f"target: the laser's points fit it as well {ways}: its upper end was not seen clearly enough to tell; let "
+            "the laser see it, and check target.origin.height_m",
         )
     elif another and exchanged:
         also = f", and target.origin.height_m {how}" if abs(shift) > SMALLEST_M else ""
@@ -118,11 +119,12 @@ def signs(given: config.Mount, provisional: pd.DataFrame, within_deg: float) -> 
     if as_given < LEAST_DEG or best > HALF * as_given:
         return
     found = Mounted(wanted, np.zeros(3)).settings()
-    changed = ", ".join(f"mbes.mount.{key} = {-getattr(given, key):g} in place of {getattr(given, key):g}" for key in which)
-    values = ", ".join(f"{key} {found[key]:.1f}" for key in ANGLES)
+    values = {key: getattr(given, key) for key in which}
+    changed = ", ".join(f"mbes.mount.{key} = {-value:g} in place of {value:g}" for key, value in values.items())
+    asked = ", ".join(f"{key} {found[key]:.1f}" for key in ANGLES)
     yield Finding(
         "sign",
-        f"mbes: the soundings fit better with {changed} (a sample of them asks for {values}): reverse the sign; if you "
+        f"mbes: the soundings fit better with {changed} (a sample of them asks for {asked}): reverse the sign; if you "
         "have measured it so, enter those three values and check again",
         "fault" if as_given > within_deg else "look",
     )

@@ -110,6 +110,11 @@ def _check_kind(path: Path, name: str, sensor: Sensor, settings: Settings) -> No
     kind = detect.kind_of(path, name)
     if kind.format == settings.format and sensor in kind.sensors:
         return
+    if settings.format == "inertial_explorer" and kind is detect.TEXT:
+        raise RawDataError(
+            f"{name}: is a text without Inertial Explorer's column names; export it from Inertial Explorer with its "
+            "header ('header' ticked in the export profile)"
+        )
     if kind.format is None:
         raise RawDataError(f"{name}: is {kind.title}, not {settings.format}; {kind.advice}")
     if sensor in kind.sensors:

@@ -210,6 +210,7 @@ def _chunk(pings: list[tuple[int, Ping, float]], latency_s: float, dropped: Coun
             "beam": np.concatenate([np.arange(count, dtype=np.int16) for count in counts]),
             "two_way_time_s": np.concatenate([ping.two_way_time_s for _, ping, _ in pings]),
             "angle_rad": -np.radians(np.concatenate([ping.angle_deg for _, ping, _ in pings])),
+            "transmit_tilt_rad": np.zeros(counts.sum()),
             "sound_speed_m_s": spread([speed for _, _, speed in pings], np.float64),
             "usable": np.concatenate([ping.usable for _, ping, _ in pings]),
             "smooth": spread(smooth, bool),

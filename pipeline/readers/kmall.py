@@ -187,6 +187,7 @@ def _chunk(pings: list[Ping], latency_s: float, dropped: Counter[str]) -> Chunk:
             "beam": np.concatenate([np.arange(count, dtype=np.int16) for count in counts]),
             "two_way_time_s": np.concatenate([ping.two_way_time_s for ping in pings]),
             "angle_rad": -np.radians(np.concatenate([ping.angle_deg for ping in pings])),
+            "transmit_tilt_rad": np.zeros(counts.sum()),
             "sound_speed_m_s": spread([ping.sound_speed_m_s for ping in pings], np.float64),
             "kind": kind,
         },

@@ -155,7 +155,9 @@ def _survey(file: BinaryIO, dropped: Counter[str]) -> tuple[int | None, int | No
                 names[kind] = kind.__name__.partition("_")[0]
             total[names[kind]] += 1
             if names[kind] == "UnknownBytes" and _PROMPT.fullmatch(message.data) is None:
-                dropped["undecodable bytes"] += 1
+                starts = sum(1 for _ in _START.finditer(message.data))
+                text = not starts and message.data.isascii() and b"\0" not in message.data
+                dropped["text between records" if text else "undecodable bytes"] += max(starts, 1)
     there = [number for number, name in NAMES.items() if total[name]]
     if not there:
         dropped["message other than INSPVA, INSPVAS, INSPVAX"] += total.total() - total["UnknownBytes"]

@@ -116,6 +116,29 @@ def test_accepted_then_nothing_to_do_then_rejected(pool: Pool) -> None:
     assert _toy("verify", pool.run_folder).returncode == 0
 
 
+def test_another_sessions_run_is_replaced_only_when_asked(pool: Pool) -> None:
+    _told(pool, 1)
+    _toy(*_words(pool))
+    (pool.run_folder / "report" / "report.html").write_text("<p>ours</p>")
+    before = (pool.run_folder / "report" / "calibration.json").read_bytes()
+    pool.session = pool.session.rename(pool.session.with_name("other"))
+    for number, path in enumerate(sorted(pool.session.rglob("*.bin"))):
+        path.write_bytes(bytes(8 * (100 + number)))
+    done = _toy(*_words(pool))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert f"{pool.run_folder}: holds the run of another session, 'toy' in {pool.session.parent}" in done.stderr
+    assert "poolcal run --overwrite" in done.stderr
+    assert (pool.run_folder / "report" / "calibration.json").read_bytes() == before
+    done = _toy(*_words(pool), "--overwrite")
+    assert (done.returncode, done.stdout) == (0, "toy: accepted\n")
+    kept = pool.run_folder / "report.1"
+    assert f"report: the accepted result that was there is kept in {kept}\n" in done.stderr
+    assert (kept / "calibration.json").read_bytes() == before
+    assert (kept / "report.html").read_text() == "<p>ours</p>"
+    assert _toy("verify", pool.run_folder).returncode == 0
+
+
 def test_the_report_learns_what_it_was_made_from(pool: Pool) -> None:
     _told(pool, 1)
     _toy(*_words(pool))
