@@ -1,7 +1,7 @@
 """All questions in their order; what would only follow from an earlier finding is not asked."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from pipeline.checking import clocks, files, hits, passes
 from pipeline.checking.calibrated import Calibrate, Calibrated
 from pipeline.checking.expected import Soundings, missed, soundings
 from pipeline.checking.finding import Finding
+from pipeline.checking.ins_quality import Quality, quality, told
 from pipeline.checking.latency import latencies
 from pipeline.checking.placed import placeable, rows_of, sample
 from pipeline.checking.survey import SENSORS, Seen, Times, survey
@@ -33,6 +34,7 @@ class Examined:
     findings: tuple[Finding, ...]
     model: TargetModel | None = None  # with the soundings on its faces, where they were counted
     soundings: Soundings | None = None
+    quality: Quality = field(default_factory=Quality)
 
     @property
     def faulty(self) -> bool:
@@ -52,6 +54,14 @@ def examine(
     folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None, calibrate: Calibrate
 ) -> Examined:
     """``pool``: where the target is; without it nothing is asked about the target. ``calibrate``: does so in memory."""
+    found = _examined(folder, session, pool, calibrate)
+    said = quality(found.files, [leg for leg in found.legs if leg.good])
+    return replace(found, quality=said, findings=(*found.findings, *told(said)))
+
+
+def _examined(
+    folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None, calibrate: Calibrate
+) -> Examined:
     seen, wrong = survey(session, folder)
     findings = list(_of_files(seen, wrong, session))
     epochs = _epochs(seen)

@@ -73,7 +73,8 @@ def wrong_height(
             f"heights do not agree: the target is hit by {both}: check target.origin.height_m, laser.mount.z_m and "
             "mbes.mount.z_m (z is up: a sonar below the INS has a negative one)",
         )
-    for fit in off if len(off) == 1 else []:
+    others_fit = all(abs(fit.shift_m) < LEAST_M for fit in fits if not fit.off)
+    for fit in off if len(off) == 1 and others_fit else []:
         remedy = "reverse its sign (z is up)" if fit.sign else "measure it again"
         new_m = -fit.z_m if fit.sign else round(fit.z_m + fit.shift_m, 1)
         yield Finding(

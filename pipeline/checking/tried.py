@@ -19,7 +19,7 @@ from pipeline.mounts import Mounted, mount_of
 
 Array = NDArray[np.float64]
 REACH_M = 0.15  # in the pose found, whose place along x and y is known
-SHIFTS_M = np.linspace(-5.0, 5.0, 101)
+SHIFTS_M = np.linspace(-5.0, 5.0, 201)
 CLEARLY = 0.95  # of the best agreement: what has less is another
 SMALLEST_M = 0.15  # a height within it is right, as near as this tells
 ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
