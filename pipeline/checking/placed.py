@@ -16,6 +16,7 @@ from pipeline.streams import xyz
 from pipeline.times import NS
 
 Array = NDArray[np.float64]
+NAMES = {"laser": "laser points", "mbes": "soundings"}
 
 
 @dataclass(frozen=True)
