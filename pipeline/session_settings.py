@@ -220,6 +220,7 @@ class Recording(Model):
     frame: str = "laser"
     heights: Heights = None
     sound_speed_m_s: float | None = None  # of GSF alone, which may have none
+    projector_offset_m: tuple[float, float, float] | None = None  # of Kongsberg's files alone, which tell one too
 
 
 class Recordings(Model):
@@ -260,6 +261,9 @@ class SessionConfig(Model):
                 frame=getattr(sensor, "frame", "laser"),
                 heights=getattr(sensor, "heights", None),
                 sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
+                projector_offset_m=(
+                    getattr(sensor, "projector_offset_m", None) if sensor.format in ("kmall", "all") else None
+                ),
             )
 
         return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))

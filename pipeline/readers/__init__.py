@@ -226,7 +226,8 @@ def _soundings(files: Files, settings: Mbes) -> tuple[Part, ...]:
     if settings.format == "kmall":
         from pipeline.readers.kmall import KmallPart
 
-        return tuple(KmallPart(path, name, settings.latency_s) for path, name in files)
+        offset_m = settings.projector_offset_m
+        return tuple(KmallPart(path, name, settings.latency_s, offset_m) for path, name in files)
     from pipeline.readers.r2sonic import R2sonicPart
 
     return tuple(
