@@ -60,6 +60,8 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
     config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
+    if "mbes" in config:
+        raw |= cast_digest(this)
     return manifest.Key(config, raw, inputs, manifest.source_of(stage), manifest.versions())
 
 
@@ -79,6 +81,17 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
         if first.setdefault(digest, name) != name and digest != EMPTY:
             raise RawDataError(f"{name}: is the same as {first[digest]}; list one of the two under {sensor}.files")
     return found
+
+
+def cast_digest(this: Run) -> dict[str, str]:
+    """Of the file that the cast of sound speed came from; its depths are in the settings."""
+    used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
+    if used is None:
+        return {}
+    (digest,) = this.digests.of([this.settings.session_folder / used.file])
+    if digest != used.sha256:
+        raise RawDataError(f"{used.file}: is not the cast that this run was made with; run poolcal run again")
+    return {used.file: digest}
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:

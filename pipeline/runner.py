@@ -20,7 +20,7 @@ from pipeline.evaluate import declared, evaluate, is_stream, name_of, sources
 from pipeline.executor import SERIAL, Stopped, Workers
 from pipeline.files import Digests, remove, write_text, writing
 from pipeline.folder import Settings
-from pipeline.freshness import SENSORS, Run, key_of, out_of_date, raw_digests
+from pipeline.freshness import SENSORS, Run, cast_digest, key_of, out_of_date, raw_digests
 from pipeline.progress import Progress
 from pipeline.sinks import FolderSink
 from pipeline.streams import EMPTY, Chunk, ParquetPart, Part, Stream
@@ -182,7 +182,7 @@ def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
 def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
     if isinstance(marker, Provenance):
         raw = {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
-        return {"inputs": raw, "software": manifest.versions()}
+        return {"inputs": raw | cast_digest(this), "software": manifest.versions()}
     if isinstance(marker, Raw):
         settings = getattr(this.settings.session, marker.sensor)
         if settings is None:
