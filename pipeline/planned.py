@@ -85,7 +85,8 @@ def _rates(session: config.SessionConfig) -> dict[str, Any]:
 
 def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Answer:
     setting = setting_of(plan, pool, session)
-    considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built)
+    depth = setting.model.depth_m
+    considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
     free = free_unknowns(setting.state, pool.adjust.free)
     given = _outlook(setting, plan.passes, turn_s, considered, free)

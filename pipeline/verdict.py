@@ -9,6 +9,7 @@ import pandas as pd
 
 from pipeline import config
 from pipeline.causes import causes, estimated
+from pipeline.checking.cast import doubts
 from pipeline.maths.consistency import consistency_limit
 from pipeline.mounts import PARAMETERS
 
@@ -326,7 +327,7 @@ def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str,
     (a sixtieth for a degree at 45°)."""
     if mbes.svp is None:
         return []
-    found = []
+    found = [] if mbes.svp_from is None else list(doubts(mbes.svp_from, _span(files), None))
     speeds = [speed for _, speed in mbes.svp]
     low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
     if max(low - max(speeds), min(speeds) - high) > ODD_SPEED_M_S:
@@ -341,6 +342,12 @@ def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str,
             "values found as mbes.mount and run again"
         )
     return found
+
+
+def _span(files: pd.DataFrame) -> tuple[int, int]:
+    """First and last sounding, GPS time."""
+    own = files[(files["sensor"] == "mbes") & (files["first_ns"] >= 0)]
+    return int(own["first_ns"].min()), int(own["last_ns"].max())
 
 
 def _so(sigma: Mapping[str, float] | None) -> str:

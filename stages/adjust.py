@@ -82,7 +82,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     known = Given(noise_of(ins), _ties(model, config.as_built))
     found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
     seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
-    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
+    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built, model.depth_m)
     together = correlated(found.state.names, config.laser)
     coarse = mount_of(config.mbes.mount)
     return Outputs(
