@@ -37,6 +37,7 @@ def _inside(pattern: str) -> str:
 Pattern = Annotated[str, AfterValidator(_inside)]
 Files = Annotated[list[Pattern], Field(min_length=1)]
 Heights = Literal["ellipsoidal"] | None
+LasTime = Literal["adjusted_standard", "seconds_of_week"] | None
 Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
 
 
@@ -150,6 +151,7 @@ class Laser(Model):
     files: Files
     format: Literal["las", "e57", "table"]
     gps_week: Week = None
+    time: LasTime = None  # what the times of LAS count from, where its header says it wrongly; null: as that says
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
     heights: Heights = None  # above what, where frame is a CRS that does not say
     mount: Mount
@@ -161,6 +163,12 @@ class Laser(Model):
     angle_sigma_deg: SigmaDeg = 0.003
     latency_s: Latency = 0.0
     latency_sigma_s: SigmaS = 0.0002
+
+    @model_validator(mode="after")
+    def _time_of_las(self) -> "Laser":
+        if self.time is not None and self.format != "las":
+            raise ValueError(f"time says what times of LAS count from, but format is {self.format}: take time out")
+        return self
 
     @model_validator(mode="after")
     def _heights_of_a_crs(self) -> "Laser":
@@ -217,6 +225,7 @@ class Recording(Model):
     latency_s: float
     frame: str = "laser"
     heights: Heights = None
+    time: LasTime = None
     sound_speed_m_s: float | None = None  # of GSF alone, which may have none
 
 
@@ -257,6 +266,7 @@ class SessionConfig(Model):
                 latency_s=sensor.latency_s,
                 frame=getattr(sensor, "frame", "laser"),
                 heights=getattr(sensor, "heights", None),
+                time=getattr(sensor, "time", None),
                 sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
             )
 

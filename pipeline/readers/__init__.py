@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from pipeline.config import Ins, Laser, Mbes
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import detect
@@ -111,7 +113,7 @@ def _check_kind(path: Path, name: str, sensor: Sensor, settings: Settings) -> No
     if kind.format == settings.format and sensor in kind.sensors:
         return
     if kind.format is None:
-        raise RawDataError(f"{name}: is {kind.title}, not {settings.format}; {kind.advice}")
+        raise RawDataError(f"{name}: is {kind.title}, not {settings.format}; {kind.advice_for(sensor)}")
     if sensor in kind.sensors:
         raise RawDataError(
             f"{name}: is {kind.title}, but session.yaml has {sensor}.format: {settings.format}; "
@@ -162,10 +164,13 @@ def _sbet(files: Files, accuracy: Files, settings: Ins) -> tuple[Part, ...]:
 
 def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers import las
+    from pipeline.readers.las_times import refuse_contradiction
 
-    headers = [las.read_header(path, name) for path, name in files]
+    headers = [las.read_header(path, name, settings.time) for path, name in files]
     weekly = [(name, header) for (_, name), header in zip(files, headers, strict=True) if not header.adjusted_time]
     firsts = [header.first_s for _, header in weekly]
+    for name, header in weekly:
+        refuse_contradiction(np.array([header.first_s]), name, header.adjusted_time, header.told)
     weeks = iter(_weeks(firsts, settings.gps_week, "laser", weekly[0][0]) if weekly else [])
     parts: list[Part] = []
     for (path, name), header in zip(files, headers, strict=True):

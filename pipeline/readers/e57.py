@@ -28,15 +28,23 @@ from pipeline.maths.rotations import rotation_from_quaternion
 from pipeline.readers import e57_xml
 from pipeline.readers.crs import AXES, Array, Frame, keep_placed
 from pipeline.readers.declared import refuse_another
-from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns, through_float32
+from pipeline.readers.sieve import (
+    LASER_COLUMNS,
+    LAST_WEEK,
+    Sieve,
+    chunk,
+    latency_ns,
+    no_rows,
+    possible_ns,
+    through_float32,
+)
 from pipeline.readers.worker import ADVICE, Numbers, batches, text
 from pipeline.streams import BATCH_ROWS, Chunk
-from pipeline.times import NS
+from pipeline.times import NS, WEEK_NS
 
 WORKER = Path(__file__).with_name("e57_worker.py")
 MAX_TEXT = 1 << 24
 MAX_SECONDS = 1e8  # of a time stamp: three years
-LATEST_S = 4e9  # GPS seconds: year 2106
 COARSEST_M = 0.001  # of coordinates in single precision
 RETIME = "export it again with a time stamp for each point, or as LAS or LAZ with GPS time"
 
@@ -128,7 +136,7 @@ def parts(path: Path, name: str, frame: Frame, latency_s: float) -> tuple[E57Par
             raise RawDataError(
                 f"{where}: says that its clock was not set by GPS (acquisitionStart, isAtomicClockReferenced); {RETIME}"
             )
-        if not 0 <= scan.start_s < LATEST_S or not _possible_pose(scan):
+        if not 0 <= scan.start_s < LAST_WEEK * WEEK_NS / NS or not _possible_pose(scan):
             raise RawDataError(f"{where}: its pose or start of acquisition is damaged; {ADVICE}")
     names = [name] if len(scans) == 1 else [f"{name}#{number}" for number in range(len(scans))]
     return tuple(

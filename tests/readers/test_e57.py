@@ -120,8 +120,11 @@ def test_clock_not_set_by_gps(file: Path) -> None:
 
 
 def test_impossible_start_and_pose(file: Path) -> None:
-    write(file, Scan(POINTS | TIMES, 1e200))
-    _refused(file, "damaged")
+    for start_s in (1e200, 5000 * 604_800.0, -1.0):  # week 5000, 2075, is the last everywhere
+        write(file, Scan(POINTS | TIMES, start_s))
+        _refused(file, "damaged")
+    write(file, Scan(POINTS | TIMES, 5000 * 604_800 - 100.0))
+    assert rows(read("laser", file, "e57")[0]) == 3
     write(file, Scan(POINTS | TIMES, START_S, rotation=(0.0, 0.0, 0.0, 0.0)))
     _refused(file, "damaged")
 
