@@ -38,6 +38,7 @@ Pattern = Annotated[str, AfterValidator(_inside)]
 Files = Annotated[list[Pattern], Field(min_length=1)]
 Heights = Literal["ellipsoidal"] | None
 LasTime = Literal["adjusted_standard", "seconds_of_week"] | None
+MaxRecords = Annotated[int, Field(ge=1, le=10**12)] | None  # of one file; null: 16 to each of its bytes
 Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
 
 
@@ -121,6 +122,7 @@ class Ins(Model):
     format: Literal["novatel", "sbet", "inertial_explorer", "table"]
     accuracy: list[Pattern] = Field(default_factory=list)  # SMRMSG files beside an SBET
     gps_week: Week = None
+    max_records: MaxRecords = None
     latency_s: Latency = 0.0
     drift: Drift = Drift()
     drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, where they tell; else those of drift
@@ -152,6 +154,7 @@ class Laser(Model):
     format: Literal["las", "e57", "table"]
     gps_week: Week = None
     time: LasTime = None  # what the times of LAS count from, where its header says it wrongly; null: as that says
+    max_records: MaxRecords = None
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
     heights: Heights = None  # above what, where frame is a CRS that does not say
     mount: Mount
@@ -191,6 +194,7 @@ class Mbes(Model):
     instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["r2sonic", "gsf", "kmall", "table"]
+    max_records: MaxRecords = None
     mount: Mount
     mount_origin: MountOrigin | None = None
     mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone

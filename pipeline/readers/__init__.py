@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.config import Ins, Laser, Mbes
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import detect
+from pipeline.readers.claims import refuse_claim
 from pipeline.readers.crs import Frame, placing_of
 from pipeline.streams import Part
 from pipeline.times import NS, WEEK_NS
@@ -167,6 +168,8 @@ def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers.las_times import refuse_contradiction
 
     headers = [las.read_header(path, name, settings.time) for path, name in files]
+    for (_, name), header in zip(files, headers, strict=True):
+        refuse_claim(header.present, header.size, settings.max_records, "laser", name)
     weekly = [(name, header) for (_, name), header in zip(files, headers, strict=True) if not header.adjusted_time]
     firsts = [header.first_s for _, header in weekly]
     for name, header in weekly:
@@ -182,7 +185,8 @@ def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
 def _e57(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers import e57
 
-    return tuple(part for file in files for part in e57.parts(*file, _frame(settings), settings.latency_s))
+    common = (_frame(settings), settings.latency_s, settings.max_records)
+    return tuple(part for file in files for part in e57.parts(*file, *common))
 
 
 def _frame(settings: Laser) -> Frame:
@@ -221,4 +225,4 @@ def _tables(files: Files, sensor: Sensor, settings: Settings) -> tuple[Part, ...
     from pipeline.readers.table import TablePart
 
     frame = _frame(settings) if isinstance(settings, Laser) else Frame()
-    return tuple(TablePart(path, name, sensor, frame, settings.latency_s) for path, name in files)
+    return tuple(TablePart(path, name, sensor, frame, settings.latency_s, settings.max_records) for path, name in files)

@@ -10,7 +10,7 @@ scan's pose brings them into the frame of the file, which ``laser.frame`` names.
 invalid are left out.
 
 The library sees a file only after :mod:`pipeline.readers.e57_xml` has looked at its header and its XML part. Where
-integers of a constant take no bits, a damaged count of points would be endless: it is held against the file's size.
+integers of a constant take no bits, a damaged count of points would be endless: see :mod:`pipeline.readers.claims`.
 """
 
 import json
@@ -26,8 +26,10 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.maths.rotations import rotation_from_quaternion
 from pipeline.readers import e57_xml
+from pipeline.readers.claims import refuse_claim
 from pipeline.readers.crs import AXES, Array, Frame, keep_placed
 from pipeline.readers.declared import refuse_another
+from pipeline.readers.files import opened, size_of
 from pipeline.readers.sieve import (
     LASER_COLUMNS,
     LAST_WEEK,
@@ -117,15 +119,19 @@ class E57Part:
             )
 
 
-def parts(path: Path, name: str, frame: Frame, latency_s: float) -> tuple[E57Part, ...]:
+def parts(
+    path: Path, name: str, frame: Frame, latency_s: float, max_records: int | None = None
+) -> tuple[E57Part, ...]:
     """A file's scans.
 
     Raises
     ------
     RawDataError
-        The file is damaged or cut off, has no points, or has points whose GPS time is not known.
+        The file is damaged or cut off, has no points, or more than likely, or has points whose GPS time is not known.
     """
     scans, crs = scans_of(path, name)
+    with opened(path, name) as file:
+        refuse_claim(_points_claimed(scans), size_of(file), max_records, "laser", name)
     for number, scan in enumerate(scans):
         where = name if len(scans) == 1 else f"{name}, scan {number}"
         if not scan.axes:
@@ -145,6 +151,11 @@ def parts(path: Path, name: str, frame: Frame, latency_s: float) -> tuple[E57Par
     )
 
 
+def _points_claimed(scans: list[Scan]) -> int:
+    counts = [scan.points for scan in scans]
+    return min(counts) if min(counts) < 0 else sum(counts)
+
+
 def _possible_pose(scan: Scan) -> bool:
     length = np.linalg.norm(scan.rotation)
     return bool(np.all(np.isfinite(scan.translation)) and 0.5 < length < 2)
@@ -152,7 +163,7 @@ def _possible_pose(scan: Scan) -> bool:
 
 def scans_of(path: Path, name: str) -> tuple[list[Scan], str]:
     """The scans, and the CRS that the file gives for its frame."""
-    size = e57_xml.check(path, name)
+    e57_xml.check(path, name)
     try:
         told: dict[str, Any] = json.loads(text(WORKER, [str(path)], name, MAX_TEXT))
     except ValueError as error:
@@ -160,9 +171,6 @@ def scans_of(path: Path, name: str) -> tuple[list[Scan], str]:
     scans = [Scan(**scan) for scan in told["scans"]]
     if not scans:
         raise RawDataError(f"{name}: has no scans; {ADVICE}")
-    for scan in scans:
-        if not 0 <= scan.points <= 8 * size:
-            raise RawDataError(f"{name}: is damaged ({scan.points} points in {size} bytes); {ADVICE}")
     return scans, told["crs"]
 
 

@@ -49,6 +49,7 @@ class Header:
     adjusted_time: bool
     told: LasTime  # what session.yaml says of the times, which goes before the flag
     compressed: bool
+    size: int  # of the file, bytes
     claimed: int
     present: int
     first_s: float  # GPS time of the first point
@@ -151,7 +152,7 @@ def read_header(path: Path, name: str, told: LasTime = None) -> Header:
         (first_s,) = struct.unpack("<d", read_at(file, time_at, 8).ljust(8, b"\0"))
         here = min(claimed, present)
         adjusted = told == "adjusted_standard" if told else bool(encoding & 1)
-        return Header(adjusted, told, compressed, claimed, here, first_s if here else 0.0, scales)
+        return Header(adjusted, told, compressed, size, claimed, here, first_s if here else 0.0, scales)
 
 
 def parts(
