@@ -185,8 +185,8 @@ def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
 def _e57(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers import e57
 
-    common = (_frame(settings), settings.latency_s, settings.max_records)
-    return tuple(part for file in files for part in e57.parts(*file, *common))
+    frame, latency_s, most = _frame(settings), settings.latency_s, settings.max_records
+    return tuple(part for path, name in files for part in e57.parts(path, name, frame, latency_s, most))
 
 
 def _frame(settings: Laser) -> Frame:
