@@ -39,6 +39,8 @@ def inside(pattern: str) -> str:
 Pattern = Annotated[str, AfterValidator(inside)]
 Files = Annotated[list[Pattern], Field(min_length=1)]
 Heights = Literal["ellipsoidal"] | None
+LasTime = Literal["adjusted_standard", "seconds_of_week"] | None
+MaxRecords = Annotated[int, Field(ge=1, le=10**12)] | None  # of one file; null: 16 to each of its bytes
 Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
 
 
@@ -122,6 +124,7 @@ class Ins(Model):
     format: Literal["novatel", "sbet", "inertial_explorer", "table"]
     accuracy: list[Pattern] = Field(default_factory=list)  # SMRMSG files beside an SBET
     gps_week: Week = None
+    max_records: MaxRecords = None
     latency_s: Latency = 0.0
     drift: Drift = Drift()
     drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, where they tell; else those of drift
@@ -152,6 +155,8 @@ class Laser(Model):
     files: Files
     format: Literal["las", "e57", "table"]
     gps_week: Week = None
+    time: LasTime = None  # what the times of LAS count from, where its header says it wrongly; null: as that says
+    max_records: MaxRecords = None
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
     heights: Heights = None  # above what, where frame is a CRS that does not say
     mount: Mount
@@ -163,6 +168,12 @@ class Laser(Model):
     angle_sigma_deg: SigmaDeg = 0.003
     latency_s: Latency = 0.0
     latency_sigma_s: SigmaS = 0.0002
+
+    @model_validator(mode="after")
+    def _time_of_las(self) -> "Laser":
+        if self.time is not None and self.format != "las":
+            raise ValueError(f"time says what times of LAS count from, but format is {self.format}: take time out")
+        return self
 
     @model_validator(mode="after")
     def _heights_of_a_crs(self) -> "Laser":
@@ -204,6 +215,7 @@ class Mbes(Model):
     instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["r2sonic", "gsf", "kmall", "table"]
+    max_records: MaxRecords = None
     mount: Mount
     mount_origin: MountOrigin | None = None
     mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
@@ -241,6 +253,7 @@ class Recording(Model):
     latency_s: float
     frame: str = "laser"
     heights: Heights = None
+    time: LasTime = None
     sound_speed_m_s: float | None = None  # of GSF alone, which may have none
     projector_offset_m: tuple[float, float, float] | None = None  # of Kongsberg's files alone, which tell one too
 
@@ -282,6 +295,7 @@ class SessionConfig(Model):
                 latency_s=sensor.latency_s,
                 frame=getattr(sensor, "frame", "laser"),
                 heights=getattr(sensor, "heights", None),
+                time=getattr(sensor, "time", None),
                 sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
                 projector_offset_m=(
                     getattr(sensor, "projector_offset_m", None) if sensor.format in ("kmall", "all") else None
