@@ -182,7 +182,7 @@ class Laser(Model):
 class Mbes(Model):
     instrument: InstrumentUsed | None = None
     files: Files
-    format: Literal["r2sonic", "gsf", "kmall", "table"]
+    format: Literal["r2sonic", "gsf", "kmall", "all", "table"]
     mount: Mount
     mount_origin: MountOrigin | None = None
     mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
