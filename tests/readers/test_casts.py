@@ -300,7 +300,7 @@ def test_the_name_of_the_file_stays_in_session_yaml(tmp_path: Path) -> None:
     assert "svp: casts/today.svp" in text
     assert content["mbes"]["svp"] == "casts/today.svp"
     (tmp_path / "casts" / "today.svp").write_text("1 2\n")
-    with pytest.raises(RawDataError, match="today.svp: is no cast"):
+    with pytest.raises(RawDataError, match=r"today\.svp: is no cast"):
         read_session(tmp_path)
 
 
