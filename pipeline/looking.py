@@ -27,7 +27,7 @@ Integers = NDArray[np.int64]
 WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # degrees, m, s
 REACH = 4  # bins on either side of a step
 FEWEST, FEWEST_FREE = 30, 8.0  # points, and degrees of freedom, of a mean that is judged
-POSE = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # components of the drift
+TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # columns of the drift
 KNOWN = 1e9  # degrees of freedom of a sigma that is given
 Row = dict[str, Any]
 Cells = Mapping[tuple[str, int, int], Cell]  # by sensor, surface, pass
@@ -106,15 +106,17 @@ def _table(rows: list[Row], tolerance_m: float) -> pd.DataFrame:
 
 
 def drift_rows(drift: Drift, noise: PoseNoise, poses: pd.DataFrame, passes: pd.DataFrame) -> list[Row]:
-    """The drift found in each pass against that of the others, as rows of ``patterns``; angles in rad."""
+    """How the drift found in each pass turns the boat against the others, as rows of ``patterns``; rad. (How it moves
+    the boat tells of the INS alone: both sensors move alike.)"""
     t_ns = poses["t_ns"].to_numpy()[drift.knots.record]
     number = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()).astype(np.int64)
     places, values, sigmas = against_other_passes(drift, noise, number)
     return [
-        {"by": "drift", "sensor": "ins", "family": POSE[k], "low": float(places[i]), "width": 1.0}
-        | {"count": int(np.sum(number == places[i])), "mean_m": values[i, k]}
-        | {"sigma_mean_m": sigmas[i, k], "dof": KNOWN}
-        for i, k in np.argwhere(sigmas > 0).tolist()
+        {"by": "drift", "sensor": "ins", "family": name, "low": float(place), "width": 1.0}
+        | {"count": int(np.sum(number == place)), "mean_m": value[k], "sigma_mean_m": sigma[k], "dof": KNOWN}
+        for place, value, sigma in zip(places, values, sigmas, strict=True)
+        for name, k in TURNS.items()
+        if sigma[k] > 0
     ]
 
 

@@ -152,7 +152,7 @@ def one(task: Task) -> dict[str, Any]:
     from stages.campaign import calibrate_in_memory
 
     fault, kind, number = task
-    seed = 60000 + 1000 * list(KINDS).index(kind) + number + (10000 if fault else 0)
+    seed = seed_of(task)
     scenario = scenario_of(kind, number)
     made = simulate(parse(Scenario, scenario, kind), seed)
 
@@ -183,6 +183,17 @@ def one(task: Task) -> dict[str, Any]:
         row |= {f"number_{by}": len(rows), f"u_{by}": rows["normalised"].abs().max()}
         row |= {f"bare_{by}": rows["bare"].abs().max()}
     return row
+
+
+def seed_of(task: Task) -> int:
+    fault, kind, number = task
+    return 60000 + 1000 * list(KINDS).index(kind) + number + (10000 if fault else 0)
+
+
+def read(path: Path) -> pd.DataFrame:
+    """The rows so far."""
+    rows = pd.read_csv(path)
+    return rows.assign(fault=rows["fault"].fillna(""), reasons=rows["reasons"].fillna(""))
 
 
 def summary(rows: pd.DataFrame) -> str:
@@ -231,11 +242,13 @@ def main() -> None:
         for task in tasks_of(options.good, options.seeds)
         if not options.only or (task[0] or task[1]).startswith(tuple(options.only))
     ]
-    done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
+    done = read(path) if options.resume and path.is_file() else pd.DataFrame(columns=["fault", "seed"])
+    there = set(zip(done["fault"], done["seed"], strict=True))
+    left = [task for task in tasks if (task[0], seed_of(task)) not in there]
     with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-        for number, row in enumerate(pool.imap(one, tasks[done:]), start=done):  # written as they come
+        for number, row in enumerate(pool.imap(one, left), start=len(done)):  # written as they come: nothing is lost
             pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
-    rows = pd.read_csv(path, keep_default_na=False, na_values=["nan"])
+    rows = read(path)
     rows.to_parquet(PATH, index=False)
     print(summary(rows))
 

@@ -21,8 +21,8 @@ CONCEDED = "{:.1f} times the drift that it is conceded"
 SENSORS = {"laser": "the laser", "mbes": "the sonar"}
 FAR_M = 0.05  # a mean residual beyond this is no drift: the model is another
 ALIKE_DEG = 3.0  # steps nearer to each other than this are one
-TURNS = {"turn_x": "about the track's normal", "turn_y": "about the track", "turn_z": "in heading"}
-Row = Mapping[str, Any]
+AXES = {"turn_x": "about the track's horizontal normal", "turn_y": "about the track", "turn_z": "about the vertical"}
+Row = Mapping[Any, Any]
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def off(tables: Tables, level: float) -> list[Found]:
 def _worst(rows: pd.DataFrame) -> list[Row]:
     """Of each variable the row that lies farthest off; the farthest of all first."""
     found: list[Row] = [
-        group.loc[group["normalised"].abs().idxmax()].to_dict() for _, group in rows.groupby("by", sort=True)
+        group.iloc[int(group["normalised"].abs().argmax())].to_dict() for _, group in rows.groupby("by", sort=True)
     ]
     return sorted(found, key=lambda row: -abs(row["normalised"]))
 
@@ -130,13 +130,11 @@ def _pass(row: Row, tables: Tables, over: pd.DataFrame, test: str) -> str:
 
 
 def _drift(row: Row, test: str) -> str:
-    turn = str(row["family"])
-    size = f"{np.degrees(row['mean_m']):+.3f}°" if turn in TURNS else f"{1000 * row['mean_m']:+.1f} mm"
-    how = f"turned by {size} {TURNS[turn]}" if turn in TURNS else f"moved by {size} along {turn}"
+    how = f"{np.degrees(row['mean_m']):+.3f}° {AXES[str(row['family'])]}"
     return (
-        f"the passes do not agree: for both sensors to fit in pass {int(row['low'])}, the INS must have {how} against "
-        f"the other passes ({test}); likely a bracket that moved in that pass, a sensor's clock, or ins.drift is too "
-        "small"
+        f"the passes do not agree: for both sensors to fit in pass {int(row['low'])}, the INS must be wrong there by "
+        f"{how} more than in the other passes ({test}); likely a bracket that moved in that pass, a sensor's clock, or "
+        "ins.drift is too small"
     )
 
 

@@ -93,7 +93,9 @@ class _Side:
     @classmethod
     def of(cls, slots: Integers, sums: Array) -> "_Side":
         found, inverse = np.unique(slots, return_inverse=True)
-        p, pv = (np.bincount(inverse, weights=sums[:, k], minlength=len(found)) for k in (0, 1))
+        p, pv = np.zeros((2, len(found)))
+        np.add.at(p, inverse, sums[:, 0])
+        np.add.at(pv, inverse, sums[:, 1])
         return cls(found, p, pv, float(pv.sum() / p.sum()), int(sums[:, 2].sum()))
 
     @property

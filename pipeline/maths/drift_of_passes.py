@@ -2,8 +2,9 @@
 
 What one sensor alone does in one pass (a bracket that moves, a clock that jumps) need not stay in the residuals: where
 the INS is conceded a drift, the adjustment turns the boat in that pass until both sensors fit. It pays with a drift
-that is larger than conceded, and there it is to be seen. With weights c, Σ c ξ = (mean of the pass's knots) - (mean of
-all others), and ξ the Gauss-Markov process of :mod:`pipeline.maths.knots`,
+that is larger than conceded, and there it is to be seen. (5 mm more range in one of four passes leaves 1 mm in the
+residuals, and turns the boat by 0.15° in heading.) With weights c, Σ c ξ = (mean of the pass's knots) - (mean of all
+others), and ξ the Gauss-Markov process of :mod:`pipeline.maths.knots`,
 
     Var(Σ c ξ) = c' K c,    K_ij = σ² exp(-|t_i - t_j| / τ)
 
