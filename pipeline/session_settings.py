@@ -31,6 +31,8 @@ def _inside(pattern: str) -> str:
         raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
     if any("**" in part and part != "**" for part in path.parts):
         raise ValueError("must have ** only as a whole part between two /")
+    if path.parts.count("**") > 2 or len(pattern) > 300:  # each more takes several times as long to search
+        raise ValueError("must have ** twice at most, and no more than 300 letters")
     return pattern
 
 
@@ -218,6 +220,7 @@ class Recording(Model):
     frame: str = "laser"
     heights: Heights = None
     sound_speed_m_s: float | None = None  # of GSF alone, which may have none
+    projector_offset_m: tuple[float, float, float] | None = None  # of Kongsberg's files alone, which tell one too
 
 
 class Recordings(Model):
@@ -258,6 +261,9 @@ class SessionConfig(Model):
                 frame=getattr(sensor, "frame", "laser"),
                 heights=getattr(sensor, "heights", None),
                 sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
+                projector_offset_m=(
+                    getattr(sensor, "projector_offset_m", None) if sensor.format in ("kmall", "all") else None
+                ),
             )
 
         return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))

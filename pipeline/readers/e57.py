@@ -9,13 +9,11 @@ here. Coordinates are metres, Cartesian or spherical (range, azimuth from x to y
 scan's pose brings them into the frame of the file, which ``laser.frame`` names. Points and times that are marked as
 invalid are left out.
 
-Header (little-endian): 8 u32 x 2 version, 16 u64 size of the file, 24 u64 where the XML part is, 32 u64 its length, 40
-u64 size of a page. Where integers of a constant take no bits, a damaged count of points would be endless: it is held
-against the file's size.
+The library sees a file only after :mod:`pipeline.readers.e57_xml` has looked at its header and its XML part. Where
+integers of a constant take no bits, a damaged count of points would be endless: it is held against the file's size.
 """
 
 import json
-import struct
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,17 +25,15 @@ from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
 from pipeline.maths.rotations import rotation_from_quaternion
+from pipeline.readers import e57_xml
 from pipeline.readers.crs import AXES, Array, Frame, keep_placed
 from pipeline.readers.declared import refuse_another
-from pipeline.readers.files import opened, size_of
 from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns, through_float32
 from pipeline.readers.worker import ADVICE, Numbers, batches, text
 from pipeline.streams import BATCH_ROWS, Chunk
 from pipeline.times import NS
 
 WORKER = Path(__file__).with_name("e57_worker.py")
-HEADER = struct.Struct("<8s2I4Q")
-MAX_XML = 1 << 26
 MAX_TEXT = 1 << 24
 MAX_SECONDS = 1e8  # of a time stamp: three years
 LATEST_S = 4e9  # GPS seconds: year 2106
@@ -148,14 +144,7 @@ def _possible_pose(scan: Scan) -> bool:
 
 def scans_of(path: Path, name: str) -> tuple[list[Scan], str]:
     """The scans, and the CRS that the file gives for its frame."""
-    with opened(path, name) as file:
-        size = size_of(file)
-        head = file.read(HEADER.size).ljust(HEADER.size, b"\0")
-    _, _, _, claimed, xml_at, xml_length, page = HEADER.unpack(head)
-    if claimed > size:
-        raise RawDataError(f"{name}: is cut off: {size} of {claimed} bytes; {ADVICE}")
-    if page != 1024 or not 0 < xml_length <= min(MAX_XML, size) or xml_at >= size:
-        raise RawDataError(f"{name}: its E57 header is damaged; {ADVICE}")
+    size = e57_xml.check(path, name)
     try:
         told: dict[str, Any] = json.loads(text(WORKER, [str(path)], name, MAX_TEXT))
     except ValueError as error:
@@ -171,6 +160,7 @@ def scans_of(path: Path, name: str) -> tuple[list[Scan], str]:
 
 def points(path: Path, name: str, number: int) -> Iterator[Numbers]:
     """A scan's points as stored: seconds, three coordinates, marks of invalid points and of invalid times."""
+    e57_xml.check(path, name)  # again: the file may be another by now
     return batches(WORKER, [str(path), str(number), str(BATCH_ROWS)], name, 6, BATCH_ROWS)
 
 

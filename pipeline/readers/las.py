@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.readers.crs import DEGREE_M, Frame, keep_placed, placing_of
+from pipeline.readers.crs import Frame, keep_placed, placing_of
 from pipeline.readers.declared import refuse_another
 from pipeline.readers.files import opened, read_at, size_of
 from pipeline.readers.laz import points_at_most, unpack
@@ -168,8 +168,8 @@ def parts(
 def _refuse_coarse(scales: tuple[float, ...], frame: Frame, name: str) -> None:
     """Coordinates are whole numbers of a scale, which must not blur what is measured to millimetres."""
     placing = placing_of(frame)
-    unit_m = 1.0 if placing is None else placing.unit_m
-    units_m = (unit_m, unit_m, 1.0 if unit_m == DEGREE_M else unit_m)
+    unit_m, height_unit_m = (1.0, 1.0) if placing is None else (placing.unit_m, placing.height_unit_m)
+    units_m = (unit_m, unit_m, height_unit_m)
     for axis, scale, axis_unit_m in zip("xyz", scales, units_m, strict=True):
         if scale * axis_unit_m > COARSEST_M * 1.2:
             raise RawDataError(

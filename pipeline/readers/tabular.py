@@ -60,6 +60,7 @@ def batches(file: BinaryIO, name: str, sensor: Sensor, dropped: Counter[str]) ->
         yield from source(file, name, sensor, dropped)
     except (pa.ArrowException, ValueError, OverflowError) as error:
         told = str(error).split("\n")[0]
+        told = told if len(told) <= 200 else f"{told[:200]}..."  # whole cells stand in it
         raise RawDataError(f"{name}: cannot be read as a table ({told}); check or export it again") from error
 
 

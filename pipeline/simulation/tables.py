@@ -17,4 +17,5 @@ def write_soundings(path: Path, mbes: Columns) -> None:
     (forward +), a row a detection."""
     columns = {"gps_ns": mbes["t_ns"]} | {name: mbes[name] for name in AS_THEY_ARE}
     columns |= {name: np.degrees(mbes[source]) for name, source in DEGREES.items()}
-    pq.write_table(pa.table({name: np.ascontiguousarray(values) for name, values in columns.items()}), path)
+    arrays = {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
+    pq.write_table(pa.table(arrays), path)
