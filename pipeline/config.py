@@ -115,7 +115,7 @@ class Adjust(Model):
     robust_k1: Annotated[float, Field(ge=0.5, le=1000)] = 6.0  # no weight above
     moment_s: Annotated[float, Field(ge=0.001, le=1000)] = 0.1  # observations within it share the INS's noise
     test_level: Annotated[float, Field(gt=0, lt=0.5)] = 0.001
-    test_tolerance_m: SigmaM = 0.003  # systematic residual per surface and pass that is not held against a session
+    test_tolerance_m: SigmaM = 0.003  # mean residual, step or difference of passes that is not held against a session
 
     @model_validator(mode="after")
     def _ordered(self) -> "Adjust":

@@ -25,6 +25,7 @@ from pipeline.blocks import (
 from pipeline.built import as_found, by_design, oddities
 from pipeline.closing import closing_table
 from pipeline.ins_sigmas import drift_of, told
+from pipeline.judging.residual_tests import pattern_tests
 from pipeline.mounts import Mounted, mount_of, target_of
 from pipeline.verdict import (
     NO_DRIFT,
@@ -33,7 +34,6 @@ from pipeline.verdict import (
     cast_doubts,
     drift_doubt,
     one_eyed,
-    pattern_tests,
     reasons,
     warnings,
 )
@@ -107,7 +107,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     drift = drift_of(config.ins, inputs.ins_sigmas, inputs.passes)
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest, level = config.segment.farthest_mount, config.adjust.test_level
-    settings = Settings(config.verdict, level, config.result, farthest, doubt, config.target.shape)
+    tolerated = config.adjust.test_tolerance_m
+    settings = Settings(config.verdict, level, tolerated, config.result, farthest, doubt, config.target.shape)
     found = reasons(evidence, methods, settings)
     model = target_of(config.target)
     built = as_found(inputs.planes, inputs.patterns, model)

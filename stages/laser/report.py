@@ -23,8 +23,9 @@ from pipeline.blocks import (
 from pipeline.built import as_found, by_design, oddities
 from pipeline.finding import FARTHEST
 from pipeline.ins_sigmas import drift_of, told
+from pipeline.judging.residual_tests import pattern_tests
 from pipeline.mounts import PARAMETERS, mount_of, target_of
-from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, pattern_tests, reasons, warnings
+from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons, warnings
 
 
 @dataclass(frozen=True)
@@ -84,9 +85,10 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
     from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
     drift, level = drift_of(config.ins, inputs.ins_sigmas, inputs.passes), config.adjust.test_level
+    tolerated = config.adjust.test_tolerance_m
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest = (FARTHEST * config.segment.search_laser_deg, np.inf)
-    given = Settings(config.verdict, level, "adjustment", farthest, doubt, config.target.shape, "laser")
+    given = Settings(config.verdict, level, tolerated, "adjustment", farthest, doubt, config.target.shape, "laser")
     found = reasons(evidence, {"adjustment": block}, given)
     built = as_found(inputs.planes, inputs.patterns, model)
     target = target_block(inputs.target_pose.iloc[0]) | {"as_found": built}
