@@ -12,7 +12,8 @@ from pipeline import planned
 from pipeline.config import Drift, PoolConfig, SessionConfig
 from pipeline.parsing import parse
 from pipeline.plan_settings import Plan
-from pipeline.planning import predict
+from pipeline.planning import _beams, predict
+from pipeline.simulation.beams import directions_in_mbes, swing_rad
 from tests.effort import often
 from tests.end_to_end.places import poolcal
 from tests.stages.conftest import THIN, calibrated, made
@@ -47,6 +48,20 @@ def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift:
         ratio = [found[key][name] / result[key][name] for name in SETTINGS]
         assert max(abs(np.log(ratio))) < np.log(1.15), (key, dict(zip(SETTINGS, ratio, strict=True)))
     assert (answer.gaps, answer.remedy, answer.better) == ([], "", None)
+
+
+def test_the_beams_of_a_plan_are_those_of_its_sectors(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    """Against the simulator's; where a beam and its fan do not meet there is none."""
+    edges = ((-29.5, 8.0), (20.5, -0.75), (90.0, -29.5))
+    figures = {
+        "sectors": [{"to_deg": to, "tilt_deg": tilt} for to, tilt in edges], "beams": 131, "ping_rate_hz": 10.0,
+    }  # fmt: skip
+    _, rays, _ = _beams(planned.setting_of(plan_of(4.0, mbes=figures), *configs), 0.15)
+    angles_deg = np.arange(-65.0, 66.0)
+    tilts = np.radians(np.select([angles_deg <= -30, angles_deg <= 20], [8.0, -0.75], -29.5))
+    swing, there = swing_rad(np.sin(np.radians(angles_deg)), tilts)
+    assert there.sum() == 131 - 5  # 61° and 29.5° are more than 90°
+    np.testing.assert_allclose(rays, directions_in_mbes(swing, tilts)[there], atol=1e-9)
 
 
 def test_the_lasers_mount_covariance_is_carried_into_the_total(configs: tuple[PoolConfig, SessionConfig]) -> None:
