@@ -18,6 +18,7 @@ from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.maths.variance import scatter
 from pipeline.mounts import Mounted
 from pipeline.passes import pass_of
+from pipeline.screen import plural
 
 Array = NDArray[np.float64]
 COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common
@@ -74,7 +75,8 @@ def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd
     solution = found.solution
     statistic = float(sum(cell.normalised**2 for cell in cells.values()))
     limit = consistency_limit(len(cells), settings.test_level)
-    reason = f"the data leave {solution.deficiency} direction(s) of the unknowns open" if solution.deficiency else ""
+    left_open = plural(solution.deficiency, "direction")
+    reason = f"the data leave {left_open} of the unknowns open" if solution.deficiency else ""
     counts = found.reading.counts.values()
     summary = {
         "converged": found.converged,

@@ -11,6 +11,7 @@ from pipeline import config
 from pipeline.causes import causes, estimated
 from pipeline.maths.consistency import consistency_limit
 from pipeline.mounts import PARAMETERS
+from pipeline.screen import plural
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
 FAR_M = 0.05  # a mean residual beyond this is no drift: the model is another
@@ -212,7 +213,7 @@ def _causes(freed: pd.DataFrame) -> list[str]:
     found = causes(freed)
     if not found:
         return []
-    others = f"; {len(found) - 1} other parameter(s) would explain it less well" if len(found) > 1 else ""
+    others = f"; {plural(len(found) - 1, 'other parameter')} would explain it less well" if len(found) > 1 else ""
     return [f"likely cause of residuals ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
 
 
@@ -316,7 +317,8 @@ def one_eyed(passes: Sequence[Mapping[str, Any]]) -> list[str]:
     ):
         numbers = [str(one["pass"]) for one in passes if one[seen] and not one[missing]]
         if numbers:
-            found.append(f"pass{'es' * (len(numbers) > 1)} {', '.join(numbers)}: {words}; was it recording?")
+            which = plural(len(numbers), "pass").partition(" ")[2]
+            found.append(f"{which} {', '.join(numbers)}: {words}; was it recording?")
     return found
 
 

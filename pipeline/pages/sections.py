@@ -235,14 +235,14 @@ def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup
     z = cells.loc[[name not in level for name in of_family], "z_target_m"]
     heights = (z.min() - 0.1, z.max() + 0.1) if len(z) else (0.0, 1.0)
     image = None
-    for axis, name in zip(panels, order, strict=True):
+    for axis, name, width in zip(panels, order, widths, strict=True):
         inside = cells[of_family == name]
         flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
         size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
         image = _grid(axis, flat[:, 0], flat[:, 1], 1000 * inside["mean_m"].to_numpy(), size, span) or image
-        axis.set(title=name if name not in level else f"{name}, from above", aspect="equal")
-        axis.xaxis.set_major_locator(MaxNLocator(3))
-        axis.set_xlabel("x, m" if name in level else "to the right, m")
+        axis.set(title=name, aspect="equal")
+        axis.xaxis.set_major_locator(MaxNLocator(2 if width < 1.2 else 4))
+        axis.set_xlabel("x, m (from above)" if name in level else "to the right, m")
         if name not in level:
             axis.set_ylim(*heights)
     panels[0].set_ylabel("z, height, m")
