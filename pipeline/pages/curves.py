@@ -62,7 +62,7 @@ def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
             mean = 1000 * rows["mean_m"].to_numpy()
             axis.errorbar(at, mean, 1000 * WITHIN_95 * rows["sigma_mean_m"], fmt=marks[name], **bars)
             for x, y, number in zip(at, mean, rows["pass"], strict=True):
-                beside = {"textcoords": "offset points", "fontsize": SMALLEST_PT, "color": colour}
+                beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALLEST_PT, "color": colour}
                 axis.annotate(f"{number}", (x, y), (2, 2), **beside)
     if len(cells):
         inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # one cell far off must not hide the others

@@ -17,6 +17,7 @@ from markupsafe import Markup
 from pipeline import artefacts, config, manifest
 from pipeline.built import by_design
 from pipeline.drawn import PAGE, agreeing, drawn_from
+from pipeline.families import families_of
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
 from pipeline.maths.solution import TOGETHER
@@ -26,6 +27,7 @@ from pipeline.pages import render
 from pipeline.pages.figures import figures_used
 from pipeline.pages.pictures import pictures_of
 from pipeline.parsing import changes
+from pipeline.residuals import FEWEST
 from pipeline.screen import verdict_in_words
 from pipeline.tables import Tables
 from pipeline.times import utc_text
@@ -163,15 +165,16 @@ def _closing(tables: Tables) -> list[dict[str, Any]]:
     """How the planes close; of families at several distances, which have no one plane, their points' mean distance from
     the adjusted surface, sonar minus laser."""
     rows: list[Any] = tables.table(artefacts.CLOSING).to_dict("records")
-    names = tables.table(artefacts.FACES)["family"].to_numpy()
+    faces = tables.table(artefacts.FACES)
+    names, distances = faces["family"].to_numpy(), faces.groupby("family")["distance_m"].agg(np.ptp)
     columns = ("sensor", "face", "residual_m", "coarse_residual_m")
     residuals, cells = tables.table(artefacts.RESIDUALS, *columns), tables.table(artefacts.CELLS)
     family = names[residuals["face"].to_numpy().astype(int)]
     solved = calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
-    for name in dict.fromkeys(names.tolist()):
+    for name in families_of(faces):
         of_family = {sensor: residuals[(residuals["sensor"] == sensor) & (family == name)] for sensor in SENSORS}
         counts = cells[cells["family"] == name].groupby("sensor")["count"].sum()
-        if any(row["plane"] == name for row in rows) or any(not len(one) for one in of_family.values()):
+        if not distances[name] or any(len(one) < FEWEST for one in of_family.values()):
             continue
         for mount, column in (("coarse", "coarse_residual_m"), ("adjustment", "residual_m"))[: 1 + solved]:
             sonar, laser = of_family["mbes"][column], of_family["laser"]["residual_m"]
