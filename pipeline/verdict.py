@@ -12,6 +12,7 @@ from pipeline.causes import causes, estimated
 from pipeline.checking.cast import doubts
 from pipeline.judging.residual_tests import Tables, off
 from pipeline.mounts import PARAMETERS
+from pipeline.screen import plural
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
 WORDS_OF_GROUP = {
@@ -159,7 +160,7 @@ def _causes(freed: pd.DataFrame, alone: bool) -> list[str]:
     found = causes(freed)
     if not found:
         return []
-    others = f"; {len(found) - 1} other parameter(s) would explain it less well" if len(found) > 1 else ""
+    others = f"; {plural(len(found) - 1, 'other parameter')} would explain it less well" if len(found) > 1 else ""
     unless = ", if it is not what lies off by itself" if alone else ""
     return [f"likely cause of residuals{unless} ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
 
@@ -264,7 +265,8 @@ def one_eyed(passes: Sequence[Mapping[str, Any]]) -> list[str]:
     ):
         numbers = [str(one["pass"]) for one in passes if one[seen] and not one[missing]]
         if numbers:
-            found.append(f"pass{'es' * (len(numbers) > 1)} {', '.join(numbers)}: {words}; was it recording?")
+            which = plural(len(numbers), "pass").partition(" ")[2]
+            found.append(f"{which} {', '.join(numbers)}: {words}; was it recording?")
     return found
 
 

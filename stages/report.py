@@ -27,6 +27,7 @@ from pipeline.closing import closing_table
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.judging.residual_tests import pattern_tests
 from pipeline.mounts import Mounted, mount_of, target_of
+from pipeline.screen import verdict_in_words
 from pipeline.verdict import (
     NO_DRIFT,
     Evidence,
@@ -113,10 +114,12 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     model = target_of(config.target)
     built = as_found(inputs.planes, inputs.patterns, model)
     summary, target = inputs.summary.iloc[0], target_block(inputs.target_pose.iloc[0]) | {"as_found": built}
+    verdict = "rejected" if found else "accepted"
     result = {
         "schema": SCHEMA,
         "session": config.name,
-        "verdict": "rejected" if found else "accepted",
+        "verdict": verdict,
+        "verdict_in_words": verdict_in_words(verdict),
         "reasons": found,
         "warnings": warnings(
             inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
