@@ -13,6 +13,7 @@ the receiver's I. (of a head IR.); .all: S1X to S1H of the transmitter or head, 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ INSIDE: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, and wheth
     },
 }  # fmt: skip
 NEAR = 3.0  # times the transmitter's distance: no shorter path is reduced
-ROUNDS = 6  # of the iteration: the error falls by (distance of the arrays / range)² with each
+ROUNDS = 4  # of the iteration: the error falls by (distance of the arrays / range)² with each
 NUMBER = re.compile(r"[-+]?\d{1,6}(\.\d{0,9})?")
 
 
@@ -133,6 +134,7 @@ def _numbers(values: str) -> dict[str, float]:
     return {key: float(value) for key, _, value in pairs if NUMBER.fullmatch(value)}
 
 
+@lru_cache(maxsize=16)  # asked for with each ping
 def of_all(text: str, serial: int, model: int) -> Arrays | None:
     """Those of the receiver of this serial number; None where the installation does not tell.
 
