@@ -33,7 +33,9 @@ class Plane:
     right: Array = field(default_factory=lambda: np.zeros(3))
     squares: float = 0.0
 
-    def add(self, forward: Array, starboard: Array, down: Array, weight: Array) -> None:
+    def add(self, places_m: Array, weight: Array) -> None:
+        """Forward, starboard, down (3, n)."""
+        forward, starboard, down = places_m
         rows = np.stack([np.ones_like(starboard), starboard, down]) * weight
         self.normal += rows @ rows.T
         self.right += rows @ (forward * weight)
@@ -41,7 +43,7 @@ class Plane:
 
     def rms_deg(self, count: int) -> float:
         found = np.linalg.lstsq(self.normal, self.right, rcond=1e-12)[0]
-        return float(np.degrees(np.sqrt(max(self.squares - found @ self.right, 0.0) / count)))
+        return float(np.degrees(np.sqrt(np.maximum(self.squares - found @ self.right, 0.0) / count)))
 
 
 @dataclass
@@ -63,8 +65,8 @@ class Fans:
             return
         places, weight = places[:, good], 1 / distance[good]
         R_body_from_level = (rotation_y(np.radians(pitch_deg)) @ rotation_x(np.radians(roll_deg))).T
-        self.level.add(*places, weight)
-        self.body.add(*(R_body_from_level @ places), weight)
+        self.level.add(places, weight)
+        self.body.add(R_body_from_level @ places, weight)
         self.pings += 1
         self.beams += len(weight)
 
