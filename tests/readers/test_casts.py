@@ -1,6 +1,7 @@
 """Casts of sound speed from files: against values written down here, and against decoders of the test's own."""
 
 import hashlib
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -294,13 +295,22 @@ def test_a_session_whose_cast_is_refused(mbes: dict[str, Any], words: str, tmp_p
         load_session(folder, with_cast)
 
 
+@pytest.mark.parametrize("name", ["a\nb.svp", os.fsdecode(b"\xff.svp"), "a\x1b[1m.svp"])
+def test_names_that_cannot_be_shown(name: str, tmp_path: Path) -> None:
+    folder = session(tmp_path, svp="casts/*.svp")
+    (folder / "casts" / "today.svp").rename(folder / "casts" / name)
+    with pytest.raises(RawDataError, match="letters that cannot be shown; rename") as error:
+        load_session(folder, with_cast)
+    assert str(error.value).isprintable()
+
+
 def test_the_name_of_the_file_stays_in_session_yaml(tmp_path: Path) -> None:
     """Where poolcal coarse and poolcal laser edit it; a cast that cannot be read is told there as well."""
     text, content = read_session(session(tmp_path, svp="casts/today.svp"))
     assert "svp: casts/today.svp" in text
     assert content["mbes"]["svp"] == "casts/today.svp"
     (tmp_path / "casts" / "today.svp").write_text("1 2\n")
-    with pytest.raises(RawDataError, match="today.svp: is no cast"):
+    with pytest.raises(RawDataError, match=r"today\.svp: is no cast"):
         read_session(tmp_path)
 
 
