@@ -132,9 +132,18 @@ def test_down_and_up_of_two_waters(file: Path) -> None:
 
 
 def test_repeated_depths_become_their_mean(file: Path) -> None:
-    svp, used = read(file, "depth speed\n1.0 1480.0\n2.0 1482.0\n2.0 1482.4\n1.9995 1482.2\n3.0 1480.0\n")
-    is_profile(svp, [(1.0, 1480.0), (1.99983, 1482.2), (3.0, 1480.0)])
+    svp, used = read(file, "depth speed\n1.0 1480.0\n2.0 1482.0\n2.0 1482.4\n1.9996 1482.2\n3.0 1480.0\n")
+    is_profile(svp, [(1.0, 1480.0), (2.0, 1482.2), (3.0, 1480.0)])
     assert used["left_out"] == {"of a depth that is there already: their mean is used": 2}
+
+
+def test_a_probe_that_sinks_slowly(file: Path) -> None:
+    """Rows a third of a millimetre apart are not all of one depth."""
+    rows = [(1 + k / 3000, 1480 + (k / 3000) ** 2) for k in range(6000)]
+    svp, _ = read(file, "depth speed\n" + "".join(f"{depth:.5f} {speed:.4f}\n" for depth, speed in rows))
+    depth, speed = np.array(svp).T
+    truth = np.array(rows)
+    assert np.max(np.abs(np.interp(truth[:, 0], depth, speed) - truth[:, 1])) < 0.025
 
 
 def test_waves_at_the_boat_change_no_order(file: Path) -> None:
