@@ -14,6 +14,7 @@ from pipeline.executor import SERIAL, Workers
 from pipeline.files import Digests
 from pipeline.folder import Settings
 from pipeline.progress import Progress
+from pipeline.run import provenance
 
 SENSORS = ("ins", "laser", "mbes")
 EMPTY = hashlib.sha256().hexdigest()  # empty files are all alike: the readers say what they think of them
@@ -28,6 +29,7 @@ class Run:
     digests: Digests
     workers: Workers = SERIAL
     progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
+    raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # by sensor, as they were first asked for
 
     def folder(self, stage: str) -> Path:
         return self.path / stage
@@ -54,17 +56,29 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     inputs: dict[str, str] = {}
     for marker in declared(stage.Inputs).values():
         if isinstance(marker, Raw):
-            raw |= raw_digests(this, marker.sensor)
+            raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):
-            raw |= {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
+            raw |= all_raw(this)
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
     config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
-    return manifest.Key(config, raw, inputs, manifest.source_of(stage), manifest.versions())
+    return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
+
+
+def raw_of(this: Run, sensor: str) -> dict[str, str]:
+    """Digests of one sensor's files as this run first found them: the later stages were made from these, and the report
+    tells these, whatever happens to the files meanwhile."""
+    if sensor not in this.raw:
+        this.raw[sensor] = raw_digests(this, sensor)
+    return this.raw[sensor]
+
+
+def all_raw(this: Run) -> dict[str, str]:
+    return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()}
 
 
 def raw_digests(this: Run, sensor: str) -> dict[str, str]:
-    """Digest by file of one sensor, relative to the session folder."""
+    """Digest by file of one sensor, relative to the session folder, as the files are now."""
     root, settings = this.settings.session_folder, getattr(this.settings.session, sensor)
     if settings is None:
         return {}

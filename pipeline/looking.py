@@ -12,6 +12,7 @@ from pipeline import artefacts
 from pipeline.adjusting import Adjusted
 from pipeline.maths.consistency import Cell, Moments, cells_of, merged_moments, moments_of
 from pipeline.maths.knots import Drift
+from pipeline.maths.soundings import receive_angle
 from pipeline.maths.unknowns import State
 from pipeline.residuals import residuals_table, step_for
 from pipeline.scene import Observations, Scene, Weighting
@@ -106,9 +107,9 @@ def _look(
 def _bins(sensor: str, seen: Observations) -> Iterator[tuple[str, Integers, Integers]]:
     """Name, and two numbers of each point's bin."""
     batch = seen.points
-    own = xyz(batch, f"{sensor}_m").T
-    range_m = np.sqrt(np.einsum("in,in->n", own, own))
-    angle = np.arcsin(own[2] / range_m) if sensor == "laser" else np.arctan2(own[0], -own[2])
+    own = xyz(batch, f"{sensor}_m")
+    range_m = np.linalg.norm(own, axis=1)
+    angle = np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own)
     yield "pass", seen.surface, batch["pass"].astype(np.int64)
     yield "face", seen.surface, batch["face"].astype(np.int64)
     yield "angle", seen.surface, np.floor(np.degrees(angle) / ANGLE_DEG).astype(np.int64)

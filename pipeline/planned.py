@@ -13,7 +13,7 @@ from pipeline.adjusting import free_unknowns
 from pipeline.considered import considered_of, correlated
 from pipeline.errors import ConfigError
 from pipeline.instruments import under
-from pipeline.maths.solution import Solution, solve
+from pipeline.maths.solution import Solution, solve, weakest_direction
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
 from pipeline.observability import VAGUE, Seen, geometry_of
@@ -49,6 +49,11 @@ class Answer:
     gaps: list[str]
     remedy: str
     better: Outlook | None
+
+    @property
+    def weakest(self) -> str:
+        """Which of the six are hardest to tell apart, in words; empty where there is no result."""
+        return "" if self.given.solution.deficiency else weakest_direction(self.given.random)
 
 
 def setting_of(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Setting:
@@ -170,7 +175,7 @@ def _better(
 def as_plain(answer: Answer) -> dict[str, Any]:
     """All of it as plain values, for YAML."""
     found: dict[str, Any] = {"given": _plain_outlook(answer.setting, answer.given)}
-    found |= {"gaps": answer.gaps, "remedy": answer.remedy}
+    found |= {"gaps": answer.gaps, "weakest": answer.weakest, "remedy": answer.remedy}
     if answer.better is not None:
         found["better"] = _plain_outlook(answer.setting, answer.better)
     return found
@@ -218,8 +223,10 @@ def table(answer: Answer, limits: config.Verdict) -> str:
     """For the screen."""
     lines = ["As given:", *_lines(answer.setting, answer.given, limits)]
     lines += [f"But: {gap}." for gap in answer.gaps]
+    if answer.weakest:
+        lines.append(f"Geometry: {answer.weakest}.")
     if answer.remedy:
-        lines.append(f"Cure: {answer.remedy}.")
+        lines.append(f"Remedy: {answer.remedy}.")
     plan = answer.setting.plan
     if plan.budget is not None:
         turns = (len(plan.passes) - 1) * plan.budget.turn_s

@@ -16,6 +16,21 @@ def signed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:+.{digits}f}"
 
 
+def plural(number: int, noun: str) -> str:
+    """A count and what is counted, in whole words.
+
+    >>> plural(1, "file"), plural(2, "pass"), plural(3, "study"), plural(0, "day")
+    ('1 file', '2 passes', '3 studies', '0 days')
+    """
+    if number == 1:
+        return f"1 {noun}"
+    if noun.endswith(("s", "x", "ch", "sh")):
+        return f"{number} {noun}es"
+    if noun.endswith("y") and noun[-2] not in "aeiou":
+        return f"{number} {noun[:-1]}ies"
+    return f"{number} {noun}s"
+
+
 def summary(calibration: Mapping[str, Any]) -> str:
     """The result on one screen, from calibration.json."""
     lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]

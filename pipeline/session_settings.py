@@ -31,6 +31,8 @@ def _inside(pattern: str) -> str:
         raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
     if any("**" in part and part != "**" for part in path.parts):
         raise ValueError("must have ** only as a whole part between two /")
+    if path.parts.count("**") > 2 or len(pattern) > 300:  # each more takes several times as long to search
+        raise ValueError("must have ** twice at most, and no more than 300 letters")
     return pattern
 
 
@@ -231,6 +233,7 @@ class Recording(Model):
     heights: Heights = None
     time: LasTime = None
     sound_speed_m_s: float | None = None  # of GSF alone, which may have none
+    projector_offset_m: tuple[float, float, float] | None = None  # of Kongsberg's files alone, which tell one too
 
 
 class Recordings(Model):
@@ -272,6 +275,9 @@ class SessionConfig(Model):
                 heights=getattr(sensor, "heights", None),
                 time=getattr(sensor, "time", None),
                 sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
+                projector_offset_m=(
+                    getattr(sensor, "projector_offset_m", None) if sensor.format in ("kmall", "all") else None
+                ),
             )
 
         return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))

@@ -31,4 +31,5 @@ def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrate
 
     with suppress(PoolcalError):
         calibrate_in_memory(session, pool, raw, "adjust", kept)
-    return Calibrated(found.get("segment/soundings_labelled", EMPTY), found.get("adjust/freed"))
+    tables = (found.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
+    return Calibrated(found.get("segment/soundings_labelled", EMPTY), *tables)

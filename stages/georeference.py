@@ -98,6 +98,7 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
         sensor, valid = soundings.points_in_mbes(
             columns["two_way_time_s"],
             columns["angle_rad"],
+            columns["transmit_tilt_rad"],
             columns["sound_speed_m_s"],
             mbes.sound_speed_m_s,
             None if mbes.projector_offset_m is None else np.array(mbes.projector_offset_m),

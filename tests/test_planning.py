@@ -93,7 +93,7 @@ def test_without_drift_passes_add_up_and_with_it_two_tell_more(configs: tuple[Po
 @pytest.mark.parametrize(
     ("distances", "gap", "remedy"),
     [
-        ((5.0,), "one pass alone", "yaw and lever arm y cannot be told apart"),
+        ((5.0,), "one pass alone", "two more passes at"),
         ((6.0, 6.1, 5.9), "all passes lie at 5.9 to 6.1 m", "two more passes at 3 m would bring sigma"),
     ][: often(1, 2)],
 )

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from stages.views.opening import silent
 from tools.pipeline_picture import picture
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
@@ -61,9 +62,9 @@ def viewer(*recordings: Path) -> Iterator[Any]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    with tempfile.TemporaryDirectory() as home:
-        kept = {name: os.environ.get(name) for name in ("HOME", "PATH")}
-        os.environ |= {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    with tempfile.TemporaryDirectory() as home, silent() as environment:
+        kept = {name: os.environ.get(name) for name in ("HOME", "PATH", "XDG_CONFIG_HOME")}
+        os.environ |= environment | {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
         try:
             client = ViewerClient.spawn(headless=True, port=port, hide_welcome_screen=True)
             try:
@@ -97,15 +98,16 @@ def tabs(run: Path, out: Path) -> None:
     import pandas as pd
 
     from stages.views import recordings_of
-    from stages.views.tour import TABS
+    from stages.views.tour import tabs_of
 
-    last = int(pd.read_parquet(run / "angle_iterate" / "iterations.parquet")["iteration"].iloc[-1])
+    steps = pd.read_parquet(run / "angle_iterate" / "iterations.parquet")["iteration"]
+    last = int(steps.max()) if len(steps) else 0
     with viewer(*recordings_of(run)) as client:
-        for tab in TABS:
+        for tab in tabs_of(run):
             show_tab(client, tab)
-            steps = {"-first": 0, "-second": 1, "-last": last} if tab == "Iteration" else {"": last}
-            for suffix, step in steps.items():
-                if tab == "Quality":
+            moments = {"-first": 0, "-second": 1, "-last": last} if tab == "Iteration" else {"": last}
+            for suffix, step in moments.items():
+                if tab == "Quality" or not len(steps):
                     client.set_time("time", play_state="paused")
                 else:
                     client.set_time("iteration", sequence=step, play_state="paused")

@@ -36,7 +36,8 @@ SOUNDINGS = Artefact(
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number in the ping, from 0 at port"),
         Column("two_way_time_s", F64, "s", "two-way travel time"),
-        Column("angle_rad", F64, "rad", "across-track angle from the array's normal, starboard +"),
+        Column("angle_rad", F64, "rad", "angle of the receive beam from the array's normal, starboard +"),
+        Column("transmit_tilt_rad", F64, "rad", "along-track angle of the transmit fan from the normal, forward +"),
         Column("sound_speed_m_s", F64, "m/s", "sound speed the head worked with"),
     ),
 )

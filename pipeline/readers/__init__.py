@@ -6,8 +6,10 @@ roll starboard down +, pitch bow up +, azimuth clockwise from north) together wi
 Damaged files give RawDataError or fewer rows, never another exception.
 """
 
+import os
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from itertools import takewhile
+from pathlib import Path, PurePosixPath
 from typing import Literal
 
 import numpy as np
@@ -69,11 +71,26 @@ def _matches(folder: Path, pattern: str, key: str) -> list[tuple[Path, Path]]:
             if not real.is_relative_to(root):
                 raise RawDataError(f"{path}: leads out of the session folder, to {real}; copy the file into it")
             files.append((path, real))
+        _refuse_unreadable(folder, pattern)
     except (ValueError, NotImplementedError) as error:
         raise ConfigError(f"session.yaml: {key}: {pattern} is no pattern ({error}); mend it") from error
     except (OSError, RuntimeError) as error:
         raise RawDataError(f"{folder}: {pattern} cannot be searched ({error}); check the folder") from error
     return files
+
+
+def _refuse_unreadable(folder: Path, pattern: str) -> None:
+    """Python passes over folders that it may not read, and so over their files: OSError instead."""
+    parts = PurePosixPath(pattern).parts
+    fixed = list(takewhile(lambda part: not set(part) & set("*?["), parts[:-1]))
+
+    def refuse(error: OSError) -> None:
+        if not isinstance(error, FileNotFoundError):
+            raise error
+
+    for _ in os.walk(folder.joinpath(*fixed), onerror=refuse):
+        if len(fixed) == len(parts) - 1:  # all that can match lies in this one
+            break
 
 
 def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, ...]:
@@ -113,6 +130,11 @@ def _check_kind(path: Path, name: str, sensor: Sensor, settings: Settings) -> No
     kind = detect.kind_of(path, name)
     if kind.format == settings.format and sensor in kind.sensors:
         return
+    if settings.format == "inertial_explorer" and kind is detect.TEXT:
+        raise RawDataError(
+            f"{name}: is a text without Inertial Explorer's column names; export it from Inertial Explorer with its "
+            "header ('header' ticked in the export profile)"
+        )
     if kind.format is None:
         raise RawDataError(f"{name}: is {kind.title}, not {settings.format}; {kind.advice_for(sensor)}")
     if sensor in kind.sensors:
@@ -213,7 +235,8 @@ def _soundings(files: Files, settings: Mbes) -> tuple[Part, ...]:
     if settings.format == "kmall":
         from pipeline.readers.kmall import KmallPart
 
-        return tuple(KmallPart(path, name, settings.latency_s) for path, name in files)
+        offset_m = settings.projector_offset_m
+        return tuple(KmallPart(path, name, settings.latency_s, offset_m) for path, name in files)
     from pipeline.readers.r2sonic import R2sonicPart
 
     return tuple(

@@ -37,6 +37,11 @@ TEXT = Kind(
     "a text without the columns of a table",
     advice="name the columns in its first line as README.md has them, or export it in a format of the instrument",
 )
+TRAJECTORY_TEXT = Kind(
+    "a trajectory as text, of a layout that is not read",
+    advice="export it as SBET (POSPac, Qinertia, Delph INS, OxTS and Inertial Explorer have it), or as a table with "
+    "the columns that README.md names; if it is Inertial Explorer's, export it with its header",
+)
 UNKNOWN = Kind(
     "of no kind that is read",
     advice="export it in one of the formats that README.md names; if it should be one of them, copy it again",
@@ -45,7 +50,7 @@ UNKNOWN = Kind(
 MAGICS = ((0, b"LASF", LAS), (0, b"PAR1", PARQUET), (0, b"ASTM-E57", E57), (8, b"GSF-v", GSF))
 RDBX = Kind("a RIEGL .rdbx file", advice=f"{foreign.CLOUD} (RiSCAN PRO or RiPROCESS)")
 NOVATEL_SYNCS = (b"\xaa\x44\x12\x1c", b"\xaa\x44\x13")
-_NOVATEL_TEXT = re.compile(rb"(?:^|[\r\n\]])[#%][A-Z][A-Z0-9_]+A,[^\r\n;]*;")
+_NOVATEL_TEXT = re.compile(rb"(?:^|[\r\n\] \t,])[#%][A-Z][A-Z0-9_]+A,[^\r\n;]*;")
 
 
 def kind_of(path: Path, name: str) -> Kind:
@@ -142,12 +147,23 @@ def _kind_of_text(head: bytes) -> Kind:
         return CSV
     if (other := foreign.text("\n".join(lines))) is not None:
         return other
+    if any(_names_trajectory(line) for line in lines):
+        return TRAJECTORY_TEXT
     numbers = [_floats(row) for row in rows[:-1][:200]]
     width = max((len(row) for row in numbers), default=0)
     whole = np.array([row for row in numbers if width >= 3 and len(row) == width]).reshape(-1, max(width, 1))
     if len(whole) and any(through_float32(column) for column in whole.T):
         return FLOAT32_TEXT
     return TEXT
+
+
+def _names_trajectory(line: str) -> bool:
+    """A line of names of columns: position and attitude, whatever program calls them so."""
+    words = re.findall(r"[a-z]+", line.lower())
+    return all(
+        any(word.startswith(start) for word in words for start in starts)
+        for starts in (("lat", "north", "poslat"), ("lon", "east", "poslon"), ("roll", "angleroll"), ("head", "yaw"))
+    )
 
 
 def _floats(row: str) -> list[float]:

@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
 from pipeline.readers.gsf_records import HEADER, PING, PROFILE, records
-from pipeline.readers.kmall import STABILISED
 from pipeline.readers.sieve import (
     MAX_SPEED_M_S,
     MBES_COLUMNS,
@@ -51,6 +50,7 @@ TIME = struct.Struct(">2I")
 MAX_BEAMS = np.iinfo(np.int16).max
 UNUSABLE = 1  # bit of a ping's or a beam's flags
 MAX_STEP_DEG = 20.0
+STABILISED = 0b11  # of Kongsberg's modeAndStabilisation: pitch, yaw
 SPEEDS = ("SurfaceVelocity_mps", "SoundSpeed_mps", "SoundVelocity_mps", "SoundSpeedAtTxDepth_mPerSec")
 Scales = dict[int, tuple[float, float, int]]
 
@@ -210,6 +210,7 @@ def _chunk(pings: list[tuple[int, Ping, float]], latency_s: float, dropped: Coun
             "beam": np.concatenate([np.arange(count, dtype=np.int16) for count in counts]),
             "two_way_time_s": np.concatenate([ping.two_way_time_s for _, ping, _ in pings]),
             "angle_rad": -np.radians(np.concatenate([ping.angle_deg for _, ping, _ in pings])),
+            "transmit_tilt_rad": np.zeros(counts.sum()),
             "sound_speed_m_s": spread([speed for _, _, speed in pings], np.float64),
             "usable": np.concatenate([ping.usable for _, ping, _ in pings]),
             "smooth": spread(smooth, bool),

@@ -17,6 +17,7 @@ TIMES = (("gps_ns",), ("gps_week", "seconds_of_week"))
 INS = ("latitude_deg", "longitude_deg", "height_m", "roll_deg", "pitch_deg", "heading_deg")
 MBES = ("ping", "beam", "angle_deg", "sound_speed_m_s")
 NEEDED = {"ins": ((*INS,),), "laser": (("x_m", "y_m", "z_m"),), "mbes": ((*MBES, "two_way_time_s"), (*MBES, "range_m"))}
+OPTIONAL: dict[str, tuple[str, ...]] = {"ins": (), "laser": (), "mbes": ("transmit_tilt_deg",)}
 WHOLE = ("gps_ns", "gps_week", "ping", "beam")
 KNOWN = frozenset(name for group in (*TIMES, *NEEDED["ins"], *NEEDED["laser"], *NEEDED["mbes"]) for name in group)
 EXACT = ("gps_ns", "seconds_of_week", "latitude_deg", "longitude_deg")  # useless as float32
@@ -46,6 +47,7 @@ def _wanted(names: list[str], name: str, sensor: Sensor) -> list[str]:
             nearest = max(alternatives, key=lambda group: len(set(group) & set(names)))
             missing = ", ".join(column for column in nearest if column not in names)
             raise RawDataError(f"{name}: has no column {missing} (has: {', '.join(names)[:200]}); add it")
+    chosen += [column for column in OPTIONAL[sensor] if column in names]
     twice = [column for column in chosen if names.count(column) > 1]
     if twice:
         raise RawDataError(f"{name}: has column {twice[0]} twice; take one out")
@@ -65,6 +67,7 @@ def batches(
         yield from _parquet(file, name, sensor, refuse) if is_parquet else _csv(file, name, sensor, dropped)
     except (pa.ArrowException, ValueError, OverflowError) as error:
         told = str(error).split("\n")[0]
+        told = told if len(told) <= 200 else f"{told[:200]}..."  # whole cells stand in it
         raise RawDataError(f"{name}: cannot be read as a table ({told}); check or export it again") from error
 
 

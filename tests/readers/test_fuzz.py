@@ -67,6 +67,7 @@ WHOLE: dict[str, tuple[str, str, bytes]] = {
     "e57": ("laser", "e57", _e57()),
     "gsf": ("mbes", "gsf", sonar_files.gsf()),
     "kmall": ("mbes", "kmall", sonar_files.kmall()),
+    "kmall sectors": ("mbes", "kmall", sonar_files.kmall_sectors()),
 }
 EXAMPLES = {"laz": 15, "e57": 10}  # each in a process of its own
 
