@@ -195,7 +195,7 @@ class Laser(Model):
 class Mbes(Model):
     instrument: InstrumentUsed | None = None
     files: Files
-    format: Literal["r2sonic", "gsf", "kmall", "table"]
+    format: Literal["r2sonic", "gsf", "kmall", "all", "table"]
     max_records: MaxRecords = None
     mount: Mount
     mount_origin: MountOrigin | None = None

@@ -232,16 +232,21 @@ def _soundings(files: Files, settings: Mbes) -> tuple[Part, ...]:
         from pipeline.readers.gsf import GsfPart
 
         return tuple(GsfPart(path, name, settings.sound_speed_m_s, settings.latency_s) for path, name in files)
-    if settings.format == "kmall":
-        from pipeline.readers.kmall import KmallPart
-
-        offset_m = settings.projector_offset_m
-        return tuple(KmallPart(path, name, settings.latency_s, offset_m) for path, name in files)
+    if settings.format in ("kmall", "all"):
+        return _kongsberg(files, settings)
     from pipeline.readers.r2sonic import R2sonicPart
 
     return tuple(
         R2sonicPart(path, name, detect.kind_of(path, name) is detect.XTF, settings.latency_s) for path, name in files
     )
+
+
+def _kongsberg(files: Files, settings: Mbes) -> tuple[Part, ...]:
+    from pipeline.readers.kmall import KmallPart
+    from pipeline.readers.kongsberg_all import AllPart
+
+    kind = KmallPart if settings.format == "kmall" else AllPart
+    return tuple(kind(path, name, settings.latency_s, settings.projector_offset_m) for path, name in files)
 
 
 def _tables(files: Files, sensor: Sensor, settings: Settings) -> tuple[Part, ...]:

@@ -17,11 +17,6 @@ from tests.readers.test_fuzz import WHOLE
 REST = bytes(range(7, 250)) * 30
 
 
-def _all(kind: bytes, body: bytes, order: str = "<") -> bytes:
-    inside = struct.pack(f"{order}BcHIIHH", 2, kind, 2040, 20230421, 64_092_662, 115, 2004) + body + b"\x03\0\0"
-    return struct.pack(f"{order}I", len(inside)) + inside
-
-
 def _s7k() -> bytes:
     head = struct.pack("<2H4I2Hf2BHI", 5, 60, 0x0000FFFF, 500, 0, 0, 2023, 111, 1.5, 10, 30, 0, 7200)
     return head + bytes(500 - len(head)) + REST
@@ -86,8 +81,6 @@ RINEX = b"     3.04           OBSERVATION DATA    M                   RINEX VERS
 CRINEX = b"3.0                 COMPACT RINEX FORMAT                    CRINEX VERS   / TYPE\nRNX2CRX\n"
 
 FILES = {  # content, words of what it is
-    "all": (_all(b"I", b"WLZ=1.18,") + _all(b"N", REST), r"Kongsberg \.all"),
-    "all of a Sun": (_all(b"I", b"WLZ=1.18,", ">") + _all(b"N", REST, ">"), r"Kongsberg \.all"),
     "s7k": (_s7k(), r"\.s7k"),
     "jsf": (_jsf(), r"EdgeTech \.jsf"),
     "bag": (b"#ROSBAG V2.0\nE\0\0\0" + REST, "ROS bag"),

@@ -343,8 +343,9 @@ def test_another_format_than_told(name: str, sensor: Any, kind: str, words: tupl
 
 NO_KIND = {path for path in REFUSED if path.endswith(".bin")}  # a program's own binary, without any mark
 WHOLE_SETTINGS: dict[str, dict[str, Any]] = {"ins": {"gps_week": 2000}, "laser": {"gps_week": 2000}, "mbes": {}}
-REFUSED_LATER = {  # of a format that is read, but damaged, without times, or with a wrong flag
+REFUSED_LATER = {  # of a format that is read, but damaged, without times, with a wrong flag, or of two heads
     "ins/pdal_badfile.sbet", "laser/pdal/pdal_sample_c.las", BUNNY, MOVED,
+    "mbes/kongsberg/all_turbeams_6641182978793103390.all",
 }  # fmt: skip
 
 
