@@ -25,7 +25,7 @@ from pipeline.quantities import (
 Calibrated = Literal["mbes", "laser"]
 
 
-def _inside(pattern: str) -> str:
+def inside(pattern: str) -> str:
     path = PurePosixPath(pattern)
     if not pattern or path.is_absolute() or ".." in path.parts or "\\" in pattern or "\0" in pattern:
         raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
@@ -36,7 +36,7 @@ def _inside(pattern: str) -> str:
     return pattern
 
 
-Pattern = Annotated[str, AfterValidator(_inside)]
+Pattern = Annotated[str, AfterValidator(inside)]
 Files = Annotated[list[Pattern], Field(min_length=1)]
 Heights = Literal["ellipsoidal"] | None
 LasTime = Literal["adjusted_standard", "seconds_of_week"] | None
@@ -192,6 +192,25 @@ class Laser(Model):
         return self
 
 
+class CastUsed(Model):
+    """A file's cast as it was used; session.yaml has the file's name alone (readers/casts.py), run.yaml all of this."""
+
+    file: Annotated[str, Field(max_length=1000)]  # in the session folder
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    kind: Annotated[str, Field(max_length=50)]
+    number: Annotated[int, Field(ge=1)]  # which of so many in the file
+    casts: Annotated[int, Field(ge=1)]
+    taken: Annotated[str, Field(max_length=50)] | None  # by the file, whose time zone is not known
+    place_deg: tuple[float, float] | None  # latitude, longitude
+    rows: int
+    left_out: dict[str, int]  # by reason
+    first_m: float
+    last_m: float
+    tolerance_m_s: float  # within which the depths that were kept have all rows, or their means
+    averaged_m: float  # over so much of depth rows that scatter were averaged first; 0: not
+    scatter_m_s: float  # of the rows about what was kept, RMS
+
+
 class Mbes(Model):
     instrument: InstrumentUsed | None = None
     files: Files
@@ -202,6 +221,9 @@ class Mbes(Model):
     mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
     sound_speed_m_s: SoundSpeed | None = None
     svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
+    svp_number: Annotated[int, Field(ge=1, le=10_000)] | None = None  # which cast of a file that holds several
+    svp_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.05  # of one of its speeds, beside what all share
+    svp_from: CastUsed | None = None  # where svp was a file's name
     sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2
     sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m: 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded

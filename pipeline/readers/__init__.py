@@ -35,18 +35,18 @@ def raw_files(settings: Settings, folder: Path) -> list[Path]:
         A pattern matches no file, or a file that lies outside the session folder (by way of a symbolic link).
     """
     key = f"{type(settings).__name__.lower()}.files"
-    return sorted({*_found(folder, settings.files, key), *_accuracy_files(settings, folder)}, key=_in(folder))
+    return sorted({*found(folder, settings.files, key), *_accuracy_files(settings, folder)}, key=_in(folder))
 
 
 def _accuracy_files(settings: Settings, folder: Path) -> list[Path]:
-    return _found(folder, settings.accuracy, "ins.accuracy") if isinstance(settings, Ins) else []
+    return found(folder, settings.accuracy, "ins.accuracy") if isinstance(settings, Ins) else []
 
 
 def _in(folder: Path) -> Callable[[Path], str]:
     return lambda path: path.relative_to(folder).as_posix()
 
 
-def _found(folder: Path, patterns: Sequence[str], key: str) -> list[Path]:
+def found(folder: Path, patterns: Sequence[str], key: str) -> list[Path]:
     if not folder.is_dir():
         raise RawDataError(f"{folder}: the session folder is gone; put it back, or name its new place")
     found: dict[Path, Path] = {}
@@ -105,7 +105,7 @@ def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, .
     """
     if isinstance(settings, Laser):
         placing_of(_frame(settings))
-    files = _named(folder, _found(folder, settings.files, f"{sensor}.files"))
+    files = _named(folder, found(folder, settings.files, f"{sensor}.files"))
     for path, name in files:
         _check_kind(path, name, sensor, settings)
     if settings.format == "table":
