@@ -14,8 +14,8 @@ from pipeline.readers.kind import Kind
 
 CLOUD = "export it to LAS or LAZ with GPS time stamps"
 SONAR = (
-    "export GSF with travel times and beam angles, of one head, or give the sonar's own files (R2Sonic packets, "
-    ".kmall, .all)"
+    "give the sonar's own files (R2Sonic packets, Kongsberg .kmall or .all), or export GSF with travel times and beam "
+    "angles, of one head"
 )
 TRACK = "export the INS's solution as SBET, as a text of Inertial Explorer, or as a table with README.md's columns"
 BY_SENSOR = {"ins": TRACK, "laser": CLOUD, "mbes": SONAR}
