@@ -56,7 +56,7 @@ def text_of(path: Path) -> str:
     try:
         content = read_regular(path, MAX_YAML_BYTES)
         if len(content) > MAX_YAML_BYTES:
-            raise ConfigError(f"{path}: more than {MAX_YAML_BYTES} bytes is no config; name the YAML file meant")
+            raise ConfigError(f"{path}: {path.stat().st_size} bytes is no config; name the YAML file meant")
         return content.decode("utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error

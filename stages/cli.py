@@ -28,6 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+SCENARIOS = ", ".join(sorted(path.stem for path in (pipeline.CONFIGS / "scenarios").glob("*.yaml")))
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")]
 Jobs = Annotated[int | None, typer.Option("--jobs", metavar="N", help="workers; default: one a core, at most 4")]
 Recordings = Annotated[bool, typer.Option("--recordings/--no-recordings", help="draw recordings for the Rerun viewer")]
@@ -60,7 +61,8 @@ def options(
 def simulate(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="session folder to make; truth goes to OUT.truth.json")],
     scenario: Annotated[
-        Path | None, typer.Option("--scenario", metavar="FILE", help="YAML file; default: the demo's pool")
+        Path | None,
+        typer.Option("--scenario", metavar="FILE", help=f"YAML file, or one of {SCENARIOS}; default: the demo's pool"),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="of all random numbers")] = 1,
 ) -> None:
@@ -161,14 +163,14 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
     Hashes again everything that it read and wrote, and lists what is not as recorded.
     """
     from pipeline.executor import workers
+    from pipeline.screen import plural
     from pipeline.verify import verify as problems_of
 
     with workers(jobs) as pool:
         problems = problems_of(load(calibrated_in(run_folder)), run_folder, pool)
     for problem in problems:
         say(problem, sys.stdout)
-    many = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
-    say(many if problems else f"{run_folder}: everything is as recorded", sys.stdout)
+    say(plural(len(problems), "problem") if problems else f"{run_folder}: everything is as recorded", sys.stdout)
     return 1 if problems else 0
 
 
@@ -252,6 +254,7 @@ def history(
     Writes history.html, history.csv and history.parquet.
     """
     from pipeline.history import Filter, read_history, write_history
+    from pipeline.screen import plural
 
     chosen = Filter(name, since.date() if since else None, until.date() if until else None)
     found = read_history(folder, chosen)
@@ -259,7 +262,9 @@ def history(
     write_history(found, target, chosen)
     for problem in found.unreadable:
         say(f"left out: {problem}", sys.stderr)
-    say(f"{len(found.table)} sessions: {target / 'history.html'}", sys.stdout)
+    if found.without:
+        say(found.without, sys.stdout)
+    say(f"{plural(len(found.table), 'session')}: {target / 'history.html'}", sys.stdout)
     return 0
 
 

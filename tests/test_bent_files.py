@@ -78,12 +78,12 @@ def test_no_more_is_read_than_allowed(tmp_path: Path) -> None:
     assert read_yaml(path) == {"a": 1}
     with path.open("ab") as file:
         file.write(b"1")
-    with pytest.raises(ConfigError, match="more than 1000000 bytes"):
+    with pytest.raises(ConfigError, match=r"\d{7} bytes is no config"):
         read_yaml(path)
     with path.open("r+b") as file:
         file.truncate(2**40)  # a hole of a terabyte
     assert len(read_regular(path, 100)) == 101
-    with pytest.raises(ConfigError, match="more than 1000000 bytes"):
+    with pytest.raises(ConfigError, match=r"\d{7} bytes is no config"):
         read_yaml(path)
 
 

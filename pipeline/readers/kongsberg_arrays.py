@@ -7,7 +7,7 @@ run from the sector's part of the transmitter to the target and back to the rece
 
 An installation is a text of KEY:VALUE or KEY=VALUE, parted by commas. .kmall: TRAI_TX1 and TRAI_RX1, or for one head
 TRAI_HD1, with X, Y, Z [m], R, P, H, and the parts of the array IPX, IPY, IPZ (port), IC. (centre), IS. (starboard), and
-the receiver's I. or IR.; .all: S1X to S1H of the transmitter or head, S2 and S3 of receivers.
+the receiver's I. (of a head IR.); .all: S1X to S1H of the transmitter or head, S2 and S3 of receivers.
 """
 
 import re
@@ -22,9 +22,19 @@ from pipeline.maths.rotations import rotation_x, rotation_y, rotation_z
 
 Array = NDArray[np.float64]
 P_MBES = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # starboard, forward, up
+ONE_HEAD = -1
 PARTS = ("P", "C", "S")  # of a transmitter, in the order of their numbers
 LEAST_ALONG = 0.9  # of the transmitter's axis along the receiver's y: else they are no crossed arrays
-NO_TILT_DEG = 0.005
+INSIDE: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, and whether it is the portable head
+    (2040, False): {
+        "IPY": -0.0554, "IPZ": -0.012, "ICY": 0.0131, "ICZ": -0.006, "ISY": 0.0554, "ISZ": -0.012,
+        "IRX": 0.011, "IRZ": -0.006,
+    },
+    (2040, True): {
+        "IPX": 0.002, "IPY": -0.10421, "IPZ": -0.01494, "ICX": 0.002, "ICZ": -0.006,
+        "ISX": 0.002, "ISY": 0.10421, "ISZ": -0.01494, "IRX": 0.204, "IRZ": -0.0315,
+    },
+}  # fmt: skip
 NEAR = 3.0  # times the transmitter's distance: no shorter path is reduced
 ROUNDS = 6  # of the iteration: the error falls by (distance of the arrays / range)² with each
 NUMBER = re.compile(r"[-+]?\d{1,6}(\.\d{0,9})?")
@@ -103,17 +113,8 @@ def _on_side(angle_rad: Array, side: Array) -> Array:
     return np.where(side > 0, np.copysign(np.pi, angle_rad) - angle_rad, angle_rad)
 
 
-def not_told(name: str, tilt_deg: float) -> str:
-    """Why a file of tilted sectors without an installation is refused."""
-    return (
-        f"{name}: its sectors are tilted ({tilt_deg:.2f} degrees), but it does not tell how the transmitter is mounted "
-        "against the receiver, without which forward and aft are the same; give the file as the sonar's program wrote "
-        "it, with its installation at the beginning"
-    )
-
-
 def of_kmall(text: str) -> dict[tuple[int, int], Arrays]:
-    """By the numbers of transmitter and receiver, from 0, those that #IIP tells."""
+    """Those that #IIP tells, by the numbers of transmitter and receiver from 0; of one head (ONE_HEAD, number)."""
     told = {name: _numbers(values) for name, values in re.findall(r"TRAI_((?:TX|RX|HD)\d):([^,]*)", text)}
     found = {}
     for sender, tx in told.items():
@@ -121,10 +122,9 @@ def of_kmall(text: str) -> dict[tuple[int, int], Arrays]:
             head = sender == receiver and sender.startswith("HD")
             if not (head or (sender.startswith("TX") and receiver.startswith("RX"))):
                 continue
-            inside = [rx.get(f"I{'R' if head else ''}{axis}", 0.0) for axis in "XYZ"]
-            crossed = _crossed(tx, rx, np.array(inside))
+            crossed = _crossed(tx, rx, _place(rx, "IR" if head else "I"))
             if crossed is not None:
-                found[int(sender[2]) - 1, int(receiver[2]) - 1] = crossed
+                found[ONE_HEAD if head else int(sender[2]) - 1, int(receiver[2]) - 1] = crossed
     return found
 
 
@@ -137,34 +137,34 @@ def of_all(text: str, serial: int, model: int) -> Arrays | None:
     """Those of the receiver of this serial number; None where the installation does not tell.
 
     STC is 0 for one transmitter and one receiver, 1, 2 and 5 for heads of both arrays, 3 for one transmitter and two
-    receivers; older sonars do not say it. Of 3 R1S and R2S are the receivers' serial numbers.
+    receivers, whose serial numbers are then R1S and R2S; older sonars do not say it. Where the parts of an array lie is
+    told by .kmall files of the same sonars alone: of the EM 2040, whose parts send different sectors.
     """
     pairs = (pair.partition("=") for pair in text.split(","))
     told = {key.strip("\0 "): float(value) for key, _, value in pairs if NUMBER.fullmatch(value)}
-    system = told.get("STC", 1.0 if "S2X" not in told or model in HEADS else 0.0)
+    system = told.get("STC", 1.0 if "S2X" not in told else 0.0)
     if "S1X" not in told or system not in (0, 1, 2, 3, 5):
         return None
+    inside = INSIDE.get((model, system == 5), {})
     if system in (1, 2, 5):
-        return SAME
+        return _crossed(inside, inside, _place(inside, "IR"))
     serials = [number for number in (2, 3) if told.get(f"R{number - 1}S") == serial] if system == 3 else [2]
     if len(serials) != 1 or f"S{serials[0]}X" not in told:
         return None
     tx, rx = ({axis: told.get(f"S{number}{axis}", 0.0) for axis in "XYZRPH"} for number in (1, serials[0]))
-    return _crossed(tx, rx, np.zeros(3))
+    return _crossed(tx | inside, rx, _place(inside, "IR"))
 
 
-HEADS = (2045,)  # models of one head with both arrays
+def _place(told: Mapping[str, float], name: str) -> Array:
+    return np.array([told.get(f"{name}{axis}", 0.0) for axis in "XYZ"])
 
 
 def _crossed(tx: Mapping[str, float], rx: Mapping[str, float], inside_m: Array) -> Arrays | None:
     """``inside_m``: the receiver's acoustic centre from its X, Y, Z, in its own axes."""
     R_mbes_from_vessel = P_MBES @ _turned(rx).T
     R_mbes_from_tx = R_mbes_from_vessel @ _turned(tx)
-    centre = R_mbes_from_vessel @ np.array([tx.get(axis, 0.0) - rx.get(axis, 0.0) for axis in "XYZ"])
-    parts = {
-        number: R_mbes_from_tx @ np.array([tx.get(f"I{part}{axis}", 0.0) for axis in "XYZ"])
-        for number, part in enumerate(PARTS)
-    }
+    centre = R_mbes_from_vessel @ (_place(tx, "") - _place(rx, ""))
+    parts = {number: R_mbes_from_tx @ _place(tx, f"I{part}") for number, part in enumerate(PARTS)}
     axis = R_mbes_from_tx[:, 0]
     return Arrays(axis, centre - P_MBES @ inside_m, parts) if abs(axis[1]) >= LEAST_ALONG else None
 

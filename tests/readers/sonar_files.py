@@ -1,4 +1,4 @@
-"""GSF and .kmall files made byte by byte from their published layouts, independent of readers and libraries."""
+"""GSF, .kmall and .all files made byte by byte from their published layouts, independent of readers and libraries."""
 
 import struct
 from collections.abc import Sequence
@@ -149,4 +149,56 @@ def kmall_sectors(count: int = 3) -> bytes:
     for k in range(count):
         fan = [sounding(n, angle, 0.007, sector=n // 2) for n, angle in enumerate(ANGLES_DEG)]
         found.append(mrz(k, fan, (0.0, 2e-4, 4e-4), (-0.45, -0.75, -0.45), (2, 1, 0), seconds=UTC_2024 + k))
+    return b"".join(found)
+
+
+# --- Kongsberg .all --------------------------------------------------------------------------------------------------
+def all_datagram(kind: str, number: int, body: bytes, **head: int) -> bytes:
+    """UTC_2024 is 2024-05-12 00:00:00 UTC or later on that day: seconds count from there."""
+    told = {"model": 2040, "date": 20240512, "milliseconds": 36_000_000, "serial": 77} | head
+    inside = struct.pack(
+        "<BHIIHH", ord(kind), told["model"], told["date"], told["milliseconds"], number, told["serial"]
+    )
+    inside += body
+    inside += b"\0" * (len(inside) % 2 == 0)  # an even length of the whole
+    whole = b"\2" + inside + b"\3" + struct.pack("<H", sum(inside) & 0xFFFF)
+    return struct.pack("<I", len(whole)) + whole
+
+
+TRANSMITTER = "S1X=0.00,S1Y=0.00,S1Z=0.00,S1H=0.00,S1P=0.00,S1R=0.00"
+RECEIVER = TRANSMITTER.replace("S1", "S2")
+
+
+def all_installation(text: str = f"STC=0,{TRANSMITTER},{RECEIVER}", **head: int) -> bytes:
+    return all_datagram("I", 1, struct.pack("<H", 0) + f"WLZ=0.00,SMH=77,{text},".encode(), **head)
+
+
+def raw_ranges(
+    number: int,
+    beams: Sequence[tuple[float, int, float]],
+    tilts_deg: Sequence[float] = (0.0,),
+    delays_s: Sequence[float] = (),
+    parts: Sequence[int] = (),
+    flags: Sequence[tuple[int, int]] = (),
+    speed_m_s: float = 1480.0,
+    **head: int,
+) -> bytes:
+    """Datagram N. ``beams``: angle [degrees, port +], sector, two-way time [s]; ``flags``: detection info, cleaning."""
+    delays, places = delays_s or [0.0] * len(tilts_deg), parts or [1] * len(tilts_deg)
+    body = struct.pack("<4HfI", round(speed_m_s * 10), len(tilts_deg), len(beams), len(beams), 30_000.0, 0)
+    for tilt, delay, place in zip(tilts_deg, delays, places, strict=True):
+        body += struct.pack("<hH3fH2Bf", round(tilt * 100), 322, 44.0, delay, 55.0, 66, 0, place, 77.0)
+    for (angle, sector, time), (info, cleaning) in zip(beams, flags or [(0, 0)] * len(beams), strict=True):
+        body += struct.pack("<hBBHBbfhbB", round(angle * 100), sector, info, 99, 9, -9, time, -99, cleaning, 0)
+    return all_datagram("N", number, body, **head)
+
+
+def kongsberg_all(count: int = 6) -> bytes:
+    """Pings a second apart, with other datagrams between them; a transmitter that looks aft."""
+    found = [all_installation(f"STC=0,{TRANSMITTER.replace('S1H=0', 'S1H=180')},{RECEIVER}")]
+    for k in range(count):
+        fan = [(angle, n // 2, 0.007 + 1e-4 * n) for n, angle in enumerate(ANGLES_DEG)]
+        when = 36_000_000 + 1000 * k + 250
+        found.append(raw_ranges(500 + k, fan, (0.5, 1.25, -0.5), (0.0, 2e-4, 4e-4), (2, 1, 0), milliseconds=when))
+        found.append(all_datagram("A", k, bytes(30), milliseconds=when))
     return b"".join(found)

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.config import Mbes
 from pipeline.errors import RawDataError
 from pipeline.maths.soundings import points_in_mbes
-from pipeline.readers import kmall, raw_parts
+from pipeline.readers import kmall, kongsberg, raw_parts
 from pipeline.readers.kmall_datagrams import datagrams
 from tests.readers.build import GPS_2024, MOUNT, UTC_2024, read, rows
 from tests.readers.sonar_files import ANGLES_DEG, datagram, iip, mrz, sounding
@@ -74,7 +74,7 @@ def test_soundings_are_the_library_s(file: Path) -> None:
     reader: Any = library()
     reader.FID = io.BytesIO(content)
     theirs = reader.read_EMdgmMRZ()
-    ours = kmall.decode(content)
+    ours = kmall.decode(content, {})
     assert ours is not None
     assert ours.angle_deg.tolist() == list(theirs["sounding"]["beamAngleReRx_deg"])
     assert ours.two_way_time_s.tolist() == list(theirs["sounding"]["twoWayTravelTime_sec"])
@@ -281,7 +281,7 @@ def test_lengths_that_claim_more_than_there_is(file: Path) -> None:
 
 
 def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kmall, "SOUNDINGS", 10)
+    monkeypatch.setattr(kongsberg, "SOUNDINGS", 10)
     file.write_bytes(made(7))
     (part,) = raw_parts("mbes", Mbes(files=[file.name], format="kmall", mount=MOUNT), file.parent)
     assert [len(chunk.columns["beam"]) for chunk in part.chunks()] == [10, 10, 10, 5]
@@ -295,6 +295,6 @@ def test_only_mrz_is_looked_into(file: Path) -> None:
 
 
 def test_unix_time_is_the_datagram_s() -> None:
-    ping = kmall.decode(mrz(1, FAN, seconds=UTC_2024, nanoseconds=5))
+    ping = kmall.decode(mrz(1, FAN, seconds=UTC_2024, nanoseconds=5), {})
     assert ping is not None
     assert ping.t_ns == GPS_2024 * NS + 5

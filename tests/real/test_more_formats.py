@@ -58,7 +58,7 @@ def test_kmall_against_its_library(data: Path, read: Read) -> None:
         columns["angle"] += list(their["beamAngleReRx_deg"])
         columns["time"] += list(their["twoWayTravelTime_sec"])
     with (data / KMALL).open("rb") as file:  # as recorded; read() turns them into those of one head in one place
-        recorded = [kmall.decode(datagram) for datagram in datagrams(file, dropped) if datagram[4:8] == b"#MRZ"]
+        recorded = [kmall.decode(datagram, {}) for datagram in datagrams(file, dropped) if datagram[4:8] == b"#MRZ"]
     pings = [ping for ping in recorded if ping is not None]
     assert np.concatenate([ping.two_way_time_s for ping in pings]).tolist() == columns["time"]
     assert np.concatenate([ping.angle_deg for ping in pings]).tolist() == columns["angle"]
