@@ -25,6 +25,20 @@ class Origin(Model):
     longitude_deg: Annotated[float, Field(ge=-180, le=360)]
     height_m: Annotated[float, Field(ge=-1000, le=10000, description="ellipsoidal")]
 
+    @model_validator(mode="before")
+    @classmethod
+    def _not_interchanged(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        one, other = given.get("latitude_deg"), given.get("longitude_deg")
+        numbers = isinstance(one, (int, float)) and isinstance(other, (int, float))
+        if numbers and abs(one) > 90 and abs(other) <= 90:
+            raise ValueError(
+                f"latitude_deg = {one:g} is no latitude: is it the longitude? Write latitude_deg: {other:g} and "
+                f"longitude_deg: {one:g}"
+            )
+        return given
+
 
 class Letters(Model):
     """The patent's target by design: CONVENTIONS.md, "The target"."""

@@ -352,8 +352,7 @@ def call(arguments: list[str]) -> int:
         say(f"poolcal: {error}", sys.stderr)
         return 2
     except typer.TyperException as error:
-        usage = " ".join(error.format_message().split())
-        say(f"poolcal: {usage or 'nothing to do'}; see poolcal --help", sys.stderr)
+        say(f"poolcal: {_usage(error)}", sys.stderr)
         return 2
     except Exception:
         if _interrupts:  # a library that was being loaded has made another error of it
@@ -362,6 +361,23 @@ def call(arguments: list[str]) -> int:
         say(traceback.format_exc().rstrip(), sys.stderr)
         say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
         return 3
+
+
+WANTED = {  # what an option that is left out must name
+    "--config": "--config FILE: the pool's YAML file, which says where the target is; begin with configs/defaults.yaml",
+    "--run": "--run RUN: the folder for the results, outside the session folder",
+    "--session": "--session SESSION: the folder with session.yaml",
+}
+
+
+def _usage(error: typer.TyperException) -> str:
+    """A command line that cannot be meant: what is wrong with it, and where its help is."""
+    command = getattr(getattr(error, "ctx", None), "command_path", "poolcal")
+    option = next(iter(getattr(getattr(error, "param", None), "opts", ())), "")
+    words = " ".join(error.format_message().split()).rstrip(".")
+    if words.startswith("Missing option") and option in WANTED:
+        words = f"missing: {WANTED[option]}"
+    return f"{words or 'nothing to do'}; see {command} --help"
 
 
 _interrupts: list[int] = []
