@@ -110,7 +110,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
 
 
 def _first(faults: list[Any]) -> Any:
-    """The fault to be told: an unknown key goes before one that is missing beside it, for it may be that one misspelt."""
+    """The fault to be told: an unknown key before one that is missing beside it, for it may be that one misspelt."""
     first = faults[0]
     beside = (one for one in faults if one["type"] == "extra_forbidden" and one["loc"][:-1] == first["loc"][:-1])
     return next(beside, first) if first["type"] == "missing" else first

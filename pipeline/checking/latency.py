@@ -43,8 +43,8 @@ def latencies(freed: pd.DataFrame) -> Iterator[Finding]:
     for sensor, (seconds, sigma) in found.items():
         yield Finding(
             "latency",
-            f"{sensor}: its clock is {_said(seconds)} the INS's ({_between(seconds, sigma)}), as the target's planes sway "
-            f"with the boat: find what delays it; for its amount run with adjust.free: [{sensor}_latency], which uses "
+            f"{sensor}: its clock is {_said(seconds)} the INS's ({_between(seconds, sigma)}), as the target's planes "
+            f"sway with the boat: find what delays it; for its amount run with adjust.free: [{sensor}_latency], which uses "
             f"all the points, and add what that finds to {sensor}.latency_s",
         )
 
