@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.files import write_text
+from pipeline.files import read_json, write_text
 
 NAME = "manifest.json"
 SCHEMA = 1
@@ -46,15 +46,22 @@ class Manifest:
 def read(folder: Path) -> Manifest | None:
     """The manifest in ``folder``; None when there is none, or none that makes sense."""
     try:
-        content = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        content: Any = read_json(folder / NAME)
         if content.pop("schema") != SCHEMA:
             return None
         manifest = Manifest(**content | {"key": Key(**content["key"])})
         plain = (manifest.key.config, manifest.key.raw, manifest.key.inputs, manifest.key.source, manifest.key.versions)
         good = all(isinstance(m, dict) for m in (*plain, manifest.rows, manifest.outputs))
+        good = good and all(isinstance(one, int) for one in manifest.rows.values()) and _are_counts(manifest.counts)
         return manifest if good and all(_is_file(*item) for item in manifest.outputs.items()) else None
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
+
+
+def _are_counts(counts: Any) -> bool:
+    of = {"source": str, "reason": str, "count": int}
+    rows = isinstance(counts, list) and all(isinstance(row, dict) for row in counts)
+    return rows and all(isinstance(row.get(key), kind) for row in counts for key, kind in of.items())
 
 
 def _is_file(name: str, entry: Any) -> bool:

@@ -67,6 +67,11 @@ class Letters(Model):
         """Which settings give the shape, for people."""
         return "target.a, b, c, e and low_side"
 
+    @property
+    def sides(self) -> str:
+        """Which setting tells left from right."""
+        return "target.low_side"
+
 
 class FaceSettings(Model):
     """A planar convex polygon: corners in the target frame, counter-clockwise as the sensors see it."""
@@ -113,6 +118,10 @@ class Faces(Model):
     @property
     def shape(self) -> str:
         return "target.faces"
+
+    @property
+    def sides(self) -> str:
+        return "the sign of y in target.faces"
 
 
 def _kind(value: Any) -> str:

@@ -24,7 +24,7 @@ from pipeline.drawn import PAGE, agreeing, page_to_draw, recording_path
 from pipeline.errors import PoolcalError
 from pipeline.files import write_bytes
 from pipeline.streams import Mapper, serial
-from stages import ORDER, calibrated_in, names_in
+from stages import ORDER, names_in
 
 RECORDINGS = "recordings"
 PATIENCE_S, ENDING_S = 600, 10
@@ -215,7 +215,7 @@ def _noting(failed: list[Failure], what: str) -> Iterator[None]:
 def _pictures(run: Path, mapper: Mapper) -> Iterable[Any]:
     from pipeline.pages.pictures import draw, pictures_of
 
-    return mapper(partial(draw, run), pictures_of(calibrated_in(run)))
+    return mapper(partial(draw, run), pictures_of(run))
 
 
 def _write_page(run: Path, pictures: Iterable[Any]) -> None:

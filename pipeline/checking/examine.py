@@ -90,6 +90,7 @@ def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: config.Sessio
     yield from files.frames(seen, session)
     yield from files.far_arms(session)
     yield from files.sound_speed(seen, session)
+    yield from files.cast(seen, session)
 
 
 def _of_target(given: _Given, epochs: dict[str, Times], clocked: set[str]) -> Examined:

@@ -4,7 +4,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pipeline.checking.cast import doubts
 from pipeline.checking.finding import Finding
 from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
@@ -147,7 +149,7 @@ def far_arms(session: SessionConfig) -> Iterator[Finding]:
             if abs(value) > FAR_ARM_M:
                 yield Finding(
                     "lever arm",
-                    f"{sensor}: {sensor}.mount.{key} = {value:g} is {abs(value):g} m from the INS: is it in centimetres "
+                    f"{sensor}: {sensor}.mount.{key} = {value:g} is {abs(value):g} m from the INS: is it in cm "
                     f"({value / 100:g} m)?",
                     "look",
                 )
@@ -181,6 +183,22 @@ def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Findi
                 "it is this day's cast",
                 "look",
             )
+
+
+def cast(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
+    """A cast's file of another day, or of another place."""
+    if session.mbes is None or session.mbes.svp_from is None:
+        return
+    times = [seen.span_ns for seen in files if seen.sensor == "mbes" and len(seen.epochs_ns)]
+    span = (min(first for first, _ in times), max(last for _, last in times)) if times else None
+    ins = next((seen.columns for seen in files if seen.sensor == "ins" and seen.columns), None)
+    place = None if ins is None else (_degrees(ins["latitude_rad"]), _degrees(ins["longitude_rad"]))
+    for words in doubts(session.mbes.svp_from, span, place):
+        yield Finding("sound speed", words, "look")
+
+
+def _degrees(angles_rad: NDArray[np.float64]) -> float:
+    return float(np.degrees(np.median(angles_rad)))
 
 
 def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:

@@ -36,16 +36,16 @@ def latencies(freed: pd.DataFrame) -> Iterator[Finding]:
             sigma = 1 / np.hypot(1 / its, 1 / others)
             yield Finding(
                 "latency",
-                f"ins: its clock is {_said(-both)} both sensors' ({_between(-both, sigma)}), as the target's planes sway "
-                "with the boat: find what delays it, and set ins.latency_s within that",
+                f"ins: its clock is {_said(-both)} both sensors' ({_between(-both, sigma)}), as the target's planes "
+                "sway with the boat: find what delays it, and set ins.latency_s within that",
             )
             return
     for sensor, (seconds, sigma) in found.items():
         yield Finding(
             "latency",
             f"{sensor}: its clock is {_said(seconds)} the INS's ({_between(seconds, sigma)}), as the target's planes "
-            f"sway with the boat: find what delays it; for its amount run with adjust.free: [{sensor}_latency], which uses "
-            f"all the points, and add what that finds to {sensor}.latency_s",
+            f"sway with the boat: find what delays it; for its amount run with adjust.free: [{sensor}_latency], which "
+            f"uses all the points, and add what that finds to {sensor}.latency_s",
         )
 
 

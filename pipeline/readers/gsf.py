@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
 from pipeline.readers.gsf_records import HEADER, PING, PROFILE, records
-from pipeline.readers.kmall import STABILISED
 from pipeline.readers.sieve import (
     MAX_SPEED_M_S,
     MBES_COLUMNS,
@@ -51,6 +50,7 @@ TIME = struct.Struct(">2I")
 MAX_BEAMS = np.iinfo(np.int16).max
 UNUSABLE = 1  # bit of a ping's or a beam's flags
 MAX_STEP_DEG = 20.0
+STABILISED = 0b11  # of Kongsberg's modeAndStabilisation: pitch, yaw
 SPEEDS = ("SurfaceVelocity_mps", "SoundSpeed_mps", "SoundVelocity_mps", "SoundSpeedAtTxDepth_mPerSec")
 Scales = dict[int, tuple[float, float, int]]
 

@@ -6,11 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from pipeline import CONFIGS
 from pipeline.config import Drift, Letters, Mount, Origin, Target, White
+from pipeline.errors import ConfigError
 from pipeline.meshes import with_mesh
 from pipeline.parsing import parse, read_yaml
 from pipeline.quantities import Angle, Latency, Length, Lever, Model, NotNegative, Positive, SoundSpeed, TransmitSectors
 
+SCENARIOS = CONFIGS / "scenarios"
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1, le=20)]
 STEEPEST_TILT_DEG = 45.0
@@ -201,5 +204,18 @@ class Scenario(Model):
 
 
 def load_scenario(path: Path | None) -> Scenario:
-    """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario."""
-    return Scenario() if path is None else parse(Scenario, with_mesh(read_yaml(path), path), str(path))
+    """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario. A single word that is no
+    file names one of configs/scenarios."""
+    if path is None:
+        return Scenario()
+    if path.name == str(path) and not path.suffix and not path.is_file():
+        names = scenario_names()
+        if path.name not in names:
+            known = ", ".join(names)
+            raise ConfigError(f"--scenario {path}: is neither a file nor the name of a scenario; these are {known}")
+        path = SCENARIOS / f"{path.name}.yaml"
+    return parse(Scenario, with_mesh(read_yaml(path), path), str(path))
+
+
+def scenario_names() -> list[str]:
+    return sorted(path.stem for path in SCENARIOS.glob("*.yaml"))

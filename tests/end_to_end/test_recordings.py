@@ -19,19 +19,13 @@ from stages import ORDER
 from stages.drawing import Painters
 from stages.views.tour import tabs_of
 from tests.end_to_end.places import Told, poolcal
-from tests.end_to_end.recordings import Chunks, points, read, rows_in
+from tests.end_to_end.recordings import Chunks, points, read, rows_in, text
 
 
 def curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:
     rows = [chunk for chunk in chunks if "Scalars:scalars" in chunk.schema.names]
     values = np.concatenate([np.ravel(chunk.column("Scalars:scalars").to_pylist()) for chunk in rows])
     return values, [moment for chunk in rows for moment in chunk.column(timeline).to_pylist()]
-
-
-def text(found: Chunks, path: str) -> str:
-    (chunk,) = found[path]
-    ((written,),) = chunk.column("TextDocument:text").to_pylist()
-    return str(written)
 
 
 def test_every_point_is_there(drawn: Path) -> None:

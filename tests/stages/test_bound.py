@@ -12,7 +12,7 @@ from tests.stages.conftest import THIN, calibrated, made, merged
 from tools.bound import bound
 from tools.montecarlo import DRIFT, WHITE
 
-SECTORS = [{"to_deg": 15.0, "tilt_deg": 10.0}, {"to_deg": 90.0, "tilt_deg": -10.0}]
+SECTORS = [{"to_deg": 15.0, "tilt_deg": 5.0}, {"to_deg": 90.0, "tilt_deg": -5.0}]
 KINDS = [{"ins": WHITE["ins"]}, {"ins": {}}, {"ins": DRIFT}, {"mbes": {"format": "parquet", "sectors": SECTORS}}]
 
 
