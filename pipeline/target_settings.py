@@ -31,8 +31,9 @@ class Origin(Model):
         if not isinstance(given, dict):
             return given
         one, other = given.get("latitude_deg"), given.get("longitude_deg")
-        numbers = isinstance(one, (int, float)) and isinstance(other, (int, float))
-        if numbers and abs(one) > 90 and abs(other) <= 90:
+        if not isinstance(one, (int, float)) or not isinstance(other, (int, float)):
+            return given
+        if abs(one) > 90 >= abs(other):
             raise ValueError(
                 f"latitude_deg = {one:g} is no latitude: is it the longitude? Write latitude_deg: {other:g} and "
                 f"longitude_deg: {one:g}"
