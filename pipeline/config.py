@@ -171,7 +171,10 @@ class PoolConfig(Model):
 # --- reading ---------------------------------------------------------------------------------------------------------
 def load_pool(path: Path) -> PoolConfig:
     """The pool's config, checked."""
-    return parse(PoolConfig, with_mesh(read_yaml(path), path), str(path))
+    content = read_yaml(path)
+    if "target" not in content and {"ins", "laser"} & content.keys():
+        raise ConfigError(f"{path}: is a session's file; --config wants the pool's, which says where the target is")
+    return parse(PoolConfig, with_mesh(content, path), str(path))
 
 
 def load_session(

@@ -122,7 +122,7 @@ def _sighted(setting: Setting, one: Pass, number: int) -> Sighted:
         "laser": _laser_rays(setting, seconds),
         "mbes": _beams(setting, seconds),
     }.items():
-        batch = _labelled(setting, caster, trajectory, sensor, t_ns, rays)
+        batch = labelled(setting, caster, trajectory, sensor, t_ns, rays)
         seen = scene.observe(sensor, batch, setting.state)
         weight, v = each / seen.sigma_m**2, np.zeros(len(seen.v_m))
         sums[sensor] = epoch_sums(seen.record, seen.share, seen.surface, seen.features, weight, v)
@@ -211,7 +211,7 @@ def _beams(setting: Setting, seconds: float) -> tuple[Integers, Array, float]:
     return np.repeat(np.round(pings * NS).astype(np.int64), len(fan)), np.tile(fan, (len(pings), 1)), 1.0
 
 
-def _labelled(
+def labelled(
     setting: Setting, caster: ClosestSurface, trajectory: Trajectory, sensor: str, t_ns: Integers, rays: Array
 ) -> dict[str, Array]:
     """Where rays meet the target, with the labels that stage segment would give; columns as of a labelled stream."""

@@ -41,7 +41,19 @@ Files = Annotated[list[Pattern], Field(min_length=1)]
 Heights = Literal["ellipsoidal"] | None
 LasTime = Literal["adjusted_standard", "seconds_of_week"] | None
 MaxRecords = Annotated[int, Field(ge=1, le=10**12)] | None  # of one file; null: 16 to each of its bytes
-Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
+
+
+def _whole_week(week: int) -> int:
+    if 0 <= week < FIRST_WEEK:
+        raise ValueError(
+            f"is a GPS week modulo 1024, or before 1999; for files from April 2019 on write {week} + 2048 = "
+            f"{week + 2048}, for files of 1999 to 2019 {week} + 1024 = {week + 1024}"
+        )
+    return week
+
+
+FIRST_WEEK = 1000  # March 1999
+Week = Annotated[int, AfterValidator(_whole_week), Field(ge=0, le=5000)] | None  # GPS week, not modulo 1024
 
 
 class Mount(Model):

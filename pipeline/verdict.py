@@ -56,7 +56,8 @@ class Settings:
     """What it is judged by: limits of the sigmas, level of the tests and what they tolerate, the method that is the
     result; ``farthest``: angle (degrees) and lever arm (m) beyond which no mount is taken for labelling;
     ``drift_doubt``: what speaks against the session's ins.drift, or nothing; ``shape``: the settings that give the
-    target's shape."""
+    target's shape, ``sides``: that which tells its left from its right; ``asked``: what to do about a mount far off
+    that was measured right."""
 
     limits: config.Verdict
     test_level: float
@@ -66,6 +67,8 @@ class Settings:
     drift_doubt: str
     shape: str
     calibrated: Literal["mbes", "laser"] = "mbes"
+    sides: str = "the target's left and right"
+    asked: str = ""
 
 
 def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settings: Settings) -> list[str]:
@@ -104,15 +107,18 @@ def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
         better = pose["rival_agreement_m2"] > pose["agreement_m2"]
         how = "better" if better else "nearly as well"
         remedy = "check" if better else "let the laser see the wall's top edge; check"
+        sides = str(pose["rival"]).startswith("left and right exchanged")
+        remedy += f" {settings.sides} first, then" if sides and better else ""
         found.append(
             f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {how} "
             f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} target.origin (a "
-            f"height wrong by e or 2 e, half a period or a whole one, does this), azimuth_deg, and {shape}"
+            f"height wrong by e or 2 e, half a period or a whole one, does this), azimuth_deg, and {shape}; poolcal "
+            "check tells which"
         )
     if not pose["within"]:
         found.append(
             "no pose of the target within the search limits fits the laser points: target.origin or target.azimuth_deg "
-            "is farther off than segment.search_... allow"
+            "is farther off than segment.search_... allow; poolcal check tells by how much"
         )
     if not mount["within"] and settings.calibrated == "laser":
         found.append(
@@ -125,7 +131,7 @@ def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
             f"no mount within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings the soundings onto the "
             f"target{_beyond(mount, farthest)}: mbes.mount is farther off than segment.search_mount_deg and "
             f"search_mount_m allow (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
-            "18 s behind GPS time)"
+            f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{settings.asked}"
         )
     if mount["ambiguous"]:
         found.append(
@@ -148,7 +154,8 @@ def _few(cells: pd.DataFrame) -> list[str]:
     """Families with so few soundings that their labels cannot be trusted; with none at all they are not used."""
     count = cells[cells["sensor"] == "mbes"].groupby("family")["count"].sum()
     return [
-        f"only {number} soundings lie on {family}: too few to trust; sail so that the fan covers it"
+        f"only {number} soundings lie on {family}: too few to trust; sail so that the fan covers it (poolcal check "
+        "tells why so few hit it)"
         for family, number in count.items()
         if number < FEWEST
     ]

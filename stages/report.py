@@ -26,7 +26,7 @@ from pipeline.built import as_found, by_design, oddities
 from pipeline.closing import closing_table
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.judging.residual_tests import pattern_tests
-from pipeline.mounts import Mounted, mount_of, target_of
+from pipeline.mounts import Mounted, mount_of, target_of, turned
 from pipeline.screen import verdict_in_words
 from pipeline.verdict import (
     NO_DRIFT,
@@ -109,7 +109,10 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest, level = config.segment.farthest_mount, config.adjust.test_level
     tolerated = config.adjust.test_tolerance_m
-    settings = Settings(config.verdict, level, tolerated, config.result, farthest, doubt, config.target.shape)
+    settings = Settings(
+        config.verdict, level, tolerated, config.result, farthest, doubt, config.target.shape,
+        sides=config.target.sides, asked=_asked(config.mbes.mount, inputs.provisional_mount),
+    )
     found = reasons(evidence, methods, settings)
     model = target_of(config.target)
     built = as_found(inputs.planes, inputs.patterns, model)
@@ -154,6 +157,14 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         closing_table(inputs.faces, inputs.planes, inputs.sounding_moments, coarse, mounts),
         *documents(result),
     )
+
+
+def _asked(coarse: config.Mount, provisional: pd.DataFrame) -> str:
+    """What to enter where the coarse angles have been checked, and the soundings yet ask for others."""
+    found = provisional.iloc[0]
+    settings = turned(coarse, [float(found[f"rotation_{axis}_deg"]) for axis in "xyz"]).settings()
+    values = ", ".join(f"{key} {settings[key]:.1f}" for key in ("roll_deg", "pitch_deg", "yaw_deg"))
+    return f"; if you have checked the signs, enter {values} as mbes.mount and run again"
 
 
 def _range_note(mbes: config.Mbes) -> str:

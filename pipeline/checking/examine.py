@@ -69,10 +69,12 @@ def _examined(
         return Examined(tuple(seen), (), tuple(findings))
     max_gap_s = (config.Ingest() if pool is None else pool.ingest).max_gap_s
     coarse = max(s.coarseness_ns for s in seen if s.sensor == "ins")
-    findings += clocks.apart(epochs, max(round(max_gap_s * NS), round(coarse)), seen)
+    weeks = {"ins": session.ins.gps_week, "laser": session.laser.gps_week}
+    findings += clocks.apart(epochs, max(round(max_gap_s * NS), round(coarse)), seen, weeks)
     if pool is None:
         return Examined(tuple(seen), (), tuple(findings))
     clocked = {f.words.split(":")[0] for f in findings if f.question == "clock"}
+    clocked |= {"laser", "mbes"} if "ins" in clocked else set()
     clocked |= {"laser" for f in findings if f.question == "frame"}
     given = _Given(seen, session, pool, target_of(pool.target), calibrate)
     of_target = _of_target(given, epochs, clocked)
@@ -86,6 +88,7 @@ def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: config.Sessio
     yield from files.ins_rate(seen)
     yield from files.alignment(seen)
     yield from files.frames(seen, session)
+    yield from files.far_arms(session)
     yield from files.sound_speed(seen, session)
     yield from files.cast(seen, session)
 

@@ -10,6 +10,7 @@ from pipeline.checking.cast import doubts
 from pipeline.checking.finding import Finding
 from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
+from pipeline.maths.geodesy import ecef_from_geodetic
 from pipeline.screen import plural
 from pipeline.times import utc_text
 
@@ -19,6 +20,8 @@ CUT = ("truncated", "truncated message", "truncated packet", "truncated record",
 FAR_M = 10_000.0  # from a scanner: coordinates of a CRS
 SPEEDS_M_S = (1400.0, 1560.0)
 DIFFERENT_M_S = 5.0
+FAR_ARM_M = 5.0  # of a bracket that is rigid to millimetres
+NAMES = ("latitude_rad", "longitude_rad", "height_m")
 
 
 def unreadable(files: Sequence[Seen], wrong: Sequence[str]) -> Iterator[Finding]:
@@ -115,6 +118,41 @@ def frames(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
                 f"{seen.name}: its points lie {away:.4g} m from their origin, but laser.frame is EPSG:4978 (from the "
                 "earth's centre): write laser.frame: laser if they are in the scanner's own frame",
             )
+        elif session.laser.frame != "laser":
+            yield from _elsewhere(seen, files, session.laser.frame)
+
+
+def _elsewhere(laser: Seen, files: Sequence[Seen], frame: str) -> Iterator[Finding]:
+    """Points of a CRS, which are in ECEF by now, far from where the boat was: the zone may be another."""
+    of_ins = [seen.columns for seen in files if seen.sensor == "ins" and seen.records]
+    if not of_ins:
+        return
+    boat = np.median(
+        ecef_from_geodetic(*(np.concatenate([one[name] for one in of_ins]) for name in NAMES)), axis=0
+    )
+    points = np.median(np.column_stack([laser.columns[axis] for axis in ("x_m", "y_m", "z_m")]), axis=0)
+    away = float(np.linalg.norm(points - boat))
+    if away > FAR_M:
+        yield Finding(
+            "frame",
+            f"{laser.name}: its points lie {away / 1000:.3g} km from the INS's track with laser.frame {frame}: another "
+            "zone, or interchanged axes? Write the CRS that they were exported in",
+        )
+
+
+def far_arms(session: SessionConfig) -> Iterator[Finding]:
+    """Lever arms as long as a boat: they may be in another unit."""
+    for sensor in ("laser", "mbes"):
+        settings = getattr(session, sensor)
+        for key in ("x_m", "y_m", "z_m") if settings is not None else ():
+            value = getattr(settings.mount, key)
+            if abs(value) > FAR_ARM_M:
+                yield Finding(
+                    "lever arm",
+                    f"{sensor}: {sensor}.mount.{key} = {value:g} is {abs(value):g} m from the INS: is it in cm "
+                    f"({value / 100:g} m)?",
+                    "look",
+                )
 
 
 def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline import config
 from pipeline.checking.clocks import named
+from pipeline.checking.files import FAR_ARM_M
 from pipeline.checking.finding import Finding
 from pipeline.checking.heights import wrong_height
 from pipeline.checking.passes import heading
@@ -64,6 +65,11 @@ def hypotheses(track: Track, some: Sample, closest: ClosestSurface) -> list[Hit]
         turned = some.mount.model_copy(update={key: -value})
         words = f"with {some.sensor}.mount.{key} = {-value:g} in place of {value:g}: reverse its sign"
         tried.append(Hit(judge(mount=turned), words=words))
+    for key in ("x_m", "y_m", "z_m"):
+        value = getattr(some.mount, key)
+        if abs(value) > FAR_ARM_M:
+            words = f"with {some.sensor}.mount.{key} = {value / 100:g} in place of {value:g}: write metres"
+            tried.append(Hit(judge(mount=some.mount.model_copy(update={key: value / 100})), words=words))
     coarse = np.arange(-FARTHEST_S, FARTHEST_S + STEP_S / 2, STEP_S)
     best = float(max(coarse, key=lambda ahead_s: judge(ahead_s=ahead_s)))
     fine = best + np.arange(-STEP_S, STEP_S + FINE_S / 2, FINE_S)

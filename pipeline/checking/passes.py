@@ -87,6 +87,8 @@ def sailing(track: Track, place: config.TargetPlace) -> Iterator[Finding]:
             yield Finding("side", f"{words}, stern first by its heading: is the INS's heading turned by 180°?")
         else:
             yield Finding("side", f"{words}: sail the other way, with the target's front to starboard")
+    elif askew := heading(track, place):
+        yield Finding("azimuth", f"the boat does not sail along the target: {askew}")
     distances = [leg.distance_m for leg in sounded if leg.good]
     if distances and np.ptp(distances) < ALIKE_M:
         yield Finding(
@@ -102,10 +104,10 @@ def heading(track: Track, place: config.TargetPlace) -> str:
     turn = askew_deg(track)
     if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:
         return ""
-    sailed = (place.azimuth_deg + turn) % 360.0
+    sailed = round(place.azimuth_deg + turn) % 360
     return (
-        f"it heads {sailed:.0f}° with target.origin to starboard, but target.azimuth_deg is {place.azimuth_deg:g} (the "
-        f"direction of the target's +y, along which it is sailed): write {sailed:.0f}, or check target.origin"
+        f"it heads {sailed}° with target.origin to starboard, but target.azimuth_deg is {place.azimuth_deg:g} (the "
+        f"direction of the target's +y, along which it is sailed): write {sailed}, or check target.origin"
     )
 
 

@@ -11,7 +11,7 @@ from pipeline.checking.survey import Columns, Seen
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory, poses_in_pool
-from pipeline.passes import estimate_azimuth, find_passes
+from pipeline.passes import beside, estimate_azimuth, find_passes
 from pipeline.times import NS
 
 Array = NDArray[np.float64]
@@ -108,12 +108,17 @@ def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[Seen]) -> Leg:
 
 
 def askew_deg(track: Track) -> float | None:
-    """By how much the boat headed to the right of the target's +y while it had target.origin to starboard and near,
-    within ±180 degrees; None where it never had."""
+    """By how much the boat headed and went to the right of the target's +y while it had target.origin to starboard and
+    near, within ±180 degrees: the lesser of the two, none where they do not agree. None where it never had."""
     x, y = track.trajectory.positions_m[:, :2].T
     ahead = track.trajectory.R_frame_from_body[:, :2, 1]
-    turn = estimate_azimuth(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
-    return None if turn is None else float(np.degrees(turn))
+    near = beside(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
+    if not near.any():
+        return None
+    steps = np.flatnonzero(near[1:] & near[:-1])
+    headed = float(np.arctan2(*ahead[near].sum(axis=0)))
+    went = float(np.arctan2((x[steps + 1] - x[steps]).sum(), (y[steps + 1] - y[steps]).sum()))
+    return float(np.degrees(min(headed, went, key=abs))) if headed * went > 0 else 0.0
 
 
 def _ran(start: int, end: int, files: Sequence[Seen]) -> float:

@@ -13,9 +13,9 @@ from pipeline.checking.heights import profile, way
 from pipeline.checking.placed import Sample, put
 from pipeline.checking.track import Track
 from pipeline.clouds import ClosestSurface
-from pipeline.maths.rotations import exp_so3, log_so3
+from pipeline.maths.rotations import log_so3
 from pipeline.maths.targets import TargetModel
-from pipeline.mounts import Mounted, mount_of
+from pipeline.mounts import mount_of, turned
 
 Array = NDArray[np.float64]
 REACH_M = 0.15  # in the pose found, whose place along x and y is known
@@ -103,13 +103,14 @@ def signs(given: config.Mount, provisional: pd.DataFrame, within_deg: float) -> 
     """Angles whose reversed sign is nearer to the mount that the sample asks for; ``within_deg``: how far off a coarse
     mount may be, so that the calibration finds the rest."""
     row = provisional.iloc[0]
-    turn = np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"])
-    if not np.isfinite(turn).all():
+    turn_deg = [float(row[f"rotation_{axis}_deg"]) for axis in "xyz"]
+    if not np.isfinite(turn_deg).all():
         return
-    wanted = exp_so3(turn) @ mount_of(given).R_body_from_sensor
+    wanted = turned(given, turn_deg)
 
     def off_deg(mount: config.Mount) -> float:
-        return float(np.degrees(np.linalg.norm(log_so3(wanted @ mount_of(mount).R_body_from_sensor.T))))
+        R = mount_of(mount).R_body_from_sensor
+        return float(np.degrees(np.linalg.norm(log_so3(wanted.R_body_from_sensor @ R.T))))
 
     as_given = off_deg(given)
     keys = [key for key in ANGLES if abs(getattr(given, key)) > SMALL_DEG]
@@ -118,7 +119,7 @@ def signs(given: config.Mount, provisional: pd.DataFrame, within_deg: float) -> 
     best, which = min(reversed_, default=(np.inf, ()))
     if as_given < LEAST_DEG or best > HALF * as_given:
         return
-    found = Mounted(wanted, np.zeros(3)).settings()
+    found = wanted.settings()
     values = {key: getattr(given, key) for key in which}
     changed = ", ".join(f"mbes.mount.{key} = {-value:g} in place of {value:g}" for key, value in values.items())
     asked = ", ".join(f"{key} {found[key]:.1f}" for key in ANGLES)
