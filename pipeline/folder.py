@@ -18,6 +18,7 @@ from pipeline.errors import ArtefactError, ConfigError
 from pipeline.files import read_json, remove, settle, settle_names, write_text, writing
 from pipeline.mounts import target_of
 from pipeline.parsing import parse, read_yaml
+from pipeline.readers.casts import with_cast
 
 RUN_YAML = "run.yaml"
 LOCK = ".lock"
@@ -61,7 +62,7 @@ def load_settings(
     except ConfigError as error:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_faces(pool, config_path)
-    session = config.load_session(session_folder)
+    session = config.load_session(session_folder, with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
     elif calibrated == "mbes" and session.mbes is None:
@@ -85,8 +86,7 @@ def refuse_cast(target: config.Target, mbes: config.Mbes, path: Path) -> None:
     """A cast is of the water that the rays go through: at least of half the depth down to the target's lower end."""
     if mbes.svp is None:
         return
-    model = target_of(target)
-    depth = model.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in model.faces)
+    depth = target_of(target).depth_m
     first, last = mbes.svp[0][0], mbes.svp[-1][0]
     if min(last, depth) - first < depth / 2:
         raise ConfigError(

@@ -62,6 +62,8 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
     config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
+    if "mbes" in config:
+        raw |= cast_digest(this)
     return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
 
 
@@ -74,7 +76,8 @@ def raw_of(this: Run, sensor: str) -> dict[str, str]:
 
 
 def all_raw(this: Run) -> dict[str, str]:
-    return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()}
+    """Digests of all files that the session was read from."""
+    return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()} | cast_digest(this)
 
 
 def raw_digests(this: Run, sensor: str) -> dict[str, str]:
@@ -93,6 +96,17 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
         if first.setdefault(digest, name) != name and digest != EMPTY:
             raise RawDataError(f"{name}: is the same as {first[digest]}; list one of the two under {sensor}.files")
     return found
+
+
+def cast_digest(this: Run) -> dict[str, str]:
+    """Of the file that the cast of sound speed came from; its depths are in the settings."""
+    used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
+    if used is None:
+        return {}
+    (digest,) = this.digests.of([this.settings.session_folder / used.file])
+    if digest != used.sha256:
+        raise RawDataError(f"{used.file}: is not the cast that this run was made with; run poolcal run again")
+    return {used.file: digest}
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:

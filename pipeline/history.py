@@ -23,6 +23,7 @@ from pipeline.files import write_bytes, write_text, writing
 from pipeline.folder import RUN_YAML, calibration
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.mounts import SETTINGS
+from pipeline.screen import plural
 from pipeline.verdict import SIX
 
 TEXTS = ("date_utc", "session", "run", "verdict", "moved")  # columns
@@ -50,17 +51,25 @@ class Filter:
 
 @dataclass(frozen=True)
 class History:
-    """One row a session in order of time; and the runs that could not be read, with the reason."""
+    """One row a session in order of time; the runs that could not be read, with the reason; and those of a laser, which
+    has a mount of its own."""
 
     table: pd.DataFrame
     unreadable: list[str] = field(default_factory=list)
+    lasers: list[str] = field(default_factory=list)
+
+    @property
+    def without(self) -> str:
+        """What is not shown because it is of the laser, in words."""
+        many = len(self.lasers)
+        return f"{plural(many, 'laser run')} not shown: {', '.join(self.lasers)}" if many else ""
 
 
 def read_history(folder: Path, chosen: Filter) -> History:
     """Every run in ``folder``, two levels deep."""
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; RUNS_DIR is the folder that holds run folders")
-    found, unreadable = [], []
+    found, unreadable, lasers = [], [], []
     finished, begun = _runs_in(folder)
     if not finished and not begun:
         itself = (folder / RUN_YAML).is_file()
@@ -70,7 +79,7 @@ def read_history(folder: Path, chosen: Filter) -> History:
         try:
             result = calibration(run)
             if result.get("calibrated") == "laser":
-                unreadable.append(f"{run}: calibrates the laser")
+                lasers.append(run.relative_to(folder).as_posix())
                 continue
             row, estimate = _row(run.relative_to(folder).as_posix(), result), estimate_of(result)
         except PoolcalError as error:
@@ -84,7 +93,7 @@ def read_history(folder: Path, chosen: Filter) -> History:
     unreadable += [_why_without(run) for run in begun]
     found.sort(key=lambda one: one[:2])
     rows = list(_with_jumps([(row, estimate) for *_, row, estimate in found]))
-    return History(pd.DataFrame(rows, columns=list(_columns())), unreadable)
+    return History(pd.DataFrame(rows, columns=list(_columns())), unreadable, lasers)
 
 
 def _runs_in(folder: Path) -> tuple[list[Path], list[Path]]:

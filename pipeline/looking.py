@@ -1,6 +1,6 @@
 """The last reading: what the residuals of every point say, and some of the points to be looked at."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,19 +8,28 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts
+from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted
-from pipeline.maths.consistency import Cell, Moments, cells_of, merged_moments, moments_of
-from pipeline.maths.knots import Drift
+from pipeline.maths.consistency import Cell, Moments, against_others, cells_of, merged_moments, moments_of, steps_of
+from pipeline.maths.drift_of_passes import against_other_passes
+from pipeline.maths.excess import standardised
+from pipeline.maths.knots import Drift, PoseNoise
+from pipeline.maths.soundings import receive_angle
 from pipeline.maths.unknowns import State
+from pipeline.passes import pass_of
 from pipeline.residuals import residuals_table, step_for
 from pipeline.scene import Observations, Scene, Weighting
 from pipeline.streams import Batch, Stream, xyz
 from pipeline.times import NS
 
+Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-ANGLE_DEG, DISTANCE_M, TIME_S = 5.0, 1.0, 10.0
-FEWEST, FEWEST_MOMENTS = 30, 5  # points and moments of a bin that is judged
+WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # degrees, m, s
+REACH = 4  # bins on either side of a step
+FEWEST, FEWEST_FREE = 30, 8.0  # points, and degrees of freedom, of a mean that is judged
+TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # columns of the drift
+KNOWN = 1e9  # degrees of freedom of a sigma that is given
+Row = dict[str, Any]
 Cells = Mapping[tuple[str, int, int], Cell]  # by sensor, surface, pass
 
 
@@ -34,49 +43,81 @@ class Look:
 
 
 def look(
-    streams: Mapping[str, Stream], scene: Scene, adjusted: Adjusted, slot_s: float, tolerance_m: float, at_most: int
+    streams: Mapping[str, Stream],
+    scene: Scene,
+    adjusted: Adjusted,
+    settings: config.Adjust,
+    of_drift: Iterable[Row],
+    at_most: int,
 ) -> Look:
-    """``at_most`` points of a sensor in the table."""
+    """``of_drift``: further rows of ``patterns``; ``at_most`` points of a sensor in the table."""
     cells: dict[tuple[str, int, int], Cell] = {}
-    patterns: list[dict[str, Any]] = []
+    patterns: list[Row] = []
     taken: list[Batch] = []
     families = [surface.family for surface in adjusted.state.surfaces]
     for sensor, stream in streams.items():
         step = step_for(adjusted.reading.observations(sensor), at_most)
-        arguments = (scene, sensor, adjusted.state, adjusted.drift, adjusted.weighting, round(slot_s * NS), step)
+        slot_ns = round(settings.moment_s * NS)
+        arguments = (scene, sensor, adjusted.state, adjusted.drift, adjusted.weighting, slot_ns, step)
         found: dict[str, list[Moments]] = {}
         for moments, points in stream.fold(_look, *arguments):
             taken.append(points)
             for name, one in moments.items():
                 found.setdefault(name, []).append(one)
         for name, pieces in found.items():
-            binned = cells_of(merged_moments(pieces), tolerance_m)
+            whole = merged_moments(pieces)
             if name == "pass":
-                cells |= {(sensor, *cell.key): cell for cell in binned}
-            else:
-                patterns += [_row(name, sensor, families, cell) for cell in binned if _judged(cell)]
-    columns = [column.name for column in artefacts.PATTERNS.columns]
-    return Look(cells, pd.DataFrame(patterns, columns=columns), residuals_table(taken))
+                cells |= {(sensor, *cell.key): cell for cell in cells_of(whole)}
+            means = _means(name, whole)
+            patterns += [_row(name, sensor, families[cell.key[0]], cell) for cell in means if _judged(cell)]
+    return Look(cells, _table([*patterns, *of_drift], settings.test_tolerance_m), residuals_table(taken))
+
+
+def _means(name: str, moments: Moments) -> list[Cell]:
+    if name == "pass":
+        return against_others(moments)
+    return steps_of(moments, REACH) if name == "step" else cells_of(moments)
 
 
 def _judged(cell: Cell) -> bool:
-    return cell.count >= FEWEST and cell.moments >= FEWEST_MOMENTS
+    return cell.count >= FEWEST and cell.dof >= FEWEST_FREE
 
 
-def _row(name: str, sensor: str, families: list[str], cell: Cell) -> dict[str, Any]:
-    first, second = cell.key
-    width = {"face": 1.0, "angle": ANGLE_DEG, "distance": DISTANCE_M, "time": TIME_S}[name]
+def _row(name: str, sensor: str, family: str, cell: Cell) -> Row:
     return {
         "by": name,
         "sensor": sensor,
-        "family": families[first],
-        "low": second * width,
-        "width": width,
+        "family": family,
+        "low": cell.key[1] * WIDTHS[name],
+        "width": WIDTHS[name],
         "count": cell.count,
         "mean_m": cell.mean_m,
         "sigma_mean_m": cell.sigma_mean_m,
-        "normalised": cell.normalised,
+        "dof": cell.dof,
     }
+
+
+def _table(rows: list[Row], tolerance_m: float) -> pd.DataFrame:
+    columns = [column.name for column in artefacts.PATTERNS.columns]
+    table = pd.DataFrame(rows, columns=columns)
+    mean, sigma, dof = (table[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
+    tolerated = np.where(table["by"] == "drift", 0.0, tolerance_m)
+    return table.assign(normalised=standardised(mean, sigma, dof, tolerated))
+
+
+def drift_rows(drift: Drift, noise: PoseNoise, poses: pd.DataFrame, passes: pd.DataFrame) -> list[Row]:
+    """How the drift found in each pass turns the boat against the others, as rows of ``patterns``; rad. (How it moves
+    the boat tells of the INS alone: both sensors move alike.)"""
+    t_ns = poses["t_ns"].to_numpy()[drift.knots.record]
+    number = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()).astype(np.int64)
+    places, values, sigmas = against_other_passes(drift, noise, number)
+    return [
+        {"by": "drift", "sensor": "ins", "family": name, "low": float(place), "width": 1.0}
+        | {"count": int(np.sum(number == place)), "mean_m": value[k], "sigma_mean_m": sigma[k], "dof": KNOWN}
+        for place, value, sigma in zip(places, values, sigmas, strict=True)
+        for name, k in TURNS.items()
+        if sigma[k] > 0
+    ]
 
 
 def _look(
@@ -95,22 +136,24 @@ def _look(
     size = np.where(robust > 0, np.abs(weighting.normalised(seen)), 0.0)
     slot = seen.points["t_ns"] // slot_ns
     # a whole cell off must show, not be cut away: plain weights
-    moments = {
-        name: moments_of(first, second, slot, 1 / plain**2, seen.v_m, size)
-        for name, first, second in _bins(sensor, seen)
-    }
+    moments = {}
+    for name, values in _variables(sensor, seen):
+        place = np.floor(values / WIDTHS[name]).astype(np.int64)
+        moments[name] = moments_of(seen.surface, place, slot, 1 / plain**2, seen.v_m, size)
     some = {name: values[::step] for name, values in batch.items()}
     return moments, scene.sample(sensor, some, state, drift, weighting)
 
 
-def _bins(sensor: str, seen: Observations) -> Iterator[tuple[str, Integers, Integers]]:
-    """Name, and two numbers of each point's bin."""
+def _variables(sensor: str, seen: Observations) -> Iterator[tuple[str, Array | Integers]]:
+    """What residuals are sorted by, and its value of each point (n,)."""
     batch = seen.points
-    own = xyz(batch, f"{sensor}_m").T
-    range_m = np.sqrt(np.einsum("in,in->n", own, own))
-    angle = np.arcsin(own[2] / range_m) if sensor == "laser" else np.arctan2(own[0], -own[2])
-    yield "pass", seen.surface, batch["pass"].astype(np.int64)
-    yield "face", seen.surface, batch["face"].astype(np.int64)
-    yield "angle", seen.surface, np.floor(np.degrees(angle) / ANGLE_DEG).astype(np.int64)
-    yield "distance", seen.surface, np.floor(range_m / DISTANCE_M).astype(np.int64)
-    yield "time", seen.surface, batch["t_ns"] // round(TIME_S * NS)
+    own = xyz(batch, f"{sensor}_m")
+    range_m = np.linalg.norm(own, axis=1)
+    angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
+    yield "pass", batch["pass"].astype(np.int64)
+    yield "face", batch["face"].astype(np.int64)
+    yield "angle", angle
+    yield "distance", range_m
+    yield "time", batch["t_ns"] // NS
+    if sensor == "mbes":
+        yield "step", angle

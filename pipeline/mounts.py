@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.maths.assembly import Outline, Relation, build_target
 from pipeline.maths.letters import lettered
-from pipeline.maths.rotations import mount_from_rotation, mount_partials, rotation_from_mount
+from pipeline.maths.rotations import exp_so3, mount_from_rotation, mount_partials, rotation_from_mount
 from pipeline.maths.targets import TargetModel
 
 Array = NDArray[np.float64]
@@ -47,6 +47,12 @@ class Mounted:
         angles = np.degrees(np.sqrt(np.diag(partials @ covariance[:3, :3] @ partials.T)))
         six = [*angles, *np.sqrt(np.diag(covariance)[3:])]
         return {key: float(six[place]) for _, place, key, _ in PARAMETERS}
+
+
+def turned(mount: config.Mount, turn_deg: Sequence[float]) -> Mounted:
+    """A mount after a correction by a rotation vector about the body's x, y, z, its lever arm as it is."""
+    as_given = mount_of(mount)
+    return Mounted(exp_so3(np.radians(turn_deg)) @ as_given.R_body_from_sensor, as_given.lever_arm_body_m)
 
 
 def mount_of(mount: config.Mount) -> Mounted:

@@ -1,6 +1,6 @@
 """What the adjustment found, as tables."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted
 from pipeline.considered import Block
+from pipeline.judging.residual_tests import passes_test
 from pipeline.looking import Cells
-from pipeline.maths.consistency import consistency_limit
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.solution import Freed, Solution, freed, weakest_direction
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.maths.variance import scatter
 from pipeline.mounts import Mounted
 from pipeline.passes import pass_of
+from pipeline.screen import plural
 
 Array = NDArray[np.float64]
 COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common
@@ -26,6 +27,7 @@ COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoc
 def tables(
     found: Adjusted,
     cells: Cells,
+    patterns: pd.DataFrame,
     considered: Array,
     together: Sequence[Block],
     coarse: Mounted,
@@ -63,18 +65,17 @@ def tables(
         "covariance": _covariance_table(random[:SIX, :SIX], total[:SIX, :SIX]),
         "freed": _freed_table(found, considered, estimate),
         "groups": _groups_table(found),
-        "summary": _summary_table(found, cells, settings),
+        "summary": _summary_table(found, passes_test(patterns, settings.test_level)),
         "drift": _drift_table(found, poses),
-        "cells": _cells_table(found, cells, poses, passes),
+        "cells": _cells_table(found, cells, patterns, poses, passes),
         "surfaces": _surfaces_table(found, cells),
     }
 
 
-def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd.DataFrame:
+def _summary_table(found: Adjusted, test: Mapping[str, Any]) -> pd.DataFrame:
     solution = found.solution
-    statistic = float(sum(cell.normalised**2 for cell in cells.values()))
-    limit = consistency_limit(len(cells), settings.test_level)
-    reason = f"the data leave {solution.deficiency} direction(s) of the unknowns open" if solution.deficiency else ""
+    left_open = plural(solution.deficiency, "direction")
+    reason = f"the data leave {left_open} of the unknowns open" if solution.deficiency else ""
     counts = found.reading.counts.values()
     summary = {
         "converged": found.converged,
@@ -87,10 +88,7 @@ def _summary_table(found: Adjusted, cells: Cells, settings: config.Adjust) -> pd
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
         "weakest": "" if solution.deficiency else _weakest(solution),
-        "test_statistic": statistic,
-        "test_dof": len(cells),
-        "test_limit": limit,
-        "test_passed": statistic <= limit,
+        **{f"test_{name}": test[name] for name in ("statistic", "dof", "limit", "passed")},
         "reason": reason,
     }
     return pd.DataFrame([summary])
@@ -175,8 +173,11 @@ def _groups_table(found: Adjusted) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _cells_table(found: Adjusted, cells: Cells, poses: pd.DataFrame, passes: pd.DataFrame) -> pd.DataFrame:
-    """Every cell, with the scatter of its epochs about planes of their own."""
+def _cells_table(
+    found: Adjusted, cells: Cells, patterns: pd.DataFrame, poses: pd.DataFrame, passes: pd.DataFrame
+) -> pd.DataFrame:
+    """Every cell, with the scatter of its epochs about planes of their own, and how far it lies off other passes."""
+    of_pass = patterns[patterns["by"] == "pass"].set_index(["sensor", "family", "low"])["normalised"].to_dict()
     t_ns, starts, ends = poses["t_ns"].to_numpy(), passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
     rows = []
     for (sensor, surface, number), cell in sorted(cells.items()):
@@ -193,7 +194,7 @@ def _cells_table(found: Adjusted, cells: Cells, poses: pd.DataFrame, passes: pd.
                 "mean_m": cell.mean_m,
                 "rms_m": cell.rms_m,
                 "sigma_mean_m": cell.sigma_mean_m,
-                "normalised": cell.normalised,
+                "normalised": of_pass.get((sensor, found.state.surfaces[surface].family, float(number)), np.nan),
                 "largest": cell.largest,
                 "redundancy": within.free,
                 "variance_factor": within.factor,

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Iterator
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -94,6 +95,8 @@ def _loaded(text: str, path: Path, how: Callable[[_StrictLoader], Any]) -> Any:
         ) from error
 
 
+LETTERS = tuple(f"target.{letter}" for letter in "abce")
+Location = tuple[int | str, ...]
 _WORDS = {  # where pydantic speaks to programmers
     "too_short": "has too few entries: {actual_length} of at least {min_length}",
     "too_long": "has more entries than {max_length}; a decimal comma makes two of one",
@@ -106,21 +109,62 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
     try:
         return model.model_validate_json(_to_json(content, where), strict=True)
     except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
+        fault = _first(error.errors(include_url=False))
         place = _without_tags(model, fault["loc"])
         key = ".".join(str(part) for part in place if part not in ("function-after", "[key]")) or "(whole file)"
         if fault["type"] == "extra_forbidden":
             known = ", ".join(_known_keys(model, fault["loc"][:-1]))
-            raise ConfigError(f"{where}: {key}: unknown key; known here: {known}") from error
+            meant = _meant(str(fault["loc"][-1]), known.split(", "))
+            raise ConfigError(f"{where}: {key}: unknown key; {meant}known here: {known}") from error
         if fault["type"] == "missing":
-            raise ConfigError(f"{where}: {key}: is missing; add it") from error
+            raise ConfigError(f"{where}: {key}: is missing; {_missing(model, fault['loc'])}") from error
         message = _WORDS[fault["type"]].format(**fault["ctx"]) if fault["type"] in _WORDS else fault["msg"]
         message = message.removeprefix("Value error, ").replace("a valid array", "a list, in square brackets")
         if fault["type"] == "float_type" and "," in str(fault["input"]):
             message += ", with a point where the comma is"
+        message += _in_metres(key, fault)
         shown = repr(fault["input"])
         shown = shown if len(shown) <= 60 else shown[:57] + "..."
         raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; mend this value") from error
+
+
+def _first(faults: list[Any]) -> Any:
+    """The fault to be told: an unknown key before one that is missing beside it, for it may be that one misspelt."""
+    first = faults[0]
+    beside = (one for one in faults if one["type"] == "extra_forbidden" and one["loc"][:-1] == first["loc"][:-1])
+    return next(beside, first) if first["type"] == "missing" else first
+
+
+def _meant(unknown: str, known: list[str]) -> str:
+    """What an unknown key may be.
+
+    >>> _meant("roll", ["roll_deg", "x_m"]), _meant("mbes2", ["ins", "mbes"])
+    ('is it roll_deg? ', 'one mbes is calibrated at a time: write one session.yaml for each; ')
+    """
+    bare = unknown.rstrip("0123456789_")
+    if bare != unknown and bare in known:
+        return f"one {bare} is calibrated at a time: write one session.yaml for each; "
+    begun = [key for key in known if key.startswith(f"{unknown}_") or unknown.startswith(f"{key}_")]
+    alike = begun or get_close_matches(unknown, known, 1, 0.75)
+    return f"is it {' or '.join(alike)}? " if alike else ""
+
+
+def _missing(model: type[BaseModel], location: Location) -> str:
+    if location[-1] == "mount":
+        keys = ", ".join(_fields(model, location))
+        return f"add it with its six keys, {keys}, or let poolcal coarse write it"
+    return "add it"
+
+
+def _in_metres(key: str, fault: Any) -> str:
+    """A word where a length is out of bounds in metres, and would not be if it were given in millimetres."""
+    value, bounds = fault["input"], fault.get("ctx", {})
+    last = key.rpartition(".")[2]
+    length = last.endswith("_m") or ".corners." in key or key in LETTERS
+    beyond = fault["type"] in ("less_than_equal", "greater_than_equal") and isinstance(value, (int, float))
+    if not (length and beyond) or abs(value) / 1000 > abs(bounds.get("le", bounds.get("ge", 0.0))):
+        return ""
+    return f", in metres: is {value:g} in mm? It is then {value / 1000:.4g}"
 
 
 def _to_json(content: dict[str, Any], where: str) -> str:
@@ -144,15 +188,18 @@ def _to_json(content: dict[str, Any], where: str) -> str:
     return json.dumps(content)
 
 
-Location = tuple[int | str, ...]
-
-
 def _known_keys(model: type[BaseModel], location: Location) -> list[str]:
+    return sorted(_fields(model, location)) or ["see README.md"]
+
+
+def _fields(model: type[BaseModel], location: Location) -> list[str]:
+    """Keys that the model at this place in a file has, in its order; none where there is none."""
     current: Any = model
     for part in location:
         field = getattr(current, "model_fields", {}).get(part)
         current = field.annotation if field is not None else _tagged(current).get(part)
-    return sorted(getattr(current, "model_fields", {"see README.md": None}))
+        current = next((one for one in get_args(current) if hasattr(one, "model_fields")), current)  # or none at all
+    return list(getattr(current, "model_fields", ()))
 
 
 def _tagged(annotation: Any) -> dict[int | str, Any]:

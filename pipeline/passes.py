@@ -88,15 +88,20 @@ def pass_of(t_ns: Times, starts_ns: Times, ends_ns: Times) -> NDArray[np.int16]:
     return np.where(inside, index, -1).astype(np.int16)
 
 
+def beside(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> NDArray[np.bool_]:
+    """Where (n,) an INS at east, north (n,) from the target's origin has that abeam to starboard, and near."""
+    starboard = -(east_m * np.cos(azimuth_rad) - north_m * np.sin(azimuth_rad))
+    ahead = -(east_m * np.sin(azimuth_rad) + north_m * np.cos(azimuth_rad))
+    return np.asarray((starboard > 0) & (starboard < within_m) & (np.abs(ahead) < starboard))
+
+
 def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> float | None:
     """Direction of the track past the origin, clockwise from north: mean heading while the origin is near, to
     starboard.
 
     east, north (n,): the INS relative to the target's origin. None when the boat never had the target to starboard.
     """
-    starboard = -(east_m * np.cos(azimuth_rad) - north_m * np.sin(azimuth_rad))
-    ahead = -(east_m * np.sin(azimuth_rad) + north_m * np.cos(azimuth_rad))
-    near = (starboard > 0) & (starboard < within_m) & (np.abs(ahead) < starboard)
+    near = beside(east_m, north_m, azimuth_rad, within_m)
     if not near.any():
         return None
     return float(np.arctan2(np.sin(azimuth_rad[near]).mean(), np.cos(azimuth_rad[near]).mean()))

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.quantities import Angle, Length, Lever, Model
+from pipeline.quantities import Angle, Length, Lever, Model, TransmitSectors
 
 Rate = Annotated[float, Field(ge=0.1, le=1e7)]
 Swing = Annotated[float, Field(ge=0, le=45)]
@@ -25,6 +25,7 @@ class MbesFigures(Model):
     beams: Annotated[int, Field(ge=2, le=2048)] = 256
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
     max_range_m: Length = 15.0
+    sectors: TransmitSectors = ()  # tilts of the transmit fan; none: no tilt
 
 
 class Unrest(Model):

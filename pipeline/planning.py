@@ -19,7 +19,9 @@ from pipeline.maths.adjustment import Body, normal_equations
 from pipeline.maths.epochs import EpochSums, epoch_sums, merged
 from pipeline.maths.knots import Drift, knots_of
 from pipeline.maths.labelling import Beams, label_points
+from pipeline.maths.observations import SPEED_M_S
 from pipeline.maths.rotations import rotation_from_attitude
+from pipeline.maths.soundings import points_in_mbes
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory
 from pipeline.maths.unknowns import SIX, State
@@ -120,7 +122,7 @@ def _sighted(setting: Setting, one: Pass, number: int) -> Sighted:
         "laser": _laser_rays(setting, seconds),
         "mbes": _beams(setting, seconds),
     }.items():
-        batch = _labelled(setting, caster, trajectory, sensor, t_ns, rays)
+        batch = labelled(setting, caster, trajectory, sensor, t_ns, rays)
         seen = scene.observe(sensor, batch, setting.state)
         weight, v = each / seen.sigma_m**2, np.zeros(len(seen.v_m))
         sums[sensor] = epoch_sums(seen.record, seen.share, seen.surface, seen.features, weight, v)
@@ -201,11 +203,15 @@ def _beams(setting: Setting, seconds: float) -> tuple[Integers, Array, float]:
     half = np.radians(figures.sector_deg) / 2
     angle = np.linspace(-half, half, figures.beams)
     pings = np.arange(0.5 / figures.ping_rate_hz, seconds, 1 / figures.ping_rate_hz)
-    fan = np.column_stack([np.sin(angle), np.zeros(len(angle)), -np.cos(angle)])
+    edges_deg, tilts_deg = np.array([(one.to_deg, one.tilt_deg) for one in figures.sectors] or [(90.0, 0.0)]).T
+    tilt = np.radians(tilts_deg[np.searchsorted(edges_deg, np.degrees(angle))])
+    speed = np.full(len(angle), SPEED_M_S)
+    fan, there = points_in_mbes(2 / speed, angle, tilt, speed)
+    fan = fan[there]
     return np.repeat(np.round(pings * NS).astype(np.int64), len(fan)), np.tile(fan, (len(pings), 1)), 1.0
 
 
-def _labelled(
+def labelled(
     setting: Setting, caster: ClosestSurface, trajectory: Trajectory, sensor: str, t_ns: Integers, rays: Array
 ) -> dict[str, Array]:
     """Where rays meet the target, with the labels that stage segment would give; columns as of a labelled stream."""

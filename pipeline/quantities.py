@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -22,3 +22,20 @@ Latency = Annotated[float, Field(ge=-10, le=10)]
 
 class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class TransmitSector(Model):
+    """The tilt (along track, forward +) of the transmit fan for receive angles up to ``to_deg`` (starboard +)."""
+
+    to_deg: Annotated[float, Field(ge=-90, le=90)]
+    tilt_deg: Annotated[float, Field(ge=-45, le=45)]
+
+
+def _in_order(sectors: tuple[TransmitSector, ...]) -> tuple[TransmitSector, ...]:
+    edges = [sector.to_deg for sector in sectors]
+    if edges and (edges != sorted(set(edges)) or edges[-1] != 90):
+        raise ValueError("sectors must stand from port to starboard, the last one with to_deg: 90")
+    return sectors
+
+
+TransmitSectors = Annotated[tuple[TransmitSector, ...], AfterValidator(_in_order)]

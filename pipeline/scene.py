@@ -15,6 +15,7 @@ from pipeline.maths.epochs import MOVING, Runs
 from pipeline.maths.knots import Drift
 from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.robust import igg3_weights
+from pipeline.maths.soundings import receive_angle
 from pipeline.maths.targets import Family, TargetModel
 from pipeline.maths.unknowns import SIX, State, Surface
 from pipeline.mounts import mount_of
@@ -203,7 +204,7 @@ class Scene:
         points = seen.points
         own = xyz(points, f"{sensor}_m")
         ranges = np.linalg.norm(own, axis=1)
-        angle = np.arctan2(own[:, 0], -own[:, 2]) if sensor == "mbes" else np.arcsin(own[:, 2] / ranges)
+        angle = receive_angle(own) if sensor == "mbes" else np.arcsin(own[:, 2] / ranges)
         if sensor != state.calibrated:
             placed = coarse_placed = xyz(points, "target_m")
             coarse_residual = seen.v_m

@@ -25,6 +25,21 @@ class Origin(Model):
     longitude_deg: Annotated[float, Field(ge=-180, le=360)]
     height_m: Annotated[float, Field(ge=-1000, le=10000, description="ellipsoidal")]
 
+    @model_validator(mode="before")
+    @classmethod
+    def _not_interchanged(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        one, other = given.get("latitude_deg"), given.get("longitude_deg")
+        if not isinstance(one, (int, float)) or not isinstance(other, (int, float)):
+            return given
+        if abs(one) > 90 >= abs(other):
+            raise ValueError(
+                f"latitude_deg = {one:g} is no latitude: is it the longitude? Write latitude_deg: {other:g} and "
+                f"longitude_deg: {one:g}"
+            )
+        return given
+
 
 class Letters(Model):
     """The patent's target by design: CONVENTIONS.md, "The target"."""
@@ -52,6 +67,11 @@ class Letters(Model):
     def shape(self) -> str:
         """Which settings give the shape, for people."""
         return "target.a, b, c, e and low_side"
+
+    @property
+    def sides(self) -> str:
+        """Which setting tells left from right."""
+        return "target.low_side"
 
 
 class FaceSettings(Model):
@@ -99,6 +119,10 @@ class Faces(Model):
     @property
     def shape(self) -> str:
         return "target.faces"
+
+    @property
+    def sides(self) -> str:
+        return "the sign of y in target.faces"
 
 
 def _kind(value: Any) -> str:

@@ -9,11 +9,12 @@ import pandas as pd
 
 from pipeline import config
 from pipeline.causes import causes, estimated
-from pipeline.maths.consistency import consistency_limit
+from pipeline.checking.cast import doubts
+from pipeline.judging.residual_tests import Tables, off
 from pipeline.mounts import PARAMETERS
+from pipeline.screen import plural
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
-FAR_M = 0.05  # a mean residual beyond this is no drift: the model is another
 WORDS_OF_GROUP = {
     "laser": "laser points",
     "mbes_vertical": "soundings on vertical faces",
@@ -33,12 +34,6 @@ NO_DRIFT = "ins.drift concedes the INS no drift at all: give its figures before 
 ODD_DRIFT = 1.2  # drift found, in sigmas of ins.drift
 ODD_SPEED_M_S = 3.0  # and a head's sound speed so far beyond the cast's
 FEWEST = 30  # soundings on a family of faces
-PLACES = {
-    "face": "on face {face}",
-    "angle": "from {low:.0f}° to {high:.0f}°",
-    "distance": "from {low:.0f} to {high:.0f} m",
-    "time": "for ten seconds (GPS {low:.0f})",
-}
 
 
 @dataclass(frozen=True)
@@ -58,17 +53,22 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Settings:
-    """What it is judged by: limits of the sigmas, level of the tests, the method that is the result; ``farthest``:
-    angle (degrees) and lever arm (m) beyond which no mount is taken for labelling; ``drift_doubt``: what speaks against
-    the session's ins.drift, or nothing; ``shape``: the settings that give the target's shape."""
+    """What it is judged by: limits of the sigmas, level of the tests and what they tolerate, the method that is the
+    result; ``farthest``: angle (degrees) and lever arm (m) beyond which no mount is taken for labelling;
+    ``drift_doubt``: what speaks against the session's ins.drift, or nothing; ``shape``: the settings that give the
+    target's shape, ``sides``: that which tells its left from its right; ``asked``: what to do about a mount far off
+    that was measured right."""
 
     limits: config.Verdict
     test_level: float
+    tolerated_m: float
     chosen: config.Method
     farthest: tuple[float, float]
     drift_doubt: str
     shape: str
     calibrated: Literal["mbes", "laser"] = "mbes"
+    sides: str = "the target's left and right"
+    asked: str = ""
 
 
 def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settings: Settings) -> list[str]:
@@ -84,10 +84,10 @@ def reasons(evidence: Evidence, methods: Mapping[str, Mapping[str, Any]], settin
     if not summary["converged"]:
         found.append(f"the adjustment did not converge in {summary['iterations']} steps")
     found += _few(cells)
-    tests = [] if summary["test_passed"] else [_inconsistency(summary, cells, settings.shape)]
-    tests += _patterns(evidence, settings.test_level)
-    likely = _causes(evidence.freed)
-    found += tests
+    names = evidence.faces["name"].tolist()
+    tests = off(Tables(evidence.patterns, names, settings.shape, settings.tolerated_m), settings.test_level)
+    likely = _causes(evidence.freed, any(one.alone for one in tests))
+    found += [one.words for one in tests]
     if (tests or likely) and settings.drift_doubt:
         found.append(settings.drift_doubt)
     found += likely + _away(evidence.freed)
@@ -107,15 +107,18 @@ def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
         better = pose["rival_agreement_m2"] > pose["agreement_m2"]
         how = "better" if better else "nearly as well"
         remedy = "check" if better else "let the laser see the wall's top edge; check"
+        sides = str(pose["rival"]).startswith("left and right exchanged")
+        remedy += f" {settings.sides} first, then" if sides and better else ""
         found.append(
             f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {how} "
             f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} target.origin (a "
-            f"height wrong by e or 2 e, half a period or a whole one, does this), azimuth_deg, and {shape}"
+            f"height wrong by e or 2 e, half a period or a whole one, does this), azimuth_deg, and {shape}; poolcal "
+            "check tells which"
         )
     if not pose["within"]:
         found.append(
             "no pose of the target within the search limits fits the laser points: target.origin or target.azimuth_deg "
-            "is farther off than segment.search_... allow"
+            "is farther off than segment.search_... allow; poolcal check tells by how much"
         )
     if not mount["within"] and settings.calibrated == "laser":
         found.append(
@@ -128,7 +131,7 @@ def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
             f"no mount within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings the soundings onto the "
             f"target{_beyond(mount, farthest)}: mbes.mount is farther off than segment.search_mount_deg and "
             f"search_mount_m allow (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
-            "18 s behind GPS time)"
+            f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{settings.asked}"
         )
     if mount["ambiguous"]:
         found.append(
@@ -147,73 +150,26 @@ def _beyond(mount: pd.Series, farthest: tuple[float, float]) -> str:
     return f"; best fits {', '.join(off)}" if off else ""
 
 
-def _inconsistency(summary: Any, cells: pd.DataFrame, shape: str) -> str:
-    """The cell that lies off most; and whether the other sensor lies off there as well."""
-    worst = cells.iloc[int(cells["normalised"].abs().argmax())]
-    place = (cells["family"] == worst["family"]) & (cells["pass"] == worst["pass"])
-    other = cells[place & (cells["sensor"] != worst["sensor"])]["mean_m"]
-    both = bool(len(other)) and float(other.iloc[0]) * worst["mean_m"] > worst["mean_m"] ** 2 / 4
-    one, another = ("the laser", "the sonar") if worst["sensor"] == "laser" else ("the sonar", "the laser")
-    also = f" and {another} {1000 * other.iloc[0]:+.1f} mm" if both else ""
-    if abs(worst["mean_m"]) > FAR_M:
-        cause = f"wrong {shape}, or a coarse mount farther off than segment searches"
-    elif both:
-        cause = "drift of the INS in that pass, or its clock: sail again, in shorter time"
-    elif worst["sensor"] == "mbes":
-        cause = "the sonar's clock, the sound speed, or a bracket that moved"
-    else:
-        cause = "a wrong laser.mount, the laser's clock, or INS drift between the passes"
-    return (
-        f"the passes do not agree: in pass {worst['pass']} {one} lies {1000 * worst['mean_m']:+.1f} mm{also} "
-        f"off {worst['family']} (statistic {summary['test_statistic']:.0f}, limit {summary['test_limit']:.0f}); likely "
-        f"{cause}"
-    )
-
-
 def _few(cells: pd.DataFrame) -> list[str]:
     """Families with so few soundings that their labels cannot be trusted; with none at all they are not used."""
     count = cells[cells["sensor"] == "mbes"].groupby("family")["count"].sum()
     return [
-        f"only {number} soundings lie on {family}: too few to trust; sail so that the fan covers it"
+        f"only {number} soundings lie on {family}: too few to trust; sail so that the fan covers it (poolcal check "
+        "tells why so few hit it)"
         for family, number in count.items()
         if number < FEWEST
     ]
 
 
-def pattern_tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
-    """By what the residuals were binned: statistic Σ normalised², its degrees of freedom and its limit."""
-    found = []
-    for by, rows in patterns.groupby("by", sort=True):
-        statistic, dof = float((rows["normalised"] ** 2).sum()), len(rows)
-        limit = consistency_limit(dof, level)
-        found.append({"by": str(by), "statistic": statistic, "dof": dof, "limit": limit, "passed": statistic <= limit})
-    return found
-
-
-def _patterns(evidence: Evidence, level: float) -> list[str]:
-    """The bin that lies off most, of each variable along which the residuals are not what noise leaves."""
-    found = []
-    for test in pattern_tests(evidence.patterns, level):
-        if not test["passed"]:
-            rows = evidence.patterns[evidence.patterns["by"] == test["by"]]
-            worst = rows.iloc[int(rows["normalised"].abs().argmax())]
-            sensor = {"laser": "the laser", "mbes": "the sonar"}[worst["sensor"]]
-            face = evidence.faces["name"].iloc[int(worst["low"])] if test["by"] == "face" else ""
-            place = PLACES[test["by"]].format(face=face, low=worst["low"], high=worst["low"] + worst["width"])
-            found.append(
-                f"residuals go with {test['by']}: {place} {sensor} lies {1000 * worst['mean_m']:+.1f} mm off "
-                f"{worst['family']} (statistic {test['statistic']:.0f}, limit {test['limit']:.0f})"
-            )
-    return found
-
-
-def _causes(freed: pd.DataFrame) -> list[str]:
-    """The parameter that the residuals ask to be another, and how many more they would ask for instead."""
+def _causes(freed: pd.DataFrame, alone: bool) -> list[str]:
+    """The parameter that the residuals ask to be another, and how many more they would ask for instead; ``alone``: some
+    points have been named that lie off by themselves, and may be all that it is."""
     found = causes(freed)
     if not found:
         return []
-    others = f"; {len(found) - 1} other parameter(s) would explain it less well" if len(found) > 1 else ""
-    return [f"likely cause of residuals ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
+    others = f"; {plural(len(found) - 1, 'other parameter')} would explain it less well" if len(found) > 1 else ""
+    unless = ", if it is not what lies off by itself" if alone else ""
+    return [f"likely cause of residuals{unless} ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
 
 
 def _away(freed: pd.DataFrame) -> list[str]:
@@ -316,7 +272,8 @@ def one_eyed(passes: Sequence[Mapping[str, Any]]) -> list[str]:
     ):
         numbers = [str(one["pass"]) for one in passes if one[seen] and not one[missing]]
         if numbers:
-            found.append(f"pass{'es' * (len(numbers) > 1)} {', '.join(numbers)}: {words}; was it recording?")
+            which = plural(len(numbers), "pass").partition(" ")[2]
+            found.append(f"{which} {', '.join(numbers)}: {words}; was it recording?")
     return found
 
 
@@ -326,7 +283,7 @@ def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str,
     (a sixtieth for a degree at 45°)."""
     if mbes.svp is None:
         return []
-    found = []
+    found = [] if mbes.svp_from is None else list(doubts(mbes.svp_from, _span(files), None))
     speeds = [speed for _, speed in mbes.svp]
     low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
     if max(low - max(speeds), min(speeds) - high) > ODD_SPEED_M_S:
@@ -341,6 +298,12 @@ def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str,
             "values found as mbes.mount and run again"
         )
     return found
+
+
+def _span(files: pd.DataFrame) -> tuple[int, int]:
+    """First and last sounding, GPS time."""
+    own = files[(files["sensor"] == "mbes") & (files["first_ns"] >= 0)]
+    return int(own["first_ns"].min()), int(own["last_ns"].max())
 
 
 def _so(sigma: Mapping[str, float] | None) -> str:

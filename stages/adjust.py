@@ -12,7 +12,7 @@ from pipeline import artefacts, config
 from pipeline.adjusting import Adjusted, Given, adjust, noise_of
 from pipeline.considered import considered_of, correlated
 from pipeline.ins_sigmas import drift_of
-from pipeline.looking import Cells, look
+from pipeline.looking import Cells, drift_rows, look
 from pipeline.maths.rigid_design import Known
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.ties import of_ties
@@ -81,12 +81,13 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
     known = Given(noise_of(ins), _ties(model, config.as_built))
     found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
-    seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
-    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
+    of_drift = drift_rows(found.drift, noise_of(ins), inputs.poses, inputs.passes)
+    seen = look(streams, scene, found, settings, of_drift, SHOWN)
+    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built, model.depth_m)
     together = correlated(found.state.names, config.laser)
     coarse = mount_of(config.mbes.mount)
     return Outputs(
-        **tables(found, seen.cells, sigmas, together, coarse, settings, inputs.poses, inputs.passes),
+        **tables(found, seen.cells, seen.patterns, sigmas, together, coarse, settings, inputs.poses, inputs.passes),
         geometry=_geometry_table(found, seen.cells, inputs, config, ins),
         patterns=seen.patterns,
         residuals=seen.residuals,

@@ -163,14 +163,14 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
     Hashes again everything that it read and wrote, and lists what is not as recorded.
     """
     from pipeline.executor import workers
+    from pipeline.screen import plural
     from pipeline.verify import verify as problems_of
 
     with workers(jobs) as pool:
         problems = problems_of(load(calibrated_in(run_folder)), run_folder, pool)
     for problem in problems:
         say(problem, sys.stdout)
-    many = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
-    say(many if problems else f"{run_folder}: everything is as recorded", sys.stdout)
+    say(plural(len(problems), "problem") if problems else f"{run_folder}: everything is as recorded", sys.stdout)
     return 1 if problems else 0
 
 
@@ -184,23 +184,9 @@ def view(
 
     Nothing is served beyond this machine.
     """
-    from pipeline import folder
-    from pipeline.files import temporary_folder
-    from stages.drawing import Painters
-    from stages.views import recordings_of, show
+    from stages.viewing import view as open_viewer
 
-    if stage is not None and stage not in ORDER:
-        raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
-    if second is None:
-        folder.read_settings(first)
-        say_failures(Painters(report=False, recordings=True).draw(first))
-        return show(recordings_of(first, stage))
-    if stage is not None:
-        raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
-    with temporary_folder() as place:
-        path = place / "pair.rrd"
-        save_pair(first, second, comparison(first, second), path)
-        return show([path])
+    return open_viewer(first, second, stage)
 
 
 @app.command()
@@ -251,6 +237,7 @@ def history(
     Writes history.html, history.csv and history.parquet.
     """
     from pipeline.history import Filter, read_history, write_history
+    from pipeline.screen import plural
 
     chosen = Filter(name, since.date() if since else None, until.date() if until else None)
     found = read_history(folder, chosen)
@@ -258,7 +245,9 @@ def history(
     write_history(found, target, chosen)
     for problem in found.unreadable:
         say(f"left out: {problem}", sys.stderr)
-    say(f"{len(found.table)} sessions: {target / 'history.html'}", sys.stdout)
+    if found.without:
+        say(found.without, sys.stdout)
+    say(f"{plural(len(found.table), 'session')}: {target / 'history.html'}", sys.stdout)
     return 0
 
 

@@ -19,6 +19,23 @@ SPEAKERS = ("typer", "click", "rich")  # print the help by themselves
 interrupts: list[int] = []
 
 
+WANTED = {  # what an option that is left out must name
+    "--config": "--config FILE: the pool's YAML file, which says where the target is; begin with configs/defaults.yaml",
+    "--run": "--run RUN: the folder for the results, outside the session folder",
+    "--session": "--session SESSION: the folder with session.yaml",
+}
+
+
+def _usage(error: typer.TyperException) -> str:
+    """A command line that cannot be meant: what is wrong with it, and where its help is."""
+    command = getattr(getattr(error, "ctx", None), "command_path", "poolcal")
+    option = next(iter(getattr(getattr(error, "param", None), "opts", ())), "")
+    words = " ".join(error.format_message().split()).rstrip(".")
+    if words.startswith("Missing option") and option in WANTED:
+        words = f"missing: {WANTED[option]}"
+    return f"{words or 'nothing to do'}; see {command} --help"
+
+
 def status_of(command: Callable[[], Any], debug: bool) -> int:
     """The exit status of a command; nothing is raised. ``debug``: show the traceback of bad input as well."""
     try:
@@ -32,8 +49,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
         say(f"poolcal: {error}", sys.stderr)
         return 2
     except typer.TyperException as error:
-        usage = " ".join(error.format_message().split())
-        say(f"poolcal: {usage or 'nothing to do'}; see poolcal --help", sys.stderr)
+        say(f"poolcal: {_usage(error)}", sys.stderr)
         return 2
     except Exception as error:
         if interrupts:  # a library that was being loaded has made another error of it

@@ -98,6 +98,7 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
         sensor, valid = soundings.points_in_mbes(
             columns["two_way_time_s"],
             columns["angle_rad"],
+            columns["transmit_tilt_rad"],
             columns["sound_speed_m_s"],
             mbes.sound_speed_m_s,
             None if mbes.projector_offset_m is None else np.array(mbes.projector_offset_m),
@@ -169,7 +170,8 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
                 )
             raise RawDataError(
                 f"{sensor}: no point within {config.georeference.box_margin_m:g} m of the target ({why}); "
-                f"check target.origin, target.azimuth_deg and {sensor}.mount"
+                f"check target.origin, target.azimuth_deg and {sensor}.mount: poolcal check tells which sign, clock or "
+                "height would bring points there"
             )
     quaternion = quaternion_from_rotation(prepared.trajectory.R_frame_from_body)
     poses = pd.DataFrame({"t_ns": prepared.trajectory.t_ns})

@@ -82,7 +82,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     if len(dry.voxel_means_m) < 50:
         raise RawDataError(
             f"laser: {len(dry.voxel_means_m)} places seen above the water near the target, at least 50 are needed; "
-            "check target.origin, target.water_level_m and laser.mount"
+            "check target.origin, target.water_level_m and laser.mount; poolcal check tells which of them"
         )
     known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
     target = find_target(dry, model, config.segment, known)
@@ -229,7 +229,8 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
             mount = f"the coarse mount by more than {limits}, " if sensor == "mbes" else ""
             raise RawDataError(
                 f"{sensor}: no point on the target's faces ({why}); target.origin, target.azimuth_deg (of +y) "
-                f"or {config.target.shape} may be wrong, {mount}or a clock (UTC is 18 s behind GPS time)"
+                f"or {config.target.shape} may be wrong, {mount}or a clock (UTC is 18 s behind GPS time); "
+                "poolcal check tells which"
             )
     return Outputs(_faces(prepared.model), _target_pose(prepared.target), _mount(prepared.mount), counts)
 

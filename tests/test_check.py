@@ -158,9 +158,8 @@ SBET = {"ins": {"rate_hz": 100.0, "format": "sbet"}}
 
 def test_utc_taken_for_gps_shows_in_when_sensors_ran(spoilt: Callable[..., Path]) -> None:
     session = spoilt(**SBET)
-    _shift_ins(session, -18.0)  # the INS in UTC: both others are ahead
-    said = ("laser: its clock is 18 s ahead of", "mbes: its clock is 18 s ahead of", "UTC and GPS time are mixed up")
-    only(session, "clock", *said)
+    _shift_ins(session, -18.0)  # the INS in UTC
+    only(session, "clock", "ins: its clock is 18 s behind both sensors'", "UTC and GPS time are mixed up")
 
 
 def test_a_clock_is_told_from_the_target_where_all_ran_on(spoilt: Callable[..., Path]) -> None:
@@ -172,17 +171,29 @@ def test_a_clock_is_told_from_the_target_where_all_ran_on(spoilt: Callable[..., 
     assert abs(float(said.split("clock is ")[1].split(" s")[0]) - 7.0) < 1.0  # the origin is 0.2 m off along the track
 
 
-@pytest.mark.parametrize(("weeks", "said"), [(-1, "1 week ahead"), (2, "2 weeks behind")])
+@pytest.mark.parametrize(("weeks", "said"), [(-1, "1 week behind"), (2, "2 weeks ahead of")])
 def test_a_wrong_week(spoilt: Callable[..., Path], weeks: int, said: str) -> None:
     session = spoilt(**SBET)
     edit(session / "session.yaml", "ins", gps_week=2418 + weeks)
-    only(session, "clock", f"laser: its clock is {said}", f"mbes: its clock is {said}", "gps_week")
+    week = f"write ins.gps_week: 2418 in place of {2418 + weeks}"
+    only(session, "clock", f"ins: its clock is {said} both sensors'", week)
 
 
 def test_a_time_zone(spoilt: Callable[..., Path]) -> None:
     session = spoilt(**SBET)
     _shift_ins(session, 8 * 3600.0)
-    only(session, "clock", "8 hours behind", "time zone")
+    only(session, "clock", "8 hours ahead of both sensors'", "time zone")
+
+
+@pytest.mark.parametrize(
+    ("days", "said"),
+    [(-2, ("2 days behind", "all of a Sunday: they are seconds of the day")), (1, ("1 day ahead", "check the clocks"))],
+)
+def test_whole_days(spoilt: Callable[..., Path], days: int, said: tuple[str, ...]) -> None:
+    """Seconds of the day in place of the week are those of a Sunday; the session is of a Tuesday."""
+    session = spoilt(**SBET)
+    _shift_ins(session, days * 86_400.0)
+    only(session, "clock", *said)
 
 
 @pytest.mark.calibrates
@@ -194,7 +205,9 @@ def test_a_clock_off_by_milliseconds(spoilt: Callable[..., Path], sensor: str, l
     only(session, "latency", f"{sensor}: its clock is", "ahead of" if latency_ms < 0 else "behind", " ms ")
     said = checked(session)[1][0]["words"]
     assert abs(float(said.split(" is ")[1].split(" ms")[0]) - abs(latency_ms)) < 8
-    assert abs(float(said.split("add ")[1].split()[0]) + latency_ms / 1000) < 0.008
+    low, high = (float(number) for number in said.split(" (")[1].split(" ms, 95 %")[0].split(" to "))
+    assert low - 8 < abs(latency_ms) < high + 8
+    assert f"{sensor}_latency]" in said or "set ins.latency_s within that" in said
 
 
 def test_one_recording_twice(spoilt: Callable[..., Path]) -> None:

@@ -7,18 +7,22 @@ import pandas as pd
 import pytest
 
 from pipeline.config import Drift, Mbes, Verdict
-from pipeline.verdict import Evidence, Settings, cast_doubts, drift_doubt, one_eyed, pattern_tests, reasons, warnings
+from pipeline.judging.residual_tests import passes_test, pattern_tests
+from pipeline.maths.excess import limit_of
+from pipeline.verdict import Evidence, Settings, cast_doubts, drift_doubt, one_eyed, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 LEVEL = 0.001
 ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
 
 
-ADJUSTED = Settings(Verdict(), LEVEL, "adjustment", (4.5, 0.45), "", "target.a, b, c, e and low_side")
+ADJUSTED = Settings(Verdict(), LEVEL, 0.003, "adjustment", (4.5, 0.45), "", "target.a, b, c, e and low_side")
 IN_TURN = replace(ADJUSTED, chosen="patent_alternating")
 LIMITS = ((0.006, 6e-4), (0.0059, 5.9e-4))  # either side of SIGMA's largest
 FIGURES = ("horizontal_m", "vertical_m", "roll_pitch_deg", "heading_deg")
 DRIFTS = "the INS drifts at least 1.2 times as far as ins.drift says: "
+OFF = {"normalised": 3.5}  # beyond the limit of one row, 3.29
+PASS_3 = {"by": "pass", "low": 3.0, "mean_m": -0.012, "normalised": -4.0}
 CLOCK = {"sigma": 3e-4, "considered": 4e-4}
 
 
@@ -41,9 +45,6 @@ def evidence(pose=None, mount=None, summary=None, alternating=None, held=None, b
         "reason": "",
         "converged": True,
         "iterations": 6,
-        "test_passed": True,
-        "test_statistic": 1.0,
-        "test_limit": 60.0,
     }
     row = {"method": "patent_alternating", "reason": "", "converged": True, "iterations": 9}
     cells = pd.DataFrame(
@@ -51,13 +52,11 @@ def evidence(pose=None, mount=None, summary=None, alternating=None, held=None, b
             "sensor": ["laser", "mbes", "mbes"],
             "family": ["P1", "P2", "P2"],
             "pass": [0, 3, 4],
-            "mean_m": [0.001, -0.012, 0.001],
-            "normalised": [0.3, -4.0, 0.2],
             "count": [5000, 400, count],
         }
     )
     nothing = {"unknown": "sound_speed", "estimated": False, "considered": 1e-4, "value": 2e-4, "sigma": 1e-4}
-    bins = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 5.0, "mean_m": 0.001}
+    bins = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     return Evidence(
         pd.DataFrame({"name": ["P1-0", "P2"]}),
         pd.DataFrame([pose_row | (pose or {})]),
@@ -67,7 +66,7 @@ def evidence(pose=None, mount=None, summary=None, alternating=None, held=None, b
         cells,
         pd.DataFrame([("remedy", "two more passes at 3 m would do")], columns=["kind", "words"]),
         pd.DataFrame([nothing | (held or {})]),
-        pd.DataFrame([bins | {"normalised": 0.3} | (bin_ or {})]),
+        pd.DataFrame([bins | {"normalised": 0.3} | one for one in bin_ or [{}]]),
     )
 
 
@@ -97,21 +96,28 @@ def test_a_good_session_has_no_reason():
             {"mount": {"within": False, "rotation_z_deg": -4.6, "lever_arm_z_m": 0.6}},
             "onto the target; best fits -4.60° in yaw, +0.60 m in lever arm z: mbes.mount is farther off",
         ),
-        ({"bin_": {"by": "face", "low": 1.0, "normalised": 3.5}}, "residuals go with face: on face P2 the sonar lies"),
+        ({"bin_": [OFF | {"by": "face", "low": 1.0}]}, "residuals go with face: on face P2 the sonar lies +1.0 mm"),
         ({"pose": {"within": False}}, "target.origin or target.azimuth_deg is farther off"),
         (
             {"summary": {"reason": "the data leave 2 directions open"}},
             "no result: the data leave 2 directions open; two more passes at 3 m would do",
         ),
         ({"count": -371}, "only 29 soundings lie on P2"),
-        ({"bin_": {"normalised": 3.5}}, "residuals go with angle: from 20° to 25° the sonar lies +1.0 mm off P2"),
-        ({"bin_": {"by": "distance", "normalised": -3.5}}, "from 20 to 25 m the sonar lies"),
+        ({"bin_": [OFF]}, "residuals go with angle: between receive angles 20° and 22° the sonar lies +1.0 mm off P2"),
+        ({"bin_": [OFF | {"sensor": "laser"}]}, "between elevations 20° and 22° the laser lies"),
+        ({"bin_": [OFF | {"by": "distance", "normalised": -3.5}]}, "from 20 to 22 m the sonar lies"),
+        ({"bin_": [OFF | {"by": "time"}]}, "for ten seconds (GPS 20) the sonar lies"),
+        ({"bin_": [OFF | {"by": "step"}]}, "at a receive angle of 20° the sonar's distance from P2 steps by +1.0 mm"),
+        (
+            {"bin_": [OFF | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "low": 1.0}]},
+            "pass 1, the INS must be wrong there by -0.115° about the vertical more than in the other passes (3.5",
+        ),
         ({"held": {"value": 6e-4}}, "the sound speed: it is +0.06 ± 0.01 % above that recorded"),
         ({"held": {"unknown": "mbes_latency", "value": 0.02}}, "the sonar's clock: its latency is +20.0 ± 0.1 ms more"),
         ({"held": {"unknown": "laser_rotation_y", "value": -0.01}}, "it should be turned by -0.573 ± 0.006° about"),
         ({"held": {"unknown": "wet_H_shift", "value": 0.02}}, "that are horizontal lie higher by +20.0 ± 0.1 mm"),
         ({"summary": {"converged": False}}, "did not converge in 6 steps"),
-        ({"summary": {"test_passed": False}}, "in pass 3 the sonar lies -12.0 mm off P2"),
+        ({"bin_": [PASS_3]}, "in pass 3 the sonar lies -12.0 mm off P2 against the other passes (4.0 sigma"),
     ],
 )
 def test_each_evidence_is_one_reason(change, words):
@@ -121,7 +127,7 @@ def test_each_evidence_is_one_reason(change, words):
 
 
 def test_where_labels_are_in_doubt_nothing_else_is_judged():
-    doubtful = evidence(pose={"ambiguous": True}, summary={"converged": False, "test_passed": False})
+    doubtful = evidence(pose={"ambiguous": True}, summary={"converged": False}, bin_=[PASS_3])
     assert len(reasons(doubtful, methods(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=1e-6)))) == 1
 
 
@@ -150,11 +156,8 @@ def test_a_patent_form_as_the_result_is_held_to_the_adjustment(alternating, pate
 
 
 def test_both_sensors_off_together_is_the_ins():
-    found = evidence(summary={"test_passed": False})
     for laser, expected in ((-0.011, "and the laser -11.0 mm off P2"), (0.011, "sonar lies -12.0 mm off P2")):
-        cells = found.cells.copy()
-        cells.loc[len(cells)] = ["laser", "P2", 3, laser, -2.0, 900]
-        (reason,) = judged(replace(found, cells=cells))
+        (reason,) = judged(evidence(bin_=[PASS_3, PASS_3 | {"sensor": "laser", "mean_m": laser, "normalised": -2.0}]))
         assert expected in reason
         assert ("drift of the INS" in reason) == (laser < 0)
 
@@ -237,10 +240,10 @@ def test_a_pass_that_one_sensor_missed_is_said():
 def test_an_ins_that_is_conceded_no_drift_is_looked_at_first():
     still = replace(ADJUSTED, drift_doubt=drift_doubt(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0))))
     assert reasons(evidence(), methods(), still) == []
-    found = reasons(evidence(summary={"test_passed": False}, held={"value": 6e-4}), methods(), still)
+    found = reasons(evidence(bin_=[OFF], held={"value": 6e-4}), methods(), still)
     assert found[1].startswith("ins.drift concedes the INS no drift at all")
-    assert found[2].startswith("likely cause")
-    assert len(judged(evidence(summary={"test_passed": False}))) == 1
+    assert found[2].startswith("likely cause of residuals (6 sigma)")
+    assert len(judged(evidence(bin_=[PASS_3]))) == 1
 
 
 def drift(sigmas):
@@ -260,11 +263,55 @@ def test_an_ins_that_drifts_farther_than_its_figures(sigmas, far):
     assert drift_doubt(drift(sigmas).iloc[:0], Drift()) == ""
 
 
-def test_each_variable_has_its_own_test():
-    rows = [{"by": by, "normalised": n} for by, n in (("angle", 3.0), ("angle", 0.0), ("face", 3.5))]
-    angle, face = pattern_tests(pd.DataFrame(rows), LEVEL)
-    assert (angle["by"], angle["statistic"], angle["dof"], angle["passed"]) == ("angle", 9.0, 2, True)
-    assert (face["passed"], face["limit"]) == (False, pytest.approx(10.83, abs=0.01))
+def table(*rows):
+    return pd.DataFrame([{"by": by, "normalised": normalised} for by, normalised in rows])
+
+
+def test_all_variables_have_one_limit():
+    """Šidák over all three rows, not over those of a variable."""
+    limit = limit_of(3, LEVEL)
+    assert limit == pytest.approx(3.588, abs=0.001)
+    just, beyond = 0.999 * limit, -1.001 * limit
+    angle, face = pattern_tests(table(("angle", just), ("angle", 0.0), ("face", beyond)), LEVEL)
+    assert angle == {"by": "angle", "statistic": just, "dof": 2, "limit": limit, "passed": True}
+    assert (face["statistic"], face["dof"], face["passed"]) == (-beyond, 1, False)
+
+
+def test_the_consistency_of_passes_is_of_residuals_and_of_drift():
+    agreed = passes_test(table(("pass", 1.0), ("drift", -3.0), ("face", 9.0)), LEVEL)
+    assert (agreed["statistic"], agreed["dof"], agreed["passed"]) == (3.0, 2, True)
+    assert agreed["limit"] == limit_of(3, LEVEL)
+    assert not passes_test(table(("pass", 1.0), ("drift", -3.7)), LEVEL)["passed"]
+    alone = passes_test(table(("face", 9.0)), LEVEL)
+    assert (alone["statistic"], alone["dof"], alone["passed"]) == (0.0, 0, True)
+
+
+def test_what_lies_farthest_off_comes_first():
+    """A step of ten millimetres shows by angle as well: named once, by what shows it best."""
+    bins = [{"normalised": 6.0}, {"by": "step", "normalised": -15.0, "mean_m": -0.0101}, PASS_3 | {"normalised": -5.0}]
+    first, second = judged(evidence(bin_=bins))
+    assert "steps by -10.1 mm (15.0 sigma beyond 3 mm, limit 3.6)" in first
+    assert first.endswith("; residuals by angle lie beyond it too")
+    assert second.startswith("the passes do not agree")
+
+
+@pytest.mark.parametrize(
+    ("family", "mean_m", "low", "tilted"),
+    [("P3", 0.013, 20.0, True), ("P3", 0.013, 23.0, True), ("P3", 0.013, 24.0, False), ("P3", -0.013, 20.0, False)],
+)
+def test_steps_to_both_sides_are_transmit_sectors(family, mean_m, low, tilted):
+    step = {"by": "step", "normalised": -15.0, "mean_m": -0.014, "family": "P1"}
+    other = step | {"family": family, "mean_m": mean_m, "low": low, "normalised": 9.0}
+    (reason,) = judged(evidence(bin_=[step, other]))
+    assert ("P1 steps by -14.0 mm, and from P3 by +13.0 mm (15.0" in reason) == tilted
+    assert ("transmit sectors of different tilt" in reason) == tilted
+
+
+def test_a_cause_of_all_points_is_told_apart_from_what_is_off_by_itself():
+    held = {"value": 6e-4}
+    assert "likely cause of residuals (6 sigma)" in judged(evidence(bin_=[OFF], held=held))[1]
+    words = "likely cause of residuals, if it is not what lies off by itself (6 sigma)"
+    assert words in judged(evidence(bin_=[OFF | {"by": "step"}], held=held))[1]
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ TRAJECTORY = Artefact(
     "ingest", "trajectory", "table", "INS solution, time ascending, unusable records left out",
     (
         T_NS,
-        Column("latitude_rad", F64, "rad", "geodetic latitude, WGS 84"),
-        Column("longitude_rad", F64, "rad", "longitude, WGS 84"),
+        Column("latitude_rad", F64, "rad", "geodetic latitude, in the datum of the INS"),
+        Column("longitude_rad", F64, "rad", "longitude, in the datum of the INS"),
         Column("height_m", F64, "m", "ellipsoidal height"),
         Column("roll_rad", F64, "rad", "starboard down +"),
         Column("pitch_rad", F64, "rad", "bow up +"),
@@ -36,7 +36,8 @@ SOUNDINGS = Artefact(
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number in the ping, from 0 at port"),
         Column("two_way_time_s", F64, "s", "two-way travel time"),
-        Column("angle_rad", F64, "rad", "across-track angle from the array's normal, starboard +"),
+        Column("angle_rad", F64, "rad", "angle of the receive beam from the array's normal, starboard +"),
+        Column("transmit_tilt_rad", F64, "rad", "along-track angle of the transmit fan from the normal, forward +"),
         Column("sound_speed_m_s", F64, "m/s", "sound speed the head worked with"),
     ),
 )

@@ -1,13 +1,16 @@
 """Clocks compared by when sensors ran: offsets that have a name, such as a week, hours of a time zone, leap seconds."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.days import whole_days
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import Seen
 from pipeline.passes import pass_of, split_at_gaps
+from pipeline.screen import plural
 from pipeline.times import NS, WEEK_NS, utc_text
 
 Times = NDArray[np.int64]
@@ -18,6 +21,7 @@ LEAPS = {  # s
     17: "the leap seconds are those of 2015",
 }
 HOUR_NS = 3_600 * NS
+NO_WEEKS: Mapping[str, int | None] = {}
 FARTHEST_H = 14
 ENOUGH, MOST = 0.9, 0.99  # of a sensor's time in which the INS runs: as it is, and with a named offset
 
@@ -37,19 +41,53 @@ def covered(t_ns: Times, stretches: Sequence[tuple[int, int]]) -> float:
     return float(np.mean(pass_of(t_ns, starts, ends) >= 0))
 
 
-def apart(epochs: Mapping[str, Times], max_gap_ns: int, files: Sequence[Seen]) -> Iterator[Finding]:
-    """Sensors that did not run while the INS did."""
+@dataclass(frozen=True)
+class Offset:
+    """How far a clock is from the INS's, what that is called and calls for; ``weeks``: where it is whole weeks."""
+
+    how: str
+    ahead: bool
+    why: str
+    weeks: int = 0
+
+    def words(self, to_the_ins: bool, week: int | None, key: str, whose: str = "the INS's") -> str:
+        """Of the clock of a sensor against the INS's, or (``to_the_ins`` false) of the INS's against theirs. ``week``:
+        the session's ``key``, from which another may follow."""
+        ahead = self.ahead == to_the_ins
+        why = self.why
+        if self.weeks and week is not None:
+            why = f"write {key}: {week - self.weeks * (1 if to_the_ins else -1)} in place of {week}"
+        return f"its clock is {self.how} {'ahead of' if ahead else 'behind'} {whose}: {why}"
+
+
+def apart(
+    epochs: Mapping[str, Times], max_gap_ns: int, files: Sequence[Seen], weeks: Mapping[str, int | None] = NO_WEEKS
+) -> Iterator[Finding]:
+    """Sensors that did not run while the INS did; what both are off by is the INS's. ``weeks``: gps_week by sensor."""
     ins = epochs["ins"]
     running = split_at_gaps(ins, max_gap_ns)
+    offsets = {
+        sensor: off
+        for sensor, t_ns in epochs.items()
+        if sensor != "ins" and (share := covered(t_ns, running)) < ENOUGH
+        if (off := _offset(t_ns, running, share < 1 - ENOUGH, len(split_at_gaps(t_ns, max_gap_ns)) > 1))
+    }
+    both = list(offsets.values())
+    if len(both) == 2 and both[0] == both[1]:
+        words = both[0].words(False, weeks.get("ins"), "ins.gps_week", "both sensors'")
+        yield Finding("clock", f"ins: {words} (ins from {utc_text(ins[0])}, {_from(epochs)})")
+        return
+    third = len(epochs) == 3 and len(both) == 1
     for sensor in ("laser", "mbes"):
         t_ns = epochs.get(sensor, np.empty(0, np.int64))
         share = covered(t_ns, running) if len(t_ns) else 1.0
         if share >= ENOUGH:
             continue
         spans = f"ins {utc_text(ins[0])} to {utc_text(ins[-1])}, {sensor} {utc_text(t_ns[0])} to {utc_text(t_ns[-1])}"
-        words = _offset(t_ns, running, share < 1 - ENOUGH, len(split_at_gaps(t_ns, max_gap_ns)) > 1)
-        if words:
-            yield Finding("clock", f"{sensor}: its clock is {words} ({spans})")
+        if sensor in offsets:
+            whose = f"the INS's and {'the sonar' if sensor == 'laser' else 'the laser'}'s" if third else "the INS's"
+            words = offsets[sensor].words(True, weeks.get(sensor), f"{sensor}.gps_week", whose)
+            yield Finding("clock", f"{sensor}: {words} ({spans})")
         elif share < 1 - ENOUGH:
             yield Finding("clock", f"{sensor}: has no time in common with the INS ({spans}); check the clocks")
         else:
@@ -65,19 +103,21 @@ def apart(epochs: Mapping[str, Times], max_gap_ns: int, files: Sequence[Seen]) -
             )
 
 
+def _from(epochs: Mapping[str, Times]) -> str:
+    return ", ".join(f"{sensor} from {utc_text(epochs[sensor][0])}" for sensor in ("laser", "mbes") if sensor in epochs)
+
+
 def _amount(offset_ns: int) -> str:
     """
     >>> _amount(18 * NS), _amount(-2 * WEEK_NS)
-    ('18 s ahead of', '2 weeks behind')
+    ('18 s', '2 weeks')
     """
     size = abs(offset_ns)
     how = plural(size // WEEK_NS, "week") if size >= WEEK_NS and size % WEEK_NS == 0 else f"{size / NS:g} s"
-    if size % HOUR_NS == 0 and size < WEEK_NS:
-        how = plural(size // HOUR_NS, "hour")
-    return f"{how} {'ahead of' if offset_ns > 0 else 'behind'}"
+    return plural(size // HOUR_NS, "hour") if size % HOUR_NS == 0 and size < WEEK_NS else how
 
 
-def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses: bool) -> str:
+def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses: bool) -> Offset | None:
     """By how much the sensor's clock is off, if an offset that has a name brings it into the INS's time; else nothing.
 
     Weeks and hours only where nothing was in common; leap seconds there, and where the sensor paused: one that did not,
@@ -90,15 +130,18 @@ def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses
         return covered(t_ns - offset_ns, running) >= MOST
 
     if apart and weeks and fits(weeks * WEEK_NS):
-        return f"{_amount(weeks * WEEK_NS)} the INS's: check gps_week, and the GPS time flag of the export"
+        why = "check gps_week, and the GPS time flag of the export"
+        return Offset(_amount(weeks * WEEK_NS), weeks > 0, why, weeks)
+    if apart and (days := whole_days((running[0][0], running[-1][1]), (int(t_ns[0]), int(t_ns[-1])), fits)):
+        return Offset(*days)
     leaps = [sign * leap * NS for leap in LEAPS for sign in (1, -1)] if apart or pauses else []
     for offset_ns in leaps:
         if fits(offset_ns):
-            return f"{_amount(offset_ns)} the INS's: {named(offset_ns / NS)}; set the clock's time scale"
+            return Offset(_amount(offset_ns), offset_ns > 0, f"{named(offset_ns / NS)}; set the clock's time scale")
     if apart:
         hours = [h for h in range(-FARTHEST_H, FARTHEST_H + 1) if h and fits(h * HOUR_NS)]
         if hours:
             least, most = min(hours, key=abs), max(hours, key=abs)
             amount = _amount(most * HOUR_NS) if least == most else f"{abs(least)} to {_amount(most * HOUR_NS)}"
-            return f"{amount} the INS's: a time zone; export in UTC or GPS time"
-    return ""
+            return Offset(amount, most > 0, "a time zone; export in UTC or GPS time")
+    return None

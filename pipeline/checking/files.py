@@ -2,13 +2,16 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.cast import doubts
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
+from pipeline.maths.geodesy import ecef_from_geodetic
+from pipeline.screen import plural
 from pipeline.times import utc_text
 
 SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock
@@ -17,6 +20,8 @@ CUT = ("truncated", "truncated message", "truncated packet", "truncated record",
 FAR_M = 10_000.0  # from a scanner: coordinates of a CRS
 SPEEDS_M_S = (1400.0, 1560.0)
 DIFFERENT_M_S = 5.0
+FAR_ARM_M = 5.0  # of a bracket that is rigid to millimetres
+NAMES = ("latitude_rad", "longitude_rad", "height_m")
 
 
 def unreadable(files: Sequence[Seen], wrong: Sequence[str]) -> Iterator[Finding]:
@@ -42,12 +47,8 @@ def unreadable(files: Sequence[Seen], wrong: Sequence[str]) -> Iterator[Finding]
 
 def twice(files: Sequence[Seen]) -> Iterator[Finding]:
     """Files of one sensor that hold the same time."""
-    for one, other in combinations([seen for seen in files if len(seen.epochs_ns) > 1], 2):
-        if one.sensor != other.sensor:
-            continue
+    for one, other in _overlapping([seen for seen in files if len(seen.epochs_ns) > 1]):
         first = max(one.span_ns[0], other.span_ns[0])
-        if first >= min(one.span_ns[1], other.span_ns[1]):
-            continue
         common = np.count_nonzero(np.isin(one.epochs_ns, other.epochs_ns, assume_unique=True))
         share = float(common / min(len(one.epochs_ns), len(other.epochs_ns)))
         if share < TWICE:
@@ -59,6 +60,19 @@ def twice(files: Sequence[Seen]) -> Iterator[Finding]:
         tiles = one.sensor == "laser" and not same
         words = f"{other.name}: {what}, from {utc_text(first)}; {advice}"
         yield Finding("twice", words, "look" if tiles else "fault")
+
+
+def _overlapping(files: Sequence[Seen]) -> Iterator[tuple[Seen, Seen]]:
+    """Pairs of one sensor whose times overlap, each in the order of the list. Of many files few do."""
+    order = {id(seen): k for k, seen in enumerate(files)}
+    running: list[Seen] = []
+    for seen in sorted(files, key=lambda seen: (seen.sensor, seen.span_ns[0])):
+        start, end = seen.span_ns
+        running = [one for one in running if one.sensor == seen.sensor and one.span_ns[1] > start]
+        for one in running if end > start else ():
+            first, second = sorted((one, seen), key=lambda seen: order[id(seen)])
+            yield first, second
+        running.append(seen)
 
 
 def ins_rate(files: Sequence[Seen]) -> Iterator[Finding]:
@@ -104,6 +118,41 @@ def frames(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
                 f"{seen.name}: its points lie {away:.4g} m from their origin, but laser.frame is EPSG:4978 (from the "
                 "earth's centre): write laser.frame: laser if they are in the scanner's own frame",
             )
+        elif session.laser.frame != "laser":
+            yield from _elsewhere(seen, files, session.laser.frame)
+
+
+def _elsewhere(laser: Seen, files: Sequence[Seen], frame: str) -> Iterator[Finding]:
+    """Points of a CRS, which are in ECEF by now, far from where the boat was: the zone may be another."""
+    of_ins = [seen.columns for seen in files if seen.sensor == "ins" and seen.records]
+    if not of_ins:
+        return
+    boat = np.median(
+        ecef_from_geodetic(*(np.concatenate([one[name] for one in of_ins]) for name in NAMES)), axis=0
+    )
+    points = np.median(np.column_stack([laser.columns[axis] for axis in ("x_m", "y_m", "z_m")]), axis=0)
+    away = float(np.linalg.norm(points - boat))
+    if away > FAR_M:
+        yield Finding(
+            "frame",
+            f"{laser.name}: its points lie {away / 1000:.3g} km from the INS's track with laser.frame {frame}: another "
+            "zone, or interchanged axes? Write the CRS that they were exported in",
+        )
+
+
+def far_arms(session: SessionConfig) -> Iterator[Finding]:
+    """Lever arms as long as a boat: they may be in another unit."""
+    for sensor in ("laser", "mbes"):
+        settings = getattr(session, sensor)
+        for key in ("x_m", "y_m", "z_m") if settings is not None else ():
+            value = getattr(settings.mount, key)
+            if abs(value) > FAR_ARM_M:
+                yield Finding(
+                    "lever arm",
+                    f"{sensor}: {sensor}.mount.{key} = {value:g} is {abs(value):g} m from the INS: is it in cm "
+                    f"({value / 100:g} m)?",
+                    "look",
+                )
 
 
 def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
@@ -134,6 +183,22 @@ def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Findi
                 "it is this day's cast",
                 "look",
             )
+
+
+def cast(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
+    """A cast's file of another day, or of another place."""
+    if session.mbes is None or session.mbes.svp_from is None:
+        return
+    times = [seen.span_ns for seen in files if seen.sensor == "mbes" and len(seen.epochs_ns)]
+    span = (min(first for first, _ in times), max(last for _, last in times)) if times else None
+    ins = next((seen.columns for seen in files if seen.sensor == "ins" and seen.columns), None)
+    place = None if ins is None else (_degrees(ins["latitude_rad"]), _degrees(ins["longitude_rad"]))
+    for words in doubts(session.mbes.svp_from, span, place):
+        yield Finding("sound speed", words, "look")
+
+
+def _degrees(angles_rad: NDArray[np.float64]) -> float:
+    return float(np.degrees(np.median(angles_rad)))
 
 
 def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:

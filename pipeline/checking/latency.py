@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.checking.finding import Finding
+from pipeline.mounts import WITHIN_95
 
 SIGMAS, LEAST_S = 4.0, 0.005  # far enough from zero, and worth a word
 SAME = 3.0  # sigmas within which two offsets are one, of the INS
@@ -32,15 +33,30 @@ def latencies(freed: pd.DataFrame) -> Iterator[Finding]:
         (one, its), (other, others) = found.values()
         if abs(one - other) < SAME * np.hypot(its, others):
             both = (one / its**2 + other / others**2) / (1 / its**2 + 1 / others**2)
-            said = f"ins: its clock is {_said(-both)} both sensors': add {-both:.3f} to ins.latency_s"
-            yield Finding("latency", said)
+            sigma = 1 / np.hypot(1 / its, 1 / others)
+            yield Finding(
+                "latency",
+                f"ins: its clock is {_said(-both)} both sensors' ({_between(-both, sigma)}), as the target's planes "
+                "sway with the boat: find what delays it, and set ins.latency_s within that",
+            )
             return
     for sensor, (seconds, sigma) in found.items():
         yield Finding(
             "latency",
-            f"{sensor}: its clock is {_said(seconds)} the INS's (sigma {1000 * sigma:.1f} ms), as the target's planes "
-            f"sway with the boat: add {seconds:.3f} to {sensor}.latency_s, and see what delays it",
+            f"{sensor}: its clock is {_said(seconds)} the INS's ({_between(seconds, sigma)}), as the target's planes "
+            f"sway with the boat: find what delays it; for its amount run with adjust.free: [{sensor}_latency], which "
+            f"uses all the points, and add what that finds to {sensor}.latency_s",
         )
+
+
+def _between(seconds: float, sigma: float) -> str:
+    """From the sample alone, 95 %.
+
+    >>> _between(-0.0204, 0.001)
+    '18.4 to 22.4 ms, 95 %'
+    """
+    low, high = sorted(abs(1000 * seconds) + side * 1000 * WITHIN_95 * sigma for side in (-1, 1))
+    return f"{low:.1f} to {high:.1f} ms, 95 %"
 
 
 def _said(ahead_s: float) -> str:

@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.checking.examine import Examined
+from pipeline.checking.expected import USUAL
+from pipeline.checking.ins_quality import Quality
 from pipeline.checking.survey import Seen
+from pipeline.maths.targets import names_in_order
 from pipeline.times import utc_text
 
 
@@ -17,6 +20,7 @@ def text(examined: Examined) -> str:
     lines += [_file_line(seen, width) for seen in examined.files]
     if any(seen.share < 1 or not seen.ended for seen in examined.files):
         lines.append("~: read in part")
+    lines += _quality_lines(examined.quality)
     if examined.legs:
         head = f"{'pass':<6}{'from (UTC)':<22}{'seconds':>8}{'distance':>10}{'speed':>10}{'laser':>8}{'sonar':>8}"
         lines += ["", head]
@@ -34,6 +38,21 @@ def text(examined: Examined) -> str:
     if not examined.findings:
         lines.append("Nothing found.")
     return "\n".join(lines)
+
+
+def _quality_lines(found: Quality) -> list[str]:
+    """What the INS says of itself; nothing where it says nothing."""
+    lines = []
+    for name, kinds in found.by_file.items():
+        for counts in kinds.values():
+            shares = (f"{state} {number / counts.total():.0%}" for state, number in counts.most_common())
+            lines.append(f"{name}: {', '.join(shares)}")
+    if found.sigmas:
+        units = {name: "°" if name.endswith("deg") else " m" for name in found.sigmas}
+        axes = {name: name.rpartition("_")[0].replace("_", " and ") for name in found.sigmas}
+        said = ", ".join(f"{axes[name]} {sigma:.2g}{units[name]}" for name, sigma in found.sigmas.items())
+        lines.append(f"ins, by its own sigmas {'in the passes' if found.of_passes else 'in the whole log'}: {said}")
+    return lines
 
 
 def _by_face(examined: Examined) -> list[dict[str, Any]]:
@@ -54,10 +73,12 @@ def _soundings_lines(examined: Examined) -> list[str]:
     faces = _by_face(examined)
     if not faces:
         return []
-    lines = ["", f"{'soundings on':<14}{'expected':>10}{'found':>10}"]
-    for family in dict.fromkeys(str(face["family"]) for face in faces):
+    lines = ["", f"{'soundings on':<22}{'expected':>10}{'found':>10}   share ({USUAL})"]
+    order = names_in_order(examined.model.families) if examined.model is not None else ()
+    for family in [family.name for family in order if any(face["family"] == family.name for face in faces)]:
         expected, found = (sum(f[key] for f in faces if f["family"] == family) for key in ("expected", "found"))
-        lines.append(f"{family:<14}{'~' + str(expected):>10}{'~' + str(found):>10}")
+        share = f"{found / expected:.0%}" if expected else "-"
+        lines.append(f"{family:<22}{'~' + str(expected):>10}{'~' + str(found):>10}{share:>8}")
     return lines
 
 
@@ -65,9 +86,17 @@ def _file_line(seen: Seen, width: int) -> str:
     about = "" if seen.share == 1.0 and seen.ended else "~"
     first, last = (utc_text(t) for t in seen.span_ns) if len(seen.epochs_ns) else ("-", "-")
     last = last[11:] if last[:10] == first[:10] else last
-    rate = f"{seen.rate_hz:.4g} Hz" if np.isfinite(seen.rate_hz) else "-"
+    rate = _rate(seen.rate_hz) if np.isfinite(seen.rate_hz) else "-"
     records = f"{about}{seen.records}"
     return f"{seen.sensor:<7}{seen.name:<{width + 2}}{seen.kind:<24}{records:>11}  {first:<21}{last:<10}{rate:>9}"
+
+
+def _rate(rate_hz: float) -> str:
+    """
+    >>> _rate(10638.7), _rate(199.98), _rate(9.9)
+    ('10600 Hz', '200 Hz', '9.9 Hz')
+    """
+    return f"{float(f'{rate_hz:.3g}'):.15g} Hz"
 
 
 def as_json(examined: Examined) -> str:
@@ -90,6 +119,8 @@ def as_json(examined: Examined) -> str:
             }
             for seen in examined.files
         ],
+        "ins_states": examined.quality.by_file,
+        "ins_sigmas": examined.quality.sigmas,
         "soundings": _by_face(examined),
         "passes": [
             {

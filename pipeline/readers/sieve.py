@@ -17,12 +17,13 @@ Mask = NDArray[np.bool_]
 
 INS_COLUMNS = ("t_ns", "latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
 LASER_COLUMNS = ("t_ns", "x_m", "y_m", "z_m")
-MBES_COLUMNS = ("t_ns", "ping", "beam", "two_way_time_s", "angle_rad", "sound_speed_m_s")
+MBES_COLUMNS = ("t_ns", "ping", "beam", "two_way_time_s", "angle_rad", "transmit_tilt_rad", "sound_speed_m_s")
 SIGMA_COLUMNS = ("t_ns", "north_m", "east_m", "up_m", "roll_deg", "pitch_deg", "heading_deg")
 TYPES = {"t_ns": np.int64, "ping": np.int64, "beam": np.int16}
 
 FIRST_WEEK, LAST_WEEK = 1000, 5000  # as in config: March 1999 to 2075
 MAX_ANGLE_RAD = 1.2 * np.pi / 2
+MAX_TILT_RAD = np.pi / 4
 MIN_SPEED_M_S, MAX_SPEED_M_S = 1300.0, 1700.0
 MAX_TRAVEL_S = 20.0
 MAX_HEIGHT_M = 20_000.0
@@ -124,6 +125,7 @@ def keep_possible_soundings(sieve: Sieve) -> None:
     time = sieve["two_way_time_s"]
     sieve.keep((time > 0) & (time < MAX_TRAVEL_S), "impossible travel time")
     sieve.keep(np.abs(sieve["angle_rad"]) <= MAX_ANGLE_RAD, "impossible angle")
+    sieve.keep(np.abs(sieve["transmit_tilt_rad"]) <= MAX_TILT_RAD, "impossible tilt")
 
 
 @dataclass

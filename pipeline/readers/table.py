@@ -8,7 +8,8 @@ comma, semicolon or tab; numbers with a decimal point):
     ins           latitude_deg, longitude_deg, height_m (ellipsoidal), roll_deg (starboard down +),
                   pitch_deg (bow up +), heading_deg (clockwise from true north)
     laser         x_m, y_m, z_m                     in the frame that session.yaml names
-    mbes          ping, beam, angle_deg (starboard +), sound_speed_m_s, and two_way_time_s or range_m (one way)
+    mbes          ping, beam, angle_deg (starboard +), sound_speed_m_s, and two_way_time_s or range_m (one way);
+                  transmit_tilt_deg (along track, forward +) where the transmit fan is tilted: 0 without the column
 
 A CSV row of the wrong number of columns, and a last line without line end (it may be cut off), are left out and
 counted. A word where a number should be is refused, as are times and positions that have been stored as float32.
@@ -57,6 +58,7 @@ class TablePart:
     sensor: Sensor
     frame: Frame
     latency_s: float
+    max_records: int | None = None
 
     def chunks(self) -> Iterator[Chunk]:
         dropped: Counter[str] = Counter()
@@ -64,7 +66,7 @@ class TablePart:
         canonical = CANONICAL[self.sensor]
         first = True
         with opened(self.path, self.name) as file:
-            for batch in batches(file, self.name, self.sensor, dropped):
+            for batch in batches(file, self.name, self.sensor, dropped, self.max_records):
                 columns = _numpy(batch, dropped)
                 if first:
                     refuse_float32(columns, self.name)
@@ -125,6 +127,8 @@ def _to_poses(sieve: Sieve) -> None:
 def _to_soundings(sieve: Sieve) -> None:
     sieve.keep((sieve["beam"] >= 0) & (sieve["beam"] <= np.iinfo(np.int16).max), "impossible beam")
     sieve.columns["angle_rad"] = np.radians(sieve["angle_deg"])
+    tilt_deg = sieve.columns.get("transmit_tilt_deg", np.zeros(len(sieve)))
+    sieve.columns["transmit_tilt_rad"] = np.radians(tilt_deg)
     if "two_way_time_s" not in sieve.columns:
         sieve.columns["two_way_time_s"] = 2 * sieve["range_m"] / sieve["sound_speed_m_s"]
     keep_possible_soundings(sieve)

@@ -13,7 +13,7 @@ from pipeline.adjusting import Given, adjust, free_unknowns, noise_of
 from pipeline.considered import considered_of
 from pipeline.ins_sigmas import drift_of
 from pipeline.laser_fit import bounds_of, coarse_covariance, design_of, held_of
-from pipeline.looking import look
+from pipeline.looking import drift_rows, look
 from pipeline.maths.rigid_design import of_design
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
@@ -67,14 +67,15 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     streams = {"laser": inputs.laser_labelled}
     known = Given(noise_of(ins), partial(of_design, design_of(model, inputs.target_pose, fit)), held)
     found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
-    seen = look(streams, scene, found, settings.moment_s, settings.test_tolerance_m, SHOWN)
+    of_drift = drift_rows(found.drift, noise_of(ins), inputs.poses, inputs.passes)
+    seen = look(streams, scene, found, settings, of_drift, SHOWN)
     sigmas = considered_of(found.state.names, config.laser, None, config.as_built)
     kept = np.setdiff1d(np.arange(SIX), found.solution.free)
     sigmas[kept] = np.sqrt(np.diag(coarse))[kept]
     blocks = [(kept, coarse[np.ix_(kept, kept)])] if len(kept) else []
     mount = mount_of(config.laser.mount)
     return Outputs(
-        **tables(found, seen.cells, sigmas, blocks, mount, settings, inputs.poses, inputs.passes),
+        **tables(found, seen.cells, seen.patterns, sigmas, blocks, mount, settings, inputs.poses, inputs.passes),
         geometry=_geometry_table(refused),
         patterns=seen.patterns,
         residuals=seen.residuals,

@@ -23,8 +23,10 @@ from pipeline.blocks import (
 from pipeline.built import as_found, by_design, oddities
 from pipeline.finding import FARTHEST
 from pipeline.ins_sigmas import drift_of, told
+from pipeline.judging.residual_tests import pattern_tests
 from pipeline.mounts import PARAMETERS, mount_of, target_of
-from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, pattern_tests, reasons, warnings
+from pipeline.screen import verdict_in_words
+from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons, warnings
 
 
 @dataclass(frozen=True)
@@ -84,17 +86,20 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
     from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
     drift, level = drift_of(config.ins, inputs.ins_sigmas, inputs.passes), config.adjust.test_level
+    tolerated = config.adjust.test_tolerance_m
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest = (FARTHEST * config.segment.search_laser_deg, np.inf)
-    given = Settings(config.verdict, level, "adjustment", farthest, doubt, config.target.shape, "laser")
+    given = Settings(config.verdict, level, tolerated, "adjustment", farthest, doubt, config.target.shape, "laser")
     found = reasons(evidence, {"adjustment": block}, given)
     built = as_found(inputs.planes, inputs.patterns, model)
     target = target_block(inputs.target_pose.iloc[0]) | {"as_found": built}
     methods = {"adjustment": block}
+    verdict = "rejected" if found else "accepted"
     result = {
         "schema": SCHEMA,
         "session": config.name,
-        "verdict": "rejected" if found else "accepted",
+        "verdict": verdict,
+        "verdict_in_words": verdict_in_words(verdict, held),
         "reasons": found,
         "warnings": warnings(inputs.groups, target, inputs.geometry, block["sigma_mount_total"])
         + ([doubt] if doubt not in ("", NO_DRIFT, *found) else [])

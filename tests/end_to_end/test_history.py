@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.end_to_end.pages import Page
 from tests.end_to_end.places import Told, poolcal
 
 HOSTILE = '<script>alert("x")</script> & 水池 ' + "n" * 100
@@ -20,7 +21,9 @@ def planted(folder: Path, template: Path, name: str, day: int, **changes: Any) -
     result = json.loads((template / "report" / "calibration.json").read_text(encoding="utf-8"))
     result["session"] = changes.get("session", name)
     result["verdict"] = changes.get("verdict", "accepted")
-    result["passes"][0]["start_utc"] = f"2026-05-{day:02d}T08:00:00Z"
+    result["passes"][0]["start_utc"] = f"2026-05-{day:02d}T{changes.get('hour', 8):02d}:00:00Z"
+    if changes.get("laser"):
+        result["calibrated"] = "laser"
     shift = changes.get("z_m", 0.0)
     for block in (result["mbes"], result["methods"]["adjustment"]):
         block["lever_arm_m"][2] += shift
@@ -189,3 +192,20 @@ def test_no_folder(tmp_path: Path) -> None:
     told = poolcal("history", tmp_path / "none")
     assert told.status == 2
     assert "RUNS_DIR" in told.err
+
+
+def test_sessions_of_one_day_are_told_apart_lasers_named(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    folder, template = tmp_path / "runs", undisturbed[0]
+    planted(folder, template, "12_harbour_launch_north", 1, hour=8)
+    planted(folder, template, "afternoon", 1, hour=14)
+    planted(folder, template, "laser_alone", 2, laser=True)
+    told = poolcal("history", folder)
+    assert (told.status, told.err) == (0, "")
+    lines = told.out.splitlines()
+    assert lines[0] == "1 laser run not shown: laser_alone"
+    assert lines[1].startswith("2 sessions: ")
+    html = (folder / "history" / "history.html").read_text(encoding="utf-8")
+    assert "1 laser run not shown: laser_alone." in html
+    assert "12_<wbr>harbour_<wbr>launch_<wbr>north" in html  # a name is broken between words alone
+    times = [row[1] for row in Page(html).table("no.", "date (UTC)")]
+    assert times == ["2026-05-01 08:00", "2026-05-01 14:00"]
