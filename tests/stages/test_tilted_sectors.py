@@ -118,3 +118,13 @@ def test_hidden_tilts_from_ping_to_ping_are_warned_of():
     session = made(by_ping(0.0, 0.3), seed=22)
     hidden = result_of(session, raw=without_tilts(session))
     assert any("whole pings scatter" in words for words in hidden["warnings"])
+
+
+@pytest.mark.thorough
+def test_one_tilt_hidden_in_all_sectors_shows_nowhere():
+    """README says so: it is taken for a yaw of the head, which is rolled by -48.8°."""
+    session = made({"mbes": {"format": "parquet", "sectors": [{"to_deg": 90.0, "tilt_deg": -0.75}]}}, seed=22)
+    hidden = result_of(session, raw=without_tilts(session))
+    assert hidden["verdict"] == "accepted"
+    yaw_deg = hidden["mbes"]["mount"]["yaw_deg"] - session.truth["mbes"]["mount"]["yaw_deg"]
+    assert yaw_deg == pytest.approx(-0.72, abs=0.05)
