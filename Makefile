@@ -8,6 +8,7 @@ RUN      =
 A        =
 B        =
 JOBS     =
+OVERWRITE =
 SEED     = 1
 
 POOLCAL := .venv/bin/poolcal
@@ -47,7 +48,7 @@ GIVEN = $(foreach name,SESSION CONFIG RUN,$(if $($(name)),,$(error $(name)= is m
 
 calibrate: $(SETUP) ## all stages that are out of date: SESSION= CONFIG= RUN=
 	@:$(GIVEN)
-	$(POOLCAL) run '$(SESSION)' --config '$(CONFIG)' --run '$(RUN)' $(if $(JOBS),--jobs $(JOBS))
+	$(POOLCAL) run '$(SESSION)' --config '$(CONFIG)' --run '$(RUN)' $(if $(JOBS),--jobs $(JOBS)) $(if $(OVERWRITE),--overwrite)
 
 diff: $(SETUP) ## compare two runs: A= B=
 	@:$(foreach name,A B,$(if $($(name)),,$(error $(name)= is missing: make diff A=runs/x B=runs/y)))

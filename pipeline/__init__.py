@@ -6,8 +6,10 @@ over parts of a stream instead (:mod:`pipeline.executor`).
 """
 
 import os
+from pathlib import Path
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"
 
+CONFIGS = Path(__file__).parents[1] / "configs"  # beside the packages, also where they are installed
 __version__ = "0.1.0"

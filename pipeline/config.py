@@ -4,8 +4,9 @@ Two files are read: the pool's config (target, thresholds) and the session's (in
 Both keep the units of the contract (degrees, metres); code that computes converts at once to radians.
 """
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -21,6 +22,7 @@ from pipeline.quantities import (
 )
 from pipeline.session_settings import INSTRUMENT as INSTRUMENT
 from pipeline.session_settings import Calibrated as Calibrated
+from pipeline.session_settings import CastUsed as CastUsed
 from pipeline.session_settings import Drift as Drift
 from pipeline.session_settings import Ins as Ins
 from pipeline.session_settings import InstrumentTitle as InstrumentTitle
@@ -172,14 +174,18 @@ def load_pool(path: Path) -> PoolConfig:
     return parse(PoolConfig, with_mesh(read_yaml(path), path), str(path))
 
 
-def load_session(folder: Path) -> SessionConfig:
-    """The session's config, checked."""
+def load_session(
+    folder: Path, with_cast: Callable[[dict[str, Any], Path], dict[str, Any]] | None = None
+) -> SessionConfig:
+    """The session's config, checked. ``with_cast``: puts a cast in the place of its file's name (readers/casts.py,
+    which the simulator must not come to through here); a session that names one cannot be loaded without."""
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
     from pipeline.instruments import applied  # here: it is made of the models above
 
     path = folder / "session.yaml"
     content, own = applied(read_yaml(path), folder)
+    content = content if with_cast is None else with_cast(content, folder)
     ins = content.get("ins")
     if isinstance(ins, dict) and "drift" in ins and "ins.drift" not in own:  # a preset's: what files tell goes first
         content = content | {"ins": {"drift_from": "files"} | ins}

@@ -15,10 +15,11 @@ from pipeline import artefacts, manifest
 from pipeline.drawn import agreeing
 from pipeline.errors import ArtefactError
 from pipeline.families import families_of, level_families
-from pipeline.folder import Settings, calibration, read_settings, refuse_other
+from pipeline.folder import Settings, as_written, calibration, read_settings, refuse_other
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.planes import angle_between
 from pipeline.mounts import PARAMETERS
+from pipeline.screen import summary
 from pipeline.tables import Tables
 from pipeline.verdict import SIX
 
@@ -51,13 +52,11 @@ class RunRead:
             if stage not in found:
                 raise ArtefactError(f"{path}: {stage} was made from other settings or results; run poolcal run again")
         result = calibration(path)
-        try:
+        with as_written(path):
             estimate_of(result)
             for name in ("inputs", "software"):
                 manifest.flattened(result[name])
-            str(result["session"])
-        except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
-            raise ArtefactError(f"{path}: its calibration.json is not as poolcal writes it; run it again") from error
+            summary(result)  # with --rrd
         return cls(path, read_settings(path), result, found)
 
 

@@ -10,12 +10,15 @@ import hashlib
 import json
 import os
 import shutil
+import stat
+import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from pipeline.errors import ArtefactError
 from pipeline.streams import Mapper, serial
 
+MOST_JSON_BYTES = 300_000_000
 _REMEDIES = {
     errno.ENOSPC: "make room and run again",
     errno.EDQUOT: "make room within the quota and run again",
@@ -23,6 +26,7 @@ _REMEDIES = {
     errno.EACCES: "mend its permissions or name another run folder",
     errno.EPERM: "mend its permissions or name another run folder",
     errno.EEXIST: "move what is in the way, or name another run folder",
+    errno.ELOOP: "remove the symbolic link that is in the way, or name another run folder",
     errno.ENOTDIR: "move what is in the way, or name another run folder",
 }
 
@@ -76,9 +80,86 @@ def remove(path: Path) -> None:
     """A file, link or folder, whether it is there or not."""
     with writing(path):
         if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
+            try:
+                shutil.rmtree(path)
+            except OSError as error:  # it names what it cannot remove by its last name alone
+                last = Path(error.filename).name if isinstance(error.filename, str) else path.name
+                place = path if last == path.name else f"{path} (its {last})"
+                raise OSError(error.errno, error.strerror, str(place)) from error
         else:
             path.unlink(missing_ok=True)
+
+
+def settle(folder: Path) -> None:
+    """Have the disk hold a finished folder, with all its files, before a rename says that it is complete."""
+    with writing(folder):
+        for place, _, names in os.walk(folder, topdown=False):
+            for name in names:
+                _sync(os.path.join(place, name))
+            settle_names(Path(place))
+
+
+def settle_names(folder: Path) -> None:
+    """Have the disk hold the names in a folder, as after a rename. (Some network disks refuse: their server sees to
+    it.)"""
+    with contextlib.suppress(OSError):
+        _sync(folder)
+
+
+def _sync(path: str | Path) -> None:
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """A file's content, of at most ``most`` bytes and one more: a longer one is the caller's to refuse.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, or is no regular file: a FIFO would be waited for without end, a device has no end.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with open(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(errno.EINVAL, "is no regular file", str(path))
+        return file.read(most + 1)
+
+
+def read_json(path: Path) -> object:
+    """What a JSON file of a run folder says.
+
+    Raises
+    ------
+    OSError
+        As :func:`read_regular`.
+    ValueError
+        It is no JSON, or nested too deeply.
+    """
+    content = read_regular(path, MOST_JSON_BYTES)
+    if len(content) > MOST_JSON_BYTES:
+        raise ValueError(f"has more than {MOST_JSON_BYTES:,} bytes")
+    try:
+        return json.loads(content.decode("utf-8"))
+    except RecursionError as error:
+        raise ValueError("is nested too deeply") from error
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder for the time being."""
+    try:
+        place = tempfile.TemporaryDirectory(prefix="poolcal-")
+    except OSError as error:
+        raise ArtefactError(
+            f"no temporary folder can be made ({error.strerror or error}); name one that can be written, with room: "
+            "TMPDIR=/some/folder poolcal ..."
+        ) from error
+    with place as name:
+        yield Path(name)
 
 
 def sha256(path: Path) -> str:
@@ -121,7 +202,7 @@ def _mark(path: Path) -> list[object]:
 def _read_memory(path: Path) -> dict[str, list[object]]:
     """A damaged memory is forgotten: it only saves time."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
     except (OSError, ValueError):
         return {}
     if not isinstance(content, dict):

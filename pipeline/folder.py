@@ -1,9 +1,10 @@
 """A run folder: locked while in use, every stage swapped in whole, what it was made from in run.yaml."""
 
 import contextlib
+import errno
 import fcntl
-import json
 import os
+import stat
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +15,10 @@ from pydantic import BaseModel
 
 from pipeline import config, manifest
 from pipeline.errors import ArtefactError, ConfigError
-from pipeline.files import remove, write_text, writing
+from pipeline.files import read_json, remove, settle, settle_names, write_text, writing
 from pipeline.mounts import target_of
 from pipeline.parsing import parse, read_yaml
+from pipeline.readers.casts import with_cast
 
 RUN_YAML = "run.yaml"
 LOCK = ".lock"
@@ -60,7 +62,7 @@ def load_settings(
     except ConfigError as error:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_faces(pool, config_path)
-    session = config.load_session(session_folder)
+    session = config.load_session(session_folder, with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
     elif calibrated == "mbes" and session.mbes is None:
@@ -84,8 +86,7 @@ def refuse_cast(target: config.Target, mbes: config.Mbes, path: Path) -> None:
     """A cast is of the water that the rays go through: at least of half the depth down to the target's lower end."""
     if mbes.svp is None:
         return
-    model = target_of(target)
-    depth = model.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in model.faces)
+    depth = target_of(target).depth_m
     first, last = mbes.svp[0][0], mbes.svp[-1][0]
     if min(last, depth) - first < depth / 2:
         raise ConfigError(
@@ -158,7 +159,7 @@ def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
         strangers = sorted(entry.name for entry in run.iterdir() if entry.name not in (LOCK, DIGESTS))
         if strangers and not (run / RUN_YAML).is_file() and strangers != [RUN_YAML + ".new"]:
             raise ArtefactError(f"{run}: holds {strangers[0]} but no {RUN_YAML}, so it is no run folder; name another")
-        file = (run / LOCK).open("a+", encoding="utf-8")
+        file = _opened(run / LOCK, os.O_RDWR | os.O_CREAT)
     with file:
         _lock(file, run, fcntl.LOCK_EX)
         with writing(run / LOCK):
@@ -174,13 +175,22 @@ def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
 def reading(run: Path) -> Iterator[None]:
     """Keep writers out while a run is checked. A folder that cannot be written needs no lock."""
     try:
-        file = (run / LOCK).open(encoding="utf-8")
+        file = _opened(run / LOCK, os.O_RDONLY)
     except OSError:
         yield
         return
     with file:
         _lock(file, run, fcntl.LOCK_SH)
         yield
+
+
+def _opened(lock: Path, how: int) -> TextIO:
+    """A run folder may come from somebody else: no link is followed, and nothing but a regular file is opened."""
+    handle = os.open(lock, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EEXIST, "is no regular file", str(lock))
+    return os.fdopen(handle, "r" if how == os.O_RDONLY else "r+", encoding="utf-8")
 
 
 def _lock(file: TextIO, run: Path, how: int) -> None:
@@ -204,13 +214,20 @@ def _old(stage: Path) -> Path:
     return stage.with_name(stage.name + ".old")
 
 
+def keeping(stage: Path) -> Path:
+    return stage.with_name(stage.name + ".keeping")
+
+
 def swap_in(stage: Path) -> None:
-    """The finished partial folder takes the stage's place. Killed at any step, :func:`recover` finds a whole result."""
+    """The finished partial folder takes the stage's place. Killed at any step, :func:`recover` finds a whole result;
+    and so it does after a power cut, for the disk holds every file before the first rename."""
+    settle(partial(stage))
     with writing(stage):
         remove(_old(stage))
         if os.path.lexists(stage):
             stage.rename(_old(stage))
         partial(stage).rename(stage)
+        settle_names(stage.parent)
     remove(_old(stage))
 
 
@@ -223,6 +240,7 @@ def recover(stage: Path) -> None:
                     candidate.rename(stage)
                     break
         remove(partial(stage))
+        remove(keeping(stage))
         if os.path.lexists(stage):
             remove(_old(stage))
 
@@ -239,12 +257,22 @@ def calibration(run: Path) -> dict[str, Any]:
     if run.is_file():
         raise ConfigError(f"{run}: is a file; RUN is a run folder, and stands first")
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
     except (OSError, ValueError) as error:
-        raise ArtefactError(f"{path}: cannot be read ({error}); run poolcal run again") from error
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise ArtefactError(f"{path}: cannot be read ({reason}); run poolcal run again") from error
     if not isinstance(content, dict) or content.get("verdict") not in ("accepted", "rejected"):
         raise ArtefactError(f"{path}: holds no verdict; run poolcal run again")
     return content
+
+
+@contextlib.contextmanager
+def as_written(run: Path) -> Iterator[None]:
+    """Where values are taken out of a run's calibration.json: one that somebody changed is an ArtefactError."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
+        raise ArtefactError(f"{run}: its calibration.json is not as poolcal writes it; run it again") from error
 
 
 def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b"") -> None:

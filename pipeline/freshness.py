@@ -14,6 +14,7 @@ from pipeline.executor import SERIAL, Workers
 from pipeline.files import Digests
 from pipeline.folder import Settings
 from pipeline.progress import Progress
+from pipeline.run import provenance
 
 SENSORS = ("ins", "laser", "mbes")
 EMPTY = hashlib.sha256().hexdigest()  # empty files are all alike: the readers say what they think of them
@@ -28,6 +29,7 @@ class Run:
     digests: Digests
     workers: Workers = SERIAL
     progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
+    raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # by sensor, as they were first asked for
 
     def folder(self, stage: str) -> Path:
         return self.path / stage
@@ -54,17 +56,32 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     inputs: dict[str, str] = {}
     for marker in declared(stage.Inputs).values():
         if isinstance(marker, Raw):
-            raw |= raw_digests(this, marker.sensor)
+            raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):
-            raw |= {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
+            raw |= all_raw(this)
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
     config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
-    return manifest.Key(config, raw, inputs, manifest.source_of(stage), manifest.versions())
+    if "mbes" in config:
+        raw |= cast_digest(this)
+    return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
+
+
+def raw_of(this: Run, sensor: str) -> dict[str, str]:
+    """Digests of one sensor's files as this run first found them: the later stages were made from these, and the report
+    tells these, whatever happens to the files meanwhile."""
+    if sensor not in this.raw:
+        this.raw[sensor] = raw_digests(this, sensor)
+    return this.raw[sensor]
+
+
+def all_raw(this: Run) -> dict[str, str]:
+    """Digests of all files that the session was read from."""
+    return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()} | cast_digest(this)
 
 
 def raw_digests(this: Run, sensor: str) -> dict[str, str]:
-    """Digest by file of one sensor, relative to the session folder."""
+    """Digest by file of one sensor, relative to the session folder, as the files are now."""
     root, settings = this.settings.session_folder, getattr(this.settings.session, sensor)
     if settings is None:
         return {}
@@ -79,6 +96,17 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
         if first.setdefault(digest, name) != name and digest != EMPTY:
             raise RawDataError(f"{name}: is the same as {first[digest]}; list one of the two under {sensor}.files")
     return found
+
+
+def cast_digest(this: Run) -> dict[str, str]:
+    """Of the file that the cast of sound speed came from; its depths are in the settings."""
+    used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
+    if used is None:
+        return {}
+    (digest,) = this.digests.of([this.settings.session_folder / used.file])
+    if digest != used.sha256:
+        raise RawDataError(f"{used.file}: is not the cast that this run was made with; run poolcal run again")
+    return {used.file: digest}
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:

@@ -1,5 +1,6 @@
 """What an INS says of its own accuracy (table ins_sigmas), and the drift that the adjustment concedes it by that."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,12 @@ def told(ins: config.Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dic
         return {}
     number = pass_of(*(table.to_numpy() for table in (ins_sigmas["t_ns"], passes["start_ns"], passes["end_ns"])))
     inside = ins_sigmas[number >= 0]
-    squares = {name: np.mean(inside[columns].to_numpy(np.float64) ** 2, axis=1) for name, columns in AXES.items()}
+    return rms({name: inside[name].to_numpy(np.float64) for columns in AXES.values() for name in columns})
+
+
+def rms(sigmas: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+    """The medians of the drift's figures by the sigmas' columns; those that are told."""
+    squares = {name: np.mean([sigmas[one] ** 2 for one in columns], axis=0) for name, columns in AXES.items()}
     known = {name: values[np.isfinite(values)] for name, values in squares.items()}
     return {name: float(np.sqrt(np.median(values))) for name, values in known.items() if len(values)}
 

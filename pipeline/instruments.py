@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, create_model
 
-from pipeline import config
+from pipeline import CONFIGS, config
 from pipeline.errors import ConfigError
 from pipeline.parsing import parse, read_yaml
 from pipeline.plan_settings import LaserFigures, MbesFigures, Plan
@@ -21,7 +21,7 @@ from pipeline.quantities import Model
 
 Sensor = Literal["ins", "laser", "mbes"]
 Block = dict[str, Any]
-PRESETS = Path(__file__).parents[1] / "configs" / "instruments"
+PRESETS = CONFIGS / "instruments"
 SENSORS: Mapping[Sensor, type[Model]] = {"ins": config.Ins, "laser": config.Laser, "mbes": config.Mbes}
 SETTINGS: Mapping[Sensor, tuple[str, ...]] = {  # what a preset may say, and the report shows
     "ins": ("drift", "white"),

@@ -4,29 +4,17 @@ A result is current when the same config section, the same input content, the sa
 versions of the libraries would be used again, and its files are still as they were written. Times are never compared.
 """
 
-import functools
 import hashlib
 import json
-import platform
-import subprocess
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from importlib import metadata
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-import pipeline
-from pipeline.files import sha256, write_text
+from pipeline.files import read_json, write_text
 
 NAME = "manifest.json"
 SCHEMA = 1
-LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "lazrs", "novatel-edie")
-ROOT = Path(pipeline.__file__).parent.parent
-NO_INFLUENCE = (  # of pipeline/: cannot change a result
-    "simulation/", "exports/", "pages/", "progress.py", "executor.py", "verify.py", "screen.py", "diff.py",
-    "history.py", "tables.py", "drawn.py", "maths/comparison.py",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -58,15 +46,22 @@ class Manifest:
 def read(folder: Path) -> Manifest | None:
     """The manifest in ``folder``; None when there is none, or none that makes sense."""
     try:
-        content = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        content: Any = read_json(folder / NAME)
         if content.pop("schema") != SCHEMA:
             return None
         manifest = Manifest(**content | {"key": Key(**content["key"])})
         plain = (manifest.key.config, manifest.key.raw, manifest.key.inputs, manifest.key.source, manifest.key.versions)
         good = all(isinstance(m, dict) for m in (*plain, manifest.rows, manifest.outputs))
+        good = good and all(isinstance(one, int) for one in manifest.rows.values()) and _are_counts(manifest.counts)
         return manifest if good and all(_is_file(*item) for item in manifest.outputs.items()) else None
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
+
+
+def _are_counts(counts: Any) -> bool:
+    of = {"source": str, "reason": str, "count": int}
+    rows = isinstance(counts, list) and all(isinstance(row, dict) for row in counts)
+    return rows and all(isinstance(row.get(key), kind) for row in counts for key, kind in of.items())
 
 
 def _is_file(name: str, entry: Any) -> bool:
@@ -101,53 +96,6 @@ def consistent(manifests: Mapping[str, Manifest]) -> bool:
         return digest == found.get(f"{artefact}.parquet", found.get(artefact))
 
     return all(holds(*item) for one in manifests.values() for item in one.key.inputs.items())
-
-
-# --- what a result follows from, beside its inputs -------------------------------------------------------------------
-@functools.cache
-def versions() -> dict[str, str]:
-    """Of Python, this program and the libraries that can change a digit."""
-    found = {"poolcal": pipeline.__version__, "python": platform.python_version()}
-    for name in LIBRARIES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-def source_of(stage: ModuleType) -> dict[str, str]:
-    """Digests of the stage's own files and of the library's."""
-    own = Path(str(stage.__file__))
-    files = list(own.parent.rglob("*")) if own.name == "__init__.py" else [own]
-    base = own.parent.parent.parent if own.name == "__init__.py" else own.parent.parent
-    mine = {path.relative_to(base).as_posix(): sha256(path) for path in files if _is_source(path)}
-    return dict(sorted({**_library(), **mine}.items()))
-
-
-@functools.cache
-def _library() -> dict[str, str]:
-    folder = Path(pipeline.__file__).parent
-    names = ((path.relative_to(folder).as_posix(), path) for path in folder.rglob("*") if _is_source(path))
-    return {f"pipeline/{name}": sha256(path) for name, path in names if not name.startswith(NO_INFLUENCE)}
-
-
-def _is_source(path: Path) -> bool:
-    hidden = any(part.startswith(".") or part == "__pycache__" for part in path.parts[-3:])
-    return path.is_file() and not hidden and path.suffix != ".pyc"
-
-
-@functools.cache
-def git_commit() -> str | None:
-    """The commit this program was checked out at, where git and a repository are there to tell."""
-    if not (ROOT / ".git").exists():
-        return None
-    command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
-    try:
-        answer = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return answer.stdout.strip() or None
 
 
 # --- reasons ---------------------------------------------------------------------------------------------------------

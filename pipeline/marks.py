@@ -17,6 +17,7 @@ from pipeline.errors import ConfigError, DegenerateGeometryError
 from pipeline.maths.rigid import FORWARD, STARBOARD, Axes, Frame, Survey, adjust, closed_form
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.snooping import LEVEL, LINE_RAD, fits, limit, sigma_about_line
+from pipeline.screen import plural
 
 Array = NDArray[np.float64]
 UNITS = {"mm": 1000.0, "cm": 100.0, "inches": 1 / 0.0254, "feet": 1 / 0.3048}  # how many of them are a metre
@@ -86,7 +87,8 @@ def examine(placed: Placed, where: str, present: Mapping[str, Array]) -> None:
         key = f"{where}: {name}.marks"
         count = len(frame.marks)
         if count < 3:
-            raise DegenerateGeometryError(f"{key}: {count} usable mark(s), and a rotation takes three; survey more")
+            few = plural(count, "usable mark")
+            raise DegenerateGeometryError(f"{key}: {few}, and a rotation takes three; survey more")
         sigma = np.degrees(sigma_about_line(placed.survey, frame))
         if not sigma <= np.degrees(LINE_RAD):
             known = f"known to {sigma:.0f}° only" if sigma < 90 else "not determined"

@@ -4,6 +4,7 @@ trimesh reads the files. A group's polygons make one face, their common outline,
 if they stood there, so that everything after knows polygons only and a run's settings hold what was used.
 """
 
+import io
 import operator
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from pipeline.errors import ConfigError
+from pipeline.files import read_regular
 
 Array = NDArray[np.float64]
 Polygon = Sequence[int]
@@ -61,9 +63,10 @@ def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
     if read is None:
         raise ConfigError(f"{where}: is neither .obj nor .ply; export it as one of them")
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise ConfigError(f"{where}: {path.stat().st_size} bytes; give the target's faces alone")
-        groups = read(path)
+        content = read_regular(path, MOST_BYTES)
+        if len(content) > MOST_BYTES:
+            raise ConfigError(f"{where}: more than {MOST_BYTES:,} bytes; give the target's faces alone")
+        groups = read(content, path)
     except OSError as error:
         raise ConfigError(f"{where}: cannot be read ({error.strerror}); check the path") from error
     except ConfigError:
@@ -81,20 +84,19 @@ def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
         yield name, _outline(vertices[used], own, f"{where}: group {name!r}")
 
 
-def _obj(path: Path) -> Groups:
+def _obj(content: bytes, path: Path) -> Groups:
     from trimesh.exchange.obj import load_obj
 
-    with path.open(encoding="utf-8", errors="replace") as file:
-        scene = load_obj(file, skip_materials=True, split_groups=True, split_objects=True)
+    text = io.StringIO(content.decode("utf-8", errors="replace"), newline=None)
+    scene = load_obj(text, skip_materials=True, split_groups=True, split_objects=True)
     meshes = scene.get("geometry", {"mesh": scene})
     return {name: (_array(one["vertices"]), np.asarray(one["faces"]).tolist()) for name, one in meshes.items()}
 
 
-def _ply(path: Path) -> Groups:
+def _ply(content: bytes, path: Path) -> Groups:
     from trimesh.exchange.ply import load_ply
 
-    with path.open("rb") as file:
-        mesh = load_ply(file)
+    mesh = load_ply(io.BytesIO(content))
     elements = mesh["metadata"]["_ply_raw"]["face"]
     columns, names = elements["data"], list(elements["properties"])
     if GROUP not in names:

@@ -1,4 +1,4 @@
-"""What the passes can tell and what not, in words, and which passes would cure it."""
+"""What the passes can tell and what not, in words, and which passes would help."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.solution import WORDS, Solution, solve, strongest
+from pipeline.maths.solution import WORDS, Solution, solve, together
 from pipeline.maths.unknowns import SIX
 from pipeline.plan_settings import Pass
 from pipeline.planning import Setting, predict
 
 Array = NDArray[np.float64]
-STRONG = 0.95  # a correlation above this leaves two unknowns hardly apart
 NEAR_M = 1.5  # passes whose distances differ by less are at one distance
 WANTED_DEG, WANTED_M = 0.025, 0.0025  # larger random sigmas are worth another pass
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
@@ -48,14 +47,12 @@ def geometry_of(setting: Setting, seen: Seen, normal: Array, solution: Solution)
     """``normal`` (u, u): the session's."""
     bounds, gaps = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3), _gaps(seen)
     sigma = _sigmas(normal, solution)
-    pair = None if solution.deficiency else strongest(solution.covariance[:SIX, :SIX])
-    if pair is not None and abs(pair[2]) <= STRONG:
-        pair = None
-    if not (gaps or pair or np.any(sigma > bounds)):
-        return Geometry([], "")
+    pair = None if solution.deficiency else together(solution.covariance[:SIX, :SIX])
+    if not (gaps or np.any(sigma > bounds)):
+        return Geometry([], "")  # where all are sure enough, two that move together do no harm
     among = range(SIX) if pair is None else pair[:2]
     target = max(among, key=lambda k: sigma[k] / bounds[k])
-    return Geometry(gaps, _remedy(setting, seen, normal, solution, target, bounds, pair))
+    return Geometry(gaps, _remedy(setting, seen, normal, solution, target, bounds))
 
 
 def _sigmas(normal: Array, solution: Solution) -> Array:
@@ -96,7 +93,6 @@ def _remedy(
     solution: Solution,
     target: int,
     bounds: Array,
-    pair: tuple[int, int, float] | None,
 ) -> str:
     """The distance at which two more passes would help most, and by how much; empty if none halves the sigma."""
     before = float(_sigmas(normal, solution)[target])
@@ -111,16 +107,11 @@ def _remedy(
         worst = float(np.max(sigma / bounds))
         if best is None or worst < best[0]:
             best = worst, distance, float(sigma[target])
-    apart = "" if pair is None else (
-        f"{WORDS[pair[0]]} and {WORDS[pair[1]]} cannot be told apart (correlation {pair[2]:+.3f}): "
-    )
     if best is None or best[2] > before / 2:
-        return apart.removesuffix(": ")
+        return ""
     was = "open" if before > VAGUE / 2 else _sized(before, target)
-    return (
-        f"{apart}two more passes at {best[1]:.0f} m would bring sigma {WORDS[target]} from {was} to "
-        f"{_sized(best[2], target)}"
-    )
+    now = _sized(best[2], target)
+    return f"two more passes at {best[1]:.0f} m would bring sigma {WORDS[target]} from {was} to {now}"
 
 
 def _sized(sigma: float, which: int) -> str:

@@ -18,6 +18,7 @@ from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.maths.variance import scatter
 from pipeline.mounts import Mounted
 from pipeline.passes import pass_of
+from pipeline.screen import plural
 
 Array = NDArray[np.float64]
 COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common
@@ -73,7 +74,8 @@ def tables(
 
 def _summary_table(found: Adjusted, test: Mapping[str, Any]) -> pd.DataFrame:
     solution = found.solution
-    reason = f"the data leave {solution.deficiency} direction(s) of the unknowns open" if solution.deficiency else ""
+    left_open = plural(solution.deficiency, "direction")
+    reason = f"the data leave {left_open} of the unknowns open" if solution.deficiency else ""
     counts = found.reading.counts.values()
     summary = {
         "converged": found.converged,

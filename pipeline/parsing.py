@@ -10,9 +10,11 @@ import yaml
 from pydantic import BaseModel, Tag, ValidationError
 
 from pipeline.errors import ConfigError
+from pipeline.files import read_regular
 
 M = TypeVar("M", bound=BaseModel)
 MAX_YAML_BYTES = 1_000_000
+MAX_INTEGER = 2**63
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -34,6 +36,15 @@ class _StrictLoader(yaml.SafeLoader):
             seen.add(key)
         return super().construct_mapping(node, deep)
 
+    def construct_yaml_int(self, node: Any) -> int:
+        value = super().construct_yaml_int(node)
+        if abs(value) >= MAX_INTEGER:  # thousands of digits cannot even be shown
+            raise yaml.YAMLError(f"line {node.start_mark.line + 1}: a whole number of more than 18 digits")
+        return value
+
+
+_StrictLoader.add_constructor("tag:yaml.org,2002:int", _StrictLoader.construct_yaml_int)
+
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """One mapping from a YAML file; every way this can fail is a ConfigError."""
@@ -43,9 +54,10 @@ def read_yaml(path: Path) -> dict[str, Any]:
 def text_of(path: Path) -> str:
     """A YAML file's text as it stands, line ends and all."""
     try:
-        if path.stat().st_size > MAX_YAML_BYTES:
+        content = read_regular(path, MAX_YAML_BYTES)
+        if len(content) > MAX_YAML_BYTES:
             raise ConfigError(f"{path}: {path.stat().st_size} bytes is no config; name the YAML file meant")
-        return path.read_bytes().decode("utf-8")
+        return content.decode("utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     except UnicodeDecodeError as error:
@@ -71,8 +83,15 @@ def compose(text: str, path: Path) -> yaml.Node:
 def _loaded(text: str, path: Path, how: Callable[[_StrictLoader], Any]) -> Any:
     try:
         return how(_StrictLoader(text))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
+    except RecursionError as error:
+        raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; mend the file") from error
+    except Exception as error:  # the library alone runs here, and raises anything at a value it cannot read
+        raise ConfigError(
+            f"{path}: not valid YAML: a value is not what it is said or seems to be ({type(error).__name__}: {error}); "
+            "put it in quotes, and take tags such as !!float out"
+        ) from error
 
 
 _WORDS = {  # where pydantic speaks to programmers

@@ -13,7 +13,7 @@ from pipeline.adjusting import free_unknowns
 from pipeline.considered import considered_of, correlated
 from pipeline.errors import ConfigError
 from pipeline.instruments import under
-from pipeline.maths.solution import Solution, solve
+from pipeline.maths.solution import Solution, solve, weakest_direction
 from pipeline.maths.unknowns import SIX
 from pipeline.mounts import PARAMETERS, mount_of, target_of
 from pipeline.observability import VAGUE, Seen, geometry_of
@@ -39,6 +39,10 @@ class Outlook:
     def seconds(self) -> float:
         return sum(self.predicted.seconds)
 
+    def each(self) -> Iterator[tuple[Pass, float, dict[str, Array]]]:
+        """Passes with their time (s) and the points of each sensor by face."""
+        return zip(self.passes, self.predicted.seconds, self.predicted.points, strict=True)
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -49,6 +53,11 @@ class Answer:
     gaps: list[str]
     remedy: str
     better: Outlook | None
+
+    @property
+    def weakest(self) -> str:
+        """Which of the six are hardest to tell apart, in words; empty where there is no result."""
+        return "" if self.given.solution.deficiency else weakest_direction(self.given.random)
 
 
 def setting_of(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Setting:
@@ -80,12 +89,13 @@ def _rates(session: config.SessionConfig) -> dict[str, Any]:
 
 def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Answer:
     setting = setting_of(plan, pool, session)
-    considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built)
+    depth = setting.model.depth_m
+    considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
     free = free_unknowns(setting.state, pool.adjust.free)
     given = _outlook(setting, plan.passes, turn_s, considered, free)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
-    distances = [one.distance_m for one, _, points in _each(given) if points["mbes"].any()]
+    distances = [one.distance_m for one, _, points in given.each() if points["mbes"].any()]
     level = {family.name for family in setting.model.families if family.level}
     seen = Seen(distances, soundings(setting, given), level, float(speeds), float(swings))
     geometry = geometry_of(setting, seen, given.predicted.normal, given.solution)
@@ -112,7 +122,7 @@ def _blind(outlook: Outlook) -> list[str]:
     """Passes from which a sensor does not see the target."""
     found = []
     for sensor, name in (("laser", "laser"), ("mbes", "sonar")):
-        far = [f"{one.distance_m:g} m" for one, _, points in _each(outlook) if not points[sensor].any()]
+        far = [f"{one.distance_m:g} m" for one, _, points in outlook.each() if not points[sensor].any()]
         if far:
             found.append(f"the {name} sees nothing of the target from {', '.join(dict.fromkeys(far))}")
     return found
@@ -166,11 +176,10 @@ def _better(
     return _outlook(setting, [candidates[k] for k in chosen], turn_s, considered, free)
 
 
-# --- in words --------------------------------------------------------------------------------------------------------
 def as_plain(answer: Answer) -> dict[str, Any]:
     """All of it as plain values, for YAML."""
     found: dict[str, Any] = {"given": _plain_outlook(answer.setting, answer.given)}
-    found |= {"gaps": answer.gaps, "remedy": answer.remedy}
+    found |= {"gaps": answer.gaps, "weakest": answer.weakest, "remedy": answer.remedy}
     if answer.better is not None:
         found["better"] = _plain_outlook(answer.setting, answer.better)
     return found
@@ -184,17 +193,13 @@ def _plain_outlook(setting: Setting, outlook: Outlook) -> dict[str, Any]:
         "passes": [
             one.model_dump(mode="json", exclude_none=True)
             | {"seconds": round(seconds, 1), "points": _faces(setting, points)}
-            for one, seconds, points in _each(outlook)
+            for one, seconds, points in outlook.each()
         ],
         "sigma_mount": mounted.sigmas(outlook.random) if known else None,
         "sigma_mount_total": mounted.sigmas(outlook.total) if known else None,
         "correlation": (outlook.random / np.outer(sigma, sigma)).tolist() if known else None,
         "condition": outlook.solution.condition if known else None,
     }
-
-
-def _each(outlook: Outlook) -> Iterator[tuple[Pass, float, dict[str, Array]]]:
-    return zip(outlook.passes, outlook.predicted.seconds, outlook.predicted.points, strict=True)
 
 
 def _faces(setting: Setting, points: dict[str, Array]) -> dict[str, dict[str, int]]:
@@ -205,54 +210,15 @@ def _faces(setting: Setting, points: dict[str, Array]) -> dict[str, dict[str, in
     }
 
 
+def shares_of_limits(setting: Setting, outlook: Outlook, limits: config.Verdict) -> dict[str, float]:
+    """Total sigma ÷ the verdict's limit, by parameter; NaN where a direction stays open."""
+    sigma = mount_of(setting.mbes.mount).sigmas(outlook.total)
+    bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
+    return {name: sigma[key] / bounds[unit] for name, _, key, unit in PARAMETERS}
+
+
 def is_enough(answer: Answer, limits: config.Verdict) -> bool:
     """Whether the list as given will keep the total sigmas below the verdict's limits."""
     if answer.given.solution.deficiency:
         return False
-    sigma = mount_of(answer.setting.mbes.mount).sigmas(answer.given.total)
-    bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
-    return all(sigma[key] <= bounds[unit] for _, _, key, unit in PARAMETERS)
-
-
-def table(answer: Answer, limits: config.Verdict) -> str:
-    """For the screen."""
-    lines = ["As given:", *_lines(answer.setting, answer.given, limits)]
-    lines += [f"But: {gap}." for gap in answer.gaps]
-    if answer.remedy:
-        lines.append(f"Cure: {answer.remedy}.")
-    plan = answer.setting.plan
-    if plan.budget is not None:
-        turns = (len(plan.passes) - 1) * plan.budget.turn_s
-        lines.append(f"Time: {answer.given.seconds:.0f} s and {turns:.0f} s of turns, of {plan.budget.seconds:g} s.")
-    if answer.better is not None:
-        lines += ["", "Better, in the time there is:", *_lines(answer.setting, answer.better, limits)]
-    elif plan.candidates:
-        short = "no candidate helps within the budget" if plan.budget else "candidates want a budget to be chosen for"
-        lines += ["", f"Nothing better was looked for: {short}."]
-    return "\n".join(lines)
-
-
-def _lines(setting: Setting, outlook: Outlook, limits: config.Verdict) -> list[str]:
-    families = list(dict.fromkeys(face.family for face in setting.model.faces))
-    heads = "".join(f"{family:>9}" for family in families)
-    lines = [f"  distance   speed   swing    time   soundings on{heads}   laser points"]
-    for one, seconds, points in _each(outlook):
-        by_family = dict.fromkeys(families, 0.0)
-        for face, count in zip(setting.model.faces, points["mbes"], strict=True):
-            by_family[face.family] += float(count)
-        counts = "".join(f"{count:>9,.0f}" for count in by_family.values())
-        sailed = f"  {one.distance_m:>6.1f} m {one.speed_m_s:>5.2f} m/s {one.heading_swing_deg:>4.1f}°"
-        lines.append(f"{sailed} {seconds:>6.0f} s               {counts}{points['laser'].sum():>15,.0f}")
-    lines.append(f"  {'sigma':<8}{'random':>12}{'total':>12}{'limit':>12}")
-    if outlook.solution.deficiency:
-        return [*lines, f"  {outlook.solution.deficiency} direction(s) of the unknowns stay open: no result"]
-    mounted = mount_of(setting.mbes.mount)
-    random, total = mounted.sigmas(outlook.random), mounted.sigmas(outlook.total)
-    for name, _, key, unit in PARAMETERS:
-        limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, " m")
-        over = "  above the limit" if not total[key] <= limit else ""
-        row = "".join(f"{value:>11.4f}{sign.strip()}" for value in (random[key], total[key], limit))
-        lines.append(f"  {name:<8}{row}{over}")
-    return lines
-
-
+    return all(share <= 1 for share in shares_of_limits(answer.setting, answer.given, limits).values())

@@ -206,7 +206,8 @@ def _beams(setting: Setting, seconds: float) -> tuple[Integers, Array, float]:
     edges_deg, tilts_deg = np.array([(one.to_deg, one.tilt_deg) for one in figures.sectors] or [(90.0, 0.0)]).T
     tilt = np.radians(tilts_deg[np.searchsorted(edges_deg, np.degrees(angle))])
     speed = np.full(len(angle), SPEED_M_S)
-    fan, _ = points_in_mbes(2 / speed, angle, tilt, speed)
+    fan, there = points_in_mbes(2 / speed, angle, tilt, speed)
+    fan = fan[there]
     return np.repeat(np.round(pings * NS).astype(np.int64), len(fan)), np.tile(fan, (len(pings), 1)), 1.0
 
 

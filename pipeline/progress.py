@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TextIO
 
+from pipeline.errors import ArtefactError
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
@@ -24,10 +26,18 @@ def printable(text: str) -> str:
 
 
 def say(text: str, stream: TextIO) -> None:
-    """Print lines; a reader that has gone away is no reason to stop."""
+    """Print lines. A reader that has gone away is no reason to stop, nor a log that cannot be written: what could be
+    said of that would go there, too. An answer on standard output that cannot be written is an ArtefactError."""
     lines = "\n".join(printable(line) for line in text.split("\n"))
-    with contextlib.suppress(BrokenPipeError):
+    try:
         print(lines, file=stream, flush=True)
+    except BrokenPipeError:
+        return
+    except OSError as error:
+        if stream is sys.stdout:
+            raise ArtefactError(
+                f"standard output: cannot be written ({error.strerror}); make room, or send it elsewhere"
+            ) from error
 
 
 @dataclass

@@ -20,8 +20,11 @@ from pipeline.evaluate import declared, evaluate, is_stream, name_of, sources
 from pipeline.executor import SERIAL, Stopped, Workers
 from pipeline.files import Digests, remove, write_text, writing
 from pipeline.folder import Settings
-from pipeline.freshness import SENSORS, Run, key_of, out_of_date, raw_digests
+from pipeline.freshness import Run, all_raw, key_of, out_of_date, raw_digests, raw_of
 from pipeline.progress import Progress
+from pipeline.run import provenance
+from pipeline.run.another import refuse_another
+from pipeline.run.kept import keep_accepted
 from pipeline.sinks import FolderSink
 from pipeline.streams import EMPTY, Chunk, ParquetPart, Part, Stream
 
@@ -35,14 +38,20 @@ def run(
     progress: Progress | None = None,
     finished: Callable[[str], object] = lambda _: None,
     calibrated: Calibrated = "mbes",
+    overwrite: bool = False,
 ) -> list[str]:
-    """Bring every stage up to date; the names of those that had to be run, each told to ``finished`` in its turn."""
+    """Bring every stage up to date; the names of those that had to be run, each told to ``finished`` in its turn.
+
+    A run folder with another session's results is refused, unless they may be replaced (``overwrite``).
+    """
     settings = folder.load_settings(session_folder, config_path, calibrated)
     folder.refuse_folders(run_folder, session_folder)
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
         folder.refuse_other(run_folder, calibrated)
-        folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
+        if not overwrite:
+            refuse_another(this, [name_of(stage) for stage in stages])
+        folder.write_settings(run_folder, settings)
         first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)
         had_to_run = []
         for stage in stages:
@@ -62,12 +71,15 @@ def run_stage(
 ) -> bool:
     """Bring one stage up to date; those before it must be. ``settings``: new ones, else those in run.yaml."""
     names = [name_of(stage) for stage in stages]
+    new = settings is not None
     if settings is None:
         settings = folder.read_settings(run_folder)
     folder.refuse_folders(run_folder, settings.session_folder)
     with folder.locked(run_folder, names):
-        folder.write_settings(run_folder, settings)
         this = _open(run_folder, settings, workers, progress)
+        if new:
+            refuse_another(this, names)
+        folder.write_settings(run_folder, settings)
         for stage in stages[: names.index(name)]:
             if why := out_of_date(this, stage):
                 raise ArtefactError(f"{run_folder}: {name_of(stage)}: {why[0]}; run stage {name_of(stage)} first")
@@ -130,7 +142,7 @@ def _execute(this: Run, stage: ModuleType) -> None:
         sink = FolderSink(partial, streams)
         outputs = evaluate(stage, inputs, config, sink, this.workers.map, lambda: this.progress.begin(total))
         rows = _write(partial, stage, outputs)
-        if key_of(this, stage).raw != key.raw:
+        if _raw_has_changed(this, stage):
             raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")
         entries = _entries(this, partial)
         counts = getattr(outputs, "counts", None)
@@ -140,13 +152,22 @@ def _execute(this: Run, stage: ModuleType) -> None:
             outputs=entries,
             rows=rows,
             counts=[] if counts is None else counts.to_dict("records"),
-            git_commit=manifest.git_commit(),
+            git_commit=provenance.git_commit(),
             wall_s=round(time.perf_counter() - start, 3),
         ).write(partial)
+        kept = keep_accepted(target)
         folder.swap_in(target)
+        if kept is not None:
+            this.progress.note(f"{name_of(stage)}: the accepted result that was there is kept in {kept}")
     except BaseException:
         _remove_quietly(partial)
         raise
+
+
+def _raw_has_changed(this: Run, stage: ModuleType) -> bool:
+    """Whether a raw file is not what it was when this run first looked at it, of those that the stage has read."""
+    sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, Raw)]
+    return any(raw_digests(this, sensor) != raw_of(this, sensor) for sensor in sensors)
 
 
 def _remove_quietly(partial: Path) -> None:
@@ -181,8 +202,7 @@ def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
 
 def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
     if isinstance(marker, Provenance):
-        raw = {name: digest for sensor in SENSORS for name, digest in raw_digests(this, sensor).items()}
-        return {"inputs": raw, "software": manifest.versions()}
+        return {"inputs": all_raw(this), "software": provenance.versions()}
     if isinstance(marker, Raw):
         settings = getattr(this.settings.session, marker.sensor)
         if settings is None:

@@ -1,7 +1,7 @@
 """The result on one screen."""
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from pipeline.mounts import PARAMETERS, change_of
@@ -16,17 +16,46 @@ def signed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:+.{digits}f}"
 
 
+def plural(number: int, noun: str) -> str:
+    """A count and what is counted, in whole words.
+
+    >>> plural(1, "file"), plural(2, "pass"), plural(3, "study"), plural(0, "day")
+    ('1 file', '2 passes', '3 studies', '0 days')
+    """
+    if number == 1:
+        return f"1 {noun}"
+    if noun.endswith(("s", "x", "ch", "sh")):
+        return f"{number} {noun}es"
+    if noun.endswith("y") and noun[-2] not in "aeiou":
+        return f"{number} {noun[:-1]}ies"
+    return f"{number} {noun}s"
+
+
+def verdict_in_words(verdict: str, held: Collection[str] = ()) -> str:
+    """The verdict as people read it; ``held``: of an accepted calibration the values that it could not find.
+
+    >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
+    ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
+    """
+    if verdict != "accepted" or not held:
+        return verdict
+    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in held)}"
+
+
 def summary(calibration: Mapping[str, Any]) -> str:
     """The result on one screen, from calibration.json."""
-    lines = [f"{calibration['session']}: {calibration['verdict'].upper()}"]
+    held = calibration.get("held", {})
+    kind, colon, found = verdict_in_words(calibration["verdict"], held).partition(": ")
+    lines = [f"{calibration['session']}: {kind.upper()}{colon}{found}"]
     rejected = calibration["verdict"] == "rejected"
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    lines += [f"  but look: {warning}" for warning in calibration["warnings"]]
+    lines += [f"  not found, held at the coarse value: {', '.join(held)}"] if colon else []
+    lines += [f"  warning: {warning}" for warning in calibration["warnings"]]
     sensor = calibration.get("calibrated", "mbes")
     heads = f"{sensor + ' mount':<12}{'coarse':>12}{'computed' if rejected else 'calibrated':>14}"
     heads += f"{'change':>14}{'sigma':>12}{'total':>12}"
     lines += ["", f"{heads}   (result: {calibration['result']})"]
-    block, coarse, held = calibration[sensor], calibration["coarse"]["mount"], calibration.get("held", [])
+    block, coarse = calibration[sensor], calibration["coarse"]["mount"]
     for parameter, _, key, of_setting in PARAMETERS:
         unit = "°" if of_setting == "deg" else of_setting
         total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"

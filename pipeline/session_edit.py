@@ -24,6 +24,7 @@ from pipeline.files import sha256, write_bytes, writing
 from pipeline.instruments import applied
 from pipeline.mounts import SETTINGS, Mounted
 from pipeline.parsing import compose, content_of, parse, text_of
+from pipeline.readers.casts import with_cast
 
 SENSORS = ("laser", "mbes")
 NOWHERE = dict.fromkeys(SETTINGS, 0.0)
@@ -45,7 +46,7 @@ def read_session(folder: Path) -> tuple[str, Content]:
 
 def _check(content: Content, folder: Path) -> config.SessionConfig:
     path = folder / "session.yaml"
-    filled, _ = applied(content, folder)
+    filled = with_cast(applied(content, folder)[0], folder)
     for name in SENSORS:
         if isinstance(filled.get(name), dict):
             filled[name] = {"mount": NOWHERE} | filled[name]

@@ -25,18 +25,22 @@ from pipeline.quantities import (
 Calibrated = Literal["mbes", "laser"]
 
 
-def _inside(pattern: str) -> str:
+def inside(pattern: str) -> str:
     path = PurePosixPath(pattern)
     if not pattern or path.is_absolute() or ".." in path.parts or "\\" in pattern or "\0" in pattern:
         raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
     if any("**" in part and part != "**" for part in path.parts):
         raise ValueError("must have ** only as a whole part between two /")
+    if path.parts.count("**") > 2 or len(pattern) > 300:  # each more takes several times as long to search
+        raise ValueError("must have ** twice at most, and no more than 300 letters")
     return pattern
 
 
-Pattern = Annotated[str, AfterValidator(_inside)]
+Pattern = Annotated[str, AfterValidator(inside)]
 Files = Annotated[list[Pattern], Field(min_length=1)]
 Heights = Literal["ellipsoidal"] | None
+LasTime = Literal["adjusted_standard", "seconds_of_week"] | None
+MaxRecords = Annotated[int, Field(ge=1, le=10**12)] | None  # of one file; null: 16 to each of its bytes
 Week = Annotated[int, Field(ge=1000, le=5000)] | None  # GPS week, not modulo 1024 (1000: March 1999)
 
 
@@ -120,6 +124,7 @@ class Ins(Model):
     format: Literal["novatel", "sbet", "inertial_explorer", "table"]
     accuracy: list[Pattern] = Field(default_factory=list)  # SMRMSG files beside an SBET
     gps_week: Week = None
+    max_records: MaxRecords = None
     latency_s: Latency = 0.0
     drift: Drift = Drift()
     drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, where they tell; else those of drift
@@ -150,6 +155,8 @@ class Laser(Model):
     files: Files
     format: Literal["las", "e57", "table"]
     gps_week: Week = None
+    time: LasTime = None  # what the times of LAS count from, where its header says it wrongly; null: as that says
+    max_records: MaxRecords = None
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
     heights: Heights = None  # above what, where frame is a CRS that does not say
     mount: Mount
@@ -161,6 +168,12 @@ class Laser(Model):
     angle_sigma_deg: SigmaDeg = 0.003
     latency_s: Latency = 0.0
     latency_sigma_s: SigmaS = 0.0002
+
+    @model_validator(mode="after")
+    def _time_of_las(self) -> "Laser":
+        if self.time is not None and self.format != "las":
+            raise ValueError(f"time says what times of LAS count from, but format is {self.format}: take time out")
+        return self
 
     @model_validator(mode="after")
     def _heights_of_a_crs(self) -> "Laser":
@@ -179,15 +192,38 @@ class Laser(Model):
         return self
 
 
+class CastUsed(Model):
+    """A file's cast as it was used; session.yaml has the file's name alone (readers/casts.py), run.yaml all of this."""
+
+    file: Annotated[str, Field(max_length=1000)]  # in the session folder
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    kind: Annotated[str, Field(max_length=50)]
+    number: Annotated[int, Field(ge=1)]  # which of so many in the file
+    casts: Annotated[int, Field(ge=1)]
+    taken: Annotated[str, Field(max_length=50)] | None  # by the file, whose time zone is not known
+    place_deg: tuple[float, float] | None  # latitude, longitude
+    rows: int
+    left_out: dict[str, int]  # by reason
+    first_m: float
+    last_m: float
+    tolerance_m_s: float  # within which the depths that were kept have all rows, or their means
+    averaged_m: float  # over so much of depth rows that scatter were averaged first; 0: not
+    scatter_m_s: float  # of the rows about what was kept, RMS
+
+
 class Mbes(Model):
     instrument: InstrumentUsed | None = None
     files: Files
-    format: Literal["r2sonic", "gsf", "kmall", "table"]
+    format: Literal["r2sonic", "gsf", "kmall", "all", "table"]
+    max_records: MaxRecords = None
     mount: Mount
     mount_origin: MountOrigin | None = None
     mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
     sound_speed_m_s: SoundSpeed | None = None
     svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
+    svp_number: Annotated[int, Field(ge=1, le=10_000)] | None = None  # which cast of a file that holds several
+    svp_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.05  # of one of its speeds, beside what all share
+    svp_from: CastUsed | None = None  # where svp was a file's name
     sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2
     sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m: 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
@@ -217,7 +253,9 @@ class Recording(Model):
     latency_s: float
     frame: str = "laser"
     heights: Heights = None
+    time: LasTime = None
     sound_speed_m_s: float | None = None  # of GSF alone, which may have none
+    projector_offset_m: tuple[float, float, float] | None = None  # of Kongsberg's files alone, which tell one too
 
 
 class Recordings(Model):
@@ -257,7 +295,11 @@ class SessionConfig(Model):
                 latency_s=sensor.latency_s,
                 frame=getattr(sensor, "frame", "laser"),
                 heights=getattr(sensor, "heights", None),
+                time=getattr(sensor, "time", None),
                 sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
+                projector_offset_m=(
+                    getattr(sensor, "projector_offset_m", None) if sensor.format in ("kmall", "all") else None
+                ),
             )
 
         return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))

@@ -35,11 +35,13 @@ def xyz(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarray:
 @dataclass(frozen=True)
 class Chunk:
     """What a part yields: good rows as columns, how many records were left out, by reason, and what an INS says of its
-    own accuracy, at times of its own (columns of the table ins_sigmas)."""
+    own accuracy, at times of its own (columns of the table ins_sigmas). ``states``: of each good row numbers of what
+    its log says of it, by their name (readers/novatel.py: STATES)."""
 
     columns: Batch
     dropped: Mapping[str, int] = field(default_factory=dict)
     sigmas: Batch = field(default_factory=dict)
+    states: Batch = field(default_factory=dict)
 
 
 class Part(Protocol):

@@ -9,8 +9,10 @@ import pandas as pd
 
 from pipeline import config
 from pipeline.causes import causes, estimated
+from pipeline.checking.cast import doubts
 from pipeline.judging.residual_tests import Tables, off
 from pipeline.mounts import PARAMETERS
+from pipeline.screen import plural
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
 WORDS_OF_GROUP = {
@@ -158,7 +160,7 @@ def _causes(freed: pd.DataFrame, alone: bool) -> list[str]:
     found = causes(freed)
     if not found:
         return []
-    others = f"; {len(found) - 1} other parameter(s) would explain it less well" if len(found) > 1 else ""
+    others = f"; {plural(len(found) - 1, 'other parameter')} would explain it less well" if len(found) > 1 else ""
     unless = ", if it is not what lies off by itself" if alone else ""
     return [f"likely cause of residuals{unless} ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
 
@@ -263,7 +265,8 @@ def one_eyed(passes: Sequence[Mapping[str, Any]]) -> list[str]:
     ):
         numbers = [str(one["pass"]) for one in passes if one[seen] and not one[missing]]
         if numbers:
-            found.append(f"pass{'es' * (len(numbers) > 1)} {', '.join(numbers)}: {words}; was it recording?")
+            which = plural(len(numbers), "pass").partition(" ")[2]
+            found.append(f"{which} {', '.join(numbers)}: {words}; was it recording?")
     return found
 
 
@@ -273,7 +276,7 @@ def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str,
     (a sixtieth for a degree at 45°)."""
     if mbes.svp is None:
         return []
-    found = []
+    found = [] if mbes.svp_from is None else list(doubts(mbes.svp_from, _span(files), None))
     speeds = [speed for _, speed in mbes.svp]
     low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
     if max(low - max(speeds), min(speeds) - high) > ODD_SPEED_M_S:
@@ -288,6 +291,12 @@ def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str,
             "values found as mbes.mount and run again"
         )
     return found
+
+
+def _span(files: pd.DataFrame) -> tuple[int, int]:
+    """First and last sounding, GPS time."""
+    own = files[(files["sensor"] == "mbes") & (files["first_ns"] >= 0)]
+    return int(own["first_ns"].min()), int(own["last_ns"].max())
 
 
 def _so(sigma: Mapping[str, float] | None) -> str:

@@ -83,7 +83,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
     of_drift = drift_rows(found.drift, noise_of(ins), inputs.poses, inputs.passes)
     seen = look(streams, scene, found, settings, of_drift, SHOWN)
-    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built)
+    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built, model.depth_m)
     together = correlated(found.state.names, config.laser)
     coarse = mount_of(config.mbes.mount)
     return Outputs(

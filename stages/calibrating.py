@@ -22,11 +22,13 @@ def calibrate(
     jobs: int | None,
     executor: str | None,
     wanted: tuple[bool, bool],
+    overwrite: bool = False,
 ) -> int:
-    """The exit status; ``after`` each stage; ``wanted``: the report's page, the recordings."""
+    """The exit status; ``after`` each stage; ``wanted``: the report's page, the recordings; ``overwrite``: also another
+    session's run."""
     with workers(jobs, executor) as pool, painters(*wanted, pool.jobs > 1) as drawing:
         finished = partial(after, drawing, run)
-        runner.run(load(calibrated), session, config, run, pool, Progress(), finished, calibrated)
+        runner.run(load(calibrated), session, config, run, pool, Progress(), finished, calibrated, overwrite)
         status = answer_of(run)
         say_failures(drawing.draw(run), "; the calibration is complete")
     say_where(run)

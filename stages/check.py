@@ -10,6 +10,7 @@ from pipeline.checking.examine import examine
 from pipeline.config import PoolConfig, SessionConfig, load_session
 from pipeline.errors import PoolcalError
 from pipeline.folder import load_settings
+from pipeline.readers.casts import with_cast
 from pipeline.streams import EMPTY
 from stages.campaign import calibrate_in_memory
 
@@ -17,7 +18,7 @@ from stages.campaign import calibrate_in_memory
 def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]:
     """What the screen says, and whether something is wrong."""
     settings = None if config is None else load_settings(session, config, None)
-    content, pool = (load_session(session), None) if settings is None else (settings.session, settings.pool)
+    content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     found = examine(session, content, pool, _calibrated)
     return saying.as_json(found) if as_json else saying.text(found), found.faulty
 
@@ -31,4 +32,5 @@ def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrate
 
     with suppress(PoolcalError):
         calibrate_in_memory(session, pool, raw, "adjust", kept)
-    return Calibrated(found.get("segment/soundings_labelled", EMPTY), found.get("adjust/freed"))
+    tables = (found.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
+    return Calibrated(found.get("segment/soundings_labelled", EMPTY), *tables)

@@ -1,28 +1,22 @@
 """The command line: thin. Imports what computes only inside the command that computes."""
 
-import os
-import signal
 import sys
-import traceback
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import pipeline
-from pipeline.errors import ConfigError, PoolcalError
+from pipeline.errors import ConfigError
 from pipeline.progress import say
-from stages import ORDER, calibrated_in, load, names_in
+from stages import ORDER, calibrated_in, ending, load, names_in
 from stages.comparing import comparison, save_pair
 from stages.saying import answer_of, say_failures
 
 if TYPE_CHECKING:
 
     from stages.drawing import Painters
-
-INTERRUPTED = 130  # what typer makes of Ctrl-C
-STOPPED = "poolcal: interrupted; what was complete is kept"
 
 app = typer.Typer(
     name="poolcal",
@@ -34,9 +28,13 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+SCENARIOS = ", ".join(sorted(path.stem for path in (pipeline.CONFIGS / "scenarios").glob("*.yaml")))
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")]
 Jobs = Annotated[int | None, typer.Option("--jobs", metavar="N", help="workers; default: one a core, at most 4")]
 Recordings = Annotated[bool, typer.Option("--recordings/--no-recordings", help="draw recordings for the Rerun viewer")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="replace another session's run in RUN; its accepted result is kept")
+]
 Report = Annotated[bool, typer.Option("--report/--no-report", help="draw RUN/report/report.html")]
 Address = Annotated[
     str | None, typer.Option("--executor", metavar="ADDRESS", help="dask scheduler; its workers must see these folders")
@@ -63,7 +61,8 @@ def options(
 def simulate(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="session folder to make; truth goes to OUT.truth.json")],
     scenario: Annotated[
-        Path | None, typer.Option("--scenario", metavar="FILE", help="YAML file; default: the demo's pool")
+        Path | None,
+        typer.Option("--scenario", metavar="FILE", help=f"YAML file, or one of {SCENARIOS}; default: the demo's pool"),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="of all random numbers")] = 1,
 ) -> None:
@@ -88,11 +87,12 @@ def run(
     executor: Address = None,
     recordings: Recordings = True,
     report: Report = True,
+    overwrite: Overwrite = False,
 ) -> int:
     """Run all stages that are out of date, and say why each is."""
     from stages.calibrating import calibrate
 
-    return calibrate("mbes", session, config, run_folder, _go_on, jobs, executor, (report, recordings))
+    return calibrate("mbes", session, config, run_folder, _go_on, jobs, executor, (report, recordings), overwrite)
 
 
 @app.command()
@@ -105,6 +105,7 @@ def laser(
     recordings: Recordings = True,
     report: Report = True,
     write: Annotated[bool, typer.Option("--write/--no-write", help="an accepted mount into session.yaml")] = True,
+    overwrite: Overwrite = False,
 ) -> int:
     """Calibrate the laser itself, from its own passes at the target.
 
@@ -113,7 +114,7 @@ def laser(
     from stages.calibrating import calibrate
     from stages.laser.session import write as write_mount
 
-    status = calibrate("laser", session, config, run_folder, _go_on, jobs, executor, (report, recordings))
+    status = calibrate("laser", session, config, run_folder, _go_on, jobs, executor, (report, recordings), overwrite)
     if write and status == 0:
         say(write_mount(session, run_folder), sys.stdout)
     return status
@@ -162,14 +163,14 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
     Hashes again everything that it read and wrote, and lists what is not as recorded.
     """
     from pipeline.executor import workers
+    from pipeline.screen import plural
     from pipeline.verify import verify as problems_of
 
     with workers(jobs) as pool:
         problems = problems_of(load(calibrated_in(run_folder)), run_folder, pool)
     for problem in problems:
         say(problem, sys.stdout)
-    many = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
-    say(many if problems else f"{run_folder}: everything is as recorded", sys.stdout)
+    say(plural(len(problems), "problem") if problems else f"{run_folder}: everything is as recorded", sys.stdout)
     return 1 if problems else 0
 
 
@@ -183,24 +184,26 @@ def view(
 
     Nothing is served beyond this machine.
     """
-    import tempfile
-
     from pipeline import folder
+    from pipeline.files import temporary_folder
     from stages.drawing import Painters
-    from stages.views import recordings_of, show
+    from stages.views import recordings_of
+    from stages.views.opening import show
 
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
         folder.read_settings(first)
         say_failures(Painters(report=False, recordings=True).draw(first))
-        return show(recordings_of(first, stage))
+        copy = f"copy {first}/*/*.rrd to a machine with one, or open {first}/report/report.html"
+        return show(recordings_of(first, stage), copy)
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
-    with tempfile.TemporaryDirectory() as place:
-        path = Path(place) / "pair.rrd"
+    with temporary_folder() as place:
+        path = place / "pair.rrd"
         save_pair(first, second, comparison(first, second), path)
-        return show([path])
+        copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
+        return show([path], copy)
 
 
 @app.command()
@@ -251,6 +254,7 @@ def history(
     Writes history.html, history.csv and history.parquet.
     """
     from pipeline.history import Filter, read_history, write_history
+    from pipeline.screen import plural
 
     chosen = Filter(name, since.date() if since else None, until.date() if until else None)
     found = read_history(folder, chosen)
@@ -258,7 +262,9 @@ def history(
     write_history(found, target, chosen)
     for problem in found.unreadable:
         say(f"left out: {problem}", sys.stderr)
-    say(f"{len(found.table)} sessions: {target / 'history.html'}", sys.stdout)
+    if found.without:
+        say(found.without, sys.stdout)
+    say(f"{plural(len(found.table), 'session')}: {target / 'history.html'}", sys.stdout)
     return 0
 
 
@@ -332,65 +338,21 @@ def compare(
 def call(arguments: list[str]) -> int:
     """The exit status of a command line; nothing is raised."""
     debug = "--debug" in arguments  # accepted anywhere on the line
-    words = [word for word in arguments if word != "--debug"]
-    try:
-        status = int(app(words or ["--help"], prog_name="poolcal", standalone_mode=False) or 0)
-        if status == INTERRUPTED:
-            say(STOPPED, sys.stderr)
-        return status
-    except PoolcalError as error:
-        if debug:
-            traceback.print_exc()
-        say(f"poolcal: {error}", sys.stderr)
-        return 2
-    except typer.TyperException as error:
-        usage = " ".join(error.format_message().split())
-        say(f"poolcal: {usage or 'nothing to do'}; see poolcal --help", sys.stderr)
-        return 2
-    except Exception:
-        if _interrupts:  # a library that was being loaded has made another error of it
-            say(STOPPED, sys.stderr)
-            return INTERRUPTED
-        say(traceback.format_exc().rstrip(), sys.stderr)
-        say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
-        return 3
-
-
-_interrupts: list[int] = []
-
-
-def _interrupted(number: int, _: object) -> None:
-    _interrupts.append(number)
-    raise KeyboardInterrupt
+    words = [word for word in arguments if word != "--debug"] or ["--help"]
+    return ending.status_of(lambda: app(words, prog_name="poolcal", standalone_mode=False), debug)
 
 
 def _go_on(drawing: "Painters", run_folder: Path, stage: str) -> None:
     """After a stage; not where somebody interrupted it in a place in which Python ignores that."""
-    if _interrupts:
+    if ending.interrupts:
         raise KeyboardInterrupt
     drawing.begin(run_folder, stage)
 
 
 def main() -> None:
     """The console script."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupted)
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the shell; open to the end
-            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        reconfigure: Any = getattr(stream, "reconfigure", None)
-        if reconfigure is not None:
-            reconfigure(errors="backslashreplace")
-    status = call(sys.argv[1:])
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:  # nobody listens any more: leave without Python's own complaint
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    if status == INTERRUPTED:
-        sys.stderr.flush()
-        os._exit(status)  # a library left in the middle of its work would end with a status of its own
-    sys.exit(status)
+    ending.prepare()
+    ending.leave(call(sys.argv[1:]))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ the covariance speaks of. The answer is yes when the calibration was accepted an
 is within LIMIT sigmas; a method without sigmas is held to LIMIT times the verdict's largest allowed ones.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config import Mount, Verdict
 from pipeline.errors import ConfigError
-from pipeline.folder import calibration, read_settings
-from pipeline.mounts import PARAMETERS
+from pipeline.files import read_json
+from pipeline.folder import as_written, calibration, read_settings
+from pipeline.mounts import PARAMETERS, SETTINGS
 
 LIMIT = 4.0
 Array = NDArray[np.float64]
@@ -27,6 +27,8 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
     result, settings = calibration(run), read_settings(run)
     R_true, lever_arm_true_m = read_truth(truth_path)
     chosen = settings.pool.result
+    with as_written(run):
+        _refuse_damaged(result, chosen)
     values = result["methods"][chosen]
     error, sigma = errors_of(values, R_true, lever_arm_true_m), _sigma_of(values)
     lines = [f"session {result['session']}: {result['verdict']}", *(f"  {reason}" for reason in result["reasons"])]
@@ -45,6 +47,22 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
     return "\n".join(lines), accepted and within
 
 
+def _refuse_damaged(result: dict[str, Any], chosen: str) -> None:
+    """Any of the errors that damaged values end in, before anything is computed from them."""
+    for values in (result["methods"][chosen], *result["methods"].values()):
+        if values["R_body_from_mbes"] is not None and values["lever_arm_m"] is not None:
+            R = np.array(values["R_body_from_mbes"], dtype=np.float64).reshape(3, 3)
+            if not np.allclose(R @ R.T, np.eye(3), atol=1e-6):
+                raise ValueError("no rotation")
+            np.array(values["lever_arm_m"], dtype=np.float64).reshape(3)
+            for key in SETTINGS:
+                float(values["mount"][key])
+        sigma = _sigma_of(values)
+        if sigma is not None:
+            sigma.reshape(6)
+    " ".join(result["reasons"])
+
+
 def _error_row(error: Array | None) -> str:
     return "  no result" if error is None else "".join(f"{error[index]:10.5f}" for _, index, *_ in PARAMETERS)
 
@@ -52,7 +70,8 @@ def _error_row(error: Array | None) -> str:
 def read_truth(path: Path) -> tuple[Array, Array]:
     """True rotation and lever arm of the sonar, from the simulator's file."""
     try:
-        mbes = json.loads(path.read_text(encoding="utf-8"))["mbes"]
+        content: Any = read_json(path)
+        mbes = content["mbes"]
         R_body_from_mbes = np.array(mbes["R_body_from_mbes"], dtype=np.float64).reshape(3, 3)
         return R_body_from_mbes, np.array(mbes["lever_arm_m"], dtype=np.float64).reshape(3)
     except OSError as error:

@@ -24,13 +24,14 @@ from pipeline.drawn import PAGE, agreeing, page_to_draw, recording_path
 from pipeline.errors import PoolcalError
 from pipeline.files import write_bytes
 from pipeline.streams import Mapper, serial
-from stages import ORDER, calibrated_in, names_in
+from stages import ORDER, names_in
 
 RECORDINGS = "recordings"
 PATIENCE_S, ENDING_S = 600, 10
 PREPARE, DRAW = "prepare", "draw"
 TOO_EARLY = ORDER[:1]  # what follows the first stage needs every processor as well
 BESIDE_THE_PAGE = ORDER[-2:]  # recordings for which the page would have to wait
+DECIDES = "angle_iterate"  # on which tabs there are
 ALLOCATION = {  # one thread, for the process is to fork; one allocator, and large pages where the system has them
     "OPENBLAS_NUM_THREADS": "1",
     "ARROW_DEFAULT_MEMORY_POOL": "system",
@@ -104,7 +105,10 @@ class Painters:
         page = [PAGE] if PAGE in self._wanted and page_to_draw(run, stages) else []
         if RECORDINGS not in self._wanted:
             return page
-        return page + [stage for stage in agreeing(run, stages) if not recording_path(run, stage).is_file()]
+        done = agreeing(run, stages)
+        if DECIDES in done and not recording_path(run, DECIDES).is_file():
+            return page + list(done)  # with its result the tabs may come or go, and every recording names them
+        return page + [stage for stage in done if not recording_path(run, stage).is_file()]
 
     def close(self) -> None:
         if self._process is not None:
@@ -159,17 +163,26 @@ def painters(report: bool, recordings: bool, beside: bool) -> Iterator[Painters]
 # --- drawing ---------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Prepared:
-    """A recording, and the manifest of the stage that is shown."""
+    """A recording, the manifest of the stage that is shown, and the tabs in which it is shown."""
 
     shown: bytes
+    tabs: tuple[str, ...]
     recording: bytes
 
     @classmethod
     def of(cls, run: Path, stage: str) -> "Prepared":
         from stages.views import record
+        from stages.views.tour import tabs_of
 
+        tabs = tabs_of(run)
         shown = (run / stage / manifest.NAME).read_bytes()
-        return cls(shown, record(run, stage))
+        return cls(shown, tabs, record(run, stage, tabs))
+
+    def still(self, run: Path, stage: str) -> bool:
+        """Whether it shows the stage as it is now."""
+        from stages.views.tour import tabs_of
+
+        return self.shown == (run / stage / manifest.NAME).read_bytes() and self.tabs == tabs_of(run)
 
 
 def paint(
@@ -202,7 +215,7 @@ def _noting(failed: list[Failure], what: str) -> Iterator[None]:
 def _pictures(run: Path, mapper: Mapper) -> Iterable[Any]:
     from pipeline.pages.pictures import draw, pictures_of
 
-    return mapper(partial(draw, run), pictures_of(calibrated_in(run)))
+    return mapper(partial(draw, run), pictures_of(run))
 
 
 def _write_page(run: Path, pictures: Iterable[Any]) -> None:
@@ -212,6 +225,6 @@ def _write_page(run: Path, pictures: Iterable[Any]) -> None:
 
 
 def _write_recording(run: Path, stage: str, ready: Prepared | None) -> None:
-    if ready is None or ready.shown != (run / stage / manifest.NAME).read_bytes():
+    if ready is None or not ready.still(run, stage):
         ready = Prepared.of(run, stage)
     write_bytes(recording_path(run, stage), ready.recording)

@@ -1,6 +1,7 @@
 """Raw instrument files -> canonical streams and tables, with quality control."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -9,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline import artefacts, config
+from pipeline.checking.days import whole_days
 from pipeline.errors import RawDataError
 from pipeline.ins_sigmas import thinned
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
@@ -136,12 +138,17 @@ def _refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
             raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {advice}")
 
 
+def _meet(ins: tuple[int, int], other: tuple[int, int], offset_ns: int) -> bool:
+    return ins[0] <= other[1] - offset_ns and other[0] - offset_ns <= ins[1]
+
+
 def _refuse_apart(ins: tuple[int, int], spans: dict[str, tuple[int, int]]) -> None:
     for sensor, (first, last) in spans.items():
         start, end = ins
         if last < start or first > end:
             apart = first - start
-            hint = (
+            days = whole_days(ins, (first, last), partial(_meet, ins, (first, last)))
+            hint = f"{sensor} is {days}" if days else (
                 f"they are {abs(apart) / WEEK_NS:.1f} weeks apart: check gps_week"
                 if abs(apart) > WEEK_NS / 2
                 else "check the instruments' clocks and latency_s"

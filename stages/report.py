@@ -27,6 +27,7 @@ from pipeline.closing import closing_table
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.judging.residual_tests import pattern_tests
 from pipeline.mounts import Mounted, mount_of, target_of
+from pipeline.screen import verdict_in_words
 from pipeline.verdict import (
     NO_DRIFT,
     Evidence,
@@ -113,10 +114,12 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     model = target_of(config.target)
     built = as_found(inputs.planes, inputs.patterns, model)
     summary, target = inputs.summary.iloc[0], target_block(inputs.target_pose.iloc[0]) | {"as_found": built}
+    verdict = "rejected" if found else "accepted"
     result = {
         "schema": SCHEMA,
         "session": config.name,
-        "verdict": "rejected" if found else "accepted",
+        "verdict": verdict,
+        "verdict_in_words": verdict_in_words(verdict),
         "reasons": found,
         "warnings": warnings(
             inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
@@ -140,6 +143,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "target": target,
         "passes": passes,
         "ranges": _range_note(config.mbes),
+        **_cast_block(config.mbes),
         "ins_drift": drift.model_dump() | {"from_files": list(from_files)},
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
@@ -156,7 +160,27 @@ def _range_note(mbes: config.Mbes) -> str:
     said = "sonar ranges taken as recorded: half the two-way path"
     if mbes.projector_offset_m is not None:
         said = f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
-    return said if mbes.svp is None else f"{said}; rays traced through a cast of {len(mbes.svp)} depths"
+    if mbes.svp is None:
+        return said
+    said = f"{said}; rays traced through a cast of {len(mbes.svp)} depths"
+    used = mbes.svp_from
+    if used is None:
+        return said
+    averaged = f"averaged over {used.averaged_m:g} m, " if used.averaged_m else ""
+    left_out = "".join(f", left out {count} {reason}" for reason, count in used.left_out.items())
+    return (
+        f"{said} (mbes.svp {used.file}, {used.kind}, {f'taken {used.taken}' if used.taken else 'without a time'}: "
+        f"{used.rows} rows{left_out}; {used.first_m:g} to {used.last_m:g} m, {averaged}thinned within "
+        f"{used.tolerance_m_s:g} m/s)"
+    )
+
+
+def _cast_block(mbes: config.Mbes) -> dict[str, Any]:
+    """What of calibration.json tells of the cast; nothing without one."""
+    if mbes.svp is None:
+        return {}
+    used = {} if mbes.svp_from is None else mbes.svp_from.model_dump(mode="json")
+    return {"cast": {"depths": len(mbes.svp), "sigma_m_s": mbes.svp_sigma_m_s} | used}
 
 
 def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dict[str, Any]]:

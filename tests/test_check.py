@@ -185,6 +185,17 @@ def test_a_time_zone(spoilt: Callable[..., Path]) -> None:
     only(session, "clock", "8 hours behind", "time zone")
 
 
+@pytest.mark.parametrize(
+    ("days", "said"),
+    [(-2, ("2 days ahead", "all of a Sunday: they are seconds of the day")), (1, ("1 day behind", "check the clocks"))],
+)
+def test_whole_days(spoilt: Callable[..., Path], days: int, said: tuple[str, ...]) -> None:
+    """Seconds of the day in place of the week are those of a Sunday; the session is of a Tuesday."""
+    session = spoilt(**SBET)
+    _shift_ins(session, days * 86_400.0)
+    only(session, "clock", *said)
+
+
 @pytest.mark.calibrates
 @pytest.mark.parametrize(("sensor", "latency_ms"), [("mbes", -16), ("laser", 12), ("ins", 20), ("mbes", 100)])
 def test_a_clock_off_by_milliseconds(spoilt: Callable[..., Path], sensor: str, latency_ms: int) -> None:

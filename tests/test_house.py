@@ -56,6 +56,9 @@ def test_make_explains_itself() -> None:
 def test_make_calibrate_takes_blanks() -> None:
     shown = _make("-n", "calibrate", "SESSION=my pool", "CONFIG=a b.yaml", "RUN=runs/c d", "JOBS=2")
     assert "run 'my pool' --config 'a b.yaml' --run 'runs/c d' --jobs 2" in shown
+    assert "--overwrite" not in shown
+    words = ("SESSION=a", "CONFIG=b", "RUN=c", "OVERWRITE=1")
+    assert "run 'a' --config 'b' --run 'c'  --overwrite" in _make("-n", "calibrate", *words)
 
 
 def test_make_has_one_rule_a_stage_over_real_files(tmp_path: Path) -> None:

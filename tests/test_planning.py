@@ -1,6 +1,8 @@
 """A plan's prediction: against the adjustment of a simulated session of the same plan, and what it says and chooses."""
 
 import json
+import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,10 @@ from pipeline import planned
 from pipeline.config import Drift, PoolConfig, SessionConfig
 from pipeline.parsing import parse
 from pipeline.plan_settings import Plan
-from pipeline.planning import predict
+from pipeline.planned import shares_of_limits
+from pipeline.planning import _beams, predict
+from pipeline.simulation.beams import directions_in_mbes, swing_rad
+from stages.plan import table
 from tests.effort import often
 from tests.end_to_end.places import poolcal
 from tests.stages.conftest import THIN, calibrated, made
@@ -47,6 +52,20 @@ def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift:
         ratio = [found[key][name] / result[key][name] for name in SETTINGS]
         assert max(abs(np.log(ratio))) < np.log(1.15), (key, dict(zip(SETTINGS, ratio, strict=True)))
     assert (answer.gaps, answer.remedy, answer.better) == ([], "", None)
+
+
+def test_the_beams_of_a_plan_are_those_of_its_sectors(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    """Against the simulator's; where a beam and its fan do not meet there is none."""
+    edges = ((-29.5, 8.0), (20.5, -0.75), (90.0, -29.5))
+    figures = {
+        "sectors": [{"to_deg": to, "tilt_deg": tilt} for to, tilt in edges], "beams": 131, "ping_rate_hz": 10.0,
+    }  # fmt: skip
+    _, rays, _ = _beams(planned.setting_of(plan_of(4.0, mbes=figures), *configs), 0.15)
+    angles_deg = np.arange(-65.0, 66.0)
+    tilts = np.radians(np.select([angles_deg <= -30, angles_deg <= 20], [8.0, -0.75], -29.5))
+    swing, there = swing_rad(np.sin(np.radians(angles_deg)), tilts)
+    assert there.sum() == 131 - 5  # 61° and 29.5° are more than 90°
+    np.testing.assert_allclose(rays, directions_in_mbes(swing, tilts)[there], atol=1e-9)
 
 
 def test_the_lasers_mount_covariance_is_carried_into_the_total(configs: tuple[PoolConfig, SessionConfig]) -> None:
@@ -93,7 +112,7 @@ def test_without_drift_passes_add_up_and_with_it_two_tell_more(configs: tuple[Po
 @pytest.mark.parametrize(
     ("distances", "gap", "remedy"),
     [
-        ((5.0,), "one pass alone", "yaw and lever arm y cannot be told apart"),
+        ((5.0,), "one pass alone", "two more passes at"),
         ((6.0, 6.1, 5.9), "all passes lie at 5.9 to 6.1 m", "two more passes at 3 m would bring sigma"),
     ][: often(1, 2)],
 )
@@ -104,7 +123,7 @@ def test_what_a_plan_lacks_is_said_with_its_cure(
     assert gap in answer.gaps[0]
     assert remedy in answer.remedy
     assert not planned.is_enough(answer, configs[0].verdict)
-    said = planned.table(answer, configs[0].verdict)
+    said = table(answer, configs[0].verdict)
     assert "above the limit" in said
 
 
@@ -118,9 +137,18 @@ def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, Se
     assert {one.distance_m for one in answer.better.passes} >= {3.0}
     assert len({one.distance_m for one in answer.better.passes}) > 1
     assert answer.better.random[2, 2] < answer.given.random[2, 2] / 25
+    chosen = table(answer, configs[0].verdict).partition("Chosen from the candidates, in the time there is: ")[2]
+    kinds = Counter(one.distance_m for one in answer.better.passes)
+    listed = dict(re.findall(r"(\d+) x ([\d.]+) m", chosen.splitlines()[0]))
+    assert {float(d): int(n) for n, d in listed.items()} == kinds
+    shares = [shares_of_limits(answer.setting, one, configs[0].verdict) for one in (answer.given, answer.better)]
+    largest = [f"{max(share.values()):.2f} ({max(share, key=lambda k, s=share: s[k])})" for share in shares]
+    assert f"{largest[0]} as given, {largest[1]} with these" in chosen
+    grown = [name for name in shares[0] if shares[1][name] > 1.05 * shares[0][name]]
+    assert re.findall(r"(\w+) \([\d.]+ to", chosen) == grown
     nothing = planned.judge(plan_of(6.0, candidates=candidates, budget={"seconds": 5.0}), *configs)
     assert nothing.better is None
-    words = planned.table(nothing, configs[0].verdict)
+    words = table(nothing, configs[0].verdict)
     assert "and 0 s of turns, of 5 s." in words
     assert "no candidate helps within the budget" in words
 
@@ -130,7 +158,7 @@ def test_out_of_sight_there_is_no_result(configs: tuple[PoolConfig, SessionConfi
     assert answer.given.solution.deficiency > 0
     assert answer.gaps[:2] == [f"the {sensor} sees nothing of the target from 60 m" for sensor in ("laser", "sonar")]
     assert not any("alone has soundings" in gap for gap in answer.gaps)
-    assert "stay open" in planned.table(answer, configs[0].verdict)
+    assert "left open: no result" in table(answer, configs[0].verdict)
     assert planned.as_plain(answer)["given"]["sigma_mount"] is None
 
 
@@ -197,3 +225,21 @@ def test_what_is_freed_is_freed_in_the_prediction_too(configs: tuple[PoolConfig,
     freed = pool.model_copy(update={"adjust": pool.adjust.model_copy(update={"free": ("mbes_latency",)})})
     held, free = (planned.judge(plan_of(4.0, 8.0), one, session).given.random for one in (pool, freed))
     assert np.sqrt(free[4, 4]) > 1.1 * np.sqrt(held[4, 4])  # y, along the track
+
+
+def test_no_two_columns_of_a_plan_run_together(configs: tuple[PoolConfig, SessionConfig]) -> None:
+    """Families with long names; each head ends where its numbers end."""
+    pool, session = configs
+    faces = {"kind": "faces", "origin": pool.target.origin.model_dump(), "azimuth_deg": 0.0, "faces": {
+        "return-of-the-quay-in-the-south": {"corners": [[0, 1.5, -4], [0, -1.5, -4], [0, -1.5, 2], [0, 1.5, 2]]},
+        "return-of-the-quay-in-the-north": {"corners": [[1.0, 4.3, -4], [0, 1.5, -4], [0, 1.5, 2], [1.0, 4.3, 2]]},
+    }}
+    other = PoolConfig.model_validate_json(json.dumps({"target": faces}))
+    said = table(planned.judge(plan_of(4.0), other, session), other.verdict)
+    head, row = said.splitlines()[1:3]
+    names = [f"return-of-the-quay-in-the-{side}" for side in ("south", "north")]
+    assert head.split()[-4:-2] == names
+    for name, number in zip(names, row.split()[-3:-1], strict=True):
+        end = head.index(name) + len(name)
+        assert row[:end].endswith(number)
+        assert head[head.index(name) - 1] == " "

@@ -32,7 +32,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
 from pipeline.config import Segment
-from pipeline.simulation.beams import fan
+from pipeline.simulation.beams import directions_in_mbes, fan, swing_rad, transmit_tilts_rad
 from pipeline.simulation.earth import Site
 from pipeline.simulation.ins import sigmas
 from pipeline.simulation.laser import direction
@@ -67,10 +67,9 @@ class Rays:
     clean: Array
 
 
-def _of_beam(across_rad: Array, along_rad: Array) -> Array:
-    """(n, 3) directions in the sonar's frame: x starboard, y forward, z up; across from straight down."""
-    along = np.cos(along_rad)
-    return np.column_stack([np.sin(across_rad) * along, np.sin(along_rad), -np.cos(across_rad) * along])
+def _ray(angle_rad: Array, tilt_rad: Array) -> Array:
+    """(n, 3) in the sonar's frame: of a receive beam and a transmit fan."""
+    return directions_in_mbes(swing_rad(np.sin(angle_rad), tilt_rad)[0], tilt_rad)
 
 
 class World:
@@ -148,14 +147,17 @@ class World:
         period_ns = (1 + CLOCK_RATE_ERROR) / s.ping_rate_hz * NS
         number = np.arange(round((end_ns - start_ns) / period_ns))
         pings = start_ns + np.rint((number + phase) * period_ns).astype(np.int64)
-        t_ns, angle = (values.ravel() for values in np.meshgrid(pings, fan(s).angles_rad, indexing="ij"))
+        angles = fan(s).angles_rad
+        t_ns, angle = (values.ravel() for values in np.meshgrid(pings, angles, indexing="ij"))
+        tilt = transmit_tilts_rad(s, angles, number).ravel()
         across, along = np.radians(s.beam_deg) / 2
         ends = ((0, 0), (across, 0), (0, along))
-        bundle = np.stack([_of_beam(angle + turn, np.full(len(angle), tilt)) for turn, tilt in ends], axis=1)
+        _, looks = swing_rad(np.sin(angle), tilt)
+        bundle = np.stack([_ray(angle + turn, tilt + more) for turn, more in ends], axis=1)
         ranges, plane, rise = self.hits("mbes", k, t_ns, bundle)
-        kept = np.flatnonzero((plane >= 0) & (ranges <= s.max_range_m))
-        axis, angle = bundle[kept, 0], angle[kept]
-        turned = np.column_stack([np.cos(angle), np.zeros(len(kept)), np.sin(angle)])
+        kept = np.flatnonzero((plane >= 0) & (ranges <= s.max_range_m) & looks)
+        axis, angle, tilt = bundle[kept, 0], angle[kept], tilt[kept]
+        turned = (_ray(angle + 1e-6, tilt) - _ray(angle - 1e-6, tilt)) / 2e-6
         noise = [s.range_sigma_m * axis, np.radians(s.angle_sigma_deg) * ranges[kept, None] * turned]
         clean = np.where(rise[kept] > np.sin(UPWARD_RAD), 1 - s.surface_share, 1.0)
         clean *= (1 - s.outlier_share) * (1 - s.dropped_ping_share)

@@ -60,6 +60,13 @@ HALF: dict[str, Any] = {  # half the pings, and passes just long enough
 }
 
 
+def _sectors(border_deg: float) -> dict[str, Any]:
+    """Transmit sectors 0.254° apart, as of a Kongsberg EM2042, symmetrical about the array's normal; half the pings."""
+    edges = ((-border_deg, -0.447), (border_deg, -0.701), (90.0, -0.447))
+    return {"mbes": TABLE | {"sectors": [{"to_deg": to, "tilt_deg": tilt} for to, tilt in edges]}}
+
+
+TABLE: dict[str, Any] = {"format": "parquet", "ping_rate_hz": 10.0}
 TWELVE: dict[str, Any] = {"distances_m": [3.5, 6.0, 8.5] * 4, "speed_m_s": 0.18, "gap_s": 20.0}  # 50 s each
 
 
@@ -104,6 +111,11 @@ CAMPAIGNS = (
     Campaign("finite beams and INS white noise", 600, 7000, {}),
     Campaign("finite beams and INS drift", 600, 8000, {"ins": DRIFT}),
     Campaign("twelve passes, INS drift", 160, 9000, {"ins": DRIFT, "track": TWELVE}),
+    Campaign("tilted sectors, border at 15", 24, 12000, _sectors(15.0)),
+    Campaign("tilted sectors, border at 30", 24, 12100, _sectors(30.0)),
+    Campaign("tilted sectors, border at 40", 24, 12200, _sectors(40.0)),
+    Campaign("tilted sectors, border at 48", 24, 12300, _sectors(48.0)),
+    Campaign("tilted from ping to ping", 24, 12400, {"mbes": TABLE | {"ping_tilts_deg": [0.0, 0.3]}}),
     Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
 )
 

@@ -8,6 +8,7 @@ Needs Chromium and a Vulkan driver in software, which ``make setup-visual`` inst
 
 import argparse
 import contextlib
+import hashlib
 import os
 import shutil
 import socket
@@ -19,11 +20,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from stages.views.opening import silent
 from tools.pipeline_picture import picture
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 SETTLE_S = 1.5  # after a change of tab or time, before the picture
 WIDTH = 1280
+TITLE_BAR_PX = 36  # of the viewer's window, with its warnings about this machine
+ROOT = Path(__file__).parents[1]
+DRAWN_FROM = "drawn_from.txt"  # beside the pictures
+SOURCES = {"report": "pipeline/pages", "recordings": "stages/views"}  # what each is drawn by
 
 
 def missing() -> str:
@@ -61,9 +67,9 @@ def viewer(*recordings: Path) -> Iterator[Any]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    with tempfile.TemporaryDirectory() as home:
-        kept = {name: os.environ.get(name) for name in ("HOME", "PATH")}
-        os.environ |= {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    with tempfile.TemporaryDirectory() as home, silent() as environment:
+        kept = {name: os.environ.get(name) for name in ("HOME", "PATH", "XDG_CONFIG_HOME")}
+        os.environ |= environment | {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
         try:
             client = ViewerClient.spawn(headless=True, port=port, hide_welcome_screen=True)
             try:
@@ -97,15 +103,16 @@ def tabs(run: Path, out: Path) -> None:
     import pandas as pd
 
     from stages.views import recordings_of
-    from stages.views.tour import TABS
+    from stages.views.tour import tabs_of
 
-    last = int(pd.read_parquet(run / "angle_iterate" / "iterations.parquet")["iteration"].iloc[-1])
+    steps = pd.read_parquet(run / "angle_iterate" / "iterations.parquet")["iteration"]
+    last = int(steps.max()) if len(steps) else 0
     with viewer(*recordings_of(run)) as client:
-        for tab in TABS:
+        for tab in tabs_of(run):
             show_tab(client, tab)
-            steps = {"-first": 0, "-second": 1, "-last": last} if tab == "Iteration" else {"": last}
-            for suffix, step in steps.items():
-                if tab == "Quality":
+            moments = {"-first": 0, "-second": 1, "-last": last} if tab == "Iteration" else {"": last}
+            for suffix, step in moments.items():
+                if tab == "Quality" or not len(steps):
                     client.set_time("time", play_state="paused")
                 else:
                     client.set_time("iteration", sequence=step, play_state="paused")
@@ -116,6 +123,19 @@ def report(run: Path, out: Path, height: int = 1500) -> None:
     """The beginning of the report's page."""
     page = (run / "report" / "report.html").resolve().as_uri()
     chromium(f"--window-size={WIDTH},{height}", f"--screenshot={(out / 'report.png').resolve()}", page)
+
+
+def drawn_from() -> str:
+    """A line each for the report and the recordings: SHA-256 of all that draws them. It changes when they may look
+    otherwise; tests/test_pictures.py compares it with that of the README's pictures."""
+    found = {}
+    for what, folder in SOURCES.items():
+        digest = hashlib.sha256()
+        for path in sorted((ROOT / folder).glob("*")):
+            if path.suffix in (".py", ".html"):
+                digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+        found[what] = digest.hexdigest()
+    return "".join(f"{what} {digest}\n" for what, digest in found.items())
 
 
 def main() -> None:
@@ -132,6 +152,7 @@ def main() -> None:
     for path in out.glob("*.png"):
         _lighten(path)
     picture(out / "pipeline.svg")
+    (out / DRAWN_FROM).write_text(drawn_from(), encoding="utf-8")
 
 
 def _lighten(path: Path) -> None:
@@ -139,6 +160,8 @@ def _lighten(path: Path) -> None:
     from PIL import Image
 
     image = Image.open(path).convert("RGB")
+    if path.name.startswith("recording-"):
+        image = image.crop((0, TITLE_BAR_PX, *image.size))
     image.thumbnail((WIDTH, 4 * WIDTH))
     image.save(path.with_suffix(".webp"), quality=85, method=6)
     path.unlink()

@@ -9,8 +9,8 @@ TRAJECTORY = Artefact(
     "ingest", "trajectory", "table", "INS solution, time ascending, unusable records left out",
     (
         T_NS,
-        Column("latitude_rad", F64, "rad", "geodetic latitude, WGS 84"),
-        Column("longitude_rad", F64, "rad", "longitude, WGS 84"),
+        Column("latitude_rad", F64, "rad", "geodetic latitude, in the datum of the INS"),
+        Column("longitude_rad", F64, "rad", "longitude, in the datum of the INS"),
         Column("height_m", F64, "m", "ellipsoidal height"),
         Column("roll_rad", F64, "rad", "starboard down +"),
         Column("pitch_rad", F64, "rad", "bow up +"),

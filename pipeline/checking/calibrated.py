@@ -15,10 +15,12 @@ Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by se
 
 @dataclass(frozen=True)
 class Calibrated:
-    """Soundings, each with the face that it is on, and the adjustment's table ``freed``: none where it got no farther.
-    """
+    """Soundings, each with the face that it is on, and tables: the target's pose, the mount that the labels are by, and
+    the adjustment's ``freed``; none where it got no farther."""
 
     soundings: Stream = EMPTY
+    target_pose: pd.DataFrame | None = None
+    provisional_mount: pd.DataFrame | None = None
     freed: pd.DataFrame | None = None
 
 

@@ -5,9 +5,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.days import whole_days
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import Seen
 from pipeline.passes import pass_of, split_at_gaps
+from pipeline.screen import plural
 from pipeline.times import NS, WEEK_NS, utc_text
 
 Times = NDArray[np.int64]
@@ -91,6 +93,8 @@ def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses
 
     if apart and weeks and fits(weeks * WEEK_NS):
         return f"{_amount(weeks * WEEK_NS)} the INS's: check gps_week, and the GPS time flag of the export"
+    if apart and (days := whole_days((running[0][0], running[-1][1]), (int(t_ns[0]), int(t_ns[-1])), fits)):
+        return days
     leaps = [sign * leap * NS for leap in LEAPS for sign in (1, -1)] if apart or pauses else []
     for offset_ns in leaps:
         if fits(offset_ns):

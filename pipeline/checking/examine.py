@@ -1,7 +1,7 @@
 """All questions in their order; what would only follow from an earlier finding is not asked."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +11,12 @@ from pipeline.checking import clocks, files, hits, passes
 from pipeline.checking.calibrated import Calibrate, Calibrated
 from pipeline.checking.expected import Soundings, missed, soundings
 from pipeline.checking.finding import Finding
+from pipeline.checking.ins_quality import Quality, quality, told
 from pipeline.checking.latency import latencies
 from pipeline.checking.placed import placeable, rows_of, sample
 from pipeline.checking.survey import SENSORS, Seen, Times, survey
 from pipeline.checking.track import Leg, Track, frame_of, joined, track_of
+from pipeline.checking.tried import other_pose, signs
 from pipeline.clouds import ClosestSurface
 from pipeline.maths.targets import TargetModel
 from pipeline.mounts import target_of
@@ -32,6 +34,7 @@ class Examined:
     findings: tuple[Finding, ...]
     model: TargetModel | None = None  # with the soundings on its faces, where they were counted
     soundings: Soundings | None = None
+    quality: Quality = field(default_factory=Quality)
 
     @property
     def faulty(self) -> bool:
@@ -51,6 +54,14 @@ def examine(
     folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None, calibrate: Calibrate
 ) -> Examined:
     """``pool``: where the target is; without it nothing is asked about the target. ``calibrate``: does so in memory."""
+    found = _examined(folder, session, pool, calibrate)
+    said = quality(found.files, [leg for leg in found.legs if leg.good])
+    return replace(found, quality=said, findings=(*found.findings, *told(said)))
+
+
+def _examined(
+    folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None, calibrate: Calibrate
+) -> Examined:
     seen, wrong = survey(session, folder)
     findings = list(_of_files(seen, wrong, session))
     epochs = _epochs(seen)
@@ -76,6 +87,7 @@ def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: config.Sessio
     yield from files.alignment(seen)
     yield from files.frames(seen, session)
     yield from files.sound_speed(seen, session)
+    yield from files.cast(seen, session)
 
 
 def _of_target(given: _Given, epochs: dict[str, Times], clocked: set[str]) -> Examined:
@@ -89,7 +101,7 @@ def _of_target(given: _Given, epochs: dict[str, Times], clocked: set[str]) -> Ex
         words = "target.azimuth_deg is not given, and the boat never has target.origin within 20 m to starboard"
         return replace(nothing, findings=(Finding("side", f"{words}; give azimuth_deg, or check target.origin"),))
     track = track_of(ins, frame, model, seen, pool.ingest)
-    findings = list(passes.sailing(track))
+    findings = list(passes.sailing(track, pool.target_place))
     asked = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in clocked]
     wrong: list[Finding] = []
     counted = None
@@ -108,9 +120,7 @@ def _of_points(given: _Given, track: Track, asked: Sequence[str]) -> tuple[list[
     """Where the points fall; of sensors whose points miss the target nothing finer is asked."""
     seen, session, pool, model = given.seen, given.session, given.pool, given.model
     few = [sample(seen, session, sensor, track, ROUGHLY) for sensor in asked]
-    found = list(
-        hits.off_target(track, [one for one in few if one is not None], ClosestSurface(model), pool.segment)
-    )
+    found = list(hits.off_target(track, [one for one in few if one is not None], ClosestSurface(model), pool))
     some = sample(seen, session, "mbes", track, FINELY) if "mbes" in asked and not found else None
     if some is None:
         return found, None
@@ -118,10 +128,23 @@ def _of_points(given: _Given, track: Track, asked: Sequence[str]) -> tuple[list[
     raw = {sensor: placeable(rows_of(seen, sensor, SAMPLED), track) for sensor in ("laser", "mbes")}
     raw["ins"] = joined(seen)
     tried = given.calibrate(session, pool, raw) if "laser" in asked else Calibrated()
+    found = list(_of_trial(given, track, tried))
+    if any(finding.severity == "fault" for finding in found):
+        return found, None
     counted = soundings(track, some, tried.soundings, len(raw["mbes"]["t_ns"]), seen, model, pool, session)
     found += missed(model, counted) if counted is not None else []
     found += latencies(tried.freed) if tried.freed is not None else []
     return found, counted
+
+
+def _of_trial(given: _Given, track: Track, tried: Calibrated) -> Iterator[Finding]:
+    """Whether the target stands, and the sonar is mounted, as the settings say."""
+    laser = sample(given.seen, given.session, "laser", track, SAMPLED)
+    if laser is not None and tried.target_pose is not None:
+        yield from other_pose(track, laser, tried.target_pose, given.model, given.pool)
+    if tried.provisional_mount is not None:
+        mount = given.session.sonar.mount
+        yield from signs(mount, tried.provisional_mount, given.pool.segment.search_mount_deg)
 
 
 def _epochs(seen: Sequence[Seen]) -> dict[str, Times]:

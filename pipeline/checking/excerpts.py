@@ -25,7 +25,7 @@ BYTES = {"ins": 64 << 20, "mbes": 48 << 20}  # of a sensor, over all its files
 PLACES = 128
 LEAST = {"ins": 1 << 16, "mbes": 1 << 19}  # read at one place: some records at least, of which a sonar's are large
 HEAD = 1 << 18  # at least so much of a file's start
-LOGS = ("novatel", "r2sonic", "gsf", "kmall")
+LOGS = ("novatel", "r2sonic", "gsf", "kmall", "all")
 TEXTS = ("inertial_explorer",)
 
 

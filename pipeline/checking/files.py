@@ -2,13 +2,15 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.cast import doubts
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
+from pipeline.screen import plural
 from pipeline.times import utc_text
 
 SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock
@@ -42,12 +44,8 @@ def unreadable(files: Sequence[Seen], wrong: Sequence[str]) -> Iterator[Finding]
 
 def twice(files: Sequence[Seen]) -> Iterator[Finding]:
     """Files of one sensor that hold the same time."""
-    for one, other in combinations([seen for seen in files if len(seen.epochs_ns) > 1], 2):
-        if one.sensor != other.sensor:
-            continue
+    for one, other in _overlapping([seen for seen in files if len(seen.epochs_ns) > 1]):
         first = max(one.span_ns[0], other.span_ns[0])
-        if first >= min(one.span_ns[1], other.span_ns[1]):
-            continue
         common = np.count_nonzero(np.isin(one.epochs_ns, other.epochs_ns, assume_unique=True))
         share = float(common / min(len(one.epochs_ns), len(other.epochs_ns)))
         if share < TWICE:
@@ -59,6 +57,19 @@ def twice(files: Sequence[Seen]) -> Iterator[Finding]:
         tiles = one.sensor == "laser" and not same
         words = f"{other.name}: {what}, from {utc_text(first)}; {advice}"
         yield Finding("twice", words, "look" if tiles else "fault")
+
+
+def _overlapping(files: Sequence[Seen]) -> Iterator[tuple[Seen, Seen]]:
+    """Pairs of one sensor whose times overlap, each in the order of the list. Of many files few do."""
+    order = {id(seen): k for k, seen in enumerate(files)}
+    running: list[Seen] = []
+    for seen in sorted(files, key=lambda seen: (seen.sensor, seen.span_ns[0])):
+        start, end = seen.span_ns
+        running = [one for one in running if one.sensor == seen.sensor and one.span_ns[1] > start]
+        for one in running if end > start else ():
+            first, second = sorted((one, seen), key=lambda seen: order[id(seen)])
+            yield first, second
+        running.append(seen)
 
 
 def ins_rate(files: Sequence[Seen]) -> Iterator[Finding]:
@@ -134,6 +145,22 @@ def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Findi
                 "it is this day's cast",
                 "look",
             )
+
+
+def cast(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
+    """A cast's file of another day, or of another place."""
+    if session.mbes is None or session.mbes.svp_from is None:
+        return
+    times = [seen.span_ns for seen in files if seen.sensor == "mbes" and len(seen.epochs_ns)]
+    span = (min(first for first, _ in times), max(last for _, last in times)) if times else None
+    ins = next((seen.columns for seen in files if seen.sensor == "ins" and seen.columns), None)
+    place = None if ins is None else (_degrees(ins["latitude_rad"]), _degrees(ins["longitude_rad"]))
+    for words in doubts(session.mbes.svp_from, span, place):
+        yield Finding("sound speed", words, "look")
+
+
+def _degrees(angles_rad: NDArray[np.float64]) -> float:
+    return float(np.degrees(np.median(angles_rad)))
 
 
 def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:

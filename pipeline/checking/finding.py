@@ -13,11 +13,3 @@ class Finding:
     question: str
     words: str
     severity: Severity = "fault"
-
-
-def plural(number: int, noun: str) -> str:
-    """
-    >>> plural(1, "file"), plural(2, "file")
-    ('1 file', '2 files')
-    """
-    return f"{number} {noun}{'s' * (number != 1)}"

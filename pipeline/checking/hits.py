@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.checking.clocks import named
 from pipeline.checking.finding import Finding
-from pipeline.checking.placed import Sample, put
+from pipeline.checking.heights import wrong_height
+from pipeline.checking.passes import heading
+from pipeline.checking.placed import NAMES, Sample, put
 from pipeline.checking.track import Track
 from pipeline.clouds import ClosestSurface
 
@@ -21,8 +23,7 @@ BETTER, AT_LEAST = 2.0, 0.02  # times the score as it is, and above it: what is 
 NOTHING, FEW = 0.01, 50  # of the points in passes, so few hit; too few points to tell
 LEAP_WITHIN_S = 1.5  # an origin half a metre off along the track looks like a second
 UNITS = {"millimetres": 0.001, "centimetres": 0.01, "feet": 0.3048}
-SIGNS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
-NAMES = {"laser": "laser points", "mbes": "soundings"}
+SIGNS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m")  # of z: heights.py
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def hypotheses(track: Track, some: Sample, closest: ClosestSurface) -> list[Hit]
     for key in SIGNS:
         value = getattr(some.mount, key)
         turned = some.mount.model_copy(update={key: -value})
-        words = f"with {some.sensor}.mount.{key} = {-value:g} in place of {value:g}: mend its sign"
+        words = f"with {some.sensor}.mount.{key} = {-value:g} in place of {value:g}: reverse its sign"
         tried.append(Hit(judge(mount=turned), words=words))
     coarse = np.arange(-FARTHEST_S, FARTHEST_S + STEP_S / 2, STEP_S)
     best = float(max(coarse, key=lambda ahead_s: judge(ahead_s=ahead_s)))
@@ -71,9 +72,15 @@ def hypotheses(track: Track, some: Sample, closest: ClosestSurface) -> list[Hit]
 
 
 def off_target(
-    track: Track, samples: Sequence[Sample], closest: ClosestSurface, settings: config.Segment
+    track: Track, samples: Sequence[Sample], closest: ClosestSurface, pool: config.PoolConfig
 ) -> Iterator[Finding]:
-    """Of each sensor what is wrong, if anything is; a clock that both are off by is the INS's."""
+    """Of each sensor what is wrong, if anything is; a clock that both are off by is the INS's. A height that both are
+    off by is the target's, whatever a mount might explain of it."""
+    settings, water_m = pool.segment, pool.target.water_level_m
+    wrong = list(wrong_height(track, samples, closest, water_m, pool.target.origin.height_m))
+    if wrong:
+        yield from wrong
+        return
     speed = max([0.05, *(leg.speed_m_s for leg in track.legs)])
     least_s = max(2.5, 2 * settings.search_horizontal_m / speed)
     clocks: dict[str, float] = {}
@@ -88,10 +95,12 @@ def off_target(
             else:
                 clocks[some.sensor] = best.clock_s
         elif _misses(track, some, closest):
+            check = f"check {some.sensor}.mount, target.origin and target.azimuth_deg"
+            askew = heading(track, pool.target_place)
             yield Finding(
                 "target",
-                f"{some.sensor}: hardly any of its {NAMES[some.sensor]} falls onto the target in its passes; "
-                f"check {some.sensor}.mount, target.origin and target.azimuth_deg",
+                f"{some.sensor}: hardly any of its {NAMES[some.sensor]} falls onto the target in its passes, nor would "
+                f"with another sign, clock or height: {f'the boat: {askew}' if askew else check}",
             )
     yield from _clocks(clocks, len(samples))
 

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import config
-from pipeline.checking.finding import Finding, plural
+from pipeline.checking.finding import Finding
 from pipeline.checking.survey import Columns, Seen
-from pipeline.checking.track import Track
+from pipeline.checking.track import Track, askew_deg
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.targets import TargetModel
+from pipeline.screen import plural
 from pipeline.times import NS, utc_text
 
 Times = NDArray[np.int64]
@@ -19,6 +20,7 @@ NEARBY_M = 60.0
 HIGHEST_M = 15.0  # of the INS above the target's upper end, or below its lower one
 ALIKE_M = 0.5  # passes whose distances differ by less tell yaw and lever arm badly apart
 RAN, NOT = 0.6, 0.2  # of a pass: a sensor ran, or did not
+ASKEW_DEG = 15.0  # between the boat's heading and the target's +y: no coarse azimuth
 HOLE_S = 0.3  # without the INS while a sensor saw the target
 
 
@@ -57,28 +59,34 @@ def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
 def _why_astray(ins: Columns, origin: config.Origin) -> str:
     latitude, longitude = origin.latitude_deg, origin.longitude_deg
     for words, place in (
-        ("latitude and longitude are exchanged", (longitude, latitude)),
+        ("latitude and longitude are interchanged", (longitude, latitude)),
         ("latitude_deg has the wrong sign", (-latitude, longitude)),
         ("longitude_deg has the wrong sign", (latitude, -longitude)),
         ("latitude_deg and longitude_deg have the wrong sign", (-latitude, -longitude)),
     ):
         if _away_m(ins, *place) < ASTRAY_M:
-            return f"{words}; mend it"
+            return f"{words}; correct it"
     return "check target.origin, and that these are this pool's files"
 
 
-def sailing(track: Track) -> Iterator[Finding]:
+def sailing(track: Track, place: config.TargetPlace) -> Iterator[Finding]:
     """Passes on the wrong side, none at all, all at one distance."""
     sounded = [leg for leg in track.legs if max(leg.ran.values()) > NOT]
+    legs = f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')}"
     if not track.legs:
-        yield Finding("passes", "the boat never passes the target: check target.origin and target.azimuth_deg")
+        yield Finding("passes", f"the boat never passes the target: {heading(track, place) or 'check target.origin'}")
+    elif all(leg.distance_m < 0 for leg in track.legs):
+        given = place.azimuth_deg
+        turned = "" if given is None else f" ({(given + 180) % 360:g} in place of {given:g})"
+        words = f"{legs} the boat sails behind the target (x > 0): turn target.azimuth_deg by 180°{turned}"
+        yield Finding("side", f"{words}, or check target.origin")
     elif not any(leg.good for leg in track.legs):
-        why = "behind the target" if all(leg.distance_m < 0 for leg in track.legs) else "with the target to port"
-        yield Finding(
-            "side",
-            f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')} the boat sails {why}: sail with its "
-            "front to starboard, or turn target.azimuth_deg by 180°",
-        )
+        astern = [leg for leg in track.legs if leg.astern]
+        words = f"{legs} the boat sails with the target to port"
+        if len(astern) > len(track.legs) / 2:
+            yield Finding("side", f"{words}, stern first by its heading: is the INS's heading turned by 180°?")
+        else:
+            yield Finding("side", f"{words}: sail the other way, with the target's front to starboard")
     distances = [leg.distance_m for leg in sounded if leg.good]
     if distances and np.ptp(distances) < ALIKE_M:
         yield Finding(
@@ -87,6 +95,18 @@ def sailing(track: Track) -> Iterator[Finding]:
             "lever arm y are told apart by different distances; sail some more, 2 m nearer or farther",
             "look",
         )
+
+
+def heading(track: Track, place: config.TargetPlace) -> str:
+    """What to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
+    turn = askew_deg(track)
+    if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:
+        return ""
+    sailed = (place.azimuth_deg + turn) % 360.0
+    return (
+        f"it heads {sailed:.0f}° with target.origin to starboard, but target.azimuth_deg is {place.azimuth_deg:g} (the "
+        f"direction of the target's +y, along which it is sailed): write {sailed:.0f}, or check target.origin"
+    )
 
 
 def missing(track: Track, files: Sequence[Seen]) -> Iterator[Finding]:

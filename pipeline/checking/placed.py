@@ -16,6 +16,7 @@ from pipeline.streams import xyz
 from pipeline.times import NS
 
 Array = NDArray[np.float64]
+NAMES = {"laser": "laser points", "mbes": "soundings"}
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,14 @@ def sample(
         return Sample(sensor, columns["t_ns"], points, session.laser.mount, placed)
     mbes = session.sonar
     offset = None if mbes.projector_offset_m is None else np.array(mbes.projector_offset_m)
-    names = ("two_way_time_s", "angle_rad", "transmit_tilt_rad", "sound_speed_m_s")
-    points, valid = points_in_mbes(*(columns[name] for name in names), mbes.sound_speed_m_s, offset)
+    points, valid = points_in_mbes(
+        columns["two_way_time_s"],
+        columns["angle_rad"],
+        columns["transmit_tilt_rad"],
+        columns["sound_speed_m_s"],
+        mbes.sound_speed_m_s,
+        offset,
+    )
     return Sample(sensor, columns["t_ns"][valid], points[valid], mbes.mount)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.checking.examine import Examined
+from pipeline.checking.ins_quality import Quality
 from pipeline.checking.survey import Seen
 from pipeline.times import utc_text
 
@@ -17,6 +18,7 @@ def text(examined: Examined) -> str:
     lines += [_file_line(seen, width) for seen in examined.files]
     if any(seen.share < 1 or not seen.ended for seen in examined.files):
         lines.append("~: read in part")
+    lines += _quality_lines(examined.quality)
     if examined.legs:
         head = f"{'pass':<6}{'from (UTC)':<22}{'seconds':>8}{'distance':>10}{'speed':>10}{'laser':>8}{'sonar':>8}"
         lines += ["", head]
@@ -34,6 +36,21 @@ def text(examined: Examined) -> str:
     if not examined.findings:
         lines.append("Nothing found.")
     return "\n".join(lines)
+
+
+def _quality_lines(found: Quality) -> list[str]:
+    """What the INS says of itself; nothing where it says nothing."""
+    lines = []
+    for name, kinds in found.by_file.items():
+        for counts in kinds.values():
+            shares = (f"{state} {number / counts.total():.0%}" for state, number in counts.most_common())
+            lines.append(f"{name}: {', '.join(shares)}")
+    if found.sigmas:
+        units = {name: "°" if name.endswith("deg") else " m" for name in found.sigmas}
+        axes = {name: name.rpartition("_")[0].replace("_", " and ") for name in found.sigmas}
+        said = ", ".join(f"{axes[name]} {sigma:.2g}{units[name]}" for name, sigma in found.sigmas.items())
+        lines.append(f"ins, by its own sigmas {'in the passes' if found.of_passes else 'in the whole log'}: {said}")
+    return lines
 
 
 def _by_face(examined: Examined) -> list[dict[str, Any]]:
@@ -90,6 +107,8 @@ def as_json(examined: Examined) -> str:
             }
             for seen in examined.files
         ],
+        "ins_states": examined.quality.by_file,
+        "ins_sigmas": examined.quality.sigmas,
         "soundings": _by_face(examined),
         "passes": [
             {

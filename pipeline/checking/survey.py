@@ -1,6 +1,5 @@
 """Every file of a session looked into: what it is, when it begins and ends, how fast it runs, samples of its rows."""
 
-import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,8 +12,11 @@ from numpy.typing import NDArray
 from pipeline import config
 from pipeline.checking.excerpts import excerpt, stretches
 from pipeline.errors import ConfigError, RawDataError
+from pipeline.files import temporary_folder
+from pipeline.ins_sigmas import thinned
 from pipeline.rates import rate_hz
 from pipeline.readers import Sensor, Settings, detect, raw_files, raw_parts
+from pipeline.readers.accuracy import AccuracyPart
 from pipeline.readers.las import LasPart
 from pipeline.sampling import every_nth
 from pipeline.streams import Part
@@ -32,7 +34,8 @@ TICK_NS = NS // 20  # of the laser's times one in each such interval is kept
 class Seen:
     """One file. ``share``: how much of it was read, ``places``: in how many evenly spread ones; ``ended``: its end was
     among that; ``epochs_ns``: times of records or pings, of a laser one a tick; ``columns``: sampled rows, of an INS
-    all; ``complaint``: why it could not be read."""
+    all; ``states``: of each of these what its log says of it; ``sigmas``: what the INS says of its accuracy, thinned;
+    ``complaint``: why it could not be read."""
 
     sensor: Sensor
     name: str
@@ -45,6 +48,8 @@ class Seen:
     dropped: Counter[str] = field(default_factory=Counter)
     epochs_ns: Times = field(default_factory=lambda: np.empty(0, np.int64))
     columns: Columns = field(default_factory=dict)
+    states: Columns = field(default_factory=dict)
+    sigmas: Columns = field(default_factory=dict)
     complaint: str = ""
 
     @property
@@ -68,7 +73,7 @@ def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], lis
     """All files, those that cannot be read with their refusal; and what is wrong with the lists themselves."""
     found: list[Seen] = []
     wrong: list[str] = []
-    with tempfile.TemporaryDirectory() as place:
+    with temporary_folder() as place:
         for sensor in SENSORS:
             settings: Settings | None = getattr(session, sensor)
             if settings is None:
@@ -76,8 +81,27 @@ def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], lis
             names, complaints = _listed(settings, folder)
             wrong += complaints
             for name, parts in _parts(sensor, settings, folder, names):
-                found.append(_look(sensor, settings, folder, name, parts, len(names), Path(place)))
+                found.append(_look(sensor, settings, folder, name, parts, len(names), place))
+    if session.ins.accuracy:
+        found, wrong = _with_accuracy(found, wrong, session.ins, folder)
     return found, wrong
+
+
+def _with_accuracy(
+    found: Sequence[Seen], wrong: Sequence[str], ins: config.Ins, folder: Path
+) -> tuple[list[Seen], list[str]]:
+    """The first good file of the INS has what its accuracy files say; those that cannot be read, with their refusal."""
+    good = next((k for k, seen in enumerate(found) if seen.sensor == "ins" and not seen.complaint), None)
+    if good is None:
+        return list(found), list(wrong)
+    try:
+        alone = ins.model_copy(update={"files": [_escaped(found[good].name)]})
+        parts = [part for part in raw_parts("ins", alone, folder) if isinstance(part, AccuracyPart)]
+        told = [thinned(chunk.sigmas) for part in parts for chunk in part.chunks()]
+    except (RawDataError, ConfigError) as error:
+        return list(found), [*wrong, str(error)]
+    sigmas = _joined([one for one in told if one])
+    return [replace(seen, sigmas=sigmas) if k == good else seen for k, seen in enumerate(found)], list(wrong)
 
 
 def _listed(settings: Settings, folder: Path) -> tuple[list[str], list[str]]:
@@ -119,8 +143,11 @@ def _parts(
                 bad[name] = error
         good = [name for name in names if name not in bad]
         parts = parts_of(good) if good else ()
+    by_path: dict[Path | None, list[Part]] = {}
+    for part in parts:
+        by_path.setdefault(_path_of(part), []).append(part)
     for name in names:
-        yield name, bad[name] if name in bad else [part for part in parts if _path_of(part) == folder / name]
+        yield name, bad[name] if name in bad else by_path.get(folder / name, [])
 
 
 def _escaped(name: str) -> str:
@@ -132,7 +159,10 @@ def _look(
     place: Path,
 ) -> Seen:
     path = folder / name
-    seen = Seen(sensor, name, path.stat().st_size)
+    try:
+        seen = Seen(sensor, name, path.stat().st_size)
+    except OSError as error:
+        return Seen(sensor, name, 0, complaint=f"{name}: cannot be read ({error.strerror}); was it moved meanwhile?")
     if isinstance(parts, RawDataError):
         return replace(seen, complaint=str(parts))
     try:
@@ -166,6 +196,8 @@ def _read(seen: Seen, parts: Sequence[Part], files: int) -> Seen:
     """The rows of some parts of one of so many files: counted, and thinned until few enough remain."""
     epochs: list[Times] = []
     kept: list[Columns] = []
+    states: list[Columns] = []
+    sigmas: list[Columns] = []
     dropped: Counter[str] = Counter()
     records, ended, one_in = 0, True, 1.0
     for chunk in (chunk for part in parts for chunk in part.chunks()):
@@ -174,6 +206,7 @@ def _read(seen: Seen, parts: Sequence[Part], files: int) -> Seen:
             break
         dropped.update(chunk.dropped)
         rows = len(chunk.columns["t_ns"]) if chunk.columns else 0
+        sigmas += [thinned(chunk.sigmas)] if chunk.sigmas else []
         records += rows
         if rows:
             t_ns = chunk.columns["t_ns"]
@@ -181,9 +214,21 @@ def _read(seen: Seen, parts: Sequence[Part], files: int) -> Seen:
             while seen.sensor != "ins" and records / one_in > KEPT:
                 one_in *= 2
             kept.append(dict(every_nth(chunk.columns, one_in)))
+            states += [dict(chunk.states)] if chunk.states else []
     times = np.unique(np.concatenate(epochs)) if epochs else np.empty(0, np.int64)
-    columns = {}
-    if kept:
-        joined = {name: np.concatenate([one[name] for one in kept]) for name in kept[0]}
-        columns = dict(every_nth(joined, one_in))
-    return replace(seen, records=records, dropped=dropped, epochs_ns=times, columns=columns, ended=ended)
+    columns = dict(every_nth(_joined(kept), one_in)) if kept else {}
+    return replace(
+        seen,
+        records=records,
+        dropped=dropped,
+        epochs_ns=times,
+        columns=columns,
+        ended=ended,
+        states=_joined(states),
+        sigmas=_joined(sigmas),
+    )
+
+
+def _joined(pieces: Sequence[Columns]) -> Columns:
+    names = pieces[0] if pieces else ()
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in names}

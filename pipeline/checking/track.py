@@ -25,8 +25,8 @@ NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "
 
 @dataclass(frozen=True)
 class Leg:
-    """The boat past the target once: while it is abeam of it. ``forward``: toward the target's +y, with the target to
-    starboard then if x < 0; ``ran``: by sensor the share of that time in which it ran."""
+    """The boat past the target once: while it is abeam of it. ``astern``: against its own heading; ``ran``: by sensor
+    the share of that time in which it ran."""
 
     start_ns: int
     end_ns: int
@@ -36,6 +36,7 @@ class Leg:
     height_m: float  # of the INS in the target frame
     starboard: bool
     ran: Mapping[str, float]
+    astern: bool = False
 
     @property
     def good(self) -> bool:
@@ -102,7 +103,17 @@ def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[Seen]) -> Leg:
         float(np.median(positions[:, 2])),
         forward == (away < 0),
         {sensor: _ran(start, end, [seen for seen in files if seen.sensor == sensor]) for sensor in ("laser", "mbes")},
+        forward != (run > 0),
     )
+
+
+def askew_deg(track: Track) -> float | None:
+    """By how much the boat headed to the right of the target's +y while it had target.origin to starboard and near,
+    within ±180 degrees; None where it never had."""
+    x, y = track.trajectory.positions_m[:, :2].T
+    ahead = track.trajectory.R_frame_from_body[:, :2, 1]
+    turn = estimate_azimuth(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
+    return None if turn is None else float(np.degrees(turn))
 
 
 def _ran(start: int, end: int, files: Sequence[Seen]) -> float:

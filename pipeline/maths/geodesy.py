@@ -1,4 +1,4 @@
-"""Geodetic, earth-centred and pool coordinates (WGS 84)."""
+"""Geodetic, earth-centred and pool coordinates, over the ellipsoid of WGS 84 (GRS 80, CGCS2000: 0.12 mm from it)."""
 
 from dataclasses import dataclass
 

@@ -25,9 +25,10 @@ no noise that v knows of.
 
 Two effects of the sonar's angle are of second order, and yet a fifth of the sigma of roll, for no number of soundings
 averages them away. (1) A stray axis meets the surface further away on average: with t = (n · a) / (n · d) the range of
-an axis off by δ is ρ (1 - t δ + (1/2 + t²) δ²), so that the *mean* is E v = (n · d) ρ σ_θ² (1/2 + t²). (That takes
-∂²d/∂θ² = -d, as without tilt; with a tilt τ it is wrong by the share τ² of itself.) (2) ρ in σ must not be the measured
-one: a range too long would get the smaller weight. It is that of the recorded ray to the surface, ρ - v / (n · d).
+an axis off by δ is ρ (1 - t δ + (1/2 + t²) δ²), so that the *mean* is E v = (n · d) ρ σ_θ² (1/2 + t²). That is with
+∂²d/∂θ² = -d; of a tilted fan, p = sin τ, it is -d + k, k = (0, p, p² (1 - p²) / c³), and E v less by ρ σ_θ² (n · k)
+/ 2. (2) ρ in σ must not be the measured one: a range too long would get the smaller weight. It is that of the recorded
+ray to the surface, ρ - v / (n · d).
 
 Further features: range b added to every range: n · d. Sonar, sound speed higher by the share k: ranges grow by k, and
 so do sin θ and sin τ, for the beams of flat arrays are steered with the recorded speed; with (x, y, z) = ρ (s, p, -c)
@@ -50,6 +51,7 @@ Array = NDArray[np.float64]
 SPEED_M_S = 1480.0  # of sound, where only the size of a small effect depends on it
 FLATTEST = 0.05  # n · d: 3°, flatter than any ray that is used, once the mount is nearly right
 STEEPEST = 0.02  # c: flatter beams are not steered by their sines
+FLATTEST_FAN = 0.25  # c: 15° from the array's plane
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,8 @@ def sonar_observations(points_m: Array, axes: Array, up: Array, r: Array, v_m: A
     side = np.einsum("in,in->n", axes[2], across_beam(x, y, z)) / range_m  # n · a
     variance = (sigmas.range_m * ray[2]) ** 2 + (reached_m * sigmas.angle_rad * side) ** 2
     mean = slant * reached_m * sigmas.angle_rad**2 * (0.5 + (side / slant) ** 2)
-    down = np.maximum(-z, STEEPEST * range_m)
+    mean -= _curvature(axes[2], y / range_m, -z / range_m) * reached_m * sigmas.angle_rad**2 / 2
+    down = np.copysign(np.maximum(np.abs(z), STEEPEST * range_m), -z)
     speed = 2 * (axes[2, 0] * x + axes[2, 1] * y) + axes[2, 2] * (z + (x * x + y * y) / down)
     up_of_ray = np.einsum("in,in->n", up, points_m) / range_m
     up_of_normal = np.einsum("in,in->n", up, axes[2])
@@ -100,6 +103,12 @@ def sonar_observations(points_m: Array, axes: Array, up: Array, r: Array, v_m: A
     features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2], speed, gradient])
     by_range = np.stack([ray[0], ray[1], np.zeros_like(x), speed / range_m, 2 * gradient / range_m])
     return Seen(mean, np.sqrt(variance), features, by_range / slant)
+
+
+def _curvature(normal: Array, p: Array, c: Array) -> Array:
+    """n · k (n,) of a tilted fan, with normals (3, n); bounded where its cones touch."""
+    steep = np.copysign(np.maximum(np.abs(c), FLATTEST_FAN), c)
+    return np.asarray(normal[1] * p + normal[2] * p**2 * (1 - p**2) / steep**3)
 
 
 def sensor_part(v_m: Array, weight: Array, epochs: Runs, common_m: Array) -> Array:

@@ -109,23 +109,32 @@ def freed(normal: Array, right: Array, solution: Solution) -> list[Freed]:
     return found
 
 
-TOGETHER = 0.5  # a weaker correlation is not worth a word
+TOGETHER = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 WORDS = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")
 
 
-def strongest(covariance: Array) -> tuple[int, int, float]:
-    """The two of the six with the strongest correlation in (6, 6), and that correlation."""
+def together(covariance: Array) -> tuple[int, int, float] | None:
+    """The two of the six in (6, 6) that are hardest to tell apart, and their correlation ρ; None if no two are.
+
+    With the other one known, the sigma of each would be √(1 - ρ²) of what it is: half of it at ρ = √3/2 = 0.866. From
+    there on two are said to move together. A weaker correlation costs less than another pass.
+    """
     sigma = np.sqrt(np.diag(covariance))
     above = np.triu(covariance / np.outer(sigma, sigma), 1)
     row, column = divmod(int(np.argmax(np.abs(above))), SIX)
-    return row, column, float(above[row, column])
+    rho = float(above[row, column])
+    return (row, column, rho) if abs(rho) >= TOGETHER else None
 
 
 def weakest_direction(covariance: Array) -> str:
     """The two of the six that are hardest to tell apart, in words."""
-    sigma = np.sqrt(np.diag(covariance))
-    row, column, rho = strongest(covariance)
-    if abs(rho) < TOGETHER:
+    sigma, pair = np.sqrt(np.diag(covariance)), together(covariance)
+    if pair is None:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))
         return f"no two are hard to tell apart; least sure are {WORDS[worst[0]]} and {WORDS[worst[1]]}"
-    return f"{WORDS[row]} and {WORDS[column]} move together (correlation {rho:+.3f})"
+    row, column, rho = pair
+    times = 1 / np.sqrt(max(1 - rho**2, 1e-6))
+    return (
+        f"{WORDS[row]} and {WORDS[column]} move together (correlation {rho:+.3f}): if one were known, the other's "
+        f"sigma would be {times:.1f} times smaller"
+    )

@@ -63,7 +63,7 @@ def receive_angle(points_mbes_m: Array) -> Array:
     array([0.785398, 0.523599])
     """
     x, y, z = points_mbes_m.T
-    return np.arctan2(x, np.copysign(np.hypot(y, z), -z))
+    return np.asarray(np.arctan2(x, np.copysign(np.hypot(y, z), -z)))
 
 
 def traced(

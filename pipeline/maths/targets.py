@@ -145,6 +145,11 @@ class TargetModel:
     repeats_m: float | None
 
     @property
+    def depth_m(self) -> float:
+        """Of its lower end below the water."""
+        return self.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in self.faces)
+
+    @property
     def half_period_m(self) -> float:
         """Half of what it repeats after; of what does not repeat half a metre, the scale on which poses differ."""
         return 0.5 if self.repeats_m is None else self.repeats_m / 2

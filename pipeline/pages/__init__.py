@@ -7,6 +7,7 @@ never a name from a file or a config.
 import base64
 import contextlib
 import io
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -21,7 +22,11 @@ LASER, COARSE, SONAR = "#3aa0dc", "#b9bcc1", "#d55e00"
 FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a", "other": "#7a5c00", "more": "#1a1a1a"}
 AXIS = {"roll": "#0072b2", "pitch": "#e6a000", "yaw": "#009e73"}
 MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s", "other": "D", "more": "X"}
+WIDTH_IN = 7.2  # of every picture
+SMALLEST_PT = 7  # letters in a picture
 DPI = 200  # of what is drawn as dots in a vector picture
+HEAD_LETTERS = 70  # of the running head of a printed page
+MARGIN_TEXT = "font-size: 8pt; color: #50555d;"
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "poolcal",
@@ -66,7 +71,29 @@ def render(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(**values)
+    environment.filters["breakable"] = breakable
+    fixed = {"css": css_text, "picture_px": round(96 * WIDTH_IN), "margin_text": MARGIN_TEXT}
+    return environment.get_template(template).render(**fixed, **values)
+
+
+def css_text(text: str) -> Markup:
+    r"""Untrusted text within the quotes of a CSS string, at most a line of it: all but plain letters as numbers.
+
+    >>> css_text('a "} </style>')
+    Markup('a \\22 \\7d  \\3c \\2f style\\3e ')
+    """
+    short = text if len(text) <= HEAD_LETTERS else f"{text[:HEAD_LETTERS]}…"
+    plain = (one if one == " " or (one.isascii() and one.isalnum()) else f"\\{ord(one):x} " for one in short)
+    return Markup("".join(plain))
+
+
+def breakable(text: str) -> Markup:
+    """A name that may be broken into lines after _ and -, and not within a word.
+
+    >>> breakable("harbour_<b>")
+    Markup('harbour_<wbr>&lt;b&gt;')
+    """
+    return Markup("<wbr>").join(Markup.escape(part) for part in re.split(r"(?<=[_-])", text))
 
 
 def picture(figure: Figure, label: str) -> Markup:

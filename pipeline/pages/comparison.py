@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.diff import shown
 from pipeline.mounts import WITHIN_95
-from pipeline.pages import ALARM, INK, QUIET, picture, render, style
+from pipeline.pages import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
 
 
 def page(found: Mapping[str, Any]) -> str:
@@ -29,8 +29,8 @@ def page(found: Mapping[str, Any]) -> str:
 def _chart(rows: list[dict[str, Any]]) -> Markup:
     """Each difference in its own sigmas, with its 95 % interval; red: moved."""
     with style():
-        figure = Figure(figsize=(7.2, 2.0))
-        axis = figure.add_axes((0.08, 0.24, 0.9, 0.72))
+        figure = Figure(figsize=(WIDTH_IN, 2.0))
+        axis = figure.add_axes((0.13, 0.24, 0.85, 0.72))
         z = np.array([row["z"] for row in rows])
         for place, row in enumerate(rows):
             colour = ALARM if row["moved"] else INK

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from pipeline.families import shown_as
 from pipeline.mounts import WITHIN_95
-from pipeline.pages import AXIS, FAMILY, LASER, MARKS, QUIET, SONAR, picture
+from pipeline.pages import AXIS, FAMILY, LASER, MARKS, QUIET, SMALLEST_PT, SONAR, WIDTH_IN, picture
 from pipeline.residuals import FEWEST
 from pipeline.times import NS
 
@@ -23,7 +23,7 @@ def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, fam
     """Mean residuals of the sonar (or of the laser, where it is calibrated) by angle and distance, and of both sensors
     by face and over time."""
     colours, marks = shown_as(families, FAMILY), shown_as(families, MARKS)
-    figure = Figure(figsize=(7.2, 6.0))
+    figure = Figure(figsize=(WIDTH_IN, 6.0))
     grid = figure.add_gridspec(3, 2, left=0.08, right=0.98, bottom=0.05, top=0.91, wspace=0.2, hspace=0.55)
     by_face, by_angle, by_range = (figure.add_subplot(grid[place]) for place in ((0, 0), (0, 1), (1, 0)))
     _by_face(by_face, cells, marks)
@@ -62,12 +62,13 @@ def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
             mean = 1000 * rows["mean_m"].to_numpy()
             axis.errorbar(at, mean, 1000 * WITHIN_95 * rows["sigma_mean_m"], fmt=marks[name], **bars)
             for x, y, number in zip(at, mean, rows["pass"], strict=True):
-                axis.annotate(f"{number}", (x, y), (2, 2), textcoords="offset points", fontsize=5, color=colour)
+                beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALLEST_PT, "color": colour}
+                axis.annotate(f"{number}", (x, y), (2, 2), **beside)
     if len(cells):
         inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # one cell far off must not hide the others
         axis.set_ylim(-inner, inner)
     axis.set_xticks(range(len(marks)), list(marks))
-    axis.set(title="by face; a mark a pass: laser light blue, sonar orange", ylabel="mean residual, mm")
+    axis.set(title="by family and pass (laser blue, sonar orange)", ylabel="mean residual, mm")
 
 
 def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
@@ -87,12 +88,12 @@ def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
     if len(middles) <= 20:
         axis.set_xticks(middles, names)
     axis.axhline(0, color=QUIET, linewidth=0.6)
-    axis.set(title="by time: a dot a second and family; laser light blue, sonar orange", ylabel="mean residual, mm")
+    axis.set(title="by time: mean of each second and family (laser blue, sonar orange)", ylabel="mean residual, mm")
 
 
 def convergence(iterations: pd.DataFrame, alternation: pd.DataFrame) -> Markup:
     """The patent's angles step by step, and its angles and offsets in turn."""
-    figure = Figure(figsize=(7.2, 2.5))
+    figure = Figure(figsize=(WIDTH_IN, 2.5))
     where = {"left": 0.1, "right": 0.99, "bottom": 0.18, "top": 0.9, "wspace": 0.22}
     angles, turns = figure.subplots(1, 2, gridspec_kw=where)
     for (axis, colour), style in zip(AXIS.items(), ("o-", "s-", "^-"), strict=True):

@@ -1,5 +1,8 @@
 """The history's page: a control chart of each parameter, and the table behind it."""
 
+from collections import Counter
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
@@ -7,7 +10,8 @@ from matplotlib.figure import Figure
 
 from pipeline.history import History
 from pipeline.mounts import PARAMETERS, WITHIN_95
-from pipeline.pages import ALARM, INK, QUIET, picture, render, style
+from pipeline.pages import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
+from pipeline.screen import plural
 from pipeline.verdict import SIX
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
@@ -39,7 +43,26 @@ def page(history: History, filters: str) -> str:
         sentence=sentence,
         filters=filters,
         unreadable=history.unreadable,
+        without=history.without,
+        sessions=plural(len(rows), "session"),
     )
+
+
+def _moments(dates: Sequence[str]) -> list[str]:
+    """The days of sessions in order of time; of a day with several, hour and minute as well; the chart takes them as
+    labels, which begin with the number in the table where even these are the same.
+
+    >>> _moments(["2026-05-12T08:00:00Z", "2026-05-12T14:30:00Z", "2026-05-13T08:00:00Z"])
+    ['2026-05-12 08:00', '2026-05-12 14:30', '2026-05-13']
+    >>> _moments(["2026-05-12T08:00:00Z", "2026-05-12T08:00:00Z"])
+    ['1: 2026-05-12 08:00', '2: 2026-05-12 08:00']
+    """
+    days, minutes = Counter(one[:10] for one in dates), Counter(one[:16] for one in dates)
+    found = []
+    for number, one in enumerate(dates, 1):
+        words = one[:16].replace("T", " ") if days[one[:10]] > 1 else one[:10]
+        found.append(f"{number}: {words}" if minutes[one[:16]] > 1 else words)
+    return found
 
 
 def _number(value: float, digits: int) -> str:
@@ -49,7 +72,7 @@ def _number(value: float, digits: int) -> str:
 def _chart(table: pd.DataFrame) -> Markup:
     """Six panels over the sessions in order of time."""
     with style():
-        figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+        figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
         axes = figure.subplots(3, 2, sharex=True).T.ravel()
         place = np.arange(len(table))
         accepted = (table["verdict"] == "accepted").to_numpy()
@@ -81,5 +104,5 @@ def _chart(table: pd.DataFrame) -> Markup:
                     edge, mark = (0.96 * reach, "^") if up else (-0.96 * reach, "v")
                     axis.plot([x], [edge], mark, color=QUIET, markersize=4)
         for axis in (axes[2], axes[5]):
-            axis.set_xticks(place, [day[:10] for day in table["date_utc"]], rotation=30, ha="right")
+            axis.set_xticks(place, _moments(table["date_utc"].tolist()), rotation=30, ha="right")
         return picture(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")

@@ -9,9 +9,8 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from pipeline import artefacts
-from pipeline.config import Calibrated
 from pipeline.families import families_of
-from pipeline.folder import calibration
+from pipeline.folder import calibration, read_settings
 from pipeline.pages import curves, sections, style
 from pipeline.passes import pass_of
 from pipeline.poses import trajectory_in_target
@@ -79,9 +78,11 @@ def _solved(tables: Tables) -> bool:
     return calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
 
 
-def pictures_of(calibrated: Calibrated) -> list[str]:
-    """Names of those that a page has."""
-    without = () if calibrated == "mbes" else ("map_mbes", "convergence")
+def pictures_of(run: Path) -> list[str]:
+    """Names of those that the run's page has."""
+    laser = read_settings(run).session.calibrated == "laser"
+    iterated = not laser and len(Tables(run).table(artefacts.ITERATIONS)) > 0
+    without = (("map_mbes",) if laser else ()) + (() if iterated else ("convergence",))
     return [name for name in PICTURES if name not in without]
 
 

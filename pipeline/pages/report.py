@@ -1,7 +1,7 @@
 """RUN/report/report.html: the answer, what it rests on, and where it came from, on one page.
 
 Every number on it is in calibration.json, run.yaml, a manifest or a Parquet of the run, or the difference of two of
-them; nothing else is computed here but the pictures' scales and the intervals of means.
+them; nothing else is computed here but the pictures' scales, means of residuals and the intervals of means.
 """
 
 import json
@@ -17,14 +17,18 @@ from markupsafe import Markup
 from pipeline import artefacts, config, manifest
 from pipeline.built import by_design
 from pipeline.drawn import PAGE, agreeing, drawn_from
+from pipeline.families import families_of
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
+from pipeline.maths.solution import TOGETHER
 from pipeline.maths.unknowns import NAMES
 from pipeline.mounts import PARAMETERS, target_of
 from pipeline.pages import render
 from pipeline.pages.figures import figures_used
 from pipeline.pages.pictures import pictures_of
 from pipeline.parsing import changes
+from pipeline.residuals import FEWEST
+from pipeline.screen import verdict_in_words
 from pipeline.tables import Tables
 from pipeline.times import utc_text
 
@@ -43,7 +47,8 @@ SOURCES = (  # first part of the unknowns' names
     ("rotation", "angles that are held"),  # of a laser that is calibrated
     ("lever_arm", "lever arm that is held"),
 )
-STRONG = 0.9  # correlation that is set in bold
+SENSORS = ("laser", "mbes")
+STRONG = TOGETHER  # correlation that is set in bold
 MOST_GAPS = 12
 SORTED_BY = {  # what residuals are sorted by, in the report
     "face": "face",
@@ -53,6 +58,10 @@ SORTED_BY = {  # what residuals are sorted by, in the report
     "time": "time",
     "pass": "pass, against the others",
     "drift": "drift of a pass, against the others",
+}
+POSITIVE = {
+    "roll": "starboard down", "pitch": "bow up", "yaw": "to port",
+    "x": "to starboard", "y": "forward", "z": "up",
 }
 METHODS = {
     "coarse": "coarse mount",
@@ -70,17 +79,20 @@ def write_page(run: Path, stages: Sequence[str], pictures: Iterable[Markup]) -> 
 def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterable[Markup]) -> str:
     """``done``: the manifests of all stages."""
     result, settings = calibration(tables.run), read_settings(tables.run)
-    calibrated = settings.session.calibrated
-    laser = calibrated == "laser"
+    laser = settings.session.calibrated == "laser"
+    held = result.get("held", {})
     passes = tables.table(artefacts.PASSES)
     gaps = tables.table(artefacts.GAPS).sort_values("duration_s", ascending=False)
     calibrations, files = tables.table(artefacts.CALIBRATION), tables.table(artefacts.FILES)
+    closing = [] if laser else _closing(tables)
     return render(
         "report.html",
         result=result,
+        held=[] if result["reasons"] else list(held),
+        verdict=verdict_in_words(result["verdict"], held),
         run=tables.run.absolute().name,
         date=str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
-        six=_six(calibrations, result["result"], settings.pool.verdict, result.get("held", {})),
+        six=_six(calibrations, result["result"], settings.pool.verdict, held),
         frame=tables.table(artefacts.POOL_FRAME).to_dict("records")[0],
         largest=_largest(tables.table(artefacts.CELLS)),
         tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
@@ -91,8 +103,10 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         methods=METHODS,
         laser=laser,
         letters=isinstance(settings.pool.target, config.Letters),
+        ways=[method for method in METHODS if method in result["methods"] and result["methods"][method]["mount"]],
         by_method=[] if laser else list(_by_method(calibrations)),
-        closing=[] if laser else tables.table(artefacts.CLOSING).sort_values("plane", kind="stable").to_dict("records"),
+        closing=closing,
+        spread=list(dict.fromkeys(row["plane"] for row in closing if np.isnan(row["angle_deg"]))),
         shares=list(_shares(tables.table(artefacts.FREED), tables.table(artefacts.ESTIMATE), settings.session)),
         built=_built(result["target"]["as_found"], by_design(target_of(settings.pool.target))),
         names=[name for name, *_ in PARAMETERS],
@@ -109,7 +123,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         commit=done["report"].git_commit,
         utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
         drawn_from=drawn_from(tables.run, done),
-        pictures=dict(zip(pictures_of(calibrated), pictures, strict=True)),  # last: others may still be drawing them
+        pictures=dict(zip(pictures_of(tables.run), pictures, strict=True)),  # last: others may still be drawing them
     )
 
 
@@ -133,17 +147,60 @@ class _Value:
             return "–"
         return f"{round(self.number, 4) + 0.0:{sign}.4f} {'°' if self.unit == 'deg' else self.unit}"
 
+    def entered(self) -> str:
+        """As one enters it: 0.001°, and metres to the tenth of a millimetre."""
+        return f"{round(self.number, 3) + 0.0:.3f} °" if self.known and self.unit == "deg" else self.text()
+
+    def small(self, sign: str = "") -> str:
+        """A change or a sigma: 0.001°, and millimetres with one decimal."""
+        if not self.known:
+            return "–"
+        number, unit, digits = (self.number, "°", 3) if self.unit == "deg" else (1000 * self.number, "mm", 1)
+        return f"{round(number, digits) + 0.0:{sign}.{digits}f} {unit}"
+
 
 def _six(table: pd.DataFrame, method: str, limits: config.Verdict, held: Collection[str]) -> list[dict[str, Any]]:
     rows = table[table["method"] == method].to_dict("records")
     bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
     values = ("coarse", "total", "change", "correction", "sigma_random", "sigma_total", "low_95", "high_95")
     return [
-        {"name": row["parameter"], "limit": _Value(bounds[row["unit"]], row["unit"])}
+        {"name": row["parameter"], "words": f"{row['parameter']} ({POSITIVE[row['parameter']]})"}
+        | {"limit": _Value(bounds[row["unit"]], row["unit"])}
         | {"sigma_in": "°" if row["unit"] == "deg" else "mm", "held": row["parameter"] in held}
         | {key: _Value(row[key], row["unit"]) for key in values}
         for row in rows
     ]
+
+
+def _closing(tables: Tables) -> list[dict[str, Any]]:
+    """How the planes close; of families at several distances, which have no one plane, their points' mean distance from
+    the adjusted surface, sonar minus laser."""
+    rows: list[Any] = tables.table(artefacts.CLOSING).to_dict("records")
+    faces = tables.table(artefacts.FACES)
+    names, one_plane = faces["family"].to_numpy(), dict(zip(faces["family"], faces["one_plane"], strict=True))
+    columns = ("sensor", "face", "residual_m", "coarse_residual_m")
+    residuals, cells = tables.table(artefacts.RESIDUALS, *columns), tables.table(artefacts.CELLS)
+    family = names[residuals["face"].to_numpy().astype(int)]
+    solved = calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
+    for name in families_of(faces):
+        of_family = {sensor: residuals[(residuals["sensor"] == sensor) & (family == name)] for sensor in SENSORS}
+        counts = cells[cells["family"] == name].groupby("sensor")["count"].sum()
+        if one_plane[name] or any(len(one) < FEWEST for one in of_family.values()):
+            continue
+        for mount, column in (("coarse", "coarse_residual_m"), ("adjustment", "residual_m"))[: 1 + solved]:
+            sonar, laser = of_family["mbes"][column], of_family["laser"]["residual_m"]
+            rows.append(
+                {
+                    "mount": mount,
+                    "plane": name,
+                    "angle_deg": np.nan,
+                    "distance_m": float(sonar.mean() - laser.mean()),
+                    "rms_m": float(sonar.std(ddof=0)),
+                    "soundings": int(counts.get("mbes", 0)),
+                    "laser_points": int(counts.get("laser", 0)),
+                }
+            )
+    return sorted(rows, key=lambda row: str(row["plane"]))
 
 
 def _shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: config.SessionConfig) -> Iterator[Row]:

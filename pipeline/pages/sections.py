@@ -1,6 +1,7 @@
 """Pictures of the target: sections to scale, distances in millimetres, maps of the faces, the passes' tracks."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -9,17 +10,19 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.families import families_of, level_families
 from pipeline.maths.residuals import face_axes
 from pipeline.maths.targets import LEVEL
-from pipeline.pages import COARSE, INK, LASER, QUIET, SONAR, picture
+from pipeline.pages import COARSE, INK, LASER, QUIET, SONAR, WIDTH_IN, picture
 from pipeline.residuals import FEWEST
 
 Array = NDArray[np.float64]
 MOST_PANELS = 7  # families in one picture
 HALF_SLICE_M = 0.04  # half the thickness of a section
+ASIDE_M = 0.3  # a point so far from a face is another's
 DOTS = 6000  # a cloud in one panel, at most
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SECTIONS = ("sensor", "face", *XYZ, *(f"coarse_{name}" for name in XYZ))  # columns of residuals
@@ -35,60 +38,106 @@ CLOUDS: Mapping[str, tuple[Cloud, ...]] = {  # by what is calibrated, in the ord
 }
 
 
+@dataclass(frozen=True)
+class _Plane:
+    """A vertical cutting plane: where this coordinate (0: x, 1: y) is ``at``; ``along`` is the other one."""
+
+    axis: int
+    at: float
+
+    @property
+    def along(self) -> int:
+        return 1 - self.axis
+
+    def __str__(self) -> str:
+        return f"{'xy'[self.axis]} = {self.at:.2f} m"
+
+
 def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Markup:
-    """Target from above and from the boat, to scale, and one wet face near by."""
-    figure = Figure(figsize=(7.2, 3.8))
-    where = {"left": 0.07, "right": 0.98, "bottom": 0.19, "top": 0.93, "wspace": 0.25}
-    above, ahead, near = figure.subplots(1, 3, width_ratios=[1.0, 2.6, 2.6], gridspec_kw=where)
+    """Target from above, a section through it, to scale, and a part of that enlarged; without panels that are empty."""
     corners = [np.reshape(one, (-1, 3)) for one in faces["vertices_target_m"]]
-    depth = _depth(corners)
     level = faces["normal_z_target_1"].abs().to_numpy() > LEVEL
-    cut = np.array([bool(_cut(points, depth)) for points in corners])
-    slope = _slopes(faces)
     face = residuals["face"].to_numpy().astype(int)
     calibrated = _calibrated(residuals)
+    of_sensor = {sensor: (residuals["sensor"] == sensor).to_numpy() for sensor in ("laser", "mbes")}
+    seen = np.bincount(face[of_sensor[calibrated]], minlength=len(faces)) >= FEWEST
+    plane = _plane(corners, ~level & seen)
+    cut = np.array([plane is not None and bool(_cut(points, plane)) for points in corners])
+    slope = np.zeros(len(faces)) if plane is None else _slopes(faces, plane)
+    figure = Figure(figsize=(WIDTH_IN, 3.8))
+    where = {"left": 0.08, "right": 0.98, "bottom": 0.19, "top": 0.93, "wspace": 0.3}
+    widths = [1.0, 2.6, 2.6] if plane is not None else [1.0]
+    above, *others = figure.subplots(1, len(widths), width_ratios=widths, gridspec_kw=where, squeeze=False)[0]
+    nearest: list[Array] = []
     for sensor, prefix, label, colour in CLOUDS[calibrated][: None if solved else -1]:  # else nothing is calibrated
-        of_sensor = (residuals["sensor"] == sensor).to_numpy()
         columns = [prefix + name for name in XYZ]
-        cloud = residuals.loc[of_sensor & ~level[face], columns].to_numpy()
+        cloud = residuals.loc[of_sensor[sensor] & ~level[face], columns].to_numpy()
         _dots(above, cloud[:, 0], cloud[:, 1], colour, label)
-        cloud = residuals.loc[of_sensor & cut[face], columns].to_numpy()
-        near_cut = np.abs(cloud[:, 0] - depth) < HALF_SLICE_M
-        cloud = cloud[near_cut]
-        cloud[:, 1] += slope[face[of_sensor & cut[face]][near_cut]] * (depth - cloud[:, 0])
-        _dots(ahead, cloud[:, 1], cloud[:, 2], colour, label)
-        _dots(near, cloud[:, 1], cloud[:, 2], colour, label, 2.2)
+        if plane is None:
+            continue
+        chosen = of_sensor[sensor] & cut[face]
+        cloud = residuals.loc[chosen, columns].to_numpy()
+        inside = np.abs(cloud[:, plane.axis] - plane.at) < HALF_SLICE_M
+        on_face, cloud = face[chosen][inside], cloud[inside]
+        cloud[:, plane.along] += slope[on_face] * (plane.at - cloud[:, plane.axis])
+        for axis, size in zip(others, (1.1, 2.2), strict=True):
+            _dots(axis, cloud[:, plane.along], cloud[:, 2], colour, label, size)
+        nearest.append(cloud[~level[on_face]][:, [plane.along, 2]])
     for points in corners:
         if np.ptp(points[:, 2]) > 0:
             above.plot(*np.vstack([points, points[:1]]).T[:2], color=INK, linewidth=0.6)
-        for one in _cut(points, depth):
-            for axis in (ahead, near):
-                axis.plot(one[:, 1], one[:, 2], color=INK, linewidth=0.7)
-    above.set(title="from above", xlabel="x, m", ylabel="y, along the target, m", aspect="equal")
-    ahead.set(title=f"section at x = {100 * depth:.0f} cm", ylabel="z, height, m", aspect="equal")
-    near.set(title="one face of it", aspect="equal")
-    seen = (residuals["sensor"] == calibrated).to_numpy() & (cut & ~level)[face]
-    _near(near, residuals[seen], corners, depth)
-    for axis in (ahead, near):
-        axis.invert_xaxis()  # seen from the boat, looking along x, y grows to the left
-        axis.set_xlabel("y, m")
+        for one in _cut(points, plane) if plane is not None else []:
+            for axis in others:
+                axis.plot(one[:, 1 - plane.axis if plane else 0], one[:, 2], color=INK, linewidth=0.7)
+    above.set(title="from above", xlabel="x, m", ylabel="y, along the target, m")
+    above.set_aspect("equal", adjustable="datalim")  # a plain wall has no depth: its panel has
+    if plane is not None:
+        _section(others, plane, corners, residuals[of_sensor[calibrated] & (cut & ~level)[face]], nearest)
+    for axis in (above, *others):
+        axis.xaxis.set_major_locator(MaxNLocator(3 if axis is above else 6))
     _legend(figure, above)
     return picture(figure, "sections through the target with points of laser and sonar, coarse and calibrated")
 
 
-def _depth(corners: Sequence[Array]) -> float:
-    """The x of the plane that cuts most faces: of the patent's target half the depth of its blocks."""
-    ends = np.unique(np.concatenate([points[:, 0] for points in corners]))
-    middles = (ends[1:] + ends[:-1]) / 2 if len(ends) > 1 else ends
-    return float(max(middles, key=lambda x: sum(bool(_cut(points, x)) for points in corners)))
+def _section(
+    axes: Sequence[Axes], plane: _Plane, corners: Sequence[Array], seen: pd.DataFrame, drawn: Sequence[Array]
+) -> None:
+    """The section's own panel, and the one that enlarges: one face of it, or of a wall cut across its thickness."""
+    ahead, near = axes
+    ahead.set(title=f"section at {plane}", ylabel="z, height, m")
+    ahead.set_aspect("equal", adjustable="datalim")
+    for axis in axes:
+        axis.set_xlabel(f"{'xy'[plane.along]}, m")
+    if len(seen) < FEWEST:
+        near.remove()
+    elif plane.axis == 0:
+        _near(near, seen, corners, plane)
+        for axis in axes:
+            axis.invert_xaxis()  # seen from the boat, looking along x, y grows to the left
+    else:
+        _across(near, seen, corners, plane, drawn)
 
 
-def _slopes(faces: pd.DataFrame) -> Array:
-    """dy/dx along each face, so that points near the cutting plane can be moved into it along their faces: of faces at
-    45° to it ±1, of level ones, and of those that it does not cut, 0."""
-    x, y = (faces[f"normal_{axis}_target_1"].to_numpy() for axis in "xy")
-    aslant = np.abs(y) > 0.1
-    return np.asarray(np.where(aslant, -x / np.where(aslant, y, 1.0), 0.0))
+def _plane(corners: Sequence[Array], seen: NDArray[np.bool_]) -> _Plane | None:
+    """The plane that cuts most of the faces ``seen``: of the patent's target half the depth of its blocks, of a wall
+    one across it. None where nothing is seen."""
+    best: tuple[int, _Plane] | None = None
+    for axis in (0, 1):
+        ends = np.unique(np.concatenate([points[:, axis] for points in corners]))
+        for at in ((ends[1:] + ends[:-1]) / 2).tolist():
+            plane = _Plane(axis, at)
+            number = sum(bool(_cut(points, plane)) for points, one in zip(corners, seen, strict=True) if one)
+            if number and (best is None or number > best[0]):
+                best = number, plane
+    return None if best is None else best[1]
+
+
+def _slopes(faces: pd.DataFrame, plane: _Plane) -> Array:
+    """How far the other coordinate goes with that of the plane along each face, so that points near the plane can be
+    moved into it along their faces: of faces at 45° to it ±1, of level ones, and of those that it does not cut, 0."""
+    across, along = (faces[f"normal_{'xy'[axis]}_target_1"].to_numpy() for axis in (plane.axis, plane.along))
+    aslant = np.abs(along) > 0.1
+    return np.asarray(np.where(aslant, -across / np.where(aslant, along, 1.0), 0.0))
 
 
 def _calibrated(residuals: pd.DataFrame) -> str:
@@ -96,35 +145,48 @@ def _calibrated(residuals: pd.DataFrame) -> str:
     return "mbes" if (residuals["sensor"] == "mbes").any() else "laser"
 
 
-def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], depth: float) -> None:
+def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: _Plane) -> None:
     """Set the panel to the face with the most points."""
-    if len(points) >= FEWEST:
-        (cut,) = _cut(corners[int(points["face"].mode().iloc[0])], depth)
-        low, high = cut[:, 1:].min(axis=0), cut[:, 1:].max(axis=0)
-        middle, half = (low + high) / 2, max(high - low) * 1.1
-        axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
-    else:
-        for drawn in (*axis.lines, *axis.collections):
-            drawn.set_visible(False)
-        axis.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
-        axis.text(0.5, 0.5, "too few points", transform=axis.transAxes, ha="center", color=QUIET)
+    (cut,) = _cut(corners[int(points["face"].mode().iloc[0])], plane)
+    ends = cut[:, [plane.along, 2]]
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    middle, half = (low + high) / 2, max(high - low) * 1.1
+    axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half), aspect="equal")
+    axis.set_title("one face of it")
 
 
-def _cut(corners: Array, x: float) -> list[Array]:
-    """Where a face's outline crosses the plane of this x: one line (2, 3), or none."""
+def _across(
+    axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: _Plane, drawn: Sequence[Array]
+) -> None:
+    """The highest of the faces with points in its whole height, its thickness stretched to where the points lie."""
+    there = [_cut(corners[number], plane)[0][:, [plane.along, 2]] for number in points["face"].astype(int).unique()]
+    ends = max(there, key=lambda cut: float(np.ptp(cut[:, 1])))
+    slant = np.ptp(ends[:, 0]) / 2
+    middle = float(ends[:, 0].mean())
+    cloud = np.concatenate(drawn)
+    away = np.abs(cloud[:, 0] - middle)
+    beside = away[away < slant + ASIDE_M]
+    half = max(0.05, 1.2 * float(np.quantile(beside, 0.98))) if len(beside) else 0.05
+    axis.set(xlim=(middle - half, middle + half), ylim=(ends[:, 1].min() - 0.2, ends[:, 1].max() + 0.2))
+    axis.set_title(f"{'xy'[plane.along]} stretched")
+
+
+def _cut(corners: Array, plane: _Plane) -> list[Array]:
+    """Where a face's outline crosses the plane: one line (2, 3), or none."""
     closed = np.vstack([corners, corners[:1]])
     found = []
     for one, other in pairwise(closed):
-        if (one[0] - x) * (other[0] - x) < 0:
-            found.append(one + (other - one) * (x - one[0]) / (other[0] - one[0]))
+        if (one[plane.axis] - plane.at) * (other[plane.axis] - plane.at) < 0:
+            found.append(one + (other - one) * (plane.at - one[plane.axis]) / (other[plane.axis] - one[plane.axis]))
     return [np.array(found)] if len(found) == 2 else []
 
 
 def distances(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any], solved: bool) -> Markup:
     """Each family's points by their distance from the adjusted surface, in mm; ``family``: of each residual."""
-    names, level = families_of(faces)[:MOST_PANELS], level_families(faces)
+    names, level = [name for name in families_of(faces) if (family == name).any()][:MOST_PANELS], level_families(faces)
+    names = names or families_of(faces)[:1]
     clouds = CLOUDS[_calibrated(residuals)][: None if solved else -1]  # without a result nothing is calibrated
-    figure = Figure(figsize=(7.2, 3.2))
+    figure = Figure(figsize=(WIDTH_IN, 3.2))
     where = {"left": 0.07, "right": 0.97, "bottom": 0.23, "top": 0.92, "wspace": 0.16}
     panels = figure.subplots(1, len(names), sharey=True, gridspec_kw=where, squeeze=False)[0]
     for axis, name in zip(panels, names, strict=True):
@@ -155,12 +217,9 @@ def _legend(figure: Figure, axis: Axes) -> None:
 
 def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
     """Mean residual over each family of faces as one sees it from the boat; level ones from above."""
-    figure = Figure(figsize=(7.2, 2.9))
+    figure = Figure(figsize=(WIDTH_IN, 2.9))
     where = {"left": 0.07, "right": 0.87, "bottom": 0.15, "top": 0.92, "wspace": 0.25}
     level = level_families(faces)
-    order = _from_the_boat(faces)[:MOST_PANELS]
-    widths = [_panel_width(faces, name) for name in order]
-    panels = figure.subplots(1, len(order), width_ratios=widths, gridspec_kw=where, squeeze=False)[0]
     family = dict(zip(faces["face"], faces["family"], strict=True))
     normal = {
         row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in faces.to_dict("records")
@@ -168,6 +227,10 @@ def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup
     enough = (residual_map["count"] >= FEWEST) & np.isfinite(residual_map["mean_m"])
     cells = residual_map[(residual_map["sensor"] == sensor) & enough]
     of_family = np.array([family[face] for face in cells["face"]], dtype=object)
+    every = _from_the_boat(faces)
+    order = ([name for name in every if name in set(of_family)] or every)[:MOST_PANELS]
+    widths = [_panel_width(faces, name) for name in order]
+    panels = figure.subplots(1, len(order), width_ratios=widths, gridspec_kw=where, squeeze=False)[0]
     span = max(1.0, 1000 * float(np.quantile(np.abs(cells["mean_m"]), 0.95))) if len(cells) else 1.0
     z = cells.loc[[name not in level for name in of_family], "z_target_m"]
     heights = (z.min() - 0.1, z.max() + 0.1) if len(z) else (0.0, 1.0)
@@ -177,16 +240,28 @@ def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup
         flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
         size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
         image = _grid(axis, flat[:, 0], flat[:, 1], 1000 * inside["mean_m"].to_numpy(), size, span) or image
-        axis.set(title=name if name not in level else f"{name}, from above", aspect="equal")
-        axis.set_xticks(np.round(axis.get_xlim(), 1))
-        axis.set_xlabel("x, m" if name in level else "to the right, m")
+        axis.set(title=name, aspect="equal")
+        axis.set_xlabel("x, m (from above)" if name in level else "to the right, m")
         if name not in level:
             axis.set_ylim(*heights)
+        _few_ticks(axis)
     panels[0].set_ylabel("z, height, m")
     if image is not None:
         bar = figure.add_axes((0.9, 0.15, 0.015, 0.7))
         figure.colorbar(image, cax=bar, label="mean residual, mm", extend="both")
     return picture(figure, f"maps of the {sensor}'s mean residuals over the faces")
+
+
+def _few_ticks(axis: Axes) -> None:
+    """Of a panel to scale, as many ticks as there is room for numbers beside each other."""
+    spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
+    box = axis.get_position(original=True)
+    room = box.width * WIDTH_IN, box.height * axis.figure.get_figheight()
+    scale = min(inches / span for inches, span in zip(room, spans, strict=True))
+    for ticks, span, needed in zip((axis.xaxis, axis.yaxis), spans, (0.5, 0.25), strict=True):
+        number = int(span * scale / needed)
+        middle = round(float(np.mean(ticks.get_view_interval())), 1)
+        ticks.set_major_locator(MaxNLocator(min(number, 6)) if number else FixedLocator([middle]))
 
 
 def _from_the_boat(faces: pd.DataFrame) -> list[str]:
@@ -223,7 +298,7 @@ def _grid(axis: Axes, x: Array, y: Array, values: Array, size: float, span: floa
 
 def tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_deg: float) -> Markup:
     """The passes' tracks before the target, north shown; ``positions_m``: of the INS in the target frame, by pass."""
-    figure = Figure(figsize=(7.2, 3.6))
+    figure = Figure(figsize=(WIDTH_IN, 3.6))
     axis = figure.add_axes((0.08, 0.14, 0.78, 0.77))
     for corners in faces.loc[faces["normal_z_target_1"].abs() <= LEVEL, "vertices_target_m"]:
         points = np.reshape(corners, (-1, 3))

@@ -6,13 +6,18 @@ roll starboard down +, pitch bow up +, azimuth clockwise from north) together wi
 Damaged files give RawDataError or fewer rows, never another exception.
 """
 
+import os
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from itertools import takewhile
+from pathlib import Path, PurePosixPath
 from typing import Literal
+
+import numpy as np
 
 from pipeline.config import Ins, Laser, Mbes
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import detect
+from pipeline.readers.claims import refuse_claim
 from pipeline.readers.crs import Frame, placing_of
 from pipeline.streams import Part
 from pipeline.times import NS, WEEK_NS
@@ -30,18 +35,18 @@ def raw_files(settings: Settings, folder: Path) -> list[Path]:
         A pattern matches no file, or a file that lies outside the session folder (by way of a symbolic link).
     """
     key = f"{type(settings).__name__.lower()}.files"
-    return sorted({*_found(folder, settings.files, key), *_accuracy_files(settings, folder)}, key=_in(folder))
+    return sorted({*found(folder, settings.files, key), *_accuracy_files(settings, folder)}, key=_in(folder))
 
 
 def _accuracy_files(settings: Settings, folder: Path) -> list[Path]:
-    return _found(folder, settings.accuracy, "ins.accuracy") if isinstance(settings, Ins) else []
+    return found(folder, settings.accuracy, "ins.accuracy") if isinstance(settings, Ins) else []
 
 
 def _in(folder: Path) -> Callable[[Path], str]:
     return lambda path: path.relative_to(folder).as_posix()
 
 
-def _found(folder: Path, patterns: Sequence[str], key: str) -> list[Path]:
+def found(folder: Path, patterns: Sequence[str], key: str) -> list[Path]:
     if not folder.is_dir():
         raise RawDataError(f"{folder}: the session folder is gone; put it back, or name its new place")
     found: dict[Path, Path] = {}
@@ -66,11 +71,26 @@ def _matches(folder: Path, pattern: str, key: str) -> list[tuple[Path, Path]]:
             if not real.is_relative_to(root):
                 raise RawDataError(f"{path}: leads out of the session folder, to {real}; copy the file into it")
             files.append((path, real))
+        _refuse_unreadable(folder, pattern)
     except (ValueError, NotImplementedError) as error:
         raise ConfigError(f"session.yaml: {key}: {pattern} is no pattern ({error}); mend it") from error
     except (OSError, RuntimeError) as error:
         raise RawDataError(f"{folder}: {pattern} cannot be searched ({error}); check the folder") from error
     return files
+
+
+def _refuse_unreadable(folder: Path, pattern: str) -> None:
+    """Python passes over folders that it may not read, and so over their files: OSError instead."""
+    parts = PurePosixPath(pattern).parts
+    fixed = list(takewhile(lambda part: not set(part) & set("*?["), parts[:-1]))
+
+    def refuse(error: OSError) -> None:
+        if not isinstance(error, FileNotFoundError):
+            raise error
+
+    for _ in os.walk(folder.joinpath(*fixed), onerror=refuse):
+        if len(fixed) == len(parts) - 1:  # all that can match lies in this one
+            break
 
 
 def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, ...]:
@@ -85,7 +105,7 @@ def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, .
     """
     if isinstance(settings, Laser):
         placing_of(_frame(settings))
-    files = _named(folder, _found(folder, settings.files, f"{sensor}.files"))
+    files = _named(folder, found(folder, settings.files, f"{sensor}.files"))
     for path, name in files:
         _check_kind(path, name, sensor, settings)
     if settings.format == "table":
@@ -110,8 +130,13 @@ def _check_kind(path: Path, name: str, sensor: Sensor, settings: Settings) -> No
     kind = detect.kind_of(path, name)
     if kind.format == settings.format and sensor in kind.sensors:
         return
+    if settings.format == "inertial_explorer" and kind is detect.TEXT:
+        raise RawDataError(
+            f"{name}: is a text without Inertial Explorer's column names; export it from Inertial Explorer with its "
+            "header ('header' ticked in the export profile)"
+        )
     if kind.format is None:
-        raise RawDataError(f"{name}: is {kind.title}, not {settings.format}; {kind.advice}")
+        raise RawDataError(f"{name}: is {kind.title}, not {settings.format}; {kind.advice_for(sensor)}")
     if sensor in kind.sensors:
         raise RawDataError(
             f"{name}: is {kind.title}, but session.yaml has {sensor}.format: {settings.format}; "
@@ -162,10 +187,15 @@ def _sbet(files: Files, accuracy: Files, settings: Ins) -> tuple[Part, ...]:
 
 def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers import las
+    from pipeline.readers.las_times import refuse_contradiction
 
-    headers = [las.read_header(path, name) for path, name in files]
+    headers = [las.read_header(path, name, settings.time) for path, name in files]
+    for (_, name), header in zip(files, headers, strict=True):
+        refuse_claim(header.present, header.size, settings.max_records, "laser", name)
     weekly = [(name, header) for (_, name), header in zip(files, headers, strict=True) if not header.adjusted_time]
     firsts = [header.first_s for _, header in weekly]
+    for name, header in weekly:
+        refuse_contradiction(np.array([header.first_s]), name, header.adjusted_time, header.told)
     weeks = iter(_weeks(firsts, settings.gps_week, "laser", weekly[0][0]) if weekly else [])
     parts: list[Part] = []
     for (path, name), header in zip(files, headers, strict=True):
@@ -177,7 +207,8 @@ def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
 def _e57(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers import e57
 
-    return tuple(part for file in files for part in e57.parts(*file, _frame(settings), settings.latency_s))
+    frame, latency_s, most = _frame(settings), settings.latency_s, settings.max_records
+    return tuple(part for path, name in files for part in e57.parts(path, name, frame, latency_s, most))
 
 
 def _frame(settings: Laser) -> Frame:
@@ -201,10 +232,8 @@ def _soundings(files: Files, settings: Mbes) -> tuple[Part, ...]:
         from pipeline.readers.gsf import GsfPart
 
         return tuple(GsfPart(path, name, settings.sound_speed_m_s, settings.latency_s) for path, name in files)
-    if settings.format == "kmall":
-        from pipeline.readers.kmall import KmallPart
-
-        return tuple(KmallPart(path, name, settings.latency_s) for path, name in files)
+    if settings.format in ("kmall", "all"):
+        return _kongsberg(files, settings)
     from pipeline.readers.r2sonic import R2sonicPart
 
     return tuple(
@@ -212,8 +241,16 @@ def _soundings(files: Files, settings: Mbes) -> tuple[Part, ...]:
     )
 
 
+def _kongsberg(files: Files, settings: Mbes) -> tuple[Part, ...]:
+    from pipeline.readers.kmall import KmallPart
+    from pipeline.readers.kongsberg_all import AllPart
+
+    kind = KmallPart if settings.format == "kmall" else AllPart
+    return tuple(kind(path, name, settings.latency_s, settings.projector_offset_m) for path, name in files)
+
+
 def _tables(files: Files, sensor: Sensor, settings: Settings) -> tuple[Part, ...]:
     from pipeline.readers.table import TablePart
 
     frame = _frame(settings) if isinstance(settings, Laser) else Frame()
-    return tuple(TablePart(path, name, sensor, frame, settings.latency_s) for path, name in files)
+    return tuple(TablePart(path, name, sensor, frame, settings.latency_s, settings.max_records) for path, name in files)

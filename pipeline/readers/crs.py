@@ -1,9 +1,10 @@
-"""Points in a coordinate reference system -> ECEF (EPSG:4978), metres.
+"""Points in a coordinate reference system -> ECEF of that system's own datum, metres (:mod:`pipeline.readers.datums`).
 
 A CRS of two axes, such as UTM, says nothing of heights: ``laser.heights: ellipsoidal`` must. Heights are then in the
-unit of the CRS's own axes (feet with feet), with degrees in metres. Heights above a geoid need a grid.
+unit of the CRS's own axes (feet with feet), with degrees in metres. Heights above a geoid are refused.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError, RawDataError
+from pipeline.readers.datums import geocentric_of, horizontal_of, unfit, vertical_of
 from pipeline.readers.sieve import Sieve
 
 Array = NDArray[np.float64]
@@ -23,6 +25,7 @@ LASER = "laser"
 AXES = ("x_m", "y_m", "z_m")
 DEGREE_M = 111_320.0  # along a meridian
 MARGIN_DEG = 1.0  # beyond a CRS's area of use, which is rounded
+ZONE_M = 1e6  # Gauss-Krueger eastings may begin with the number of their zone: 39 500 000
 ENOUGH = 100  # points by which lost digits are told from chance
 
 
@@ -41,6 +44,15 @@ class Placing:
     to_ecef: Transform
     box: Box | None
     unit_m: float  # metres in one unit of x and y
+    height_unit_m: float  # and of z
+
+    def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Which points lie in the CRS's area of use."""
+        if self.box is None:
+            return np.ones(len(x), dtype=bool)
+        west, south, east, north = self.box
+        good: NDArray[np.bool_] = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+        return good
 
 
 def keep_placed(sieve: Sieve, frame: Frame, name: str) -> None:
@@ -56,13 +68,30 @@ def keep_placed(sieve: Sieve, frame: Frame, name: str) -> None:
         _refuse_float32(sieve["x_m"], sieve["y_m"], 1.0 if placing is None else placing.unit_m, name)
     if placing is None:
         return
-    if placing.box is not None:
-        west, south, east, north = placing.box
-        x, y = sieve["x_m"], sieve["y_m"]
-        sieve.keep((x >= west) & (x <= east) & (y >= south) & (y <= north), "outside the area of laser.frame")
+    inside = placing.inside(sieve["x_m"], sieve["y_m"])
+    if len(inside) and not inside.any():
+        _refuse_misread(placing, sieve["x_m"], sieve["y_m"], name)
+    sieve.keep(inside, "outside the area of laser.frame")
     moved = placing.to_ecef(*(sieve[axis] for axis in AXES))
     sieve.columns |= dict(zip(AXES, moved, strict=True))
     sieve.keep_finite()
+
+
+def _refuse_misread(placing: Placing, x: Array, y: Array, name: str) -> None:
+    """Points of which none lies in the CRS's area, though all would if they were read otherwise."""
+    if np.all(placing.inside(y, x)):
+        raise RawDataError(
+            f"{name}: its x and y are interchanged for laser.frame (x {x[0]:.3f}, y {y[0]:.3f}): x must be east or "
+            "longitude, y north or latitude; export the points in that order"
+        )
+    if placing.box is None or placing.unit_m != 1.0:
+        return
+    millions = round(((placing.box[0] + placing.box[2]) / 2 - float(np.median(x))) / ZONE_M)
+    if np.all(placing.inside(x + millions * ZONE_M, y)):
+        raise RawDataError(
+            f"{name}: its x, such as {x[0]:.0f}, have other digits of a zone before them than laser.frame's, which "
+            f"would be {x[0] + millions * ZONE_M:.0f}: name the CRS whose false easting is that of the points"
+        )
 
 
 def _refuse_float32(x: Array, y: Array, unit_m: float, name: str) -> None:
@@ -84,8 +113,8 @@ def placing_of(frame: Frame) -> Placing | None:
     Raises
     ------
     ConfigError
-        The frame is no CRS, its heights are above something unsaid, or its way to ECEF needs a grid that is not
-        installed: PROJ's guess would be wrong by metres.
+        The frame is no CRS, or its points cannot be placed beside an INS's, or its heights are above something else
+        than the ellipsoid.
     """
     if frame.name in (LASER, ECEF):
         return None
@@ -95,76 +124,62 @@ def placing_of(frame: Frame) -> Placing | None:
     where = f"session.yaml: laser.frame = {frame.name!r}"
     try:
         crs = CRS.from_user_input(frame.name)
-        _refuse_unsaid_heights(crs, frame, where)
-        solid = crs if len(crs.axis_info) == 3 else crs.to_3d()
-        if len(solid.axis_info) != 3:
-            raise ConfigError(f"{where}: {crs.name} is no CRS of points; write laser, EPSG:4978 or the like")
-        transform = _transform(solid, _height_scale(crs, solid))
-        unit = _unit_m(crs)
-        box = None if crs.is_geocentric else _box(crs)
     except ProjError as error:
         raise ConfigError(
-            f"{where}: is no coordinate reference system ({error}); write laser, EPSG:4978 or the like"
+            f"{where}: no coordinate reference system is known by that name; write laser, or a CRS by its number, such "
+            "as EPSG:4978 (ECEF) or EPSG:32651 (UTM zone 51 north)"
         ) from error
-    if transform is None:
+    if (why := unfit(crs)) is not None:
+        raise ConfigError(f"{where}: {crs.name} {why}")
+    _refuse_other_heights(crs, frame, where)
+    level = horizontal_of(crs)
+    try:
+        return Placing(_transform(crs), None if crs.is_geocentric else _box(level), _unit_m(crs), height_unit_m(crs))
+    except ProjError as error:
         raise ConfigError(
-            f"{where}: {crs.name} cannot be turned into ECEF here (no geocentric relation, or no geoid grid); "
-            "export the points in EPSG:4978 or with ellipsoidal heights in EPSG:4979"
+            f"{where}: {crs.name} cannot be turned into ECEF here; export the points in EPSG:4978 or EPSG:4979"
+        ) from error
+
+
+def _refuse_other_heights(crs: Any, frame: Frame, where: str) -> None:
+    vertical = vertical_of(crs)
+    if vertical is not None:
+        raise ConfigError(
+            f"{where}: {crs.name} has heights of {vertical}, above a geoid or the sea; export ellipsoidal heights, "
+            "name the CRS without that part, and write laser.heights: ellipsoidal"
         )
-    return Placing(transform, box, unit)
-
-
-def _refuse_unsaid_heights(crs: Any, frame: Frame, where: str) -> None:
     if len(crs.axis_info) != 3 and frame.heights is None:
         raise ConfigError(
-            f"{where}: {crs.name} has {len(crs.axis_info)} axes: heights above what? Write laser.heights: ellipsoidal "
-            "if they are above the ellipsoid; else export ellipsoidal heights"
+            f"{where}: {crs.name} has no heights of its own, and nothing says what the points' heights are above. "
+            "Write laser.heights: ellipsoidal if they are above the ellipsoid; else export ellipsoidal heights"
         )
-    vertical = vertical_of(crs)
-    if vertical is not None and frame.heights is not None:
-        raise ConfigError(
-            f"{where}: {crs.name} has heights of {vertical}, but laser.heights is {frame.heights}; "
-            "name the CRS without them, or take laser.heights out"
-        )
-
-
-def vertical_of(crs: Any) -> str | None:
-    """The name of a compound CRS's vertical part, unless that is the ellipsoid."""
-    names = [part.name for part in crs.sub_crs_list if part.is_vertical]
-    return next((name for name in names if "ellipsoid" not in name.lower()), None)
 
 
 def _unit_m(crs: Any) -> float:
-    axis = crs.axis_info[0]
-    return DEGREE_M if axis.unit_name == "degree" else float(axis.unit_conversion_factor)
+    """Metres in one unit of x and y."""
+    factor = float(crs.axis_info[0].unit_conversion_factor)
+    return DEGREE_M * math.degrees(factor) if horizontal_of(crs).is_geographic else factor
 
 
-def _height_scale(crs: Any, solid: Any) -> float:
-    """What heights are multiplied by where a CRS of two axes has been given a third."""
-    if crs is solid or not crs.is_projected:
-        return 1.0
-    return float(crs.axis_info[0].unit_conversion_factor / solid.axis_info[2].unit_conversion_factor)
+def height_unit_m(crs: Any) -> float:
+    """Metres in one unit of z: where the CRS has two axes the unit of these, with angles metres."""
+    if len(crs.axis_info) == 3:
+        return float(crs.axis_info[2].unit_conversion_factor)
+    return 1.0 if crs.is_geographic else _unit_m(crs)
 
 
-def _transform(solid: Any, height_scale: float) -> Transform | None:
-    import warnings
+def _transform(crs: Any) -> Transform:
+    """Coordinates in the CRS (x: east or longitude, y: north or latitude) -> ECEF of its own datum."""
+    from pyproj import Transformer
 
-    from pyproj import CRS
-    from pyproj.transformer import TransformerGroup
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a missing grid: refused by the caller
-        try:
-            group = TransformerGroup(solid, CRS.from_user_input(ECEF), always_xy=True, allow_ballpark=False)
-        except IndexError:  # pyproj's way to say that there is none
-            return None
-    if not group.transformers or not group.best_available:
-        return None
-    best = group.transformers[0]
+    level = horizontal_of(crs)
+    solid = level if len(level.axis_info) == 3 else level.to_3d()
+    scale = height_unit_m(crs) / float(solid.axis_info[2].unit_conversion_factor)
+    way = Transformer.from_crs(solid, geocentric_of(crs), always_xy=True, allow_ballpark=False)
 
     def transform(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         # PROJ writes into the arrays it is given, and marks what it cannot turn by inf
-        moved = best.transform(x, y, z * height_scale, inplace=False)
+        moved = way.transform(x, y, z * scale, inplace=False)
         return np.asarray(moved[0]), np.asarray(moved[1]), np.asarray(moved[2])
 
     return transform

@@ -1,30 +1,19 @@
 """What a file is, by its content: never by its name."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.readers import foreign
+from pipeline.readers.all_datagrams import is_head
 from pipeline.readers.files import opened, size_of
 from pipeline.readers.ie_layout import names_line
+from pipeline.readers.kind import Kind
 from pipeline.readers.packets import BTH0, OTHERS, packet_size
 from pipeline.readers.sieve import through_float32
 
 HEAD = 65_536
-
-
-@dataclass(frozen=True)
-class Kind:
-    """``format``: session.yaml's word where this program reads it, for these ``sensors``; ``advice`` where not."""
-
-    title: str
-    format: str | None = None
-    sensors: tuple[str, ...] = ()
-    advice: str = ""
-
-
-_EXPORT = "export it to LAS or LAZ with GPS time stamps"
 
 LAS = Kind("LAS or LAZ", "las", ("laser",))
 NOVATEL = Kind("a NovAtel log", "novatel", ("ins",))
@@ -32,6 +21,7 @@ SBET = Kind("SBET", "sbet", ("ins",))
 E57 = Kind("E57", "e57", ("laser",))
 GSF = Kind("GSF", "gsf", ("mbes",))
 KMALL = Kind("Kongsberg .kmall", "kmall", ("mbes",))
+ALL = Kind("Kongsberg .all", "all", ("mbes",))
 INERTIAL_EXPLORER = Kind("an Inertial Explorer export", "inertial_explorer", ("ins",))
 XTF = Kind("XTF", "r2sonic", ("mbes",))
 PACKETS = Kind("R2Sonic packets", "r2sonic", ("mbes",))
@@ -49,26 +39,20 @@ TEXT = Kind(
     "a text without the columns of a table",
     advice="name the columns in its first line as README.md has them, or export it in a format of the instrument",
 )
-UNKNOWN = Kind("of no kind that is read", advice="copy it again, or see README.md for the formats")
-
-MAGICS: tuple[tuple[int, bytes, Kind], ...] = (
-    (0, b"LASF", LAS),
-    (0, b"PAR1", PARQUET),
-    (8, b"RieglLMS", Kind("a RIEGL .rxp file", advice=f"{_EXPORT} (RiSCAN PRO, RiPROCESS, or RiVLib)")),
-    (0, b"ASTM-E57", E57),
-    (8, b"GSF-v", GSF),
-    (0, b"PK\x03\x04", Kind("a ZIP archive", advice="unpack it")),
-    (0, b"\x1f\x8b", Kind("a gzip archive", advice="unpack it")),
-    (0, b"ply\n", Kind("a PLY file", advice=_EXPORT)),
-    (0, b"# .PCD", Kind("a PCD file", advice=_EXPORT)),
-    (0, b"VERSION 0.7\nFIELDS", Kind("a PCD file", advice=_EXPORT)),
-    (0, b"VERSION .7\nFIELDS", Kind("a PCD file", advice=_EXPORT)),
-    (0, b"\xd4\xc3\xb2\xa1", Kind("a network capture", advice="extract the packets of the sonar's bathymetry port")),
-    (0, b"\x0a\x0d\x0d\x0a", Kind("a network capture", advice="extract the packets of the sonar's bathymetry port")),
+TRAJECTORY_TEXT = Kind(
+    "a trajectory as text, of a layout that is not read",
+    advice="export it as SBET (POSPac, Qinertia, Delph INS, OxTS and Inertial Explorer have it), or as a table with "
+    "the columns that README.md names; if it is Inertial Explorer's, export it with its header",
 )
-RDBX = Kind("a RIEGL .rdbx file", advice=f"{_EXPORT} (RiSCAN PRO or RiPROCESS)")
+UNKNOWN = Kind(
+    "of no kind that is read",
+    advice="export it in one of the formats that README.md names; if it should be one of them, copy it again",
+)
+
+MAGICS = ((0, b"LASF", LAS), (0, b"PAR1", PARQUET), (0, b"ASTM-E57", E57), (8, b"GSF-v", GSF))
+RDBX = Kind("a RIEGL .rdbx file", advice=f"{foreign.CLOUD} (RiSCAN PRO or RiPROCESS)")
 NOVATEL_SYNCS = (b"\xaa\x44\x12\x1c", b"\xaa\x44\x13")
-_NOVATEL_TEXT = re.compile(rb"(?:^|[\r\n\]])[#%][A-Z][A-Z0-9_]+A,[^\r\n;]*;")
+_NOVATEL_TEXT = re.compile(rb"(?:^|[\r\n\] \t,])[#%][A-Z][A-Z0-9_]+A,[^\r\n;]*;")
 
 
 def kind_of(path: Path, name: str) -> Kind:
@@ -85,10 +69,14 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
     for offset, magic, kind in MAGICS:
         if head[offset : offset + len(magic)] == magic:
             return kind
+    if (other := foreign.marked(head)) is not None:
+        return other
     if head[:1] == b"\x7b" and _is_xtf(head):
         return XTF
     if re.match(rb"#[A-Z]{3}\x00?", head[4:9]) and int.from_bytes(head[:4], "little") <= max(size, 1 << 20):
         return KMALL
+    if is_head(head[:20]):
+        return ALL
     if head.startswith(NOVATEL_SYNCS):
         return NOVATEL
     if head[:4] in (BTH0, *OTHERS) or _has_packet(head[:16]):
@@ -100,6 +88,8 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
     text = _is_text(head)
     if not text and (doubles := _kind_of_doubles(head, size)) is not None:
         return doubles
+    if not text and (other := foreign.binary(head, size)) is not None:
+        return other
     if any(sync in head for sync in NOVATEL_SYNCS) or _NOVATEL_TEXT.search(head):
         return NOVATEL
     if _has_packet(head):
@@ -159,12 +149,25 @@ def _kind_of_text(head: bytes) -> Kind:
     rows = [line for line in lines if not line.startswith(("#", "//"))]
     if rows and column_names(rows[0]) is not None:
         return CSV
+    if (other := foreign.text("\n".join(lines))) is not None:
+        return other
+    if any(_names_trajectory(line) for line in lines):
+        return TRAJECTORY_TEXT
     numbers = [_floats(row) for row in rows[:-1][:200]]
     width = max((len(row) for row in numbers), default=0)
     whole = np.array([row for row in numbers if width >= 3 and len(row) == width]).reshape(-1, max(width, 1))
     if len(whole) and any(through_float32(column) for column in whole.T):
         return FLOAT32_TEXT
     return TEXT
+
+
+def _names_trajectory(line: str) -> bool:
+    """A line of names of columns: position and attitude, whatever program calls them so."""
+    words = re.findall(r"[a-z]+", line.lower())
+    return all(
+        any(word.startswith(start) for word in words for start in starts)
+        for starts in (("lat", "north", "poslat"), ("lon", "east", "poslon"), ("roll", "angleroll"), ("head", "yaw"))
+    )
 
 
 def _floats(row: str) -> list[float]:

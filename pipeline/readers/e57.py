@@ -9,13 +9,11 @@ here. Coordinates are metres, Cartesian or spherical (range, azimuth from x to y
 scan's pose brings them into the frame of the file, which ``laser.frame`` names. Points and times that are marked as
 invalid are left out.
 
-Header (little-endian): 8 u32 x 2 version, 16 u64 size of the file, 24 u64 where the XML part is, 32 u64 its length, 40
-u64 size of a page. Where integers of a constant take no bits, a damaged count of points would be endless: it is held
-against the file's size.
+The library sees a file only after :mod:`pipeline.readers.e57_xml` has looked at its header and its XML part. Where
+integers of a constant take no bits, a damaged count of points would be endless: see :mod:`pipeline.readers.claims`.
 """
 
 import json
-import struct
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,20 +25,28 @@ from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
 from pipeline.maths.rotations import rotation_from_quaternion
+from pipeline.readers import e57_xml
+from pipeline.readers.claims import refuse_claim
 from pipeline.readers.crs import AXES, Array, Frame, keep_placed
 from pipeline.readers.declared import refuse_another
 from pipeline.readers.files import opened, size_of
-from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns, through_float32
+from pipeline.readers.sieve import (
+    LASER_COLUMNS,
+    LAST_WEEK,
+    Sieve,
+    chunk,
+    latency_ns,
+    no_rows,
+    possible_ns,
+    through_float32,
+)
 from pipeline.readers.worker import ADVICE, Numbers, batches, text
 from pipeline.streams import BATCH_ROWS, Chunk
-from pipeline.times import NS
+from pipeline.times import NS, WEEK_NS
 
 WORKER = Path(__file__).with_name("e57_worker.py")
-HEADER = struct.Struct("<8s2I4Q")
-MAX_XML = 1 << 26
 MAX_TEXT = 1 << 24
 MAX_SECONDS = 1e8  # of a time stamp: three years
-LATEST_S = 4e9  # GPS seconds: year 2106
 COARSEST_M = 0.001  # of coordinates in single precision
 RETIME = "export it again with a time stamp for each point, or as LAS or LAZ with GPS time"
 
@@ -113,15 +119,19 @@ class E57Part:
             )
 
 
-def parts(path: Path, name: str, frame: Frame, latency_s: float) -> tuple[E57Part, ...]:
+def parts(
+    path: Path, name: str, frame: Frame, latency_s: float, max_records: int | None = None
+) -> tuple[E57Part, ...]:
     """A file's scans.
 
     Raises
     ------
     RawDataError
-        The file is damaged or cut off, has no points, or has points whose GPS time is not known.
+        The file is damaged or cut off, has no points, or more than likely, or has points whose GPS time is not known.
     """
     scans, crs = scans_of(path, name)
+    with opened(path, name) as file:
+        refuse_claim(_points_claimed(scans), size_of(file), max_records, "laser", name)
     for number, scan in enumerate(scans):
         where = name if len(scans) == 1 else f"{name}, scan {number}"
         if not scan.axes:
@@ -132,13 +142,18 @@ def parts(path: Path, name: str, frame: Frame, latency_s: float) -> tuple[E57Par
             raise RawDataError(
                 f"{where}: says that its clock was not set by GPS (acquisitionStart, isAtomicClockReferenced); {RETIME}"
             )
-        if not 0 <= scan.start_s < LATEST_S or not _possible_pose(scan):
+        if not 0 <= scan.start_s < LAST_WEEK * WEEK_NS / NS or not _possible_pose(scan):
             raise RawDataError(f"{where}: its pose or start of acquisition is damaged; {ADVICE}")
     names = [name] if len(scans) == 1 else [f"{name}#{number}" for number in range(len(scans))]
     return tuple(
         E57Part(path, label, number, scan, crs, frame, latency_s)
         for number, (label, scan) in enumerate(zip(names, scans, strict=True))
     )
+
+
+def _points_claimed(scans: list[Scan]) -> int:
+    counts = [scan.points for scan in scans]
+    return min(counts) if min(counts) < 0 else sum(counts)
 
 
 def _possible_pose(scan: Scan) -> bool:
@@ -148,14 +163,7 @@ def _possible_pose(scan: Scan) -> bool:
 
 def scans_of(path: Path, name: str) -> tuple[list[Scan], str]:
     """The scans, and the CRS that the file gives for its frame."""
-    with opened(path, name) as file:
-        size = size_of(file)
-        head = file.read(HEADER.size).ljust(HEADER.size, b"\0")
-    _, _, _, claimed, xml_at, xml_length, page = HEADER.unpack(head)
-    if claimed > size:
-        raise RawDataError(f"{name}: is cut off: {size} of {claimed} bytes; {ADVICE}")
-    if page != 1024 or not 0 < xml_length <= min(MAX_XML, size) or xml_at >= size:
-        raise RawDataError(f"{name}: its E57 header is damaged; {ADVICE}")
+    e57_xml.check(path, name)
     try:
         told: dict[str, Any] = json.loads(text(WORKER, [str(path)], name, MAX_TEXT))
     except ValueError as error:
@@ -163,14 +171,12 @@ def scans_of(path: Path, name: str) -> tuple[list[Scan], str]:
     scans = [Scan(**scan) for scan in told["scans"]]
     if not scans:
         raise RawDataError(f"{name}: has no scans; {ADVICE}")
-    for scan in scans:
-        if not 0 <= scan.points <= 8 * size:
-            raise RawDataError(f"{name}: is damaged ({scan.points} points in {size} bytes); {ADVICE}")
     return scans, told["crs"]
 
 
 def points(path: Path, name: str, number: int) -> Iterator[Numbers]:
     """A scan's points as stored: seconds, three coordinates, marks of invalid points and of invalid times."""
+    e57_xml.check(path, name)  # again: the file may be another by now
     return batches(WORKER, [str(path), str(number), str(BATCH_ROWS)], name, 6, BATCH_ROWS)
 
 

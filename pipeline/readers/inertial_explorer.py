@@ -3,8 +3,8 @@
 Its angles are those of this project: z up, y forward, x to the right; R_level_from_body = Rz(-heading) Rx(pitch)
 Ry(roll), heading clockwise from true north (Waypoint Software User Manual, OM-20000166: "yaw = -heading"); it may run
 from -180 to 180. Heights are ellipsoidal (H-Ell), or H-MSL + Undulation. Times are GPS seconds of week with Week, with
-GPSDate, or with ``ins.gps_week`` (the week in which the file begins), or UTC with UTCDate; beside a date seconds of the
-week and of the day are the same. Angles of three columns have their sign at the degrees, -0 included.
+a date, or with ``ins.gps_week`` (the week in which the file begins), or UTC with UTCDate (``ie_times.py``). Angles of
+three columns have their sign at the degrees, -0 included.
 
 Q is the quality of the position, from 1 to 6; from 4 on (0.5 to 2 m) it may be worse than the 0.5 m within which the
 target is looked for, and such rows are left out. SDNorth, SDEast, SDHeight, RollSD, PitchSD and HdngSD are taken as the
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
 from pipeline.readers.ie_layout import POSITION, SIGMAS, Layout, read_layout
+from pipeline.readers.ie_times import SECOND, combine, days_of, keep_times
 from pipeline.readers.sbet import running_weeks
 from pipeline.readers.sieve import (
     INS_COLUMNS,
@@ -36,16 +37,12 @@ from pipeline.readers.sieve import (
     keep_possible_poses,
     latency_ns,
     no_rows,
-    possible_ns,
-    possible_week_time,
     refuse_float32,
     sigma_rows,
 )
 from pipeline.readers.tabular import CSV_BLOCK, MAX_LINE
 from pipeline.streams import Chunk
-from pipeline.times import GPS_EPOCH_UNIX_S, NS, gps_ns_from_unix_utc, gps_ns_from_week_seconds
 
-DAY_S = 86_400
 WORST_Q = 3
 NUMBER = r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
 Columns = dict[str, NDArray[np.float64]]
@@ -96,7 +93,7 @@ def _tables(file: BinaryIO, layout: Layout, name: str, dropped: Counter[str]) ->
             count = len(rows.split(b"\n", 1)[0].split())
             raise RawDataError(
                 f"{name}: its header names {layout.width} columns, its first row has {count}; export it again, without "
-                "columns that may be blank"
+                "columns that may be blank, or have blanks within them"
             )
         fitted = True
         yield _columns(table, layout)
@@ -165,9 +162,11 @@ def _columns(table: pa.Table, layout: Layout) -> Columns:
             found[name] = _of_sixtieths(*values)
     for date in {"gpsdate", "utcdate"} & raw.keys():
         parts = dict(zip(layout.order, raw[date], strict=True))
-        found[date] = _days(parts["y"], parts["m"], parts["d"])
-    if len(layout.places[layout.time]) == 3:
-        found[layout.time] *= 3600  # hours
+        found[date] = days_of(parts["y"], parts["m"], parts["d"])
+    for time in {"gpstime", "utctime", SECOND} & raw.keys():
+        if len(raw[time]) == 3:
+            found[time] *= 3600  # hours
+    combine(found)
     return found
 
 
@@ -177,18 +176,6 @@ def _of_sixtieths(whole: NDArray[np.float64], minutes: NDArray[Any], seconds: ND
     good = (minutes >= 0) & (minutes < 60) & (seconds >= 0) & (seconds <= 60) & (whole == np.rint(whole))
     value = np.copysign(np.abs(whole) + minutes / 60 + seconds / 3600, whole)
     return np.where(good, value, np.nan)
-
-
-@np.errstate(all="ignore")
-def _days(year: NDArray[np.float64], month: NDArray[np.float64], day: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Days since 1970-01-01; NaN where there is no such date."""
-    good = (year >= 1980) & (year <= 2100) & (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31)
-    whole = np.where(good, [year, month, day], 1.0)
-    good &= np.all(whole == np.rint(whole), axis=0)
-    years, months, days = whole.astype(np.int64)
-    first = (12 * (years - 1970) + months - 1).astype("M8[M]")
-    date = first.astype("M8[D]") + (days - 1)
-    return np.where(good & (date.astype("M8[M]") == first), date.astype(np.int64), np.nan)
 
 
 # --- columns as poses ------------------------------------------------------------------------------------------------
@@ -216,7 +203,7 @@ def _chunk(columns: Columns, layout: Layout, order: Order, latency_s: float, dro
         sieve.columns["q"] = np.nan_to_num(columns["q"], nan=-1.0)
         _keep_quality(sieve)
     keep_possible_poses(sieve)
-    _time(sieve, columns, layout)
+    keep_times(sieve, columns, layout.clock, layout.time, len(layout.places[layout.time]) == 3)
     sieve.columns["t_ns"] = sieve["t_ns"] - latency_ns(latency_s)
     order.keep(sieve)
     given = {name: columns[column][sieve["row"]] for name, column in SIGMAS.items() if column in columns}
@@ -229,25 +216,3 @@ def _keep_quality(sieve: Sieve) -> None:
     for quality in np.unique(sieve["q"][bad])[:10].tolist():  # of damaged ones a few by name
         sieve.keep(sieve["q"] != quality, f"quality Q {quality:g}")
     sieve.keep((sieve["q"] >= 1) & (sieve["q"] <= WORST_Q), "quality Q of another number")
-
-
-def _time(sieve: Sieve, columns: Columns, layout: Layout) -> None:
-    """Column t_ns, GPS; rows at impossible times are left out."""
-    seconds = columns[layout.time][sieve["row"]]
-    if layout.clock in ("week", "gps_week"):
-        week = columns["week"][sieve["row"]]
-        good = possible_week_time(week, seconds) & (week == np.rint(week))
-        sieve.keep(good, "impossible time")
-        sieve.columns["t_ns"] = gps_ns_from_week_seconds(week[good].astype(np.int64), seconds[good])
-        return
-    days = columns[layout.clock][sieve["row"]]
-    of_day = seconds if len(layout.places[layout.time]) == 3 else np.mod(seconds, DAY_S)
-    good = np.isfinite(days) & (seconds >= 0) & (seconds < 14 * DAY_S) & (of_day <= DAY_S)
-    sieve.keep(good, "impossible time")
-    unix_s, ns = days[good].astype(np.int64) * DAY_S, np.rint(of_day[good] * NS).astype(np.int64)
-    if layout.clock == "utcdate":
-        t_ns = gps_ns_from_unix_utc(unix_s + ns // NS, ns % NS)
-    else:
-        t_ns = (unix_s - GPS_EPOCH_UNIX_S) * NS + ns
-    sieve.columns["t_ns"] = t_ns
-    sieve.keep(possible_ns(t_ns), "impossible time")

@@ -1,4 +1,4 @@
-"""Where #MRZ datagrams lie in Kongsberg's .kmall files (little-endian).
+"""Where #MRZ and #IIP datagrams lie in Kongsberg's .kmall files (little-endian).
 
 A datagram: u32 length, '#' and three letters, u8 version, u8 system, u16 sonar, u32 Unix seconds (UTC), u32
 nanoseconds, its body, u32 length again. Where the two lengths differ, or no datagram begins, the next whole one is
@@ -16,11 +16,11 @@ HEAD = struct.Struct("<I4s2BH2I")
 LENGTH = struct.Struct("<I")
 SMALLEST, LARGEST = HEAD.size + LENGTH.size, 1 << 24
 BLOCK = 1 << 16
-MRZ = b"#MRZ"
+MRZ, IIP = b"#MRZ", b"#IIP"  # soundings; the installation
 
 
 def datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
-    """The whole #MRZ datagrams of a file, one after another."""
+    """The whole #MRZ and #IIP datagrams of a file, one after another."""
     size, position = size_of(file), 0
     while position < size:
         length = _length_at(file, position, size)
@@ -28,7 +28,7 @@ def datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
             dropped["truncated datagram" if _cut_off(file, position, size) else "stray bytes"] += 1
             position = _next_start(file, position + 1, size)
             continue
-        if read_at(file, position + 4, 4) == MRZ:
+        if read_at(file, position + 4, 4) in (MRZ, IIP):
             yield read_at(file, position, length)
         position += length
 

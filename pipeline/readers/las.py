@@ -7,7 +7,7 @@ week), 24 u8 x 2 version, 94 u16 header size, 96 u32 offset to points, 100 u32 n
 (bit 7: LAZ), 105 u16 record length, 107 u32 points, 131 f64 x 3 scales, 155 f64 x 3 offsets, 247 u64 points (1.4).
 
 Seconds of week need ``laser.gps_week``, the week of the first point; points more than half a week before that belong
-to the next one. Adjusted standard time is GPS seconds since the epoch - 1e9.
+to the next one. Adjusted standard time is GPS seconds since the epoch - 1e9 (:mod:`pipeline.readers.las_times`).
 """
 
 import logging
@@ -22,22 +22,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.readers.crs import DEGREE_M, Frame, keep_placed, placing_of
+from pipeline.readers.crs import Frame, keep_placed, placing_of
 from pipeline.readers.declared import refuse_another
 from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.las_times import WEEK_S, refuse_useless
 from pipeline.readers.laz import points_at_most, unpack
-from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, through_float32
+from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns
 from pipeline.readers.worker import Numbers
+from pipeline.session_settings import LasTime
 from pipeline.streams import BATCH_ROWS, Chunk
-from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS, gps_ns_from_week_seconds
+from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, NS, gps_ns_from_week_seconds
 
 STRETCH = 4_000_000
 MAX_OFFSET = 1 << 26
 COARSEST_M = 0.01  # scale of coordinates; 1e-7 degrees are 11 mm
 TIMED_FORMATS = frozenset({1, 3, 4, 5, 6, 7, 8, 9, 10})
 LENGTHS = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # least record length by point format
-WEEK_S = WEEK_NS / NS
-EARLIEST_S, LATEST_S = 630_720_000, 3_786_912_000  # GPS seconds: years 2000 and 2100
+MAX_SECONDS = 1e10  # of adjusted time, which int64 nanoseconds must hold
 logging.getLogger("laspy").addHandler(logging.NullHandler())  # what laspy logs, the exceptions say as well
 
 
@@ -46,7 +47,9 @@ class Header:
     """What a LAS header says, checked against the file's size."""
 
     adjusted_time: bool
+    told: LasTime  # what session.yaml says of the times, which goes before the flag
     compressed: bool
+    size: int  # of the file, bytes
     claimed: int
     present: int
     first_s: float  # GPS time of the first point
@@ -67,6 +70,7 @@ class LasPart:
     crs: str  # what the file itself says of its frame: WKT or nothing
     latency_s: float
     gps_week: int | None  # None: adjusted standard time
+    told: LasTime
     first_s: float
 
     def chunks(self) -> Iterator[Chunk]:
@@ -92,7 +96,7 @@ class LasPart:
     def _chunk(self, points: Numbers, dropped: Counter[str], first: bool) -> Chunk:
         seconds, x_m, y_m, z_m = points
         if first:
-            _refuse_useless_times(seconds, self.name, adjusted=self.gps_week is None)
+            refuse_useless(seconds, self.name, self.gps_week is None, self.told)
         sieve = Sieve({"seconds": seconds, "x_m": x_m, "y_m": y_m, "z_m": z_m}, dropped)
         sieve.keep_finite()
         sieve.keep(sieve["seconds"] != 0, "no time")
@@ -104,15 +108,17 @@ class LasPart:
 
     def _gps_ns(self, sieve: Sieve) -> NDArray[np.int64]:
         if self.gps_week is None:
-            since = sieve["seconds"] + ADJUSTED_STANDARD_OFFSET_S
-            sieve.keep((since > EARLIEST_S) & (since < LATEST_S), "impossible time")
-            return gps_ns_from_week_seconds(0, sieve["seconds"]) + ADJUSTED_STANDARD_OFFSET_S * NS
+            sieve.keep(np.abs(sieve["seconds"]) < MAX_SECONDS, "impossible time")
+            t_ns = gps_ns_from_week_seconds(0, sieve["seconds"]) + ADJUSTED_STANDARD_OFFSET_S * NS
+            good = possible_ns(t_ns)
+            sieve.keep(good, "impossible time")
+            return t_ns[good]
         sieve.keep((sieve["seconds"] >= 0) & (sieve["seconds"] < 2 * WEEK_S), "impossible time")
         week = self.gps_week + (sieve["seconds"] < self.first_s - WEEK_S / 2)
         return gps_ns_from_week_seconds(week, sieve["seconds"])
 
 
-def read_header(path: Path, name: str) -> Header:
+def read_header(path: Path, name: str, told: LasTime = None) -> Header:
     """The header, checked.
 
     Raises
@@ -145,7 +151,8 @@ def read_header(path: Path, name: str) -> Header:
         time_at = first + (22 if form >= 6 else 20)
         (first_s,) = struct.unpack("<d", read_at(file, time_at, 8).ljust(8, b"\0"))
         here = min(claimed, present)
-        return Header(bool(encoding & 1), compressed, claimed, here, first_s if here else 0.0, scales)
+        adjusted = told == "adjusted_standard" if told else bool(encoding & 1)
+        return Header(adjusted, told, compressed, size, claimed, here, first_s if here else 0.0, scales)
 
 
 def parts(
@@ -160,7 +167,7 @@ def parts(
         stop = min(start + STRETCH, header.present)
         missing = header.claimed - header.present if k == len(starts) - 1 else 0
         label = name if len(starts) == 1 else f"{name}#{k}"
-        common = (frame, crs, latency_s, gps_week, header.first_s)
+        common = (frame, crs, latency_s, gps_week, header.told, header.first_s)
         made.append(LasPart(path, label, header.compressed, start, stop, missing, *common))
     return tuple(made)
 
@@ -168,8 +175,8 @@ def parts(
 def _refuse_coarse(scales: tuple[float, ...], frame: Frame, name: str) -> None:
     """Coordinates are whole numbers of a scale, which must not blur what is measured to millimetres."""
     placing = placing_of(frame)
-    unit_m = 1.0 if placing is None else placing.unit_m
-    units_m = (unit_m, unit_m, 1.0 if unit_m == DEGREE_M else unit_m)
+    unit_m, height_unit_m = (1.0, 1.0) if placing is None else (placing.unit_m, placing.height_unit_m)
+    units_m = (unit_m, unit_m, height_unit_m)
     for axis, scale, axis_unit_m in zip("xyz", scales, units_m, strict=True):
         if scale * axis_unit_m > COARSEST_M * 1.2:
             raise RawDataError(
@@ -207,25 +214,3 @@ def _las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[Nu
             start += len(points)
     except (laspy.LaspyException, ValueError, LookupError, OverflowError, struct.error) as error:
         raise RawDataError(f"{name}: is damaged ({error}); copy or export it again") from error
-
-
-def _refuse_useless_times(seconds: NDArray[np.float64], name: str, adjusted: bool) -> None:
-    if len(seconds) and not np.any(seconds):
-        raise RawDataError(f"{name}: all its GPS times are 0; export it again with GPS time stamps")
-    given = seconds[np.isfinite(seconds) & (seconds != 0)]
-    weekly = (given >= 0) & (given < 2 * WEEK_S)
-    since = given + ADJUSTED_STANDARD_OFFSET_S
-    if adjusted and len(given) and (np.all(weekly) or not np.any((since > EARLIEST_S) & (since < LATEST_S))):
-        raise RawDataError(
-            f"{name}: its header promises adjusted standard GPS time, but {given[0]:.6f} is none (before 2000, after "
-            "2100, or in its first week, September 2011): likely seconds of week; export it again with the right flag"
-        )
-    if not adjusted and len(given) and not np.any(weekly):
-        raise RawDataError(
-            f"{name}: its header promises seconds of GPS week, but {given[0]:.6f} is none: likely adjusted "
-            "standard time without its flag (global encoding, bit 0); export it again with the right flag"
-        )
-    if through_float32(seconds):
-        raise RawDataError(
-            f"{name}: its GPS times went through float32 (first: {seconds[0]}); export it again in double precision"
-        )

@@ -17,7 +17,7 @@ import re
 import threading
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby, islice
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -49,6 +49,10 @@ STATUS = {
     7: "INS_ALIGNMENT_COMPLETE", 8: "DETERMINING_ORIENTATION", 9: "WAITING_INITIALPOS", 10: "WAITING_AZIMUTH",
     11: "INITIALIZING_BIASES", 12: "MOTION_DETECT", 14: "WAITING_ALIGNMENTORIENTATION",
 }
+STATES = {"status": STATUS, "type": {
+    52: "INS_SBAS", 53: "INS_PSRSP", 54: "INS_PSRDIFF", 55: "INS_RTKFLOAT", 56: "INS_RTKFIXED", 68: "PPP_CONVERGING",
+    69: "PPP", 73: "INS_PPP_CONVERGING", 74: "INS_PPP",
+}}  # what is told of each record: the filter's state, and in INSPVAX the kind of position
 _POSE = [("roll", "<f8"), ("pitch", "<f8"), ("azimuth", "<f8")]
 _PLACE = [("latitude", "<f8"), ("longitude", "<f8"), ("height", "<f8")]
 PVA = [("week", "<u4"), ("seconds", "<f8"), *_PLACE, ("velocity", "<f8", 3), *_POSE, ("status", "<u4")]
@@ -155,7 +159,9 @@ def _survey(file: BinaryIO, dropped: Counter[str]) -> tuple[int | None, int | No
                 names[kind] = kind.__name__.partition("_")[0]
             total[names[kind]] += 1
             if names[kind] == "UnknownBytes" and _PROMPT.fullmatch(message.data) is None:
-                dropped["undecodable bytes"] += 1
+                starts = sum(1 for _ in _START.finditer(message.data))
+                text = not starts and message.data.isascii() and b"\0" not in message.data
+                dropped["text between records" if text else "undecodable bytes"] += max(starts, 1)
     there = [number for number, name in NAMES.items() if total[name]]
     if not there:
         dropped["message other than INSPVA, INSPVAS, INSPVAX"] += total.total() - total["UnknownBytes"]
@@ -218,6 +224,7 @@ def _chunk(
             "seconds": records["seconds"].astype(float) if own_time else records["header_ms"] / 1000.0,
             "height_m": records["height"] + undulation,
             **{f"{name}_rad": np.radians(records[name]) for name in ANGLES},
+            **{name: records[name].astype(np.uint8) for name in STATES if name in names},
         },
         dropped,
     )
@@ -227,7 +234,8 @@ def _chunk(
     sieve.columns["t_ns"] = t_ns - latency_ns(latency_s)
     order.keep(sieve)
     sigmas = _sigmas(records, latency_s, dropped) if telling else {}
-    return chunk(sieve.columns, INS_COLUMNS, dropped, sigmas)
+    told = {name: sieve[name] for name in STATES if name in names}
+    return replace(chunk(sieve.columns, INS_COLUMNS, dropped, sigmas), states=told)
 
 
 @np.errstate(all="ignore")

@@ -4,14 +4,18 @@ Layout: R2Sonic Sonic 2026/2024/2022 Operation Manual, appendix "Uplink Data For
 V6.3 agree). All big-endian. Header of 12 bytes: 'BTH0', u32 packet size, u32 stream. Then sections, each u16 name (two
 letters), u16 size (all of it), padded to 4 bytes; unknown ones are skipped by their size. At offsets in the section:
 
-    H0   28 u32 Unix seconds (UTC), 32 u32 nanoseconds, 36 u32 ping number, 44 f32 sound speed [m/s], 114 u16 points N
+    H0   28 u32 Unix seconds (UTC), 32 u32 nanoseconds, 36 u32 ping number, 44 f32 sound speed [m/s],
+         68 f32 steering of the transmit fan along track [rad], 114 u16 points N
     R0   4 f32 scale, 8 u16 range[N]                     two-way time [s] = range * scale; 0: no detection
     A0   4 f32 first, 8 f32 last                         angles evenly from first (port) to last (starboard) inclusive
     A2   4 f32 first, 8 f32 scale, 36 u16 step[N]        angle[n] = first + (step[0] + ... + step[n]) * scale
 
-Angles [rad] are from the array's normal, starboard +, not roll corrected. How packets lie in files: ``packets.py``.
+Angles [rad] are from the array's normal, starboard +, not roll corrected; roll stabilisation only moves the sector.
+Pitch stabilisation (2020, 2026) steers the transmit fan by up to 10°. Which sign forward has is documented nowhere, and
+no file at hand has it: such pings are refused. How packets lie in files: ``packets.py``.
 """
 
+import math
 import struct
 from collections import Counter
 from collections.abc import Iterator
@@ -22,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
 from pipeline.readers.packets import Sections, bare_packets, xtf_packets
 from pipeline.readers.sieve import (
@@ -39,7 +44,8 @@ from pipeline.times import NS, gps_ns_from_unix_utc
 SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 PINGS = 8_192
 MAX_POINTS = np.iinfo(np.int16).max
-HEAD = struct.Struct(">28xIII4xf66xH")
+HEAD = struct.Struct(">28xIII4xf20xf42xH")
+LEAST_STEERING, MAX_STEERING = 1e-4, 0.6  # rad: 0.006°; 20° is possible at 200 kHz
 TWO_FLOATS = struct.Struct(">4xff")
 SCALE = struct.Struct(">4xf")
 STEPS = 36
@@ -52,6 +58,7 @@ class Ping(NamedTuple):
     nanoseconds: int
     number: int
     sound_speed_m_s: float
+    steering_rad: float
     range_scale_s: float
     ranges: NDArray[np.uint16]
     first_rad: float
@@ -79,6 +86,7 @@ class R2sonicPart:
                 if ping is None:
                     dropped["damaged packet"] += 1
                     continue
+                self._refuse_steered(ping)
                 pings.append(ping)
                 waiting += len(ping.ranges)
                 if waiting >= SOUNDINGS or len(pings) >= PINGS:
@@ -89,14 +97,23 @@ class R2sonicPart:
             if dropped:
                 yield no_rows(MBES_COLUMNS, dropped)
 
+    def _refuse_steered(self, ping: Ping) -> None:
+        if abs(ping.steering_rad) > LEAST_STEERING:
+            raise RawDataError(
+                f"{self.name}: ping {ping.number} was sent with its fan steered by "
+                f"{math.degrees(ping.steering_rad):+.2f}° along track; switch pitch stabilisation off and sail again"
+            )
+
 
 def decode(sections: Sections) -> Ping | None:
     """The contents of one packet; None where they contradict themselves."""
     head, ranges, a0, a2 = (sections.get(name, b"") for name in (b"H0", b"R0", b"A0", b"A2"))
     if len(head) < HEAD.size or len(ranges) < SCALE.size:
         return None
-    seconds, nanoseconds, number, speed, points = HEAD.unpack_from(head)
+    seconds, nanoseconds, number, speed, steering, points = HEAD.unpack_from(head)
     if points > MAX_POINTS or nanoseconds >= NS or len(ranges) < SCALE.size + 2 * points:
+        return None
+    if not abs(steering) < MAX_STEERING:
         return None
     steps = None
     if len(a2) >= STEPS + 2 * points:
@@ -106,7 +123,7 @@ def decode(sections: Sections) -> Ping | None:
     first, second = TWO_FLOATS.unpack_from(a2 or a0)
     (scale,) = SCALE.unpack_from(ranges)
     ticks = np.frombuffer(ranges, ">u2", points, SCALE.size)
-    return Ping(seconds, nanoseconds, number, speed, scale, ticks, first, second, steps)
+    return Ping(seconds, nanoseconds, number, speed, steering, scale, ticks, first, second, steps)
 
 
 def _angles(ping: Ping) -> NDArray[np.float64]:

@@ -58,6 +58,7 @@ class TablePart:
     sensor: Sensor
     frame: Frame
     latency_s: float
+    max_records: int | None = None
 
     def chunks(self) -> Iterator[Chunk]:
         dropped: Counter[str] = Counter()
@@ -65,7 +66,7 @@ class TablePart:
         canonical = CANONICAL[self.sensor]
         first = True
         with opened(self.path, self.name) as file:
-            for batch in batches(file, self.name, self.sensor, dropped):
+            for batch in batches(file, self.name, self.sensor, dropped, self.max_records):
                 columns = _numpy(batch, dropped)
                 if first:
                     refuse_float32(columns, self.name)

@@ -2,12 +2,13 @@
 
 import io
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import IO, BinaryIO, Literal, cast
 
 import pyarrow as pa
 
 from pipeline.errors import RawDataError
+from pipeline.readers.claims import refuse_claim
 from pipeline.readers.files import read_at, size_of
 from pipeline.streams import BATCH_ROWS
 
@@ -53,20 +54,30 @@ def _wanted(names: list[str], name: str, sensor: Sensor) -> list[str]:
     return chosen
 
 
-def batches(file: BinaryIO, name: str, sensor: Sensor, dropped: Counter[str]) -> Iterator[pa.RecordBatch]:
-    source = _csv if read_at(file, 0, 4) != b"PAR1" else _parquet
-    file.seek(0)
+def batches(
+    file: BinaryIO, name: str, sensor: Sensor, dropped: Counter[str], max_records: int | None = None
+) -> Iterator[pa.RecordBatch]:
+    is_parquet = read_at(file, 0, 4) == b"PAR1"
+    size = size_of(file)
+
+    def refuse(claimed: int) -> None:
+        refuse_claim(claimed, size, max_records, sensor, name)
+
     try:
-        yield from source(file, name, sensor, dropped)
+        yield from _parquet(file, name, sensor, refuse) if is_parquet else _csv(file, name, sensor, dropped)
     except (pa.ArrowException, ValueError, OverflowError) as error:
         told = str(error).split("\n")[0]
+        told = told if len(told) <= 200 else f"{told[:200]}..."  # whole cells stand in it
         raise RawDataError(f"{name}: cannot be read as a table ({told}); check or export it again") from error
 
 
-def _parquet(file: BinaryIO, name: str, sensor: Sensor, dropped: Counter[str]) -> Iterator[pa.RecordBatch]:
+def _parquet(file: BinaryIO, name: str, sensor: Sensor, refuse: Callable[[int], None]) -> Iterator[pa.RecordBatch]:
+    """``refuse``: raises where so many rows are more than can be."""
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(file) as table:
+        groups = range(table.metadata.num_row_groups)
+        refuse(max(table.metadata.num_rows, sum(table.metadata.row_group(k).num_rows for k in groups)))
         schema = table.schema_arrow
         chosen = _wanted(list(schema.names), name, sensor)
         for column in chosen:

@@ -11,7 +11,7 @@ noise       one random generator for each purpose
 mounts      sensors on the body, and the coarse mount's errors
 ins, laser, mbes      what each instrument records;  beams: of what a fan of beams consists
 georeferenced         laser points placed in ECEF, as other programs hand them on
-novatel, sbet, las, bth0 (and its XTF shell)      the bytes of its files
+novatel, sbet, las, bth0 (and its XTF shell)      the bytes of its files;  tables: soundings as Parquet
 texts       session.yaml, pool.yaml, truth
 session     everything together, in memory and as a folder
 """

@@ -1,4 +1,9 @@
-"""A fan of beams: the angles a head records, and what beams of finite width measure."""
+"""A fan of beams: the angles a head records, the tilts it transmits at, and what beams of finite width measure.
+
+Where a beam looks is found by turning: a transmit fan tilted by τ consists of the ray (0, sin τ, -cos τ) swung round
+the transmitting array, the y axis, to starboard by ψ; its component along the receiving array, the x axis, is then
+cos τ sin ψ. The receive beam at the angle θ hears the ray of which that is sin θ.
+"""
 
 from dataclasses import dataclass
 
@@ -36,6 +41,32 @@ def fan(scenario: MbesScenario) -> Fan:
     return Fan(first, last, first + np.cumsum(steps.astype(np.float64)) * scale, steps, scale)
 
 
+def transmit_tilts_rad(scenario: MbesScenario, angles_rad: Floats, pings: NDArray[np.int64]) -> Floats:
+    """(p, b): the recorded tilt, forward +, of pings by their numbers and of beams by their recorded angles; a sector's
+    to_deg is its own."""
+    angles_deg = np.degrees(angles_rad)
+    of_beam = np.zeros(len(angles_rad))
+    for sector in reversed(scenario.sectors):
+        of_beam = np.where(angles_deg <= sector.to_deg, sector.tilt_deg, of_beam)
+    of_ping = np.array(scenario.ping_tilts_deg or (0.0,))
+    return np.radians(of_ping[pings % len(of_ping), None] + of_beam)
+
+
+def swing_rad(sine: Floats, tilt_rad: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """ψ of the ray of a fan tilted by ``tilt_rad`` whose starboard component is ``sine``, and whether there is one;
+    of rays that look down (the widest fan of a scenario is 170°)."""
+    sideways = sine / np.cos(tilt_rad)
+    there = np.abs(sideways) < 1
+    return np.arcsin(np.where(there, sideways, 0.0)), there
+
+
+def directions_in_mbes(swing: Floats, tilt_rad: Floats) -> Floats:
+    """(..., 3) unit vectors: the ray (0, sin τ, -cos τ) swung round y."""
+    along = np.cos(tilt_rad)
+    forward = np.broadcast_to(np.sin(tilt_rad), swing.shape)
+    return np.stack([np.sin(swing) * along, forward, -np.cos(swing) * along], axis=-1)
+
+
 class Beams:
     """Beams as bundles of rays over their -3 dB width, weighted with a Gaussian pattern."""
 
@@ -53,18 +84,20 @@ class Beams:
         self.rays = len(weights)
         self.axis = self.rays // 2
 
-    def paths(self, origins_m: Floats, R_target_from_mbes: Floats, angles_rad: Floats) -> tuple[Floats, Floats]:
-        """Half the sound's path for (p, b) physical angles, inf where nothing answers; and the directions of the axes.
+    def paths(
+        self, origins_m: Floats, R_target_from_mbes: Floats, swing: Floats, tilt_rad: Floats
+    ) -> tuple[Floats, Floats]:
+        """Half the sound's path of (p, b) beams by ψ and τ, inf where nothing answers; and the axes' directions.
 
         A beam that lies on one plane entirely is phase detected: its axis's range. Else its echo is the mean of what
-        its parts meet. Origins (p, 3) and R_target_from_mbes (p, 3, 3) are per ping, directions (p, b, 3).
+        its parts meet: rays off by parts of the receive width in θ and of the transmit width in τ. (From
+        sin θ = cos τ sin ψ: dψ = √(1 + l²) dθ + l sin ψ dτ with l = tan τ / cos ψ.) Origins (p, 3) and
+        R_target_from_mbes (p, 3, 3) are per ping, directions (p, b, 3).
         """
-        pings, beams = angles_rad.shape
-        across = angles_rad[..., None] + self.across_rad
-        sines, cosines = np.sin(across), np.cos(across)
-        along = np.cos(self.along_rad)
-        forward = np.broadcast_to(np.sin(self.along_rad), sines.shape)
-        direction_mbes = np.stack([sines * along, forward, -cosines * along], axis=-1)
+        pings, beams = swing.shape
+        lean = (np.tan(tilt_rad) / np.cos(swing))[..., None]
+        turned = np.hypot(1.0, lean) * self.across_rad + lean * np.sin(swing)[..., None] * self.along_rad
+        direction_mbes = directions_in_mbes(swing[..., None] + turned, tilt_rad[..., None] + self.along_rad)
         directions = direction_mbes.reshape(pings, beams * self.rays, 3) @ R_target_from_mbes.transpose(0, 2, 1)
         origins = np.repeat(origins_m, beams * self.rays, axis=0)
         flat = directions.reshape(-1, 3)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.simulation.beams import Beams, fan
+from pipeline.simulation.beams import Beams, directions_in_mbes, fan, swing_rad, transmit_tilts_rad
 from pipeline.simulation.earth import Floats
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import Movement, Times
@@ -76,11 +76,12 @@ class _Pass:
         origins = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(s.mount)
         R_target_from_mbes = pose.R_target_from_body @ self.R_body_from_mbes
         steered = self.angles_rad + np.radians(s.angle_sigma_deg) * self.random["angle"].standard_normal(shape)
-        # The arrays are flat: beams are steered with the recorded sound speed, sin(true) = k sin(recorded).
-        sines = s.sound_speed_true_m_s / s.sound_speed_recorded_m_s * np.sin(steered)
-        looks = np.abs(sines) < 1
-        physical = np.arcsin(np.where(looks, sines, 0.0))
-        paths, directions = self._bent(origins, R_target_from_mbes, physical)
+        tilts = transmit_tilts_rad(s, self.angles_rad, self.ping[part])
+        # Both arrays are flat: they are steered with the recorded sound speed, sin(true) = k sin(recorded).
+        k = s.sound_speed_true_m_s / s.sound_speed_recorded_m_s
+        true_tilts = np.arcsin(k * np.sin(tilts))
+        swing, looks = swing_rad(k * np.sin(steered), true_tilts)
+        paths, directions = self._bent(origins, R_target_from_mbes, swing, true_tilts)
         paths = self._corners(paths, origins, directions)
         paths = paths + s.range_sigma_m * self.random["range"].standard_normal(shape)
         paths = self._surface(paths, origins, directions)
@@ -94,24 +95,29 @@ class _Pass:
             "beam": beam.astype(np.int16),
             "two_way_time_s": 2 * paths[ping, beam] / s.sound_speed_true_m_s,
             "angle_rad": self.angles_rad[beam],
-            "transmit_tilt_rad": np.zeros(len(beam)),
+            "transmit_tilt_rad": tilts[ping, beam],
             "sound_speed_m_s": np.full(len(ping), float(np.float32(s.sound_speed_recorded_m_s))),
         }
 
-    def _bent(self, origins: Floats, R_target_from_mbes: Floats, angles: Floats) -> tuple[Floats, Floats]:
+    def _bent(
+        self, origins: Floats, R_target_from_mbes: Floats, swing: Floats, tilts: Floats
+    ) -> tuple[Floats, Floats]:
         """Paths and directions as of straight beams; where the sound speed changes with depth, of bent ones.
 
         With dc/d(depth) = g a ray curves upward by g/c per metre across itself, so the chord to where it arrives after
-        r lies r g / 2c nearer to the vertical; and on the way down sound is on the average g · depth / 2 faster.
+        r lies r g / 2c nearer to the vertical; and on the way down sound is on the average g · depth / 2 faster. The
+        part of "up" across the ray is laid on two directions, in which its ψ and its τ grow.
         """
         gradient, speed = self.scenario.sound_speed_gradient_1_s, self.scenario.sound_speed_true_m_s
-        paths, directions = self.beams.paths(origins, R_target_from_mbes, angles)
+        paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
         if not gradient:
             return paths, directions
         up = R_target_from_mbes[:, 2, :]
-        across = up[:, 0, None] * np.cos(angles) + up[:, 2, None] * np.sin(angles)
-        turned = angles + gradient / (2 * speed) * np.where(np.isfinite(paths), paths, 0.0) * across
-        paths, directions = self.beams.paths(origins, R_target_from_mbes, turned)
+        sideways = np.einsum("pi,pbi->pb", up, directions_in_mbes(swing + np.pi / 2, np.zeros_like(tilts)))
+        ahead = np.einsum("pi,pbi->pb", up, directions_in_mbes(swing, tilts + np.pi / 2))
+        turn = gradient / (2 * speed) * np.where(np.isfinite(paths), paths, 0.0)
+        turned = swing + turn * sideways / np.cos(tilts), tilts + turn * ahead
+        paths, directions = self.beams.paths(origins, R_target_from_mbes, *turned)
         depths = -directions[..., 2] * np.where(np.isfinite(paths), paths, 0.0)
         return paths * (1 - gradient * depths / (2 * speed)), directions
 

@@ -6,13 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from pipeline import CONFIGS
 from pipeline.config import Drift, Letters, Mount, Origin, Target, White
+from pipeline.errors import ConfigError
 from pipeline.meshes import with_mesh
 from pipeline.parsing import parse, read_yaml
-from pipeline.quantities import Angle, Latency, Length, Lever, Model, NotNegative, Positive, SoundSpeed
+from pipeline.quantities import Angle, Latency, Length, Lever, Model, NotNegative, Positive, SoundSpeed, TransmitSectors
 
+SCENARIOS = CONFIGS / "scenarios"
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1, le=20)]
+STEEPEST_TILT_DEG = 45.0
+Tilt = Annotated[float, Field(ge=-STEEPEST_TILT_DEG, le=STEEPEST_TILT_DEG)]
 
 
 def _moment(text: str) -> str:
@@ -107,6 +112,8 @@ class MbesScenario(Model):
     beams: Annotated[int, Field(ge=2, le=1024)] = 256
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
     spacing: Literal["equi_angle", "equidistant"] = "equi_angle"  # section A0 or A2
+    sectors: TransmitSectors = ()  # tilts of the transmit fan by receive angle; none: no tilt
+    ping_tilts_deg: Annotated[tuple[Tilt, ...], Field(max_length=16)] = ()  # added to all sectors', in turn by ping
     max_range_m: Annotated[float, Field(ge=1, le=500)] = 15.0
     range_sigma_m: NotNegative = 0.008
     angle_sigma_deg: NotNegative = 0.06
@@ -126,13 +133,28 @@ class MbesScenario(Model):
     give_projector_offset: bool = False
     latency_s: Latency = 0.0
     latency_declared_s: Latency = 0.0
-    format: Literal["xtf", "r2s"] = "xtf"  # r2s: packets one after another
+    format: Literal["xtf", "r2s", "parquet"] = "xtf"  # r2s: packets one after another; parquet: a table, with tilts
     intensity: bool = True  # section I1
 
     @model_validator(mode="after")
     def _odd(self) -> "MbesScenario":
         if any(count % 2 == 0 for count in self.sub_rays):
             raise ValueError(f"sub_rays = {list(self.sub_rays)} must be odd: the middle one is the beam's axis")
+        return self
+
+    @model_validator(mode="after")
+    def _tilted(self) -> "MbesScenario":
+        if not self.sectors and not self.ping_tilts_deg:
+            return self
+        if self.format != "parquet":
+            raise ValueError(
+                f"format = {self.format}: the sonar's own packets hold no transmit tilt, which sectors and "
+                "ping_tilts_deg give; write format: parquet"
+            )
+        tilts = [one.tilt_deg + more for one in self.sectors for more in self.ping_tilts_deg]
+        steepest = max(tilts, key=abs, default=0.0)
+        if abs(steepest) > STEEPEST_TILT_DEG:
+            raise ValueError(f"sectors and ping_tilts_deg add up to {steepest}°: at most 45° is possible")
         return self
 
 
@@ -182,5 +204,18 @@ class Scenario(Model):
 
 
 def load_scenario(path: Path | None) -> Scenario:
-    """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario."""
-    return Scenario() if path is None else parse(Scenario, with_mesh(read_yaml(path), path), str(path))
+    """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario. A single word that is no
+    file names one of configs/scenarios."""
+    if path is None:
+        return Scenario()
+    if path.name == str(path) and not path.suffix and not path.is_file():
+        names = scenario_names()
+        if path.name not in names:
+            known = ", ".join(names)
+            raise ConfigError(f"--scenario {path}: is neither a file nor the name of a scenario; these are {known}")
+        path = SCENARIOS / f"{path.name}.yaml"
+    return parse(Scenario, with_mesh(read_yaml(path), path), str(path))
+
+
+def scenario_names() -> list[str]:
+    return sorted(path.stem for path in SCENARIOS.glob("*.yaml"))

@@ -27,6 +27,7 @@ from pipeline.simulation.novatel import aligning_bodies, bodies, novatel_bytes
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.sbet import sbet_bytes
 from pipeline.simulation.scenario import Scenario, load_scenario
+from pipeline.simulation.tables import write_soundings
 from pipeline.simulation.texts import INS_SUFFIX, pool_text, session_text, truth_text
 
 
@@ -36,7 +37,7 @@ class SimulatedSession:
 
     ins: Columns  # t_ns, latitude_rad, longitude_rad, height_m, roll_rad, pitch_rad, azimuth_rad
     laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF if so asked
-    mbes: Columns  # t_ns, ping, beam, two_way_time_s, angle_rad, sound_speed_m_s; beams with a detection only
+    mbes: Columns  # t_ns, ping, beam, two_way_time_s, angle_rad, transmit_tilt_rad, sound_speed_m_s; detections only
     session: dict[str, Any]  # session.yaml
     pool: dict[str, Any]  # pool.yaml
     truth: dict[str, Any]  # OUT.truth.json
@@ -131,9 +132,7 @@ def _write_files(simulated: SimulatedSession, folder: Path, scenario: Scenario) 
         pings = _rows(simulated.pings, *np.searchsorted(simulated.pings["pass"], [k, k + 1]))
         first, last = (pings["ping"][[0, -1]] if len(pings["ping"]) else (0, -1))
         mbes = _rows(simulated.mbes, *np.searchsorted(simulated.mbes["ping"], [first, last + 1]))
-        packet = packets(mbes, pings, fan(scenario.mbes), scenario.mbes)
-        path = folder / "mbes" / f"pass_{k}.{scenario.mbes.format}"
-        path.write_bytes(xtf_bytes(packet, path.name) if scenario.mbes.format == "xtf" else packet.tobytes())
+        _write_mbes(mbes, pings, folder / "mbes" / f"pass_{k}.{scenario.mbes.format}", scenario)
     for name, text in (("session.yaml", simulated.session), ("pool.yaml", simulated.pool)):
         (folder / name).write_text(yaml.safe_dump(text, sort_keys=False), encoding="utf-8")
 
@@ -149,6 +148,14 @@ def _write_ins(simulated: SimulatedSession, folder: Path, scenario: Scenario) ->
             continue
         before = aligning_bodies(int(ins["t_ns"][0]), scenario.ins.aligning_s if k == 0 else 0.0)
         path.write_bytes(novatel_bytes(np.concatenate([before, bodies(ins)]), form))
+
+
+def _write_mbes(mbes: Columns, pings: Columns, path: Path, scenario: Scenario) -> None:
+    if scenario.mbes.format == "parquet":
+        write_soundings(path, mbes)
+        return
+    packet = packets(mbes, pings, fan(scenario.mbes), scenario.mbes)
+    path.write_bytes(xtf_bytes(packet, path.name) if scenario.mbes.format == "xtf" else packet.tobytes())
 
 
 def _rows(columns: Columns, start: int, stop: int) -> Columns:

@@ -31,7 +31,7 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
     about_laser["latency_s"] = laser.latency_declared_s
     about_mbes: Text = {
         "files": [f"mbes/*.{mbes.format}"],
-        "format": "r2sonic",
+        "format": "table" if mbes.format == "parquet" else "r2sonic",
         "mount": coarse_mount(mbes, seed).model_dump(),
         "sound_speed_m_s": mbes.sound_speed_true_m_s if mbes.give_true_sound_speed else None,
     }

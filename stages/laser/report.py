@@ -25,6 +25,7 @@ from pipeline.finding import FARTHEST
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.judging.residual_tests import pattern_tests
 from pipeline.mounts import PARAMETERS, mount_of, target_of
+from pipeline.screen import verdict_in_words
 from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons, warnings
 
 
@@ -93,10 +94,12 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     built = as_found(inputs.planes, inputs.patterns, model)
     target = target_block(inputs.target_pose.iloc[0]) | {"as_found": built}
     methods = {"adjustment": block}
+    verdict = "rejected" if found else "accepted"
     result = {
         "schema": SCHEMA,
         "session": config.name,
-        "verdict": "rejected" if found else "accepted",
+        "verdict": verdict,
+        "verdict_in_words": verdict_in_words(verdict, held),
         "reasons": found,
         "warnings": warnings(inputs.groups, target, inputs.geometry, block["sigma_mount_total"])
         + ([doubt] if doubt not in ("", NO_DRIFT, *found) else [])

@@ -14,7 +14,7 @@ that opened together they are one scene. Entities (frame target unless said), * 
     /residuals/<sensor>/<family> *     adjust: points by distance from the adjusted surface
     /maps/<sensor>/<family>            adjust: mean residual of each cell of the faces
     /fans/<sensor>/pass_<n>            adjust: rays of one moment in the middle of the pass
-    /tables/<name>                     ingest, adjust, report: what is said in words and numbers
+    /tables/<name>                     what is said in words and numbers
 
 over the steps of the timeline ``iteration``:
 
@@ -30,7 +30,7 @@ over the moments of the timeline ``time`` (UTC):
 
 import re
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -51,15 +51,28 @@ GREY, SONAR, LASER = (150, 155, 165), (213, 94, 0), (0, 114, 178)
 DOT_M = 0.008  # radius of a point
 
 
-def record(run: Path, stage: str) -> bytes:
-    """A stage's recording, as its file's content."""
+def record(run: Path, stage: str, tabs: Sequence[str]) -> bytes:
+    """A stage's recording, as its file's content; shown in these tabs of stages.views.tour."""
     from stages.views.tour import tour
 
-    return content(recording_id(run), tour(), lambda recording: log(recording, stage, Tables(run)))
+    return content(recording_id(run), tour(tabs), lambda recording: log(recording, stage, Tables(run)))
 
 
 def log(recording: Any, stage: str, tables: Tables) -> None:
     import_module(f"stages.views.{stage}").log(recording, tables)
+
+
+def curve(recording: Any, path: str, style: Any, times: Callable[[], Any], values: Any) -> None:
+    """A curve over a timeline; ``times``: makes its rerun.TimeColumn.
+
+    Where there are no values, nothing is sent: of columns without rows the viewer makes a timeline from the beginning
+    to the end of time, and dies of it.
+    """
+    import rerun as rr
+
+    if len(values):
+        recording.log(path, style, static=True)
+        recording.send_columns(path, indexes=[times()], columns=rr.Scalars.columns(scalars=values))
 
 
 def words(text: str) -> Any:
@@ -90,19 +103,6 @@ def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
     if not found:
         raise ArtefactError(f"{run}: has no recording{'' if stage is None else f' of {stage}'}; run poolcal run first")
     return found
-
-
-def show(paths: list[Path]) -> int:
-    """The viewer, until it is closed; it listens on this machine alone."""
-    import subprocess
-    import sys
-
-    viewer = Path(sys.executable).with_name("rerun")
-    try:
-        places = [str(path.absolute()) for path in paths]
-        return subprocess.run([viewer, "--bind", "127.0.0.1", *places], check=False).returncode and 1
-    except FileNotFoundError as error:
-        raise ArtefactError(f"{viewer}: there is no such program; run make setup again") from error
 
 
 def recording_id(*runs: Path) -> str:

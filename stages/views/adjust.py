@@ -1,5 +1,6 @@
 """Before and after, residuals as colours and as maps, their course over time, the sensors' fans, correlations."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,9 @@ from pipeline.mounts import PARAMETERS, Mounted, mount_of
 from pipeline.poses import trajectory_in_target
 from pipeline.residuals import FEWEST
 from pipeline.tables import Tables
-from pipeline.times import NS, unix_ns_from_gps
-from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, words
+from pipeline.times import NS
+from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, curve, words
+from stages.views.ingest import moments_of
 
 Array = NDArray[np.float64]
 Shades = dict[str, tuple[int, int, int]]  # by family
@@ -163,11 +165,10 @@ def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades
 
     bins = bins[bins["by"] == "time"].sort_values("low", kind="stable")
 
-    def curve(path: str, name: str, seconds: Any, values: Any, colour: Any) -> None:
+    def dots(path: str, name: str, seconds: Any, values: Any, colour: Any) -> None:
+        style = rr.SeriesPoints(colors=colour, names=name, marker_sizes=2.5)
         t_ns = np.round(np.asarray(seconds, dtype=np.float64) * NS).astype(np.int64)
-        times = rr.TimeColumn("time", timestamp=unix_ns_from_gps(t_ns).astype("datetime64[ns]"))
-        recording.log(path, rr.SeriesPoints(colors=colour, names=name, marker_sizes=2.5), static=True)
-        recording.send_columns(path, indexes=[times], columns=rr.Scalars.columns(scalars=values))
+        curve(recording, path, style, partial(moments_of, t_ns), values)
 
     for sensor in SENSORS:
         rows = bins[bins["sensor"] == sensor]
@@ -176,14 +177,14 @@ def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades
         count = rows.groupby("low", sort=True)["count"].sum()
         thinned = f", one in {steps[sensor]} of them" if steps[sensor] > 1 else ""
         shown = count.to_numpy(np.float64)
-        curve(f"quality/points/{sensor}", f"{sensor}{thinned}", count.index + 0.5, shown, SENSORS[sensor])
+        dots(f"quality/points/{sensor}", f"{sensor}{thinned}", count.index + 0.5, shown, SENSORS[sensor])
         for name, colour in shades.items():
             of_family = rows[(rows["family"] == name) & np.isfinite(rows["mean_m"])]
             if len(of_family):
                 where = of_family["low"].to_numpy() + 0.5
                 shade = colour if sensor == "mbes" else tuple((part + 2 * 160) // 3 for part in colour)
                 mean = 1000 * of_family["mean_m"].to_numpy()
-                curve(f"quality/residual/{sensor}/{name}", f"{sensor}/{name}", where, mean, shade)
+                dots(f"quality/residual/{sensor}/{name}", f"{sensor}/{name}", where, mean, shade)
 
 
 def _words(recording: Any, tables: Tables, span: dict[str, float]) -> None:

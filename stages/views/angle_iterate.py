@@ -1,5 +1,6 @@
 """The iteration, step by step: soundings swing from the coarse mount towards the laser's planes, normals close."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from pipeline.mounts import mount_of
 from pipeline.poses import trajectory_in_target
 from pipeline.streams import xyz
 from pipeline.tables import Tables
-from stages.views import COLOURS, GREY, SONAR
+from stages.views import COLOURS, GREY, SONAR, curve, words
 from stages.views.fit_planes import cut_out
 
 SOUNDINGS = 20_000  # for all the family's points of one step
@@ -40,6 +41,7 @@ def log(recording: Any, tables: Tables) -> None:
     laser = laser_planes(tables.table(artefacts.PLANES))
     lifted = families_of(faces, tables.table(artefacts.SOUNDING_MOMENTS))
     _curves(recording, iterations)
+    say_why(recording, "angles", tables.table(artefacts.ANGLES))
     for row in iterations.iloc[:: max(1, -(-len(iterations) // STEPS))].to_dict("records"):
         recording.set_time("iteration", sequence=int(row["iteration"]))
         correction = exp_so3(np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"]))
@@ -67,13 +69,26 @@ def log(recording: Any, tables: Tables) -> None:
 def _curves(recording: Any, iterations: pd.DataFrame) -> None:
     import rerun as rr
 
-    steps = rr.TimeColumn("iteration", sequence=iterations["iteration"].to_numpy())
     deviations = dict(zip(("roll", "pitch", "yaw"), COLOURS.values(), strict=False))
     for folder, stem, colours in (("deviation", "deviation", deviations), ("planes", "angle", ANGLES)):
         for name, colour in colours.items():
             column = f"{stem}_{name}_deg"
             if column in iterations:
-                path = f"curves/{folder}/{name}"
-                recording.log(path, rr.SeriesLines(colors=colour, names=name), static=True)
+                style = rr.SeriesLines(colors=colour, names=name)
                 values = iterations[column].to_numpy()
-                recording.send_columns(path, indexes=[steps], columns=rr.Scalars.columns(scalars=values))
+                curve(recording, f"curves/{folder}/{name}", style, partial(steps_of, iterations), values)
+
+
+def say_why(recording: Any, what: str, result: pd.DataFrame) -> None:
+    """In words why the patent's step has none; a recording with nothing at all the viewer calls broken."""
+    reasons = [reason for reason in dict.fromkeys(result["reason"]) if reason]
+    if reasons:
+        said = "\n".join([f"No {what} by the patent's steps:", *reasons])
+        recording.log(f"tables/{what}", words(said), static=True)
+
+
+def steps_of(rows: pd.DataFrame) -> Any:
+    """The timeline ``iteration``."""
+    import rerun as rr
+
+    return rr.TimeColumn("iteration", sequence=rows["iteration"].to_numpy())

@@ -1,5 +1,6 @@
 """Attitude over time, and the raw files' quality in words."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from pipeline import artefacts
 from pipeline.tables import Tables
 from pipeline.times import NS, unix_ns_from_gps, utc_text
-from stages.views import words
+from stages.views import curve, words
 
 RECORDS = 20_000  # of a curve
 HOLE_NS = 2 * NS
@@ -34,7 +35,6 @@ def log(recording: Any, tables: Tables) -> None:
     trajectory = whole.iloc[:: max(1, -(-len(whole) // RECORDS))]
     after = np.searchsorted(trajectory["t_ns"].to_numpy(), t_ns[1:][np.diff(t_ns) > HOLE_NS])
     broken = np.isin(np.arange(len(trajectory)), after)  # no line across a hole in the log
-    times = rr.TimeColumn("time", timestamp=unix_ns_from_gps(trajectory["t_ns"].to_numpy()).astype("datetime64[ns]"))
     heading = np.unwrap(trajectory["azimuth_rad"].to_numpy())
     values = {
         "roll": trajectory["roll_rad"].to_numpy(),
@@ -42,10 +42,10 @@ def log(recording: Any, tables: Tables) -> None:
         "heading": heading - heading.mean(),
     }
     for name, angle in values.items():
-        path = f"quality/attitude/{name}"
-        recording.log(path, rr.SeriesLines(colors=AXES[name], names=name), static=True)
+        style = rr.SeriesLines(colors=AXES[name], names=name)
         shown = np.where(broken, np.nan, np.degrees(angle))
-        recording.send_columns(path, indexes=[times], columns=rr.Scalars.columns(scalars=shown))
+        moments = trajectory["t_ns"].to_numpy()
+        curve(recording, f"quality/attitude/{name}", style, partial(moments_of, moments), shown)
     lines = [f"{'sensor':<8}{'records':>12}{'left out':>10}  {'from (UTC)':<22}{'rate, Hz':>10}  file"]
     for row in tables.table(artefacts.FILES).to_dict("records"):
         first = utc_text(int(row["first_ns"]))
@@ -53,3 +53,10 @@ def log(recording: Any, tables: Tables) -> None:
         lines.append(f"{row['sensor']:<8}{numbers}  {row['file']}")
     recording.log("tables/files", words("\n".join(lines)), static=True)
     recording.log("tables/how_to_read", words(HOW_TO_READ), static=True)
+
+
+def moments_of(t_ns: Any) -> Any:
+    """The timeline ``time``."""
+    import rerun as rr
+
+    return rr.TimeColumn("time", timestamp=unix_ns_from_gps(t_ns).astype("datetime64[ns]"))

@@ -1,19 +1,42 @@
 """The blueprint: a crew's tour, from the whole scene to the quality of the data."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+from pipeline import artefacts
+from pipeline.folder import read_settings
+from pipeline.maths.targets import ROLES
+from pipeline.mounts import target_of
+from pipeline.store import rows_of
+
 PAPER = (255, 255, 255)
-
-
 TABS = ("Overview", "Before and after", "Iteration", "Residuals", "Quality")
 
 
-def tour() -> Any:
+def tabs_of(run: Path) -> tuple[str, ...]:
+    """Those of TABS that have something to show.
+
+    A laser by itself has no soundings before and after. The patent's iteration is of targets with its roles, where it
+    came to a result; until its stage has run it is taken to come to one.
+    """
+    overview, change, _, left, quality = TABS
+    settings = read_settings(run)
+    if settings.session.calibrated == "laser":
+        return overview, left, quality
+    steps = run / artefacts.ITERATIONS.owner / f"{artefacts.ITERATIONS.name}.parquet"
+    families = {family.name for family in target_of(settings.pool.target).families}
+    if not families.issuperset(ROLES) or (steps.is_file() and not rows_of(steps)):
+        return overview, change, left, quality
+    return TABS
+
+
+def tour(tabs: Sequence[str] = TABS) -> Any:
     """TABS: the scene, what the calibration did, how it got there, what is left, the data."""
     import rerun.blueprint as rrb
 
     overview, change, iteration, left, quality = TABS
-    return _blueprint(
+    every = (
         rrb.Horizontal(
             _scene("The boat before the target", "/pool/**", "/target/**", "/fans/**"),
             _words("/tables/summary", "Summary"),
@@ -53,6 +76,8 @@ def tour() -> Any:
             name=quality,
         ),
     )
+    shown = [tab for tab in every if tab.name in tabs]
+    return _blueprint(*shown, timeline="iteration" if iteration in tabs else "time")
 
 
 def side_by_side() -> Any:
@@ -78,10 +103,10 @@ def side_by_side() -> Any:
     )
 
 
-def _blueprint(*tabs: Any) -> Any:
+def _blueprint(*tabs: Any, timeline: str = "iteration") -> Any:
     import rerun.blueprint as rrb
 
-    panel = rrb.TimePanel(timeline="iteration", state="collapsed", fps=3.0)
+    panel = rrb.TimePanel(timeline=timeline, state="collapsed", fps=3.0)
     return rrb.Blueprint(rrb.Tabs(*tabs, active_tab=0), panel, collapse_panels=True)
 
 

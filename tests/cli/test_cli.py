@@ -116,6 +116,29 @@ def test_accepted_then_nothing_to_do_then_rejected(pool: Pool) -> None:
     assert _toy("verify", pool.run_folder).returncode == 0
 
 
+def test_another_sessions_run_is_replaced_only_when_asked(pool: Pool) -> None:
+    _told(pool, 1)
+    _toy(*_words(pool))
+    (pool.run_folder / "report" / "report.html").write_text("<p>ours</p>")
+    before = (pool.run_folder / "report" / "calibration.json").read_bytes()
+    pool.session = pool.session.rename(pool.session.with_name("other"))
+    for number, path in enumerate(sorted(pool.session.rglob("*.bin"))):
+        path.write_bytes(bytes(8 * (100 + number)))
+    done = _toy(*_words(pool))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith(f"poolcal: {pool.run_folder}: holds the run of another session, 'toy' in ")
+    assert "poolcal run --overwrite" in done.stderr
+    assert (pool.run_folder / "report" / "calibration.json").read_bytes() == before
+    done = _toy(*_words(pool), "--overwrite")
+    assert (done.returncode, done.stdout) == (0, "toy: accepted\n")
+    kept = pool.run_folder / "report.1"
+    assert f"report: the accepted result that was there is kept in {kept}\n" in done.stderr
+    assert (kept / "calibration.json").read_bytes() == before
+    assert (kept / "report.html").read_text() == "<p>ours</p>"
+    assert _toy("verify", pool.run_folder).returncode == 0
+
+
 def test_the_report_learns_what_it_was_made_from(pool: Pool) -> None:
     _told(pool, 1)
     _toy(*_words(pool))
@@ -239,7 +262,7 @@ def test_an_interrupt_that_a_library_made_an_error_of(
 
     monkeypatch.setattr("stages.cli.app", fails)
     assert call(["run"]) == 3
-    monkeypatch.setattr("stages.cli._interrupts", [2])
+    monkeypatch.setattr("stages.ending.interrupts", [2])
     capsys.readouterr()
     assert call(["run"]) == 130
     assert capsys.readouterr().err == "poolcal: interrupted; what was complete is kept\n"
@@ -251,7 +274,49 @@ def test_an_interrupt_that_python_ignored(monkeypatch: pytest.MonkeyPatch) -> No
     drawing = Painters(report=False, recordings=False)
     monkeypatch.setattr(drawing, "begin", lambda _, stage: drawn.append(stage))
     _go_on(drawing, Path("run"), "ingest")
-    monkeypatch.setattr("stages.cli._interrupts", [2])
+    monkeypatch.setattr("stages.ending.interrupts", [2])
     with pytest.raises(KeyboardInterrupt):
         _go_on(drawing, Path("run"), "georeference")
     assert drawn == ["ingest"]
+
+
+# --- streams that cannot be written ----------------------------------------------------------------------------------
+@pytest.mark.parametrize("code", [1, 2])
+def test_a_log_that_cannot_be_written_changes_nothing(pool: Pool, code: int) -> None:
+    """A full disk under the log: the run goes on, and its status is the answer."""
+    _told(pool, code)
+    command = [*TOY, *map(str, _words(pool))]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=full, text=True, check=False)
+    assert (done.returncode, done.stdout) == (code - 1, f"toy: {('accepted', 'rejected')[code - 1]}\n")
+    assert (pool.run_folder / "report" / "manifest.json").is_file()
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["verify"], ["run"]])
+def test_an_answer_that_cannot_be_written_is_one_line(pool: Pool, words: list[str]) -> None:
+    _told(pool, 1)
+    if words == ["verify"]:
+        _toy(*_words(pool))
+    given = {"verify": ["verify", pool.run_folder], "run": list(_words(pool))}.get(words[-1], words)
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([*TOY, *map(str, given)], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    last = done.stderr.splitlines()[-1]
+    assert done.returncode == 2
+    assert last.startswith("poolcal: standard output: cannot be written (No space left on device)")
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+
+
+def test_no_temporary_folder_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import tempfile
+
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: [str(tmp_path / "none")])
+    monkeypatch.setattr("stages.cli.comparison", lambda *_: {})
+    assert call(["view", str(tmp_path), str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("poolcal: no temporary folder can be made")
+    assert "TMPDIR=" in said
+    assert said.count("\n") == 1

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline import folder
-from pipeline.errors import ConfigError
+from pipeline.errors import ArtefactError, ConfigError
 from stages.compare import compare, errors_of, read_truth
 from tests.runner.conftest import Pool
 
@@ -107,4 +107,29 @@ def test_what_is_no_truth(found: Path, content: str | None) -> None:
     if content is not None:
         _truth(found).write_text(content)
     with pytest.raises(ConfigError, match=r"truth\.json"):
+        compare(found, _truth(found))
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        ("R_body_from_mbes", 3), ("R_body_from_mbes", [[1, 0], [0, 1]]), ("R_body_from_mbes", [[0] * 3] * 3),
+        ("R_body_from_mbes", [["a"] * 3] * 3), ("lever_arm_m", 3), ("lever_arm_m", {}), ("mount", 3), ("mount", {}),
+        ("sigma", 3), ("sigma", {"rotation_vector_deg": 3, "lever_arm_m": 4}), (None, 3), (None, None),
+    ],
+)  # fmt: skip
+def test_a_crafted_result_is_one_line(found: Path, place: str | None, value: object) -> None:
+    result = _result(found)
+    if place is None:
+        result["methods"]["adjustment"] = value
+    else:
+        result["methods"]["adjustment"][place] = value
+    _write(found, result)
+    with pytest.raises(ArtefactError, match=r"calibration\.json is not as poolcal writes it"):
+        compare(found, _truth(found))
+
+
+def test_reasons_that_are_no_words(found: Path) -> None:
+    _write(found, _result(found) | {"reasons": [1]})
+    with pytest.raises(ArtefactError, match="not as poolcal writes it"):
         compare(found, _truth(found))

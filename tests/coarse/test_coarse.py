@@ -162,7 +162,7 @@ REFUSED: dict[str, tuple[Change, tuple[str, ...]]] = {
         lambda marks: marks["mbes"].update(marks={m: [0.1 * k, 0.2 * k, 0] for k, m in enumerate(ON_MBES)}),
         ("mbes.marks", "nearly in a line", "not determined"),
     ),
-    "two marks": (_kept("mbes", "M1", "M2"), ("mbes.marks", "2 usable mark(s)", "survey more")),
+    "two marks": (_kept("mbes", "M1", "M2"), ("mbes.marks", "2 usable marks", "survey more")),
     "mm in a drawing": (_drawing("mbes", 1000 * np.eye(3)), ("mbes", "its drawing's coordinates seem to be in mm")),
     "feet in a drawing": (_drawing("laser", np.eye(3) / 0.3048), ("laser", "in feet", "give all in m")),
     "inches in a drawing": (_drawing("laser", np.eye(3) / 0.0254), ("laser", "in inches")),
@@ -181,7 +181,7 @@ REFUSED: dict[str, tuple[Change, tuple[str, ...]]] = {
     "unknown in leave_out": (lambda marks: marks.update(leave_out=["X"]), ("leave_out: X is not in survey.marks",)),
     "all left out": (
         lambda marks: marks.update(leave_out=list(marks["survey"]["marks"])),
-        ("body.marks: 0 usable mark(s)",),
+        ("body.marks: 0 usable marks",),
     ),
     "left out too many": (lambda marks: marks.update(leave_out=["L1", "L3"]), ("laser.marks: 2 usable",)),
     "both ways": (_set("body", axes={"origin": "I1", "forward": ["I3", "I1"], "roll_deg": 0.0}), ("marks, or axes",)),

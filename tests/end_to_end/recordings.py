@@ -25,3 +25,9 @@ def rows_in(path: Path) -> int:
 def points(chunks: list[Any]) -> np.ndarray:
     lists = [row for chunk in chunks for row in chunk.column("Points3D:positions").to_pylist()]
     return np.array([point for row in lists for point in row])
+
+
+def text(found: Chunks, path: str) -> str:
+    (chunk,) = found[path]
+    ((written,),) = chunk.column("TextDocument:text").to_pylist()
+    return str(written)

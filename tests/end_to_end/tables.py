@@ -30,6 +30,7 @@ def write_tables(
         "laser": {f"{axis}_m": laser[f"{axis}_m"] for axis in "xyz"},
         "mbes": {
             "ping": mbes["ping"], "beam": mbes["beam"], "angle_deg": np.degrees(mbes["angle_rad"]),
+            "transmit_tilt_deg": np.degrees(mbes["transmit_tilt_rad"]),
             "sound_speed_m_s": mbes["sound_speed_m_s"], "two_way_time_s": mbes["two_way_time_s"],
         },
     }
@@ -76,6 +77,8 @@ def place_soundings(simulated: SimulatedSession) -> np.ndarray:
     position = R_target_from_level.apply(np.column_stack([np.interp(inside, seconds, level[:, k]) for k in range(3)]))
     ranges = mbes["two_way_time_s"] / 2 * mbes["sound_speed_m_s"]
     angle = mbes["angle_rad"]
-    sonar = ranges[:, None] * np.column_stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)])
+    upright = np.column_stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)])
+    forward = np.arcsin(np.sin(mbes["transmit_tilt_rad"]) / np.cos(angle))  # the turn about x that looks so far forward
+    sonar = ranges[:, None] * Rotation.from_euler("x", forward).apply(upright)
     R_body_from_mbes = np.array(truth["mbes"]["R_body_from_mbes"])
     return position + attitude.apply(sonar @ R_body_from_mbes.T + truth["mbes"]["lever_arm_m"])

@@ -103,3 +103,16 @@ def test_a_folder_that_is_no_run_is_refused(undisturbed: tuple[Path, Told], tmp_
     assert told.status == 2
     assert "no complete result" in told.err
     assert len(told.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("key", ["mbes", "methods", "inputs", "software", "session", "passes", "target", "geometry"])
+def test_a_crafted_result_is_one_line(done: Place, key: str, tmp_path: Path) -> None:
+    """Whatever the comparison, its page or its recording would take out of it."""
+    path = done.run / "report" / "calibration.json"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content[key]
+    path.write_text(json.dumps(content if key in ("session", "inputs") else content | {key: 3}), encoding="utf-8")
+    told = poolcal("diff", done.run, done.run, "--rrd", tmp_path / "pair.rrd")
+    assert told.status == 2
+    assert told.err == f"poolcal: {done.run}: its calibration.json is not as poolcal writes it; run it again\n"
+    assert not (tmp_path / "pair.rrd").exists()

@@ -18,6 +18,7 @@ from pipeline.folder import locked
 from pipeline.streams import serial
 from stages import ORDER
 from stages.drawing import Painters, Prepared, paint, painters
+from stages.views.tour import tabs_of
 from tests.effort import often
 from tests.end_to_end.places import Place, digests, poolcal
 from tests.end_to_end.recordings import points, read
@@ -55,7 +56,7 @@ def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], m
     """The reason on one line; a bug keeps its traceback as well."""
     for error, traced in ((OSError("no room\nfor pictures"), False), (ValueError("no room\nfor pictures"), True)):
 
-        def fails(run: Path, stage: str, error: Exception = error) -> bool:
+        def fails(*_: object, error: Exception = error) -> bool:
             raise error
 
         monkeypatch.setattr(stages.views, "record", fails)
@@ -104,10 +105,15 @@ def test_recordings_are_prepared_as_stages_finish_and_written_after_the_verdict(
 
 def test_what_was_prepared_is_written_only_beside_the_tables_that_it_shows(done: Place) -> None:
     shown = (done.run / "ingest" / "manifest.json").read_bytes()
-    current, stale = Prepared(shown, b"prepared"), Prepared(shown + b" ", b"of tables that are gone")
+    tabs = tabs_of(done.run)
+    current, stale = Prepared(shown, tabs, b"prepared"), Prepared(shown + b" ", tabs, b"of tables that are gone")
+    other = Prepared(shown, tabs[1:], b"beside tabs that are gone")
     assert paint(done.run, ["ingest", "offsets"], prepared={"ingest": current, "offsets": stale}) == []
     assert (done.run / "ingest" / "ingest.rrd").read_bytes() == b"prepared"
     assert "/curves/turns/angles" in read(done.run, "offsets")
+    (done.run / "ingest" / "ingest.rrd").unlink()
+    assert paint(done.run, ["ingest"], prepared={"ingest": other}) == []
+    assert "/quality/attitude/roll" in read(done.run, "ingest")
 
 
 def test_what_fails_while_stages_run_is_drawn_after_them(place: Place) -> None:

@@ -1,6 +1,7 @@
 """poolcal history: every run in a folder, in order of time, with jumps; hostile names; broken runs."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.end_to_end.pages import Page
 from tests.end_to_end.places import Told, poolcal
 
 HOSTILE = '<script>alert("x")</script> & 水池 ' + "n" * 100
@@ -19,7 +21,9 @@ def planted(folder: Path, template: Path, name: str, day: int, **changes: Any) -
     result = json.loads((template / "report" / "calibration.json").read_text(encoding="utf-8"))
     result["session"] = changes.get("session", name)
     result["verdict"] = changes.get("verdict", "accepted")
-    result["passes"][0]["start_utc"] = f"2026-05-{day:02d}T08:00:00Z"
+    result["passes"][0]["start_utc"] = f"2026-05-{day:02d}T{changes.get('hour', 8):02d}:00:00Z"
+    if changes.get("laser"):
+        result["calibrated"] = "laser"
     shift = changes.get("z_m", 0.0)
     for block in (result["mbes"], result["methods"]["adjustment"]):
         block["lever_arm_m"][2] += shift
@@ -99,7 +103,109 @@ def test_broken_runs_are_named_and_left_out(runs: Path) -> None:
     assert len(table_of(runs)) == 3
 
 
+def content_of(run: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((run / "report" / "calibration.json").read_text(encoding="utf-8"))
+    return content
+
+
+@pytest.mark.parametrize("start", ["=1+$x_{$", "2026-05-04", "2026-13-04T08:00:00Z", "", 3, None, "x" * 10_000])
+def test_a_start_that_is_no_time_leaves_its_run_out(runs: Path, start: object) -> None:
+    """It would be a formula in the table, and mathematics in the chart."""
+    content = content_of(runs / "moved")
+    content["passes"][0]["start_utc"] = start
+    (runs / "moved" / "report" / "calibration.json").write_text(json.dumps(content), encoding="utf-8")
+    told = poolcal("history", runs)
+    assert told.status == 0
+    assert f"left out: {runs / 'moved'}: its calibration.json is not as poolcal writes it" in told.err
+    assert table_of(runs)["run"].tolist() == ["b_first", "a_second", "refused", "after", "nothing"]
+
+
+@pytest.mark.parametrize("value", ["[" * 100_000, '{"verdict": "accepted", "methods": [1]}'])
+def test_one_crafted_run_does_not_stop_the_others(runs: Path, value: str) -> None:
+    (runs / "moved" / "report" / "calibration.json").write_text(value)
+    told = poolcal("history", runs)
+    assert told.status == 0
+    assert told.err.startswith(f"left out: {runs / 'moved'}")
+    assert len(table_of(runs)) == 5
+
+
+@pytest.mark.parametrize("value", [10**400, "1e400", "inf"])
+def test_numbers_beyond_all_bounds_are_left_out(runs: Path, value: object) -> None:
+    content = content_of(runs / "moved")
+    content["methods"]["adjustment"]["mount"]["roll_deg"] = value
+    (runs / "moved" / "report" / "calibration.json").write_text(json.dumps(content), encoding="utf-8")
+    assert f"left out: {runs / 'moved'}" in poolcal("history", runs).err
+    assert len(table_of(runs)) == 5
+
+
+def test_a_result_that_may_not_be_entered_is_left_out(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (runs / "closed" / "report").mkdir(parents=True)
+    (runs / "closed" / "run.yaml").write_text("")
+    stat = os.stat
+
+    def refuse(path: Any, **options: Any) -> os.stat_result:
+        if str(path).startswith(str(runs / "closed" / "report")):
+            raise PermissionError(13, "Permission denied", str(path))
+        return stat(path, **options)
+
+    monkeypatch.setattr(os, "stat", refuse)
+    told = poolcal("history", runs)
+    assert told.status == 0, told.err
+    why = "its result cannot be read (Permission denied); correct its permissions"
+    assert told.err == f"left out: {runs / 'closed'}: {why}\n"
+
+
+def test_no_link_is_written_through(runs: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "thesis.tex"
+    mine.write_text("two years of work")
+    (runs / "history").mkdir()
+    for name in ("parquet", "csv", "html"):
+        (runs / "history" / f"history.{name}.new").symlink_to(mine)
+        (runs / "history" / f"history.{name}").symlink_to(mine)
+    assert poolcal("history", runs).status == 0
+    assert mine.read_text() == "two years of work"
+    assert len(table_of(runs)) == 6
+
+
+def test_what_was_kept_of_a_replaced_run_is_no_run_of_its_own(runs: Path) -> None:
+    shutil.copytree(runs / "moved" / "report", runs / "moved" / "report.1")
+    assert poolcal("history", runs).status == 0
+    assert len(table_of(runs)) == 6
+
+
+def test_a_folder_without_runs_is_refused_and_nothing_is_written(runs: Path, small: Path, tmp_path: Path) -> None:
+    """A session's folder, say, where a page would lie among raw files; or the run itself."""
+    session = tmp_path / "session"
+    shutil.copytree(small, session)
+    (runs / "moved" / "run.yaml").write_text("")
+    for folder, remedy in ((session, "name the folder that holds them"), (runs / "moved", "it is one itself")):
+        before = sorted(folder.rglob("*"))
+        told = poolcal("history", folder)
+        assert (told.status, told.out) == (2, "")
+        assert told.err.startswith(f"poolcal: {folder}: holds no run folder")
+        assert remedy in told.err
+        assert told.err.count("\n") == 1
+        assert sorted(folder.rglob("*")) == before
+
+
 def test_no_folder(tmp_path: Path) -> None:
     told = poolcal("history", tmp_path / "none")
     assert told.status == 2
     assert "RUNS_DIR" in told.err
+
+
+def test_sessions_of_one_day_are_told_apart_lasers_named(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    folder, template = tmp_path / "runs", undisturbed[0]
+    planted(folder, template, "12_harbour_launch_north", 1, hour=8)
+    planted(folder, template, "afternoon", 1, hour=14)
+    planted(folder, template, "laser_alone", 2, laser=True)
+    told = poolcal("history", folder)
+    assert (told.status, told.err) == (0, "")
+    lines = told.out.splitlines()
+    assert lines[0] == "1 laser run not shown: laser_alone"
+    assert lines[1].startswith("2 sessions: ")
+    html = (folder / "history" / "history.html").read_text(encoding="utf-8")
+    assert "1 laser run not shown: laser_alone." in html
+    assert "12_<wbr>harbour_<wbr>launch_<wbr>north" in html  # a name is broken between words alone
+    times = [row[1] for row in Page(html).table("no.", "date (UTC)")]
+    assert times == ["2026-05-01 08:00", "2026-05-01 14:00"]

@@ -10,8 +10,10 @@ import yaml
 from pipeline.config import load_session
 from tests.end_to_end.pages import Page
 from tests.end_to_end.places import Place, Told, poolcal, simulate
+from tests.end_to_end.recordings import read, text
 
 STAGES = ("ingest", "georeference", "segment", "fit_planes", "adjust", "report")
+BADGES = ("yes", "no", "part")
 EXACT = {"face_sigma_deg": 0.001, "plumb_sigma_deg": 0.001, "face_sigma_m": 0.0002}
 SURVEYED = EXACT | {"origin_sigma_m": 0.001, "azimuth_sigma_deg": 0.002}
 
@@ -108,6 +110,17 @@ def test_its_page_and_recordings_show_the_laser_alone(laser: Place) -> None:
     assert "not drawn" not in told.err
     page = Page((laser.run / "report" / "report.html").read_text("utf-8"))
     assert "The laser's mount" in page.text
+    result = json.loads((laser.run / "report" / "calibration.json").read_text())
+    held = list(result["held"])
+    assert held
+    found = ", ".join(name for name in ("roll", "pitch", "yaw", "x", "y", "z") if name not in held)
+    assert (result["verdict"], result["verdict_in_words"]) == ("accepted", f"accepted in part: {found}")
+    for said in (told.out, text(read(laser.run, "report"), "/tables/summary")):
+        assert f": ACCEPTED IN PART: {found}\n  not found, held at the coarse value: {', '.join(held)}\n" in said
+    (shown,) = [attributes["class"] for attributes in page.named("span") if attributes.get("class") in BADGES]
+    assert shown == "part"
+    assert f"accepted in part: {found}" in page.text
+    assert f"Not found, and held at the coarse value: {', '.join(held)}." in page.text
     assert "held at the coarse value" in page.text
     for word in ("Three ways", "How the planes close", "soundings on"):
         assert word not in page.text

@@ -1,5 +1,6 @@
 """Recordings: drawn from Parquet, read back with the SDK."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -16,20 +17,15 @@ from rerun.chunk import RrdReader
 import stages.views
 from stages import ORDER
 from stages.drawing import Painters
+from stages.views.tour import tabs_of
 from tests.end_to_end.places import Told, poolcal
-from tests.end_to_end.recordings import Chunks, points, read, rows_in
+from tests.end_to_end.recordings import Chunks, points, read, rows_in, text
 
 
 def curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:
     rows = [chunk for chunk in chunks if "Scalars:scalars" in chunk.schema.names]
     values = np.concatenate([np.ravel(chunk.column("Scalars:scalars").to_pylist()) for chunk in rows])
     return values, [moment for chunk in rows for moment in chunk.column(timeline).to_pylist()]
-
-
-def text(found: Chunks, path: str) -> str:
-    (chunk,) = found[path]
-    ((written,),) = chunk.column("TextDocument:text").to_pylist()
-    return str(written)
 
 
 def test_every_point_is_there(drawn: Path) -> None:
@@ -245,6 +241,9 @@ def test_two_runs_in_one_recording(undisturbed: tuple[Path, Told], tmp_path: Pat
     assert (told.status, "two runs are shown as a whole" in told.err) == (2, True)
 
 
+RERUN = Path(sys.executable).with_name("rerun")
+
+
 def test_the_viewer_listens_on_this_machine_alone(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     called: list[list[str]] = []
 
@@ -252,6 +251,7 @@ def test_the_viewer_listens_on_this_machine_alone(drawn: Path, monkeypatch: pyte
         called.append([str(word) for word in command])
         return subprocess.CompletedProcess([], 0)
 
+    monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr(subprocess, "run", run)
     assert poolcal("view", drawn).status == 0
     assert poolcal("view", drawn, drawn).status == 0
@@ -261,3 +261,102 @@ def test_the_viewer_listens_on_this_machine_alone(drawn: Path, monkeypatch: pyte
     assert len(whole) == 3 + len(ORDER)
     assert len(pair) == 4
     assert one[3:] == [str(drawn / "adjust" / "adjust.rrd")]
+
+
+def test_the_viewer_tells_nobody_that_it_is_used(
+    drawn: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Asked itself, in the environment in which it is opened; the user's own choice stays what it is."""
+    home = tmp_path / "home"
+    home.mkdir()
+    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("DISPLAY", ":0")
+    really, answers = subprocess.run, []
+
+    def config(**environment: Any) -> dict[str, Any]:
+        told = really([RERUN, "analytics", "config"], capture_output=True, text=True, check=True, **environment)
+        found: dict[str, Any] = json.loads(told.stdout)
+        return found
+
+    assert config()["analytics_enabled"]  # the viewer's default, written into this home
+    before = {path: path.read_bytes() for path in home.rglob("*") if path.is_file()}
+
+    def run(command: list[object], env: dict[str, str], **_: object) -> subprocess.CompletedProcess[str]:
+        answers.append(config(env=env))
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert poolcal("view", drawn).status == 0
+    assert poolcal("view", drawn, drawn).status == 0
+    assert [answer["analytics_enabled"] for answer in answers] == [False, False]
+    assert not any(Path(answer["data_dir_path"]).is_relative_to(home) for answer in answers)
+    assert {path: path.read_bytes() for path in home.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("display", ["", ":987"], ids=["none", "none that answers"])
+def test_without_a_display_one_line_says_what_to_do(
+    drawn: Path, display: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    if display:
+        monkeypatch.setenv("DISPLAY", display)
+    told = poolcal("view", drawn)
+    assert (told.status, told.out) == (2, "")
+    copy = f"copy {drawn}/*/*.rrd to a machine with one, or open {drawn}/report/report.html"
+    assert told.err == f"poolcal: no display here: {copy}\n"
+    pair = poolcal("view", drawn, drawn)
+    assert pair.status == 2
+    assert f"poolcal diff {drawn} {drawn} --rrd FILE" in pair.err
+
+
+def test_what_else_stops_the_viewer_is_shown(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(command: list[object], stderr: Any, **_: object) -> subprocess.CompletedProcess[str]:
+        stderr.write("no graphics adapter\n")
+        return subprocess.CompletedProcess(command, 101)
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(subprocess, "run", run)
+    told = poolcal("view", drawn)
+    assert (told.status, told.err) == (1, "no graphics adapter\n")
+
+
+def test_nothing_is_sent_of_curves_without_values() -> None:
+    """Of columns without rows the viewer makes a timeline without an end, and dies; one place alone sends columns."""
+    sent: list[str] = []
+
+    class Recording:
+        def log(self, path: str, *_: Any, **__: Any) -> None:
+            sent.append(path)
+
+        def send_columns(self, path: str, **_: Any) -> None:
+            sent.append(path)
+
+    def times() -> Any:
+        import rerun as rr
+
+        return rr.TimeColumn("iteration", sequence=[0])
+
+    stages.views.curve(Recording(), "empty", None, times, np.empty(0))
+    assert sent == []
+    stages.views.curve(Recording(), "one", None, times, np.zeros(1))
+    assert sent == ["one", "one"]
+    folder = Path(stages.views.__file__).parent
+    callers = [path.name for path in folder.glob("*.py") if ".send_columns(" in path.read_text(encoding="utf-8")]
+    assert sorted(callers) == ["__init__.py", "pair.py"]  # pair: hands on what it is given
+
+
+def test_recordings_drawn_before_know_the_tabs_of_now(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    """Where the iteration has lost its result, no recording offers its tab any more."""
+    run = tmp_path / "run"
+    shutil.copytree(undisturbed[0], run)
+    assert Painters(report=False, recordings=True).draw(run) == []
+    before = (run / "ingest" / "ingest.rrd").read_bytes()
+    path = run / "angle_iterate" / "iterations.parquet"
+    pq.write_table(pq.read_table(path).slice(0, 0), path)
+    (run / "angle_iterate" / "angle_iterate.rrd").unlink()
+    assert Painters(report=False, recordings=True).draw(run) == []
+    assert tabs_of(run) == ("Overview", "Before and after", "Residuals", "Quality")
+    assert (run / "ingest" / "ingest.rrd").read_bytes() != before

@@ -29,17 +29,22 @@ def test_verdict_first_then_the_runs_numbers(undisturbed: tuple[Path, Told]) -> 
     assert page.text.index("accepted") < page.text.index("roll")
     rows = page.table("", "coarse", "calibrated")
     table = pd.read_parquet(run / "report" / "calibration.parquet").query("method == 'adjustment'")
-    assert [row[0] for row in rows] == table["parameter"].tolist()
+    signs = ("starboard down", "bow up", "to port", "to starboard", "forward", "up")
+    named = zip(table["parameter"].tolist(), signs, strict=True)
+    assert [row[0] for row in rows] == [f"{name} ({sign})" for name, sign in named]
     for row, values in zip(rows, table.to_dict("records"), strict=True):
         _, coarse, total, change, random, sigma, limit, interval = row
         low, high = interval.split(" … ")
-        keys = ("coarse", "total", "change", "sigma_random", "sigma_total", "low_95", "high_95")
-        assert limit == {"deg": "0.0500 °", "m": "0.0050 m"}[values["unit"]]
+        angle = values["unit"] == "deg"
+        assert limit == ("0.050 °" if angle else "5.0 mm")
         assert f"{values['correction']:+.4f}" in page.text
-        for shown, key in zip((coarse, total, change, random, sigma, low, high), keys, strict=True):
+        entered = {"coarse": coarse, "total": total, "low_95": low, "high_95": high}  # 0.001° and 0.0001 m
+        small = {"change": change, "sigma_random": random, "sigma_total": sigma}  # 0.001° and 0.1 mm
+        for key, shown in (entered | small).items():
             number, unit = shown.split()
-            assert float(number) == pytest.approx(values[key], abs=5.1e-5), key
-            assert unit == {"deg": "°", "m": "m"}[values["unit"]]
+            scale, said, digits = (1, "°", 3) if angle else (1, "m", 4) if key in entered else (1000, "mm", 1)
+            assert (unit, len(number.partition(".")[2])) == (said, digits), key
+            assert float(number) == pytest.approx(scale * values[key], abs=0.51 * 10**-digits), key
     matrix = result["geometry"]["correlation"]
     shown = page.table("correlation", "roll")
     assert float(shown[2][5]) == pytest.approx(matrix[2][4], abs=0.0051)  # yaw with y

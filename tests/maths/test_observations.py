@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.maths.epochs import Runs
 from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
 from pipeline.maths.planes import tangents_of
+from pipeline.maths.soundings import points_in_mbes
 
 NORMAL = np.array([-np.sqrt(0.5), -np.sqrt(0.4), np.sqrt(0.1)])
 AXES = np.vstack([tangents_of(NORMAL), NORMAL])
@@ -16,9 +17,10 @@ LEVER = np.array([0.4, -0.3, -1.9])
 SIGMAS = Sigmas(0.02, 0.002)
 
 
-def beams(angles: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Points (3, n) in the sonar's frame."""
-    return np.array([ranges * np.sin(angles), np.zeros(len(angles)), -ranges * np.cos(angles)])
+def beams(angles: np.ndarray, ranges: np.ndarray, tilts: np.ndarray | float = 0.0) -> np.ndarray:
+    """Points (3, n) in the sonar's frame: of a receive beam turned about x until it looks forward by the tilt."""
+    about_x = np.arcsin(np.sin(tilts) / np.cos(angles))
+    return ranges * np.array([np.sin(angles), np.cos(angles) * np.sin(about_x), -np.cos(angles) * np.cos(about_x)])
 
 
 def seen(points: np.ndarray) -> Seen:
@@ -31,15 +33,16 @@ def seen(points: np.ndarray) -> Seen:
 
 
 ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0, 4.0, 6.0, 9.0])
+TILTS = np.radians([10.0, -0.75, 6.0, -8.0, -10.0])
+of_both_fans = pytest.mark.parametrize("tilts", [np.zeros(5), TILTS], ids=["plane", "tilted"])
 
 
-def test_sonar_sigma_is_the_scatter_of_noisy_beams() -> None:
+@of_both_fans
+def test_sonar_sigma_is_the_scatter_of_noisy_beams(tilts: np.ndarray) -> None:
     rng = np.random.default_rng(1)
-    sigma = seen(beams(ANGLES, RANGES)).sigma_m
-    many = [
-        NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES + 0.002 * rng.normal(size=5), RANGES + 0.02 * rng.normal(size=5))
-        for _ in range(20_000)
-    ]
+    sigma = seen(beams(ANGLES, RANGES, tilts)).sigma_m
+    noise = rng.normal(size=(20_000, 2, 5)) * np.array([0.002, 0.02])[:, None]
+    many = [NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES + one[0], RANGES + one[1], tilts) for one in noise]
     np.testing.assert_allclose(sigma, np.std(many, axis=0), rtol=0.02)
 
 
@@ -56,21 +59,47 @@ def test_laser_sigma_is_the_scatter_of_noisy_rays() -> None:
     assert q[3, 0] == pytest.approx(NORMAL @ ray)  # a longer range
 
 
-def test_the_features_are_what_errors_do_to_the_point() -> None:
+def recomputed(tilts: np.ndarray, true_speed_m_s: float) -> np.ndarray:
+    """Points (3, n) of recordings made with 1480 m/s."""
+    recorded = np.full(5, 1480.0)
+    return points_in_mbes(2 * RANGES / recorded, ANGLES, tilts, recorded, true_speed_m_s)[0].T
+
+
+def test_beams_that_look_up_have_the_features_of_those_that_look_down() -> None:
+    """The world turned upside down about y: what a wrong speed does to a point is turned with it."""
+    angles, flip = np.radians([100.0, 120.0, -170.0, -100.0, 95.0]), np.diag([-1.0, 1.0, -1.0])
+    points = beams(angles, RANGES, np.radians([5.0, -10.0, 2.0, 0.0, 1.0]))
+    assert (points[2] > 0).all()
+    axes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], 5, axis=2)
+    turned = np.einsum("kin,ij->kjn", axes, flip)
+    up, r = np.repeat([[0.0], [0.0], [1.0]], 5, axis=1), np.zeros((3, 5))
+    found = sonar_observations(points, axes, up, r, np.zeros(5), SIGMAS)
+    expected = sonar_observations(flip @ points, turned, flip @ up, r, np.zeros(5), SIGMAS)
+    np.testing.assert_allclose(found.features, expected.features, atol=1e-12)
+    np.testing.assert_allclose(found.mean_m, expected.mean_m, rtol=1e-9)
+    np.testing.assert_allclose(found.sigma_m, expected.sigma_m, rtol=1e-12)
+
+
+@of_both_fans
+def test_the_features_are_what_errors_do_to_the_point(tilts: np.ndarray) -> None:
     """Range and sound speed by moving the measurements: travel time and steering are what was recorded."""
-    _, _, q, _ = seen(beams(ANGLES, RANGES))
+    _, _, q, _ = seen(beams(ANGLES, RANGES, tilts))
     step = 1e-6
-    longer = [beams(ANGLES, RANGES + h) for h in (step, -step)]
-    faster = [beams(np.arcsin((1 + h) * np.sin(ANGLES)), RANGES * (1 + h)) for h in (step, -step)]
+    longer = [beams(ANGLES, RANGES + h, tilts) for h in (step, -step)]
+    k = [1 + step, 1 - step]
+    faster = [beams(np.arcsin(h * np.sin(ANGLES)), RANGES * h, np.arcsin(h * np.sin(tilts))) for h in k]
+    for by_hand, one in zip(faster, k, strict=True):
+        np.testing.assert_allclose(by_hand, recomputed(tilts, 1480.0 * one), rtol=0, atol=1e-12)
     for number, (ahead, behind) in ((3, longer), (4, faster)):
         slope = NORMAL @ R_TARGET_FROM_MBES @ (ahead - behind) / (2 * step)
         np.testing.assert_allclose(q[number], slope, atol=1e-8)
 
 
-def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
+@of_both_fans
+def test_the_gradient_bends_the_ray_as_the_ray_equation_says(tilts: np.ndarray) -> None:
     """Integrated: dX/dt = c d, dd/dt = -(grad c - d (d · grad c)), c = c0 - g z, for the travel time at c0."""
     c0, g = 1480.0, 0.3
-    points = beams(ANGLES, RANGES)
+    points = beams(ANGLES, RANGES, tilts)
     _, _, q, _ = seen(points)
     for k in range(5):
         start = R_TARGET_FROM_MBES @ points[:, k]
@@ -86,13 +115,14 @@ def test_the_gradient_bends_the_ray_as_the_ray_equation_says() -> None:
     assert np.ptp(np.sign(q[5])) == 2  # both signs were tried
 
 
-def test_the_sonars_slopes_are_what_a_shift_along_the_recorded_ray_does() -> None:
+@of_both_fans
+def test_the_sonars_slopes_are_what_a_shift_along_the_recorded_ray_does(tilts: np.ndarray) -> None:
     """To the surface: by e / (n · d); features taken again."""
-    points = beams(ANGLES, RANGES)
+    points = beams(ANGLES, RANGES, tilts)
     _, _, q, slopes = seen(points)
     e = 1e-5
     assert np.all(q[3] < -0.1)  # all see the front
-    features = [seen(beams(ANGLES, RANGES + h * e / q[3])).features for h in (1, -1)]
+    features = [seen(beams(ANGLES, RANGES + h * e / q[3], tilts)).features for h in (1, -1)]
     np.testing.assert_allclose(slopes, (features[0] - features[1])[1:] / (2 * e), rtol=1e-5, atol=1e-7)
 
 
@@ -124,20 +154,21 @@ def test_beams_that_stray_from_their_recorded_angle_do_not_turn_a_grazed_face() 
     assert abs(slope(q[1] - least_squares * v)) > 20  # were the angles measured
 
 
-def test_a_stray_axis_meets_the_surface_further_away_on_average() -> None:
+@of_both_fans
+def test_a_stray_axis_meets_the_surface_further_away_on_average(tilts: np.ndarray) -> None:
     """Axes off by one sigma to either side: the mean of v, and the same sigma whatever the range that was measured."""
-    mean, sigma, _, _ = seen(beams(ANGLES, RANGES))
+    mean, sigma, _, _ = seen(beams(ANGLES, RANGES, tilts))
     found = []
     for angle in (ANGLES + SIGMAS.angle_rad, ANGLES - SIGMAS.angle_rad):
-        along, strayed = (NORMAL @ R_TARGET_FROM_MBES @ beams(one, np.ones(5)) for one in (ANGLES, angle))
+        along, strayed = (NORMAL @ R_TARGET_FROM_MBES @ beams(one, np.ones(5), tilts) for one in (ANGLES, angle))
         found.append(along * RANGES * (along / strayed - 1))
     np.testing.assert_allclose(mean, np.mean(found, axis=0), rtol=1e-3)
     assert np.all(mean < 0)
-    points = beams(ANGLES, RANGES + 0.05)
+    points = beams(ANGLES, RANGES + 0.05, tilts)
     n = points.shape[1]
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
-    v = 0.05 * NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES, np.ones(5))
+    v = 0.05 * NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES, np.ones(5), tilts)
     again = sonar_observations(points, in_mbes, up, AXES @ (R_TARGET_FROM_MBES @ points), v, SIGMAS)
     np.testing.assert_allclose(again.sigma_m, sigma, rtol=1e-12)
 

@@ -55,10 +55,17 @@ def bth0(*sections: bytes, stream: int = 0) -> bytes:
     return struct.pack(">4sII", b"BTH0", 12 + len(inside), stream) + inside
 
 
-def h0(ping: int, points: int, seconds: int = UTC_2024, nanoseconds: int = 0, sound_speed: float = 1500.0) -> bytes:
+def h0(
+    ping: int,
+    points: int,
+    seconds: int = UTC_2024,
+    nanoseconds: int = 0,
+    sound_speed: float = 1500.0,
+    steering: float = 0.0,
+) -> bytes:
     head = b"2024".ljust(12, b"\0") + b"100017".ljust(12, b"\0")
     head += struct.pack(">III", seconds, nanoseconds, ping) + struct.pack(">ff", 0.05, sound_speed)
-    head += struct.pack(">7f", 400e3, 191.0, 15e-6, 0.017, 2.2, 0.0, 0.0) + struct.pack(">Hh", 29315, 0)
+    head += struct.pack(">7f", 400e3, 191.0, 15e-6, 0.017, 2.2, steering, 0.0) + struct.pack(">Hh", 29315, 0)
     head += struct.pack(">7f", 60e3, 78125.0, 30.0, 5.0, 20.0, 100.0, 0.0) + struct.pack(">IHH", 0, 0, points)
     return section(b"H0", head)
 

@@ -8,6 +8,7 @@ import pytest
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import raw_files, raw_parts
 from tests.readers import build, ie_files
+from tests.readers.sonar_files import all_installation
 
 
 @pytest.fixture
@@ -138,6 +139,7 @@ def test_content_decides(sensor: str, kind: str, name: str, tmp_path: Path) -> N
         (b"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\n", "PCD.*export"),
         (b"\0\0\0\x14\0\0\0\1GSF-v03.08\0\0" + bytes(99), "GSF"),
         (b"\xa4\0\0\0#IIP\0" + bytes(999), "[Kk]ongsberg|KMALL"),
+        (all_installation() + bytes(999), r"Kongsberg \.all"),
     ],
 )
 @pytest.mark.parametrize(("sensor", "kind"), FORMATS)
@@ -148,6 +150,34 @@ def test_what_is_not_read_is_refused_with_advice(
     more = {"gps_week": 2300} if sensor != "mbes" else {}
     with pytest.raises(RawDataError, match=rf"data\.bin: is .*({words})"):
         raw_parts(sensor, build.settings(sensor, ["data.bin"], kind, **more), tmp_path)  # type: ignore[arg-type]
+
+
+POSPAC = """\
+POSPac MMS - EXPORT Utility [Oct 12 2021]
+Datum: WGS84,   Time in Sec of Week
+
+        TIME,    DISTANCE,       LATITUDE,      LONGITUDE, ELLIPSOID HEIGHT,      ROLL,     PITCH,   HEADING
+  (sec of week)      (m)          (deg)          (deg)             (m)           (deg)      (deg)     (deg)
+ 345600.000,        0.0,   36.123456789,  120.123456789,         12.345,         1.00,      2.00,     3.00
+"""
+
+
+QINERTIA = "GPS Time [s]; Latitude [deg]; Longitude [deg]; Altitude [m]; Roll; Pitch; Yaw\n1;36;120;5;0;0;0\n"
+
+
+@pytest.mark.parametrize("text", [POSPAC, QINERTIA])
+@pytest.mark.parametrize("kind", ["inertial_explorer", "sbet", "novatel"])
+def test_other_programs_texts_are_advised_to_become_sbet(kind: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text(text)
+    with pytest.raises(RawDataError, match=r"a\.txt: is a trajectory as text.*export it as SBET \(POSPac, Qinertia"):
+        raw_parts("ins", build.settings("ins", ["a.txt"], kind, gps_week=2300), tmp_path)
+
+
+def test_an_export_without_its_header(tmp_path: Path) -> None:
+    rows = ie_files.whole("degrees", ie_files.truth(9)).split(b"\n")[-10:]
+    (tmp_path / "a.txt").write_bytes(b"\n".join(rows))
+    with pytest.raises(RawDataError, match=r"export it from Inertial Explorer with its header \('header' ticked"):
+        raw_parts("ins", build.settings("ins", ["a.txt"], "inertial_explorer"), tmp_path)
 
 
 def test_week_is_asked_for_before_anything_is_read(tmp_path: Path) -> None:

@@ -67,6 +67,8 @@ WHOLE: dict[str, tuple[str, str, bytes]] = {
     "e57": ("laser", "e57", _e57()),
     "gsf": ("mbes", "gsf", sonar_files.gsf()),
     "kmall": ("mbes", "kmall", sonar_files.kmall()),
+    "kmall sectors": ("mbes", "kmall", sonar_files.kmall_sectors()),
+    "all": ("mbes", "all", sonar_files.kongsberg_all()),
 }
 EXAMPLES = {"laz": 15, "e57": 10}  # each in a process of its own
 
@@ -98,7 +100,7 @@ def mutated(whole: bytes) -> st.SearchStrategy[bytes]:
     """A file with some bytes overwritten, some cut out, some put in."""
     place = st.integers(0, len(whole))
     marks = [bytes(8), b"\xff" * 8, b"BTH0", b"\xaaD\x12\x1c", b"\xaaD\x13", b"\n"]
-    marks += [b"#MRZ", b"\0\0\0\2"]
+    marks += [b"#MRZ", b"\0\0\0\2", b"\0\2N", b"\3"]
     piece = st.binary(max_size=40) | st.sampled_from(marks)
     edit = st.tuples(place, st.integers(0, 60), piece)
 
@@ -141,6 +143,7 @@ def test_damaged_files(form: str, how: Callable[[bytes], st.SearchStrategy[bytes
 
 STARTS = [b"", b"LASF", b"PAR1", b"\x7b" + bytes(1023), b"BTH0", b"\xaaD\x12\x1c", b"\xaaD\x13X", b"#INSPVAA,"]
 STARTS += [b"gps_ns,x_m\n", b"Week GPSTime Latitude Longitude H-Ell Roll Pitch Heading\n"]
+STARTS += [sonar_files.all_installation(), sonar_files.all_installation()[:20]]
 STARTS += [b"ASTM-E57\1\0\0\0", b"\0\0\0\x0c\0\0\0\1GSF-v03.06\0\0", b"\xff\0\0\0#MRZ"]
 FORMATS = sorted({pair[:2] for pair in WHOLE.values()})
 

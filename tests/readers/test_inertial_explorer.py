@@ -264,7 +264,14 @@ REFUSED: dict[str, tuple[Columns, str]] = {
     "sigma in a strange unit": (with_unit("HdngSD", "(mil)", "utc"), r"column HdngSD has the unit \(mil\)"),
     "date without order": (with_unit("UTCDate", "", "utc"), r"column UTCDate has the unit \(\?dy\); .*mdy"),
     "dashes between sixtieths": (with_unit("Latitude", "(D-M-S)"), r"column Latitude has the unit \(d-m-s\)"),
-    "hours without a date": (with_unit("GPSTime", "(HMS)", "commas"), "without a date; export GPSDate"),
+    "hours without a date": (
+        LAYOUTS["commas"] | {"GPSTime": ("(HMS)", lambda row: "12:00:00.25")}, "without a date; export GPSDate"
+    ),
+    "unit of three columns over one": (
+        with_unit("Latitude", "(dms)") | {"Longitude": ("(dms)", LAYOUTS["degrees"]["Longitude"][1])},
+        r"the units of Latitude \(dms\), Longitude \(dms\) stand for three columns each.*export angles in decimal",
+    ),
+    "hours over seconds": (with_unit("GPSTime", "(HMS)"), r"the units of GPSTime \(hms\) stand for three columns"),
     "few digits": (LAYOUTS["degrees"] | {"Latitude": ("(deg)", lambda row: f"{row.latitude:.6f}")}, "Latitude.*digits"),
     "few digits of a second": (
         LAYOUTS["degrees"] | {"Latitude": ("(D M S)", lambda row: "-0 30 12.44")}, "Latitude.*more digits"

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
 
 from pipeline.config import Mbes
 from pipeline.errors import RawDataError
-from pipeline.readers import kmall, raw_parts
+from pipeline.maths.soundings import points_in_mbes
+from pipeline.readers import kmall, kongsberg, raw_parts
 from pipeline.readers.kmall_datagrams import datagrams
 from tests.readers.build import GPS_2024, MOUNT, UTC_2024, read, rows
-from tests.readers.sonar_files import ANGLES_DEG, datagram, mrz, sounding
+from tests.readers.sonar_files import ANGLES_DEG, datagram, iip, mrz, sounding
 from tests.readers.sonar_files import kmall as made
 
 NS = 10**9
@@ -71,33 +74,153 @@ def test_soundings_are_the_library_s(file: Path) -> None:
     reader: Any = library()
     reader.FID = io.BytesIO(content)
     theirs = reader.read_EMdgmMRZ()
-    ours = kmall.decode(content)
+    ours = kmall.decode(content, {})
     assert ours is not None
     assert ours.angle_deg.tolist() == list(theirs["sounding"]["beamAngleReRx_deg"])
     assert ours.two_way_time_s.tolist() == list(theirs["sounding"]["twoWayTravelTime_sec"])
     assert ours.number == theirs["cmnPart"]["pingCnt"] == 9
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ({"mode": 1}, "stabilisation.*switch both off"),
-        ({"mode": 2}, "stabilisation.*switch both off"),
-        ({"swath": 1}, "dual swath"),
-        ({"receiver": 1}, "dual head.*log one head alone"),
-    ],
-)
-def test_what_has_no_single_fan_is_refused(more: dict[str, int], words: str, file: Path) -> None:
-    file.write_bytes(mrz(1, FAN) + mrz(2, FAN, **more))
-    with pytest.raises(RawDataError, match=rf"a\.kmall: .*{words}") as error:
+# --- transmit sectors ------------------------------------------------------------------------------------------------
+LEVEL = "X=0;Y=0;Z=0;R=0;P=0;H=0"
+FANS = [sounding(n, angle, 0.008, sector=sector) for n, (angle, sector) in enumerate(((50, 0), (0, 1), (-50, 2)))]
+
+
+def tilts(file: Path, transmitter: str = LEVEL, receiver: str = LEVEL, name: str = "X1") -> np.ndarray:
+    fan = mrz(1, FANS, delays_s=(0.0, 0.0, 0.0), tilts_deg=(-0.5, 10.0, 0.25))
+    file.write_bytes(iip(transmitter, receiver, name) + fan)
+    return np.degrees(read("mbes", file, "kmall")[0]["transmit_tilt_rad"])
+
+
+def test_each_sounding_has_its_sector_s_tilt(file: Path) -> None:
+    """Forward +, as Kongsberg's own axes have it."""
+    assert tilts(file) == pytest.approx([-0.5, 10.0, 0.25], abs=1e-6)
+
+
+def test_a_transmitter_the_other_way_round(file: Path) -> None:
+    """Its own forward is aft of the receiver's; turned both, nothing changes."""
+    turned = LEVEL.replace("H=0", "H=180")
+    assert tilts(file, transmitter=turned) == pytest.approx([0.5, -10.0, -0.25], abs=1e-6)
+    assert tilts(file, receiver=turned) == pytest.approx([0.5, -10.0, -0.25], abs=1e-6)
+    assert tilts(file, turned, turned) == pytest.approx([-0.5, 10.0, 0.25], abs=1e-6)
+
+
+def test_a_transmitter_with_its_bow_down(file: Path) -> None:
+    """Kongsberg's pitch is bow up +: at P = -2 the fan leans aft by 2 degrees; at the sides less."""
+    (port, middle, starboard) = tilts(file, transmitter=LEVEL.replace("P=0", "P=-2"))
+    assert middle == pytest.approx(8.0, abs=1e-6)
+    assert port == pytest.approx(-0.5 - 2 * np.cos(np.radians(50)), abs=0.01)
+    assert starboard == pytest.approx(0.25 - 2 * np.cos(np.radians(50)), abs=0.01)
+
+
+def test_tilts_of_unknown_direction_are_refused(file: Path) -> None:
+    """Without an installation, or with one of another transmitter: forward may be aft."""
+    with pytest.raises(RawDataError, match=r"a\.kmall: .*tilted.*does not tell.*give the file as") as error:
+        tilts(file, name="X2")
+    assert "\n" not in str(error.value)
+    file.write_bytes(mrz(1, FANS, delays_s=(0.0, 0.0, 0.0)))  # none is tilted
+    assert not read("mbes", file, "kmall")[0]["transmit_tilt_rad"].any()
+
+
+def test_one_head_of_both_arrays(file: Path) -> None:
+    content = iip(LEVEL, LEVEL).replace(b"TRAI_TX1", b"TRAI_HD1").replace(b"TRAI_RX1", b"OTHERRX1")
+    file.write_bytes(content + mrz(1, FANS, delays_s=(0.0, 0.0, 0.0), tilts_deg=(-0.5, 10.0, 0.25)))
+    columns, _ = read("mbes", file, "kmall")
+    assert np.degrees(columns["transmit_tilt_rad"]) == pytest.approx([-0.5, 10.0, 0.25], abs=1e-6)
+
+
+@pytest.mark.parametrize("mode", [0, 1, 2, 3, 4, 8, 0b11111100])
+def test_the_tilt_holds_the_steering_of_stabilisation(mode: int, file: Path) -> None:
+    """Each ping has its own; both swaths of a dual swath have one number, each its own tilts."""
+    pings = [mrz(7, FAN, mode=mode, swath=swath, tilts_deg=(tilt,)) for swath, tilt in ((0, 1.0), (1, -1.5))]
+    file.write_bytes(iip(LEVEL, LEVEL) + b"".join(pings) + mrz(8, FAN, mode=mode, tilts_deg=(3.0,)))
+    columns, dropped = read("mbes", file, "kmall")
+    assert not dropped
+    assert columns["ping"].tolist() == [7] * 10 + [8] * 5
+    assert np.degrees(columns["transmit_tilt_rad"]) == pytest.approx([1.0] * 5 + [-1.5] * 5 + [3.0] * 5, abs=1e-6)
+
+
+@pytest.mark.parametrize("tilt", [46.0, float("nan"), float("inf")])
+def test_impossible_tilts(tilt: float, file: Path) -> None:
+    file.write_bytes(iip(LEVEL, LEVEL) + mrz(1, FAN, tilts_deg=(tilt,)) + mrz(2, FAN))
+    columns, dropped = read("mbes", file, "kmall")
+    assert rows(columns) == 5
+    assert dropped == {"damaged datagram": 1}
+
+
+# --- where the sectors send from -------------------------------------------------------------------------------------
+APART = "X=0.30;Y=-0.10;Z=0.02;R=1;P=2;H=181;IPX=0;IPY=-0.05;IPZ=-0.01;ICX=0;ICY=0;ICZ=-0.006;ISX=0;ISY=0.05;ISZ=-0.01"
+RECEIVER = "X=0.05;Y=0.01;Z=0;R=-3;P=-1;H=0.5;IX=-0.01;IY=0;IZ=-0.006"
+
+
+def turned(roll_deg: float, pitch_deg: float, heading_deg: float) -> np.ndarray:
+    return Rotation.from_euler("ZYX", [heading_deg, pitch_deg, roll_deg], degrees=True).as_matrix()
+
+
+def test_ranges_run_from_the_sector_s_part_to_the_receiver(file: Path) -> None:
+    """Targets seen by beams and fans of arrays that lie apart and are turned against each other, in Kongsberg's axes;
+    what is read places them all, from one point: the receiver's, but forward the transmitter's."""
+    speed, tx, rx = 1480.0, turned(1, 2, 181), turned(-3, -1, 0.5)
+    parts = [np.array([0.30, -0.10, 0.02]) + tx @ [0, y, z] for y, z in ((-0.05, -0.01), (0, -0.006), (0.05, -0.01))]
+    centre = np.array([0.05, 0.01, 0]) + rx @ [-0.01, 0, -0.006]
+    found, seen, targets = [], [], []
+    for number, (part, angle, tilt) in enumerate(((2, 65.0, 0.8), (1, 20.0, -3.0), (1, -5.0, -3.0), (0, -60.0, 8.0))):
+
+        def contradicts(x: np.ndarray, part: int = part, angle: float = angle, tilt: float = tilt) -> list[float]:
+            sent, heard = x - parts[part], x - centre
+            fan = sent @ tx[:, 0] / np.linalg.norm(sent) - np.sin(np.radians(tilt))
+            beam = heard @ rx[:, 1] / np.linalg.norm(heard) - np.sin(np.radians(-angle))
+            return [fan, beam, np.linalg.norm(heard) - 4.0]
+
+        below = rx @ [0, np.sin(np.radians(-angle)), np.cos(np.radians(angle))]
+        target = fsolve(contradicts, centre + 4 * below, xtol=1e-13)
+        assert np.abs(contradicts(target)).max() < 1e-10
+        time = (np.linalg.norm(target - parts[part]) + np.linalg.norm(target - centre)) / speed
+        found.append(sounding(number, angle, time, sector=number))
+        seen.append((part, tilt))
+        targets.append(target)
+    subarrays, sector_tilts = zip(*seen, strict=True)
+    fan = mrz(1, found, delays_s=[0.0] * 4, tilts_deg=sector_tilts, subarrays=subarrays, speed_m_s=speed)
+    file.write_bytes(iip(APART, RECEIVER) + fan)
+    forward = rx[:, 0]
+    origin = centre + (np.array([0.30, -0.10, 0.02]) - centre) @ forward * forward
+    wanted = (np.array(targets) - origin) @ rx @ [[0, 1, 0], [1, 0, 0], [0, 0, -1]]
+    for more in ({}, {"projector_offset_m": mbes_from(rx, np.array([0.30, -0.10, 0.02]) - centre)}):
+        columns, _ = read("mbes", file, "kmall", **more)
+        names = ("two_way_time_s", "angle_rad", "transmit_tilt_rad", "sound_speed_m_s")
+        offset = np.array(more["projector_offset_m"]) if more else None
+        points, valid = points_in_mbes(*(columns[name] for name in names), None, offset)
+        assert valid.all()
+        assert points == pytest.approx(wanted, abs=2e-6)  # times and angles are single precision
+
+
+def mbes_from(rx: np.ndarray, vessel: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = rx.T @ vessel
+    return float(y), float(x), float(-z)
+
+
+def test_without_an_installation_times_and_angles_stay_as_recorded(file: Path) -> None:
+    file.write_bytes(mrz(1, FAN))
+    columns, _ = read("mbes", file, "kmall")
+    assert columns["two_way_time_s"].tolist() == [float(np.float32(0.008))] * 5
+    file.write_bytes(iip(APART, RECEIVER) + mrz(1, [sounding(0, 0.0, 0.0), sounding(1, 0.0, 1e-5)]))
+    _, dropped = read("mbes", file, "kmall")
+    assert dropped == {"no detection": 1}  # also where the arrays lie apart
+
+
+# --- refused ---------------------------------------------------------------------------------------------------------
+def test_several_receivers_are_refused(file: Path) -> None:
+    file.write_bytes(mrz(1, FAN) + mrz(2, FAN, receiver=1))
+    with pytest.raises(RawDataError, match=r"a\.kmall: .*dual head.*log one head alone") as error:
         read("mbes", file, "kmall")
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("mode", [0, 4, 8, 0b11111100])
-def test_other_modes_are_read(mode: int, file: Path) -> None:
-    file.write_bytes(mrz(1, FAN, mode=mode))
-    assert rows(read("mbes", file, "kmall")[0]) == 5
+def test_a_single_beam_is_refused(file: Path) -> None:
+    file.write_bytes(mrz(1, FAN[:1]) + mrz(2, FAN[:1]))
+    with pytest.raises(RawDataError, match=r"a\.kmall: .*one beam.*multibeam") as error:
+        read("mbes", file, "kmall")
+    assert "\n" not in str(error.value)
 
 
 # --- damage ----------------------------------------------------------------------------------------------------------
@@ -158,7 +281,7 @@ def test_lengths_that_claim_more_than_there_is(file: Path) -> None:
 
 
 def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kmall, "SOUNDINGS", 10)
+    monkeypatch.setattr(kongsberg, "SOUNDINGS", 10)
     file.write_bytes(made(7))
     (part,) = raw_parts("mbes", Mbes(files=[file.name], format="kmall", mount=MOUNT), file.parent)
     assert [len(chunk.columns["beam"]) for chunk in part.chunks()] == [10, 10, 10, 5]
@@ -172,6 +295,6 @@ def test_only_mrz_is_looked_into(file: Path) -> None:
 
 
 def test_unix_time_is_the_datagram_s() -> None:
-    ping = kmall.decode(mrz(1, FAN, seconds=UTC_2024, nanoseconds=5))
+    ping = kmall.decode(mrz(1, FAN, seconds=UTC_2024, nanoseconds=5), {})
     assert ping is not None
     assert ping.t_ns == GPS_2024 * NS + 5

@@ -99,6 +99,73 @@ def test_flag_that_contradicts_the_times(file: Path) -> None:
         read("laser", file, "las")
 
 
+# --- laser.time: where the header's flag is wrong ---------------------------------------------------------------------
+@pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
+@pytest.mark.parametrize("flag", [True, False])
+def test_adjusted_times_whatever_the_flag(compress, flag: bool, file: Path) -> None:  # type: ignore[no-untyped-def]
+    content = bytearray(compress(las([(0, 0, 1, ADJUSTED + 0.25), (0, 0, 2, ADJUSTED + 0.5)])))
+    content[6] = int(flag)
+    file.write_bytes(content)
+    columns, dropped = read("laser", file, "las", time="adjusted_standard")
+    assert not dropped
+    assert columns["t_ns"].tolist() == [1_400_000_000 * NS + NS // 4, 1_400_000_000 * NS + NS // 2]
+
+
+@pytest.mark.parametrize("flag", [True, False])
+def test_seconds_of_week_whatever_the_flag(flag: bool, file: Path) -> None:
+    file.write_bytes(las([(0, 0, 1, 1000.25), (0, 0, 2, 1000.375)], adjusted=flag))
+    columns, _ = read("laser", file, "las", gps_week=WEEK, time="seconds_of_week")
+    assert (columns["t_ns"] - WEEK * WEEK_NS).tolist() == [1000 * NS + NS // 4, 1000 * NS + 3 * NS // 8]
+    with pytest.raises(ConfigError, match=r"laser\.gps_week is missing"):
+        read("laser", file, "las", time="seconds_of_week")
+
+
+@pytest.mark.parametrize("week", [None, WEEK])
+def test_wrong_flag_names_the_key(week: int | None, file: Path) -> None:
+    """Before a week is asked for that would not help."""
+    file.write_bytes(las(some(3), adjusted=False))
+    with pytest.raises(RawDataError, match=r"a\.las: its header promises seconds.*laser\.time: adjusted_standard"):
+        read("laser", file, "las", gps_week=week)
+    file.write_bytes(las(some(3, 345_600.001)))
+    with pytest.raises(RawDataError, match=r"a\.las: its header promises adj.*laser\.time: seconds_of_week"):
+        read("laser", file, "las", gps_week=week)
+
+
+@pytest.mark.parametrize("flag", [True, False])
+def test_a_key_that_the_times_contradict(flag: bool, file: Path) -> None:
+    """Whatever the flag says: times of both kinds do not overlap."""
+    file.write_bytes(las(some(3), adjusted=flag))
+    with pytest.raises(RawDataError, match=r"a\.las: laser\.time: seconds_of_week .*but 4000.*laser\.time") as error:
+        read("laser", file, "las", gps_week=WEEK, time="seconds_of_week")
+    assert "\n" not in str(error.value)
+    file.write_bytes(las(some(3, 345_600.001), adjusted=flag))
+    with pytest.raises(RawDataError, match=r"a\.las: laser\.time: adjusted_standard .*but 3456.*laser\.time"):
+        read("laser", file, "las", time="adjusted_standard")
+
+
+@pytest.mark.parametrize("time", ["adjusted_standard", "seconds_of_week", None])
+def test_times_of_no_kind(time: str | None, file: Path) -> None:
+    file.write_bytes(las(some(3, -5e9), adjusted=time == "adjusted_standard"))
+    with pytest.raises(RawDataError, match=r"a\.las: .*and no seconds of GPS week or adj.*export it again"):
+        read("laser", file, "las", gps_week=WEEK, time=time)
+
+
+def test_time_belongs_to_las() -> None:
+    with pytest.raises(ValueError, match="time says what times of LAS count from, but format is e57"):
+        build.settings("laser", ["a"], "e57", time="adjusted_standard")
+    with pytest.raises(ValueError, match="adjusted_standard"):
+        build.settings("laser", ["a"], "las", time="adjusted")
+
+
+@pytest.mark.parametrize(("week", "count"), [(999.99, 0), (1000.01, 1), (4999.99, 1), (5000.01, 0)])
+def test_first_and_last_week(week: float, count: int, file: Path) -> None:
+    """As everywhere: from week 1000, March 1999, to week 5000, 2075."""
+    file.write_bytes(las([(0, 0, 1, ADJUSTED + 0.001), (0, 0, 2, week * 604_800 - 1e9)]))
+    columns, dropped = read("laser", file, "las")
+    assert rows(columns) == 1 + count
+    assert dropped == ({} if count else {"impossible time": 1})
+
+
 def test_without_times(file: Path) -> None:
     file.write_bytes(las(some(3), point_format=0))
     with pytest.raises(RawDataError, match=r"a\.las.*no GPS time.*export"):

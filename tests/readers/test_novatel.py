@@ -248,3 +248,23 @@ def test_week_boundary(file: Path) -> None:
 def test_file_that_vanishes(tmp_path: Path) -> None:
     with pytest.raises(RawDataError, match=r"gone\.gps: cannot be read"):
         list(NovatelPart(tmp_path / "gone.gps", "gone.gps", 0.0).chunks())
+
+
+STAMPS = (b"2001,97200,1526266800,2018/05/14 03:00:00.323 ", b"2018/05/14 03:00:00.323,", b"03:00:00\t", b"[12] ")
+
+
+@pytest.mark.parametrize("stamp", STAMPS)
+def test_lines_behind_a_loggers_stamp(stamp: bytes, file: Path) -> None:
+    """All are read; of three that are damaged, cut or without a checksum each is counted, apart from the stamps."""
+    lines = [inspvasa(1000 + k / 10) for k in range(50)]
+    file.write_bytes(b"".join(stamp + line for line in lines))
+    columns, dropped = read("ins", file, "novatel")
+    assert columns["t_ns"].tolist() == [WEEK * WEEK_NS + 1000 * NS + k * NS // 10 for k in range(50)]
+    assert set(dropped) <= {"text between records"}
+    lines[10] = lines[10].replace(b"36.", b"37.", 1)
+    lines[20] = lines[20].split(b"*")[0] + b"\r\n"
+    lines[30] = lines[30][:60] + b"\r\n"
+    file.write_bytes(b"".join(stamp + line for line in lines))
+    columns, dropped = read("ins", file, "novatel")
+    assert rows(columns) == 47
+    assert dropped["undecodable bytes"] == 3

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import PoolcalError
+from pipeline.errors import PoolcalError, RawDataError
 from tests.readers import build
 from tests.readers.build import (
     GPS_2024,
@@ -54,6 +54,21 @@ def test_a2_packet(file: Path) -> None:
     assert columns["two_way_time_s"].tolist() == [1.0, 2.0, 3.0]
     assert columns["angle_rad"].tolist() == [-1.0, -1.0 + 65535 * 2.0**-17, -1.0 + 131070 * 2.0**-17]
     assert columns["sound_speed_m_s"].tolist() == [1480.5] * 3
+
+
+@pytest.mark.parametrize(("steering", "words"), [(-0.01, r"-0\.57°"), (0.0002, r"\+0\.01°")])
+def test_a_fan_steered_along_track_is_refused(file: Path, steering: float, words: str) -> None:
+    file.write_bytes(ping(8) + ping(9, steering=steering))
+    with pytest.raises(RawDataError, match=rf"ping 9 .* by {words} along track; switch pitch stabilisation off"):
+        read("mbes", file, "r2sonic")
+
+
+@pytest.mark.parametrize("steering", [0.00005, 0.7, np.nan])
+def test_no_steering_and_an_impossible_one(file: Path, steering: float) -> None:
+    """What rounding leaves is no steering; what no head can do is damage, and is counted."""
+    file.write_bytes(ping(8) + ping(9, steering=steering))
+    columns, dropped = read("mbes", file, "r2sonic")
+    assert (len(np.unique(columns["ping"])), sum(dropped.values())) == ((2, 0) if steering < 0.1 else (1, 1))
 
 
 def test_a2_values(file: Path) -> None:

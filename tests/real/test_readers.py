@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError, RawDataError
+from pipeline.readers import detect
 from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, GPS_EPOCH_UNIX_S, NS, WEEK_NS
 from tests.real.conftest import Read
+from tests.real.test_kongsberg_all import HE, TURBEAMS
 from tests.real.test_more_formats import BUNNY, GSF, KMALL, MOVED
 
 XTF = "mbes/r2sonic2026_qinsy.xtf"
@@ -264,6 +266,23 @@ def test_las_of_adjusted_time(read: Read) -> None:
     )
 
 
+def test_las_of_adjusted_time_without_its_flag(read: Read) -> None:
+    """14,408 points; laspy's times and places. Without the key the refusal names it."""
+    name = "laser/pdal/pdal_sample_c.las"
+    for more in ({}, {"gps_week": 1500}):
+        with pytest.raises(RawDataError) as error:
+            read("laser", "las", name, **more)
+        one_line(error, "pdal_sample_c.las", "laser.time: adjusted_standard")
+    points, dropped = read("laser", "las", name, time="adjusted_standard")
+    assert not dropped
+    assert len(points["t_ns"]) == 14_408
+    assert points["t_ns"].min() - ADJUSTED_STANDARD_OFFSET_S * NS == pytest.approx(159_214_261.5561611 * NS, abs=200)
+    assert [points[name][0] for name in XYZ] == pytest.approx([674_522.0, 1_206_771.75, 627.59], abs=1e-4)
+    with pytest.raises(RawDataError) as error:
+        read("laser", "las", name, time="seconds_of_week", gps_week=1500)
+    one_line(error, "pdal_sample_c.las", "laser.time: seconds_of_week", "159214342")
+
+
 def test_laz(read: Read) -> None:
     points, dropped = read("laser", "las", "laser/laspy_fullwave.laz", gps_week=2000)
     assert not dropped
@@ -288,7 +307,7 @@ REFUSED = {
 }
 FORMATS = {
     "laser": ("las", "e57", "table"),
-    "mbes": ("r2sonic", "gsf", "kmall", "table"),
+    "mbes": ("r2sonic", "gsf", "kmall", "all", "table"),
     "ins": ("novatel", "sbet", "inertial_explorer", "table"),
 }
 
@@ -313,6 +332,7 @@ def test_refused_with_advice(name: str, read: Read) -> None:
         ("laser/test1_4.las", "mbes", "r2sonic", ("LAS", "format")),
         (GSF, "mbes", "r2sonic", ("GSF", "write mbes.format: gsf")),
         (KMALL, "mbes", "table", ("kmall", "write mbes.format: kmall")),
+        (HE, "mbes", "kmall", (".all", "write mbes.format: all")),
         (BUNNY, "laser", "las", ("E57", "write laser.format: e57")),
         (BUNNY, "mbes", "gsf", ("E57", "list it under laser.files")),
     ],
@@ -323,11 +343,32 @@ def test_another_format_than_told(name: str, sensor: Any, kind: str, words: tupl
     one_line(error, Path(name).name, *words)
 
 
-def test_every_file_is_tried(data: Path) -> None:
-    """Whatever is added to the folder is to be read or refused here."""
-    tried = {XTF, PPP, PPP_ASCII, ATLANS, GSF, KMALL, BUNNY, MOVED, *REFUSED} | {
-        "ins/oem7_ins2.gps", "ins/propak6-basic-fix_payload.gps", "ins/pdal_2-points.sbet", "ins/pdal_badfile.sbet",
-        "ins/sbet_20181023.out", "laser/1.2-with-color.las", "laser/test1_4.las", "laser/laspy_fullwave.laz",
-    }  # fmt: skip
-    there = {path.relative_to(data).as_posix() for path in data.glob("*/*") if path.is_file()}
-    assert there == tried
+NO_KIND = {path for path in REFUSED if path.endswith(".bin")}  # a program's own binary, without any mark
+WHOLE_SETTINGS: dict[str, dict[str, Any]] = {"ins": {"gps_week": 2000}, "laser": {"gps_week": 2000}, "mbes": {}}
+REFUSED_LATER = {  # of a format that is read, but damaged, without times, with a wrong flag, of stabilised or two heads
+    "ins/pdal_badfile.sbet", "laser/pdal/pdal_sample_c.las", BUNNY, MOVED, GSF, TURBEAMS,
+}  # fmt: skip
+
+
+def test_every_file_is_tried(data: Path, read: Read) -> None:
+    """Whatever is added to the folder, however deep, is read for what it is, or refused in one line with advice."""
+    paths = sorted(path for path in data.glob("*/**/*") if path.is_file())
+    names = [path.relative_to(data).as_posix() for path in paths]
+    assert set(REFUSED) | REFUSED_LATER <= set(names)
+    for path, name in zip(paths, names, strict=True):
+        kind = detect.kind_of(path, path.name)
+        assert (kind is detect.UNKNOWN) == (name in NO_KIND), name
+        if kind.format is None:
+            for sensor, formats in FORMATS.items():
+                with pytest.raises(RawDataError) as error:
+                    read(sensor, formats[0], name, **WHOLE_SETTINGS[sensor])
+                one_line(error, path.name, kind.title, "; ")
+            continue
+        sensor = kind.sensors[0]
+        if name in REFUSED_LATER:
+            with pytest.raises(RawDataError) as error:
+                read(sensor, kind.format, name, **WHOLE_SETTINGS[sensor])
+            one_line(error, path.name, "; ")
+        else:
+            columns, dropped = read(sensor, kind.format, name, **WHOLE_SETTINGS[sensor])
+            assert len(columns["t_ns"]) or dropped, name

@@ -137,6 +137,7 @@ class TellConfig:
 @dataclass(frozen=True)
 class TellInputs:
     means: Annotated[pd.DataFrame, MEANS]
+    provenance: Annotated[dict[str, Any], artefacts.Provenance]
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,13 @@ def _rz(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
+def _ray(across: float, forward: float) -> np.ndarray:
+    """The ray of the receive beam across (its sine), turned about the receiving array until it looks so far forward:
+    about x, by which it stays in its beam."""
+    upright = np.array([across, 0.0, -np.cos(np.arcsin(across))])
+    return np.asarray(_rx(np.arcsin(forward / -upright[2])) @ upright)
+
+
 def _place(simulated: SimulatedSession, sensor: str, mount: dict[str, float], every: int = 1) -> np.ndarray:
     """(n, 3) points in the target frame, georeferenced one by one through ECEF."""
     origin, azimuth_deg = simulated.truth["target"]["origin"], simulated.truth["target"]["azimuth_deg"]
@@ -83,9 +90,10 @@ def _place(simulated: SimulatedSession, sensor: str, mount: dict[str, float], ev
         points = np.stack([data["x_m"], data["y_m"], data["z_m"]], axis=1)
     else:
         data = {name: values[::every] for name, values in simulated.mbes.items()}
-        ranges = data["two_way_time_s"] / 2 * data["sound_speed_m_s"]
-        sine, cosine = np.sin(data["angle_rad"]), np.cos(data["angle_rad"])
-        points = ranges[:, None] * np.stack([sine, np.zeros_like(sine), -cosine], axis=1)
+        speed = simulated.truth["sound_speed_true_m_s"]
+        ranges, k = data["two_way_time_s"] / 2 * speed, speed / data["sound_speed_m_s"]
+        beams = zip(k * np.sin(data["angle_rad"]), k * np.sin(data["transmit_tilt_rad"]), strict=True)
+        points = ranges[:, None] * np.array([_ray(*sines) for sines in beams])
     ins, begin = simulated.ins, simulated.ins["t_ns"][0]
     when, epochs = (data["t_ns"] - begin) / 1e9, (ins["t_ns"] - begin) / 1e9
     pose = {name: np.interp(when, epochs, np.unwrap(ins[name])) for name in ins if name != "t_ns"}

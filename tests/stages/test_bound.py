@@ -12,10 +12,12 @@ from tests.stages.conftest import THIN, calibrated, made, merged
 from tools.bound import bound
 from tools.montecarlo import DRIFT, WHITE
 
+SECTORS = [{"to_deg": 15.0, "tilt_deg": 5.0}, {"to_deg": 90.0, "tilt_deg": -5.0}]
+KINDS = [{"ins": WHITE["ins"]}, {"ins": {}}, {"ins": DRIFT}, {"mbes": {"format": "parquet", "sectors": SECTORS}}]
 
-@pytest.mark.parametrize("ins", often([DRIFT], [WHITE["ins"], {}, DRIFT]))
-def test_the_random_sigmas_are_those_of_the_best_estimator(ins):
-    scenario = {"ins": ins}
+
+@pytest.mark.parametrize("scenario", often(KINDS[2:3], KINDS))
+def test_the_random_sigmas_are_those_of_the_best_estimator(scenario):
     result = json.loads(calibrated(made(scenario, seed=3))["report/calibration.json"])
     covariance = np.array(result["methods"]["adjustment"]["covariance"])
     least = bound(parse(Scenario, merged({"name": "test"}, THIN, scenario), "test"), 3)

@@ -11,11 +11,13 @@ from typing import Any
 
 import pytest
 
+from pipeline.pages import SMALLEST_PT
 from tests.end_to_end.pages import Page
 from tests.end_to_end.places import poolcal
 from tools.pictures import chromium
 
 WIDTHS = (390, 1280)
+LEGIBLE_PX = 9
 MEASURE = """<!doctype html><meta charset="utf-8"><pre id="out"></pre>
 <iframe id="page" src="PAGE" style="width: 1280px; height: 900px; border: 0"></iframe>
 <script>
@@ -24,7 +26,10 @@ document.getElementById("page").onload = () => {
   for (const width of [390, 1280]) {
     frame.style.width = width + "px";
     const right = (tag) => [...page.querySelectorAll(tag)].map((one) => one.getBoundingClientRect().right);
-    found[width] = { scroll: page.documentElement.scrollWidth, tables: right("table"), pictures: right("img") };
+    const boxes = [...page.images].map((one) => (one.closest(".wide") || one).getBoundingClientRect().right);
+    const scale = [...page.images].map((one) => one.getBoundingClientRect().width / one.naturalWidth);
+    const shown = [...page.querySelectorAll(".phone")].map((one) => one.getBoundingClientRect().height > 0);
+    found[width] = { scroll: page.documentElement.scrollWidth, tables: right("table"), pictures: boxes, scale, shown };
   }
   found.drawn = [...page.images].map((one) => one.complete && one.naturalWidth > 0);
   document.getElementById("out").textContent = JSON.stringify(found);
@@ -69,6 +74,8 @@ def test_everything_is_inside_the_page_and_drawn(page: Path) -> None:
         assert len(seen["tables"]) == len(tables)
         assert len(seen["pictures"]) == len(pictures)
         assert max([seen["scroll"], *seen["tables"], *seen["pictures"]]) <= width, width
+        assert set(seen["shown"]) == {width < 600}  # what is left out here, and where to find it
+        assert min(seen["scale"]) * SMALLEST_PT * 96 / 72 >= LEGIBLE_PX, width
 
 
 def test_a_table_too_wide_would_be_seen(tmp_path: Path) -> None:
@@ -92,7 +99,8 @@ def test_on_paper_nothing_is_cut(page: Path, tmp_path: Path) -> None:
     pdf = tmp_path / "page.pdf"
     chromium("--no-pdf-header-footer", f"--print-to-pdf={pdf}", page.as_uri())
     boxes = subprocess.run(["pdftotext", "-bbox", pdf, "-"], capture_output=True, text=True, check=True).stdout
-    sheets = []
+    sheets: list[str] = []
+    title = unescape(re.search("<title>(.*?)</title>", page.read_text(encoding="utf-8"), re.DOTALL)[1])  # type: ignore[index]
     for sheet in re.split(r"<page ", boxes)[1:]:
         width, height = (float(one) for one in re.search(r'width="(.*?)" height="(.*?)"', sheet).groups())  # type: ignore[union-attr]
         assert (width, height) == (pytest.approx(595, abs=2), pytest.approx(842, abs=2))  # A4
@@ -103,13 +111,23 @@ def test_on_paper_nothing_is_cut(page: Path, tmp_path: Path) -> None:
             assert float(top) > 20, word
             assert float(bottom) < height - 20, word
         sheets.append("".join(unescape(word) for *_, word in words))
+        head = "".join(title.split())[:20]
+        assert sheets[-1].startswith(head) or head in sheets[-1][:60]  # which session, and the verdict, on each sheet
+    for number, sheet in enumerate(sheets, 1):
+        assert f"{number}of{len(sheets)}" in sheet
     whole = "".join(sheets)
-    for table in Page(page.read_text(encoding="utf-8")).tables:
+    taken = Page(page.read_text(encoding="utf-8"))
+    named = [attributes.get("class") or "" for attributes in taken.named("table")]
+    for table, classes in zip(taken.tables, named, strict=True):
+        if "whole" in classes.split():
+            short = ["".join(cell.split()) for row in table for cell in row if len(cell) < 12]
+            assert any(all(cell in sheet for cell in short) for sheet in sheets), short  # never torn
         for row in table:
             for cell in row:
                 letters = "".join(cell.split())  # of a long one, broken into lines, the order is lost
-                assert letters in whole if len(cell) < 40 else not Counter(letters) - Counter(whole), cell
-            short = ["".join(cell.split()) for cell in row if cell.strip() and len(cell) < 40]
+                lines = all(word in whole for word in cell.split()) if len(cell) < 40 else False
+                assert letters in whole or lines or (len(cell) >= 40 and not Counter(letters) - Counter(whole)), cell
+            short = [word for cell in row if cell.strip() and len(cell) < 40 for word in cell.split()]
             assert any(all(cell in sheet for cell in short) for sheet in sheets), row
 
 

@@ -1,0 +1,40 @@
+"""Whether a cast's file is of this session: by the time and the place that it tells of."""
+
+from collections.abc import Iterator
+from datetime import datetime
+
+import numpy as np
+
+from pipeline.session_settings import CastUsed
+from pipeline.times import NS, unix_ns_from_gps, utc_text
+
+LONGEST_H = 36.0  # between the cast and the soundings, whatever time zone its file has
+FARTHEST_KM = 5.0
+KM_PER_DEG = 111.2
+
+
+def doubts(
+    used: CastUsed | None, span_ns: tuple[int, int] | None, place_deg: tuple[float, float] | None
+) -> Iterator[str]:
+    """``span_ns``: first and last sounding, GPS time; ``place_deg``: latitude, longitude of the session; None: not
+    known."""
+    if used is None:
+        return
+    if used.taken is not None and span_ns is not None:
+        cast_s = (datetime.fromisoformat(used.taken) - datetime(1970, 1, 1)).total_seconds()
+        first_s, last_s = (float(one) / NS for one in unix_ns_from_gps(np.array(span_ns)))
+        apart_h = max(first_s - cast_s, cast_s - last_s) / 3600
+        if apart_h > LONGEST_H:
+            yield (
+                f"mbes.svp: {used.file} was taken at {used.taken}, {apart_h / 24:.1f} days away from the soundings "
+                f"({utc_text(span_ns[0])}): the cast is taken for true; take one at the session"
+            )
+    if used.place_deg is not None and place_deg is not None:
+        north = used.place_deg[0] - place_deg[0]
+        east = (used.place_deg[1] - place_deg[1] + 180) % 360 - 180
+        away_km = KM_PER_DEG * float(np.hypot(north, east * np.cos(np.radians(place_deg[0]))))
+        if away_km > FARTHEST_KM:
+            yield (
+                f"mbes.svp: {used.file} was taken {away_km:.0f} km from here: the cast is taken for true; take one in "
+                "the water of the session"
+            )

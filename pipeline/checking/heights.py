@@ -1,0 +1,149 @@
+"""Heights by which a sensor misses the target: both by the same, and it is target.origin.height_m that is wrong; one of
+them alone, and it is the z of its mount.
+
+The laser sees the target above the water alone, and the sonar below it alone. So points count only on their own side of
+the water: a shift downwards loses the laser's lowest points and the sonar's deepest, one upwards the laser's highest
+and the sonar's shallowest. Where a target repeats, its ends are what tells one repetition from the next.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.checking.finding import Finding
+from pipeline.checking.placed import NAMES, Sample, put
+from pipeline.checking.track import Track
+from pipeline.clouds import ClosestSurface
+
+Array = NDArray[np.float64]
+REACH_M = 0.5  # from a face, beyond which a point counts nothing
+FARTHEST_M, STEP_M = 50.0, 0.25
+SHIFTS_M = np.arange(-FARTHEST_M, FARTHEST_M + STEP_M / 2, STEP_M)
+HERE = len(SHIFTS_M) // 2
+LEAST_M = 0.8  # less may be a wrong target.water_level_m; the calibration finds its share of it by itself
+LIKE = 0.97  # of the best: as good
+TOGETHER = 0.8  # of its own best that each sensor must have at the common shift
+WORSE = 0.8  # of that, the most that the heights as given may have
+FEWEST, FIT = 50, 0.05  # points in passes, and the share of them on the target at the best shift
+SIGN_M = 0.5  # a shift as near to twice a lever arm is its sign
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Of one sensor, by shift: how well its points lie on the target where it can see it (``sided``), and anywhere, as
+    shares of the best."""
+
+    sensor: str
+    z_m: float  # of its mount
+    sided: Array
+    free: Array
+
+    @property
+    def shift_m(self) -> float:
+        return _middle(self.sided)
+
+    @property
+    def sign(self) -> bool:
+        """Whether the reversed sign of z is the shift."""
+        return bool(abs(self.shift_m + 2 * self.z_m) < SIGN_M)
+
+    @property
+    def off(self) -> bool:
+        """Clearly better elsewhere. A wrong water level lets points lie on the target as they are."""
+        far = abs(self.shift_m) >= LEAST_M and self.sided[HERE] < WORSE
+        return far and (self.sign or self.free[HERE] < WORSE)
+
+
+def wrong_height(
+    track: Track, samples: Sequence[Sample], closest: ClosestSurface, water_m: float, height_m: float
+) -> Iterator[Finding]:
+    """``height_m``: target.origin.height_m as given."""
+    fits = [fit for fit in (_fit(track, some, closest, water_m) for some in samples) if fit is not None]
+    common = common_shift(fits)
+    if common is not None and len(fits) == len(samples):
+        yield Finding("height", _target_is_off(fits, common, height_m))
+        return
+    off = [fit for fit in fits if fit.off]
+    if len(off) > 1:
+        both = ", ".join(f"{NAMES[fit.sensor]} if they lay {way(fit.shift_m, 'higher', 'lower')}" for fit in off)
+        yield Finding(
+            "height",
+            f"heights do not agree: the target is hit by {both}: check target.origin.height_m, laser.mount.z_m and "
+            "mbes.mount.z_m (z is up: a sonar below the INS has a negative one)",
+        )
+    others_fit = all(abs(fit.shift_m) < LEAST_M for fit in fits if not fit.off)
+    for fit in off if len(off) == 1 and others_fit else []:
+        remedy = "reverse its sign (z is up)" if fit.sign else "measure it again"
+        new_m = -fit.z_m if fit.sign else round(fit.z_m + fit.shift_m, 1)
+        yield Finding(
+            "target",
+            f"{fit.sensor}: {NAMES[fit.sensor]} miss the target, but hit it with {fit.sensor}.mount.z_m = {new_m:g} in "
+            f"place of {fit.z_m:g}: {remedy}",
+        )
+
+
+def _target_is_off(fits: Sequence[Fit], shift_m: float, height_m: float) -> str:
+    which, all_of_them = " and ".join(NAMES[fit.sensor] for fit in fits), "both hit" if len(fits) > 1 else "hit"
+    alone = f", or if {fits[0].sensor}.mount.z_m is that much {'higher' if shift_m > 0 else 'lower'}"
+    return (
+        f"{which} miss the target, and {all_of_them} it if target.origin.height_m is about "
+        f"{way(-shift_m, 'higher', 'lower')} ({height_m - shift_m:.1f} in place of {height_m:g})"
+        f"{alone if len(fits) == 1 else ''}: is it, or the INS's height, above sea level? Give both above the ellipsoid"
+    )
+
+
+def way(shift_m: float, up: str, down: str) -> str:
+    """
+    >>> way(-4.53, "higher", "lower")
+    '4.5 m lower'
+    """
+    return f"{abs(shift_m):.1f} m {up if shift_m > 0 else down}"
+
+
+def profile(
+    points: Array,
+    sensor: str,
+    closest: ClosestSurface,
+    water_m: float | None,
+    shifts_m: Array,
+    reach_m: float = REACH_M,
+) -> Array:
+    """How well points (n, 3) lie on the target when they are shifted upwards: the mean of 1 - (d / reach)², none beyond
+    the reach or on the other sensor's side of the water; (k,). ``water_m``: None where sides do not count."""
+    found = []
+    for shift in shifts_m:
+        moved = points + np.array([0.0, 0.0, shift])
+        if water_m is not None:
+            moved = moved[moved[:, 2] > water_m if sensor == "laser" else moved[:, 2] < water_m]
+        on, _ = closest(moved)
+        squares = np.sum((moved - on) ** 2, axis=1) / reach_m**2
+        found.append(float(np.sum(np.maximum(0.0, 1.0 - squares))) / len(points))
+    return np.array(found)
+
+
+def _fit(track: Track, some: Sample, closest: ClosestSurface, water_m: float) -> Fit | None:
+    """None where its points are few, or hit nothing at any height."""
+    points = put(track, some.near(track))
+    points = points[np.isfinite(points[:, 0])]
+    if len(points) < FEWEST:
+        return None
+    sided, free = (profile(points, some.sensor, closest, level, SHIFTS_M) for level in (water_m, None))
+    return None if sided.max() < FIT else Fit(some.sensor, some.mount.z_m, sided / sided.max(), free / free.max())
+
+
+def common_shift(fits: Sequence[Fit]) -> float | None:
+    """How far up all sensors' points have to go to lie on the target; None where they lie there as they are, or no one
+    shift brings all there."""
+    if not fits:
+        return None
+    together = np.min([fit.sided for fit in fits], axis=0)
+    shift = _middle(together)
+    lies = together[HERE] >= WORSE * together.max() or min(fit.free[HERE] for fit in fits) >= WORSE
+    return None if lies or abs(shift) < LEAST_M or together.max() < TOGETHER else shift
+
+
+def _middle(fits: Array) -> float:
+    good = SHIFTS_M[fits >= LIKE * fits.max()]
+    return float((good.min() + good.max()) / 2)

@@ -1,0 +1,89 @@
+"""A cast's rows as a profile: one direction of the probe, growing depths, no more points than the rays need."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+SAME_M = 1e-3  # depths are told apart to this
+MOST = 200  # depths of a profile
+TOLERANCE_M_S = 0.02  # of thinning: what a probe resolves; 0.1 mm in a range of 10 m
+LEAST_HEIGHT_M = 0.05  # over which scattered rows are averaged first
+
+
+def one_way(depth_m: Array) -> NDArray[np.int64]:
+    """Rows of the probe's way down; of its way up, where that alone covers half the depths. ``depth_m`` (n,) as
+    recorded. All rows where it went one way only, however unevenly."""
+    turn = int(np.argmax(depth_m))
+    rows = np.arange(len(depth_m))
+    half = (depth_m.max() - depth_m.min()) / 2
+    parts = [part for part in (rows[: turn + 1], rows[turn:]) if len(part) > 1 and np.ptp(depth_m[part]) >= half]
+    return parts[0] if len(parts) == 2 else rows
+
+
+def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[float, float]:
+    """Of two profiles (depths ascending, speeds) over the depths that both have: how much, and where."""
+    depths = one[0][(one[0] >= other[0][0]) & (one[0] <= other[0][-1])]
+    if not len(depths):
+        return 0.0, 0.0
+    apart = np.abs(np.interp(depths, *one) - np.interp(depths, *other))
+    return float(apart.max()), float(depths[np.argmax(apart)])
+
+
+def ascending(depth_m: Array, speed_m_s: Array) -> tuple[Array, Array]:
+    """Sorted by depth; rows of the same millimetre become its mean."""
+    millimetre, group = np.unique(np.rint(depth_m / SAME_M), return_inverse=True)
+    return millimetre * SAME_M, np.bincount(group, speed_m_s) / np.bincount(group)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Depths ascending. Rows, or means of those within ``averaged_m`` of depth where that is not 0, lie within
+    TOLERANCE_M_S of the straight lines between them; ``scatter_m_s``: RMS of the rows about those lines."""
+
+    depth_m: Array
+    speed_m_s: Array
+    averaged_m: float
+    scatter_m_s: float
+
+
+def thinned(depth_m: Array, speed_m_s: Array) -> Profile:
+    """Rows (n,), depths ascending, as at most MOST of them.
+
+    Straight lines are split at the row farthest off them (in speed) until none is farther than the tolerance (Ramer
+    1972; Douglas & Peucker 1973). Where too many rows remain, they scatter: then they are averaged over 5 cm of depth,
+    10 cm and so on first. (A larger tolerance would keep the worst of them.)
+    """
+    height, depth, speed = 0.0, depth_m, speed_m_s
+    while len(kept := _split(depth, speed, TOLERANCE_M_S)) > MOST:
+        height = 2 * height if height else LEAST_HEIGHT_M
+        depth, speed = _averaged(depth_m, speed_m_s, height)
+    depth, speed = depth[kept], speed[kept]
+    scatter = float(np.sqrt(np.mean((np.interp(depth_m, depth, speed) - speed_m_s) ** 2)))
+    return Profile(depth, speed, height, scatter)
+
+
+def _averaged(depth: Array, speed: Array, height: float) -> tuple[Array, Array]:
+    _, layer = np.unique(np.floor((depth - depth[0]) / height), return_inverse=True)
+    count = np.bincount(layer)
+    return np.bincount(layer, depth) / count, np.bincount(layer, speed) / count
+
+
+def _split(depth: Array, speed: Array, tolerance: float) -> NDArray[np.int64]:
+    kept = np.zeros(len(depth), dtype=bool)
+    kept[[0, -1]] = True
+    waiting = [(0, len(depth) - 1)]
+    while waiting:
+        first, last = waiting.pop()
+        if last - first < 2:
+            continue
+        inner = slice(first + 1, last)
+        line = np.interp(depth[inner], depth[[first, last]], speed[[first, last]])
+        off = np.abs(speed[inner] - line)
+        worst = int(np.argmax(off))
+        if off[worst] > tolerance:
+            middle = first + 1 + worst
+            kept[middle] = True
+            waiting += [(first, middle), (middle, last)]
+    return np.flatnonzero(kept)

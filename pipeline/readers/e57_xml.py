@@ -1,0 +1,73 @@
+"""The XML part of an E57 file, looked at before libE57Format opens the file.
+
+libE57Format's XML parser follows what the XML names: an external document type, external entities, and the schemas of
+``schemaLocation``. A file made for it could read other files of this computer and send them away. A file that has one
+of these is refused; no scanner writes them. They cannot be hidden by another encoding, for all but UTF-8 is refused.
+
+Header (little-endian): 8 u32 x 2 version, 16 u64 size of the file, 24 u64 where the XML part is, 32 u64 its length, 40
+u64 size of a page. Pages are of 1024 bytes, the last four of each a checksum. Where the XML part is counts checksums;
+its length does not (ASTM E2807, 6.2).
+"""
+
+import re
+import struct
+from pathlib import Path
+
+from pipeline.errors import RawDataError
+from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.worker import ADVICE
+
+HEADER = struct.Struct("<8s2I4Q")
+MAX_XML = 1 << 26
+PAGE, CONTENT = 1024, 1020
+FETCHING = re.compile(rb"<!DOCTYPE|<!ENTITY|schemaLocation", re.IGNORECASE)
+_QUOTED = rb"""\s*=\s*(?:"%s"|'%s')"""
+_ENCODING = rb"(?i:utf-8|us-ascii)"
+DECLARATION = re.compile(
+    rb"<\?xml\s+version" + _QUOTED % (rb"1\.[01]", rb"1\.[01]")
+    + rb"(?:\s+encoding" + _QUOTED % (_ENCODING, _ENCODING) + rb")?"
+    + rb"(?:\s+standalone" + _QUOTED % (b"(?:yes|no)", b"(?:yes|no)") + rb")?\s*\?>"
+)  # fmt: skip
+
+
+def check(path: Path, name: str) -> int:
+    """The file's size in bytes, where its header and its XML part can be trusted.
+
+    Raises
+    ------
+    RawDataError
+        The file is cut off, its header is damaged, or its XML part could fetch something.
+    """
+    with opened(path, name) as file:
+        size = size_of(file)
+        _, _, _, claimed, start, length, page = HEADER.unpack(file.read(HEADER.size).ljust(HEADER.size, b"\0"))
+        if claimed > size:
+            raise RawDataError(f"{name}: is cut off: {size} of {claimed} bytes; {ADVICE}")
+        first, skipped = divmod(start, PAGE)
+        pages = -(-(skipped + length) // CONTENT)
+        sound = page == PAGE and HEADER.size <= start and skipped < CONTENT and 0 < length <= MAX_XML
+        if not sound or (first + pages) * PAGE > size:
+            raise RawDataError(f"{name}: its E57 header is damaged; {ADVICE}")
+        stored = read_at(file, first * PAGE, pages * PAGE)
+    content = b"".join(stored[at : at + CONTENT] for at in range(0, len(stored), PAGE))
+    _refuse_fetching(content[skipped : skipped + length], name)
+    return size
+
+
+def _refuse_fetching(xml: bytes, name: str) -> None:
+    found = FETCHING.search(xml)
+    if found is not None:
+        raise RawDataError(
+            f"{name}: its XML part has {found[0].decode()!r}, by which it could read other files of this computer and "
+            "send them away; no scanner writes that: find out where the file comes from, and export it again"
+        )
+    text = xml.removeprefix(b"\xef\xbb\xbf")
+    if not _is_utf8(text) or (text.startswith(b"<?xml") and DECLARATION.match(text) is None):
+        raise RawDataError(f"{name}: its XML part is not in UTF-8, as E57 wants it; {ADVICE}")
+
+
+def _is_utf8(xml: bytes) -> bool:
+    try:
+        return "\0" not in xml.decode("utf-8")
+    except UnicodeDecodeError:
+        return False

@@ -1,0 +1,46 @@
+"""Which of the six are said to move together: both sides of the limit, and what it does to a sigma."""
+
+import numpy as np
+import pytest
+
+from pipeline.maths.solution import TOGETHER, together, weakest_direction
+
+YAW, ARM_Y = 2, 4
+
+
+def covariance_of(rho: float) -> np.ndarray:
+    """Of the six, with that correlation of yaw and lever arm y; the others have weaker ones."""
+    correlation = np.eye(6)
+    correlation[0, 1] = correlation[1, 0] = 0.3
+    correlation[YAW, ARM_Y] = correlation[ARM_Y, YAW] = rho
+    sigma = np.array([1e-4, 2e-4, 3e-4, 1e-3, 4e-3, 2e-3])
+    return correlation * np.outer(sigma, sigma)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_two_move_together_from_where_it_doubles_their_sigma(sign: float) -> None:
+    below, above = covariance_of(sign * (TOGETHER - 0.001)), covariance_of(sign * (TOGETHER + 0.001))
+    assert together(below) is None
+    assert weakest_direction(below) == "no two are hard to tell apart; least sure are yaw and lever arm y"
+    found = together(above)
+    assert found is not None
+    assert found[:2] == (YAW, ARM_Y)
+    assert found[2] == pytest.approx(sign * (TOGETHER + 0.001))
+    assert "yaw and lever arm y move together" in weakest_direction(above)
+
+
+@pytest.mark.parametrize("rho", [-0.929, 0.99])
+def test_what_is_said_of_the_sigma_is_what_fixing_the_other_does(rho: float) -> None:
+    """Fixing an unknown takes its row and column out of the normal matrix."""
+    covariance = covariance_of(rho)
+    normal = np.linalg.inv(covariance)
+    left = [k for k in range(6) if k != ARM_Y]
+    fixed = np.linalg.inv(normal[np.ix_(left, left)])
+    times = np.sqrt(covariance[YAW, YAW] / fixed[left.index(YAW), left.index(YAW)])
+    assert f"(correlation {rho:+.3f}): if one were known, the other's sigma would be {times:.1f} times smaller" in (
+        weakest_direction(covariance)
+    )
+
+
+def test_those_that_cannot_be_told_apart_at_all_leave_a_number() -> None:
+    assert "1000.0 times smaller" in weakest_direction(covariance_of(1.0))

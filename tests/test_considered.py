@@ -1,0 +1,44 @@
+"""What a cast's own error does to the change of the sound speed with depth."""
+
+import numpy as np
+import pytest
+
+from pipeline import config
+from pipeline.considered import considered_of, gradient_sigma
+
+MOUNT = config.Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
+
+
+def sonar(svp: list[list[float]] | None = None, **more: float) -> config.Mbes:
+    cast = None if svp is None else tuple((depth, speed) for depth, speed in svp)
+    return config.Mbes(files=["a"], format="table", mount=MOUNT, svp=cast, **more)  # type: ignore[arg-type]
+
+
+def test_it_is_the_scatter_of_the_slope_between_the_ends() -> None:
+    """Two hundred thousand casts whose ends are each off by themselves."""
+    errors = np.random.default_rng(3).normal(scale=0.07, size=(200_000, 2))
+    slopes = np.diff(errors, axis=1)[:, 0] / 3.5
+    found = gradient_sigma(sonar([[0.0, 1480.0], [1.0, 1481.0], [3.5, 1480.0]], svp_sigma_m_s=0.07), 3.5)
+    assert found == pytest.approx(slopes.std(), rel=0.01)
+
+
+def test_depths_below_the_target_do_not_make_it_surer() -> None:
+    long, short = [[0.0, 1480.0], [100.0, 1490.0]], [[0.0, 1480.0], [4.0, 1480.4]]
+    assert gradient_sigma(sonar(long), 4.0) == gradient_sigma(sonar(short), 4.0)
+    assert gradient_sigma(sonar(long), None) < gradient_sigma(sonar(short), None)
+
+
+def test_where_there_is_no_cast_the_gradient_is_as_unknown_as_without() -> None:
+    whole = sonar([[0.0, 1480.0], [4.0, 1480.0]], sound_speed_gradient_sigma_1_s=0.3)
+    half = sonar([[2.0, 1480.0], [4.0, 1480.0]], sound_speed_gradient_sigma_1_s=0.3)
+    assert gradient_sigma(sonar(sound_speed_gradient_sigma_1_s=0.3), 4.0) == 0.3
+    assert gradient_sigma(whole, 4.0) == pytest.approx(np.sqrt(2) * 0.05 / 4)
+    assert gradient_sigma(half, 4.0) == pytest.approx(np.hypot(np.sqrt(2) * 0.05 / 2, 0.15))
+
+
+def test_it_is_never_nothing_unless_it_is_said_to_be() -> None:
+    laser = config.Laser(files=["a"], format="las", mount=MOUNT)
+    cast = [[0.0, 1480.0], [4.0, 1480.0]]
+    names = ["sound_speed_gradient"]
+    assert considered_of(names, laser, sonar(cast), config.AsBuilt(), 4.0)[0] > 0
+    assert considered_of(names, laser, sonar(cast, svp_sigma_m_s=0.0), config.AsBuilt(), 4.0)[0] == 0.0
