@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # degrees, m, s
 REACH = 4  # bins on either side of a step
-FEWEST, FEWEST_FREE = 30, 8.0  # points, and degrees of freedom, of a mean that is judged
+FEWEST, FEWEST_MOMENTS, FEWEST_FREE = 30, 5, 8.0  # points, moments and degrees of freedom of a mean that is judged
 TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # columns of the drift
 KNOWN = 1e9  # degrees of freedom of a sigma that is given
 Row = dict[str, Any]
@@ -80,7 +80,7 @@ def _means(name: str, moments: Moments) -> list[Cell]:
 
 
 def _judged(cell: Cell) -> bool:
-    return cell.count >= FEWEST and cell.dof >= FEWEST_FREE
+    return cell.count >= FEWEST and cell.moments >= FEWEST_MOMENTS and cell.dof >= FEWEST_FREE
 
 
 def _row(name: str, sensor: str, family: str, cell: Cell) -> Row:

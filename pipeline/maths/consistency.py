@@ -8,6 +8,13 @@ the moments, not of the points. A mean is M = Σ S_m / P over moments m with P_m
 n is the number of equally heavy moments that would tell as much (Kish 1965, "Survey sampling"), n - 1 the degrees of
 freedom. 1 / P is what the observations' own noise leaves where moments share nothing: a few moments that lie close
 together by chance are no better than that.
+
+Where n - 1 < 8, Student's quantile at the levels of interest is so large that nothing would be found; there the scatter
+is taken together with what the surface's moments have everywhere, as if that were 8 moments' own (Smyth 2004, "Linear
+models and empirical Bayes methods for assessing differential expression"):
+
+    sigma² = (8 u² + (n - 1) sigma_own²) / (8 + n - 1),   u² = 1 / P + c² / n,
+    c² = max(0, Σ ((S_m - P_m M)² - P_m) / Σ P_m²) over all bins of the surface, with 8 + n - 1 degrees of freedom.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,6 +26,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 SPARSE = 10  # bins and slots, as a multiple of the points, that are not counted out one by one
+FEW = 8.0  # degrees of freedom below which the surface's other moments are asked as well
 ALONE = 1.001  # equal moments, at most, of what has no scatter
 
 
@@ -118,10 +126,17 @@ class _Side:
 def cells_of(moments: Moments) -> list[Cell]:
     """Each bin's mean."""
     found = []
-    for key, start, end in _bins(moments):
-        one = _Side.of(moments.key[start:end, 2], moments.sums[start:end])
+    bins = [(key, start, end, _Side.of(*_rows(moments, start, end))) for key, start, end in _bins(moments)]
+    of_surface: dict[int, list[_Side]] = {}
+    for key, _, _, one in bins:
+        of_surface.setdefault(key[0], []).append(one)
+    shared = {first: _shared(sides) for first, sides in of_surface.items()}
+    for key, start, end, one in bins:
         squares = float(moments.sums[start:end, 3].sum()) / one.count
-        variance = float(one.parts @ one.parts) if one.equal > ALONE else squares
+        variance, dof = (float(one.parts @ one.parts), one.equal - 1) if one.equal > ALONE else (0.0, 0.0)
+        if dof < FEW:
+            usual = one.least + shared[key[0]] / one.equal
+            variance, dof = (FEW * usual + dof * variance) / (FEW + dof), FEW + dof
         found.append(
             Cell(
                 key,
@@ -130,11 +145,17 @@ def cells_of(moments: Moments) -> list[Cell]:
                 one.mean,
                 float(np.sqrt(squares)),
                 float(np.sqrt(max(variance, one.least))),
-                one.equal - 1 if one.equal > ALONE else 0.0,
+                dof,
                 float(moments.largest[start:end].max()),
             )
         )
     return found
+
+
+def _shared(sides: list[_Side]) -> float:
+    """Variance c² of what the points of a moment share, from the scatter of all moments about their bins' means."""
+    scatter = sum(float(np.sum((one.pull - one.weight * one.mean) ** 2 - one.weight)) for one in sides)
+    return max(0.0, scatter / sum(float(one.weight @ one.weight) for one in sides))
 
 
 def against_others(moments: Moments) -> list[Cell]:
