@@ -22,6 +22,7 @@ from pipeline.clouds import ClosestSurface
 from pipeline.config import Mount, PoolConfig, SessionConfig, load_pool, load_session
 from pipeline.maths.targets import TargetModel
 from pipeline.mounts import mount_of, target_of
+from pipeline.target_settings import Letters, Origin
 from tests.effort import often
 from tests.end_to_end.places import SCENARIOS, poolcal, simulate
 
@@ -202,6 +203,9 @@ def test_a_pose_beyond_what_is_searched(blocks: Looked) -> None:
 TRUE = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.3, y_m=0.2, z_m=-2.0)
 
 
+BLOCKS = target_of(Letters(a=8, b=3, c=1, e=0.5, origin=Origin(latitude_deg=36, longitude_deg=120, height_m=12)))
+
+
 def _provisional(given: Mount) -> pd.DataFrame:
     turn = Rotation.from_matrix(mount_of(TRUE).R_body_from_sensor @ mount_of(given).R_body_from_sensor.T)
     return pd.DataFrame([dict(zip((f"rotation_{a}_deg" for a in "xyz"), turn.as_rotvec(degrees=True), strict=True))])
@@ -218,7 +222,7 @@ SIGNS = [
 @pytest.mark.parametrize(("wrong", "said", "severity"), SIGNS)
 def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severity: str) -> None:
     given = TRUE.model_copy(update=wrong)
-    (found,) = tried.signs(given, _provisional(given), 3.0)
+    (found,) = tried.signs(given, _provisional(given), BLOCKS, 3.0)
     assert said in found.words
     assert "roll_deg -48.8, pitch_deg 1.2, yaw_deg -2.0" in found.words
     assert found.severity == severity
@@ -227,7 +231,14 @@ def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severit
 @pytest.mark.parametrize("near", [{"pitch_deg": 2.0, "yaw_deg": -2.8}, {"yaw_deg": -4.9}, {"pitch_deg": -0.2}])
 def test_coarse_angles_are_no_wrong_signs(near: dict[str, float]) -> None:
     given = TRUE.model_copy(update=near)
-    assert list(tried.signs(given, _provisional(given), 3.0)) == []
+    assert list(tried.signs(given, _provisional(given), BLOCKS, 3.0)) == []
+
+
+def test_a_plain_wall_says_nothing_of_signs() -> None:
+    """Its soundings leave yaw and more to chance."""
+    given = TRUE.model_copy(update={"yaw_deg": 2.8})
+    flat = TargetModel(BLOCKS.faces[:1], BLOCKS.families[:1], (), BLOCKS.water_level_m, None)
+    assert list(tried.signs(given, _provisional(given), flat, 3.0)) == []
 
 
 def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:
