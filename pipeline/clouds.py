@@ -32,6 +32,11 @@ class ClosestSurface:
         """For workers: the scene is made anew there."""
         return ClosestSurface, (self._model,)
 
+    def around(self, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
+        """Which points (n, 3) can be within reach of the surface at all: those in its box, so much larger."""
+        low, high = self._model.bounds()
+        return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=1))
+
     def __call__(self, points_m: Array) -> tuple[Array, NDArray[np.int64]]:
         answer = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=THREADS)
         triangles = answer["primitive_ids"].numpy().astype(np.int64)

@@ -198,7 +198,8 @@ def _fields(model: type[BaseModel], location: Location) -> list[str]:
     for part in location:
         field = getattr(current, "model_fields", {}).get(part)
         current = field.annotation if field is not None else _tagged(current).get(part)
-        current = next((one for one in get_args(current) if hasattr(one, "model_fields")), current)  # or none at all
+        models = (one for one in get_args(current) if isinstance(one, type) and issubclass(one, BaseModel))
+        current = next(models, current)  # a block that may be left out altogether
     return list(getattr(current, "model_fields", ()))
 
 

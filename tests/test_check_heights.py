@@ -22,6 +22,8 @@ from pipeline.clouds import ClosestSurface
 from pipeline.config import Mount, PoolConfig, SessionConfig, load_pool, load_session
 from pipeline.maths.targets import TargetModel
 from pipeline.mounts import mount_of, target_of
+from pipeline.target_settings import Letters, Origin
+from tests.effort import often
 from tests.end_to_end.places import SCENARIOS, poolcal, simulate
 
 FINE: dict[str, Any] = {"ins": {"rate_hz": 100.0}, "mbes": {"ping_rate_hz": 10.0}}
@@ -42,7 +44,7 @@ class Looked:
         for sensor in ("laser", "mbes"):
             settings = getattr(self.session, sensor)
             changed = settings.model_copy(update={"mount": settings.mount.model_copy(update=mounts.get(sensor, {}))})
-            some = sample(self.files, self.session.model_copy(update={sensor: changed}), sensor, track, 4_000)
+            some = sample(self.files, self.session.model_copy(update={sensor: changed}), sensor, track, 2_000)
             assert some is not None
             found.append(some)
         return found
@@ -87,7 +89,7 @@ HEIGHTS = [-45, -20, -16, -9, -7, -5, -4.5, -4, -3, -2.5, -2, -1.5, 1.5, 2, 2.5,
 
 def test_a_wrong_height_names_itself_and_no_mount(looked: Looked) -> None:
     """Whole and half repetitions of the target (1 m) among them: its ends tell."""
-    for off in HEIGHTS:
+    for off in often(HEIGHTS[::3], HEIGHTS):
         (found,) = looked.missing(height_m=off)
         assert found.question == "height", (off, found)
         assert found.severity == "fault"
@@ -99,11 +101,11 @@ def test_a_wrong_height_names_itself_and_no_mount(looked: Looked) -> None:
 
 
 def test_a_height_that_is_right_is_not_doubted(looked: Looked) -> None:
-    for off in (0.0, -0.3, 0.3):
+    for off in often((0.0, 0.3), (0.0, 0.3, -0.3)):
         assert looked.missing(height_m=off) == []
 
 
-@pytest.mark.parametrize("off", [-2.0, -1.0, 1.0, 2.0])
+@pytest.mark.parametrize("off", [-2.0, pytest.param(-1.0, marks=pytest.mark.thorough), 2.0])
 def test_a_wrong_water_level_is_no_wrong_height(looked: Looked, off: float) -> None:
     assert looked.missing(water_m=off) == []
 
@@ -115,12 +117,6 @@ def test_z_of_one_mount_is_told_from_the_height(blocks: Looked) -> None:
     (found,) = blocks.missing(mbes={"z_m": -5.09})
     assert "mbes.mount.z_m = " in found.words
     assert float(found.words.split("z_m = ")[1].split()[0]) == pytest.approx(-2.09, abs=0.4)
-
-
-@pytest.mark.parametrize("off", HEIGHTS)
-def test_no_sonar_is_ever_lifted_out_of_the_water(blocks: Looked, off: float) -> None:
-    for found in blocks.missing(height_m=off):
-        assert "z_m = 2" not in found.words
 
 
 def test_a_lever_arm_in_centimetres(blocks: Looked) -> None:
@@ -207,6 +203,9 @@ def test_a_pose_beyond_what_is_searched(blocks: Looked) -> None:
 TRUE = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.3, y_m=0.2, z_m=-2.0)
 
 
+BLOCKS = target_of(Letters(a=8, b=3, c=1, e=0.5, origin=Origin(latitude_deg=36, longitude_deg=120, height_m=12)))
+
+
 def _provisional(given: Mount) -> pd.DataFrame:
     turn = Rotation.from_matrix(mount_of(TRUE).R_body_from_sensor @ mount_of(given).R_body_from_sensor.T)
     return pd.DataFrame([dict(zip((f"rotation_{a}_deg" for a in "xyz"), turn.as_rotvec(degrees=True), strict=True))])
@@ -223,7 +222,7 @@ SIGNS = [
 @pytest.mark.parametrize(("wrong", "said", "severity"), SIGNS)
 def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severity: str) -> None:
     given = TRUE.model_copy(update=wrong)
-    (found,) = tried.signs(given, _provisional(given), 3.0)
+    (found,) = tried.signs(given, _provisional(given), BLOCKS, 3.0)
     assert said in found.words
     assert "roll_deg -48.8, pitch_deg 1.2, yaw_deg -2.0" in found.words
     assert found.severity == severity
@@ -232,7 +231,14 @@ def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severit
 @pytest.mark.parametrize("near", [{"pitch_deg": 2.0, "yaw_deg": -2.8}, {"yaw_deg": -4.9}, {"pitch_deg": -0.2}])
 def test_coarse_angles_are_no_wrong_signs(near: dict[str, float]) -> None:
     given = TRUE.model_copy(update=near)
-    assert list(tried.signs(given, _provisional(given), 3.0)) == []
+    assert list(tried.signs(given, _provisional(given), BLOCKS, 3.0)) == []
+
+
+def test_a_plain_wall_says_nothing_of_signs() -> None:
+    """Its soundings leave yaw and more to chance."""
+    given = TRUE.model_copy(update={"yaw_deg": 2.8})
+    flat = TargetModel(BLOCKS.faces[:1], BLOCKS.families[:1], (), BLOCKS.water_level_m, None)
+    assert list(tried.signs(given, _provisional(given), flat, 3.0)) == []
 
 
 def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:

@@ -147,7 +147,7 @@ def _of_trial(given: _Given, track: Track, tried: Calibrated) -> Iterator[Findin
         yield from other_pose(track, laser, tried.target_pose, given.model, given.pool)
     if tried.provisional_mount is not None:
         mount = given.session.sonar.mount
-        yield from signs(mount, tried.provisional_mount, given.pool.segment.search_mount_deg)
+        yield from signs(mount, tried.provisional_mount, given.model, given.pool.segment.search_mount_deg)
 
 
 def _epochs(seen: Sequence[Seen]) -> dict[str, Times]:

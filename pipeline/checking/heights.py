@@ -117,6 +117,7 @@ def profile(
         moved = points + np.array([0.0, 0.0, shift])
         if water_m is not None:
             moved = moved[moved[:, 2] > water_m if sensor == "laser" else moved[:, 2] < water_m]
+        moved = moved[closest.around(moved, reach_m)]
         on, _ = closest(moved)
         squares = np.sum((moved - on) ** 2, axis=1) / reach_m**2
         found.append(float(np.sum(np.maximum(0.0, 1.0 - squares))) / len(points))

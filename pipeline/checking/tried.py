@@ -24,6 +24,7 @@ CLEARLY = 0.95  # of the best agreement: what has less is another
 SMALLEST_M = 0.15  # a height within it is right, as near as this tells
 ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
 LEAST_DEG, SMALL_DEG = 1.5, 0.3  # off by less the coarse mount is as good as may be; a sign of less changes nothing
+DIRECTIONS = 0.3  # smallest singular value of normals that span all directions
 HALF = 0.5  # of its error, which a reversed sign must leave at most
 
 
@@ -99,9 +100,15 @@ def _sides(target: config.Target) -> str:
     return "reverse the sign of the y of all corners, and the order of each face's corners"
 
 
-def signs(given: config.Mount, provisional: pd.DataFrame, within_deg: float) -> Iterator[Finding]:
+def signs(
+    given: config.Mount, provisional: pd.DataFrame, model: TargetModel, within_deg: float
+) -> Iterator[Finding]:
     """Angles whose reversed sign is nearer to the mount that the sample asks for; ``within_deg``: how far off a coarse
-    mount may be, so that the calibration finds the rest."""
+    mount may be, so that the calibration finds the rest. Nothing of a target whose faces do not look into three
+    directions: with a plain wall some angles are free, and come out as chance has it."""
+    normals = np.array([face.normal for face in model.faces if face.seen != "dry"])
+    if np.linalg.matrix_rank(normals, tol=DIRECTIONS) < 3:
+        return
     row = provisional.iloc[0]
     turn_deg = [float(row[f"rotation_{axis}_deg"]) for axis in "xyz"]
     if not np.isfinite(turn_deg).all():

@@ -65,7 +65,7 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
     [
         (["runn"], "No such command 'runn'"),
         (["run"], "Missing argument 'SESSION'"),
-        (["run", "x"], "missing: --config"),
+        (["run", "x"], "missing: --config FILE: the pool's YAML file"),
         (["run", "x", "--config", "y", "--run", "z", "--jobs", "many"], "--jobs"),
         (["run", "x", "--config", "y", "--run", "z", "--jobs", "0"], "--jobs 0: must be 1 or more"),
         (["run", "x", "--config", "missing.yaml", "--run", "z"], "missing.yaml: cannot be read"),
@@ -73,7 +73,7 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
         (["stage", "ingest", "z", "--session", "x"], "--session and --config: give both"),
         (["simulate", "x", "--seed", "-1"], "--seed -1: must not be negative"),
         (["verify", "z"], "z: holds no run.yaml"),
-        (["coarse", "marks.yaml"], "missing: --session"),
+        (["coarse", "marks.yaml"], "missing: --session SESSION: the folder with session.yaml"),
         (["coarse", "marks.yaml", "--session", "missing"], "missing: is no folder; SESSION is the folder that holds"),
         (["compare", "z", "truth.json"], "calibration.json: cannot be read"),
         (["--wrong"], "No such option"),

@@ -76,7 +76,7 @@ YAML: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     ),
     "session: week out of range": (
         lambda place: place.edit_session("ins", gps_week=42),
-        ("session.yaml", "ins.gps_week = 42", "1000"),
+        ("session.yaml", "ins.gps_week = 42", "modulo 1024", "42 + 2048 = 2090"),
     ),
     "session: unknown frame": (
         lambda place: place.edit_session("laser", frame="EPSG:0"),
