@@ -8,6 +8,7 @@ Needs Chromium and a Vulkan driver in software, which ``make setup-visual`` inst
 
 import argparse
 import contextlib
+import hashlib
 import os
 import shutil
 import socket
@@ -25,6 +26,10 @@ from tools.pipeline_picture import picture
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 SETTLE_S = 1.5  # after a change of tab or time, before the picture
 WIDTH = 1280
+TITLE_BAR_PX = 36  # of the viewer's window, with its warnings about this machine
+ROOT = Path(__file__).parents[1]
+DRAWN_FROM = "drawn_from.txt"  # beside the pictures
+SOURCES = {"report": "pipeline/pages", "recordings": "stages/views"}  # what each is drawn by
 
 
 def missing() -> str:
@@ -120,6 +125,19 @@ def report(run: Path, out: Path, height: int = 1500) -> None:
     chromium(f"--window-size={WIDTH},{height}", f"--screenshot={(out / 'report.png').resolve()}", page)
 
 
+def drawn_from() -> str:
+    """A line each for the report and the recordings: SHA-256 of all that draws them. It changes when they may look
+    otherwise; tests/test_pictures.py compares it with that of the README's pictures."""
+    found = {}
+    for what, folder in SOURCES.items():
+        digest = hashlib.sha256()
+        for path in sorted((ROOT / folder).glob("*")):
+            if path.suffix in (".py", ".html"):
+                digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+        found[what] = digest.hexdigest()
+    return "".join(f"{what} {digest}\n" for what, digest in found.items())
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=Path)
@@ -134,6 +152,7 @@ def main() -> None:
     for path in out.glob("*.png"):
         _lighten(path)
     picture(out / "pipeline.svg")
+    (out / DRAWN_FROM).write_text(drawn_from(), encoding="utf-8")
 
 
 def _lighten(path: Path) -> None:
@@ -141,6 +160,8 @@ def _lighten(path: Path) -> None:
     from PIL import Image
 
     image = Image.open(path).convert("RGB")
+    if path.name.startswith("recording-"):
+        image = image.crop((0, TITLE_BAR_PX, *image.size))
     image.thumbnail((WIDTH, 4 * WIDTH))
     image.save(path.with_suffix(".webp"), quality=85, method=6)
     path.unlink()

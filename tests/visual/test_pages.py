@@ -120,8 +120,8 @@ def test_on_paper_nothing_is_cut(page: Path, tmp_path: Path) -> None:
     named = [attributes.get("class") or "" for attributes in taken.named("table")]
     for table, classes in zip(taken.tables, named, strict=True):
         if "whole" in classes.split():
-            lines = ["".join("".join(row).split()) for row in table]
-            assert any(all(line in sheet for line in lines) for sheet in sheets), lines  # never torn
+            short = ["".join(cell.split()) for row in table for cell in row if 0 < len(cell) < 12]
+            assert any(all(cell in sheet for cell in short) for sheet in sheets), short  # never torn
         for row in table:
             for cell in row:
                 letters = "".join(cell.split())  # of a long one, broken into lines, the order is lost
