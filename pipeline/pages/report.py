@@ -51,7 +51,7 @@ SENSORS = ("laser", "mbes")
 STRONG = TOGETHER  # correlation that is set in bold
 MOST_GAPS = 12
 POSITIVE = {
-    "roll": "starboard down", "pitch": "bow up", "yaw": "counter-clockwise",
+    "roll": "starboard down", "pitch": "bow up", "yaw": "to port",
     "x": "to starboard", "y": "forward", "z": "up",
 }
 METHODS = {
@@ -166,7 +166,7 @@ def _closing(tables: Tables) -> list[dict[str, Any]]:
     the adjusted surface, sonar minus laser."""
     rows: list[Any] = tables.table(artefacts.CLOSING).to_dict("records")
     faces = tables.table(artefacts.FACES)
-    names, distances = faces["family"].to_numpy(), faces.groupby("family")["distance_m"].agg(np.ptp)
+    names, one_plane = faces["family"].to_numpy(), dict(zip(faces["family"], faces["one_plane"], strict=True))
     columns = ("sensor", "face", "residual_m", "coarse_residual_m")
     residuals, cells = tables.table(artefacts.RESIDUALS, *columns), tables.table(artefacts.CELLS)
     family = names[residuals["face"].to_numpy().astype(int)]
@@ -174,7 +174,7 @@ def _closing(tables: Tables) -> list[dict[str, Any]]:
     for name in families_of(faces):
         of_family = {sensor: residuals[(residuals["sensor"] == sensor) & (family == name)] for sensor in SENSORS}
         counts = cells[cells["family"] == name].groupby("sensor")["count"].sum()
-        if not distances[name] or any(len(one) < FEWEST for one in of_family.values()):
+        if one_plane[name] or any(len(one) < FEWEST for one in of_family.values()):
             continue
         for mount, column in (("coarse", "coarse_residual_m"), ("adjustment", "residual_m"))[: 1 + solved]:
             sonar, laser = of_family["mbes"][column], of_family["laser"]["residual_m"]

@@ -10,7 +10,7 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.families import families_of, level_families
@@ -158,9 +158,9 @@ def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: _Pl
 def _across(
     axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: _Plane, drawn: Sequence[Array]
 ) -> None:
-    """The whole height of the face with the most points, its thickness stretched to where the points lie."""
-    (cut,) = _cut(corners[int(points["face"].mode().iloc[0])], plane)
-    ends = cut[:, [plane.along, 2]]
+    """The highest of the faces with points in its whole height, its thickness stretched to where the points lie."""
+    there = [_cut(corners[number], plane)[0][:, [plane.along, 2]] for number in points["face"].astype(int).unique()]
+    ends = max(there, key=lambda cut: float(np.ptp(cut[:, 1])))
     slant = np.ptp(ends[:, 0]) / 2
     middle = float(ends[:, 0].mean())
     cloud = np.concatenate(drawn)
@@ -235,21 +235,33 @@ def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup
     z = cells.loc[[name not in level for name in of_family], "z_target_m"]
     heights = (z.min() - 0.1, z.max() + 0.1) if len(z) else (0.0, 1.0)
     image = None
-    for axis, name, width in zip(panels, order, widths, strict=True):
+    for axis, name in zip(panels, order, strict=True):
         inside = cells[of_family == name]
         flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
         size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
         image = _grid(axis, flat[:, 0], flat[:, 1], 1000 * inside["mean_m"].to_numpy(), size, span) or image
         axis.set(title=name, aspect="equal")
-        axis.xaxis.set_major_locator(MaxNLocator(2 if width < 1.2 else 4))
         axis.set_xlabel("x, m (from above)" if name in level else "to the right, m")
         if name not in level:
             axis.set_ylim(*heights)
+        _few_ticks(axis)
     panels[0].set_ylabel("z, height, m")
     if image is not None:
         bar = figure.add_axes((0.9, 0.15, 0.015, 0.7))
         figure.colorbar(image, cax=bar, label="mean residual, mm", extend="both")
     return picture(figure, f"maps of the {sensor}'s mean residuals over the faces")
+
+
+def _few_ticks(axis: Axes) -> None:
+    """Of a panel to scale, as many ticks as there is room for numbers beside each other."""
+    spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
+    box = axis.get_position(original=True)
+    room = box.width * WIDTH_IN, box.height * axis.figure.get_figheight()
+    scale = min(inches / span for inches, span in zip(room, spans, strict=True))
+    for ticks, span, needed in zip((axis.xaxis, axis.yaxis), spans, (0.5, 0.25), strict=True):
+        number = int(span * scale / needed)
+        middle = round(float(np.mean(ticks.get_view_interval())), 1)
+        ticks.set_major_locator(MaxNLocator(min(number, 6)) if number else FixedLocator([middle]))
 
 
 def _from_the_boat(faces: pd.DataFrame) -> list[str]:

@@ -29,7 +29,7 @@ def test_verdict_first_then_the_runs_numbers(undisturbed: tuple[Path, Told]) -> 
     assert page.text.index("accepted") < page.text.index("roll")
     rows = page.table("", "coarse", "calibrated")
     table = pd.read_parquet(run / "report" / "calibration.parquet").query("method == 'adjustment'")
-    signs = ("starboard down", "bow up", "counter-clockwise", "to starboard", "forward", "up")
+    signs = ("starboard down", "bow up", "to port", "to starboard", "forward", "up")
     named = zip(table["parameter"].tolist(), signs, strict=True)
     assert [row[0] for row in rows] == [f"{name} ({sign})" for name, sign in named]
     for row, values in zip(rows, table.to_dict("records"), strict=True):
