@@ -178,6 +178,8 @@ def _closing(tables: Tables) -> list[dict[str, Any]]:
             continue
         for mount, column in (("coarse", "coarse_residual_m"), ("adjustment", "residual_m"))[: 1 + solved]:
             sonar, laser = of_family["mbes"][column], of_family["laser"]["residual_m"]
+            if not (np.isfinite(sonar).all() and np.isfinite(laser).all()):
+                continue
             rows.append(
                 {
                     "mount": mount,
