@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from pipeline.config import PoolConfig
 from pipeline.maths.targets import TargetModel
 from pipeline.mounts import target_of
-from pipeline.pages import sections, style
+from pipeline.pages import maps, sections, style
 from pipeline.parsing import parse, read_yaml
 from tests.targets import by_letters
 
@@ -71,7 +71,8 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         found.append(figure)
         return Markup()
 
-    monkeypatch.setattr(sections, "picture", kept)
+    for module in (sections, maps):
+        monkeypatch.setattr(module, "picture", kept)
     return found
 
 
@@ -131,7 +132,7 @@ def test_no_letters_are_printed_over_others(name: str, drawn: list[Figure]) -> N
     with style():
         sections.distances(residuals, faces, family, True)
         for sensor in ("laser", "mbes"):
-            sections.maps(cells_of(residuals, faces), faces, sensor)
+            maps.maps(cells_of(residuals, faces), faces, sensor)
     for figure in drawn:
         canvas = FigureCanvasAgg(figure)
         for axis in figure.axes:
@@ -155,7 +156,7 @@ def test_families_without_points_have_no_panel(drawn: list[Figure]) -> None:
     residuals = residuals[names[residuals["face"]] != "return-north"]
     with style():
         sections.distances(residuals, faces, names[residuals["face"]], True)
-        sections.maps(cells_of(residuals, faces), faces, "mbes")
+        maps.maps(cells_of(residuals, faces), faces, "mbes")
     for figure in drawn:
         titles = [axis.get_title(loc="left").removesuffix(" (height)") for axis in figure.axes]
         assert sorted(filter(None, titles)) == ["fronts", "ledges", "return-south"]

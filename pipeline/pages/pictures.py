@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline import artefacts
 from pipeline.families import families_of
 from pipeline.folder import calibration, read_settings
-from pipeline.pages import curves, sections, style
+from pipeline.pages import curves, maps, sections, style
 from pipeline.passes import pass_of
 from pipeline.poses import trajectory_in_target
 from pipeline.tables import Tables
@@ -43,11 +43,11 @@ def _sections(tables: Tables) -> Markup:
 
 
 def _map_laser(tables: Tables) -> Markup:
-    return sections.maps(tables.table(artefacts.RESIDUAL_MAP), tables.table(artefacts.FACES), "laser")
+    return maps.maps(tables.table(artefacts.RESIDUAL_MAP), tables.table(artefacts.FACES), "laser")
 
 
 def _map_mbes(tables: Tables) -> Markup:
-    return sections.maps(tables.table(artefacts.RESIDUAL_MAP), tables.table(artefacts.FACES), "mbes")
+    return maps.maps(tables.table(artefacts.RESIDUAL_MAP), tables.table(artefacts.FACES), "mbes")
 
 
 def _convergence(tables: Tables) -> Markup:
@@ -65,7 +65,7 @@ def _tracks(tables: Tables) -> Markup:
         if len(track):
             found[int(one)] = track[:: max(1, len(track) // TRACK_POINTS)]
     azimuth_deg = tables.table(artefacts.POOL_FRAME)["azimuth_deg"].iloc[0] + pose["azimuth_correction_deg"].iloc[0]
-    return sections.tracks(found, tables.table(artefacts.FACES), float(azimuth_deg))
+    return maps.tracks(found, tables.table(artefacts.FACES), float(azimuth_deg))
 
 
 def _family(residuals: pd.DataFrame, tables: Tables) -> NDArray[Any]:
