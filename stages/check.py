@@ -6,6 +6,7 @@ from typing import Any
 
 from pipeline.checking import saying
 from pipeline.checking.calibrated import Calibrated, Raw
+from pipeline.checking.cast import in_words
 from pipeline.checking.examine import examine
 from pipeline.config import PoolConfig, SessionConfig, load_session
 from pipeline.errors import PoolcalError
@@ -20,7 +21,11 @@ def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     found = examine(session, content, pool, _calibrated)
-    return saying.as_json(found) if as_json else saying.text(found), found.faulty
+    if as_json:
+        return saying.as_json(found), found.faulty
+    used = None if content.mbes is None else content.mbes.svp_from
+    cast = "" if used is None else f"mbes.svp: {in_words(used)}\n\n"
+    return f"{cast}{saying.text(found)}", found.faulty
 
 
 def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrated:

@@ -184,26 +184,9 @@ def view(
 
     Nothing is served beyond this machine.
     """
-    from pipeline import folder
-    from pipeline.files import temporary_folder
-    from stages.drawing import Painters
-    from stages.views import recordings_of
-    from stages.views.opening import show
+    from stages.viewing import view as open_viewer
 
-    if stage is not None and stage not in ORDER:
-        raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
-    if second is None:
-        folder.read_settings(first)
-        say_failures(Painters(report=False, recordings=True).draw(first))
-        copy = f"copy {first}/*/*.rrd to a machine with one, or open {first}/report/report.html"
-        return show(recordings_of(first, stage), copy)
-    if stage is not None:
-        raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
-    with temporary_folder() as place:
-        path = place / "pair.rrd"
-        save_pair(first, second, comparison(first, second), path)
-        copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
-        return show([path], copy)
+    return open_viewer(first, second, stage)
 
 
 @app.command()

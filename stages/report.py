@@ -23,6 +23,7 @@ from pipeline.blocks import (
     target_block,
 )
 from pipeline.built import as_found, by_design, oddities
+from pipeline.checking.cast import in_words
 from pipeline.closing import closing_table
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.judging.residual_tests import pattern_tests
@@ -174,16 +175,7 @@ def _range_note(mbes: config.Mbes) -> str:
     if mbes.svp is None:
         return said
     said = f"{said}; rays traced through a cast of {len(mbes.svp)} depths"
-    used = mbes.svp_from
-    if used is None:
-        return said
-    averaged = f"averaged over {used.averaged_m:g} m, " if used.averaged_m else ""
-    left_out = "".join(f", left out {count} {reason}" for reason, count in used.left_out.items())
-    return (
-        f"{said} (mbes.svp {used.file}, {used.kind}, {f'taken {used.taken}' if used.taken else 'without a time'}: "
-        f"{used.rows} rows{left_out}; {used.first_m:g} to {used.last_m:g} m, {averaged}thinned within "
-        f"{used.tolerance_m_s:g} m/s)"
-    )
+    return said if mbes.svp_from is None else f"{said} (mbes.svp {in_words(mbes.svp_from)})"
 
 
 def _cast_block(mbes: config.Mbes) -> dict[str, Any]:

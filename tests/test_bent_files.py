@@ -1,7 +1,6 @@
 """YAML and meshes that no editor writes, files that are none, patterns without end: one line each, at once."""
 
 import os
-import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,23 +13,16 @@ from pipeline.files import read_json, read_regular
 from pipeline.meshes import with_mesh
 from pipeline.parsing import MAX_YAML_BYTES, parse, read_yaml
 from pipeline.readers import raw_files, raw_parts
+from tests.limits import limited
 from tests.runner.conftest import MOUNT
 
 ELSE = "ins: {files: [a], format: table}\nlaser: {files: [a], format: table, mount: MOUNT}\n".replace("MOUNT", MOUNT)
 
 
 @pytest.fixture(autouse=True)
-def at_most_ten_seconds() -> Iterator[None]:
-    """What waits for ever ends here."""
-
-    def late(*_: object) -> None:
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(10)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
+def limits() -> Iterator[None]:
+    with limited():
+        yield
 
 
 @pytest.mark.parametrize(

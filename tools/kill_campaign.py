@@ -3,8 +3,8 @@
 A small session is simulated and calibrated undisturbed. Then run after run is killed by SIGKILL at a random moment of
 its duration (the moments follow from the seed; what they hit does not) and started again in the same folder, after
 which every Parquet file must be that of the undisturbed run. Every other run is started over an earlier complete
-result of another config, so that results are being replaced when the kill comes. A run that ended before its kill does
-not count: it is tried again, until there are as many kills as were asked for.
+result of another config, so that results are being replaced when the kill comes; that one must still be in the folder.
+A run that ended before its kill does not count: it is tried again, until there are as many kills as were asked for.
 
     python -m tools.kill_campaign [--kills 50] [--seed 1]
 """
@@ -34,7 +34,7 @@ SCENARIO = {
     "mbes": {"ping_rate_hz": 8.0},
     "ins": {"rate_hz": 50.0},
 }
-DAMAGED = ".partial", ".old", ".new"  # what is under way when a stage or a file is being swapped in
+DAMAGED = ".partial", ".old", ".new", ".keeping"  # what is under way when a stage or a file is being swapped in
 
 
 @dataclass
@@ -81,6 +81,7 @@ def campaign(session: Path, folder: Path, kills: int, seed: int) -> Campaign:
     seconds = [calibrate(session, config, folder / "undisturbed")] * 2  # a run's duration: afresh, over a result
     right = digests(folder / "undisturbed")
     calibrate(session, other, folder / "earlier")
+    earlier = (folder / "earlier" / "report" / "calibration.json").read_bytes()
     while told.kills < kills:
         run, over = folder / f"run_{told.runs}", told.kills % 2
         if over:
@@ -98,6 +99,9 @@ def campaign(session: Path, folder: Path, kills: int, seed: int) -> Campaign:
         if found != right or left:
             wrong = sorted(name for name in right.keys() | found.keys() if right.get(name) != found.get(name))
             told.different.append(f"run {told.runs}: {', '.join(wrong + left)}")
+        elif over and earlier not in [path.read_bytes() for path in run.glob("report*/calibration.json")]:
+            left = ["the accepted result that was there is gone"]
+            told.different.append(f"run {told.runs}: {left[0]}")
         told.identical += found == right and not left
         shutil.rmtree(run)
     return told

@@ -1,4 +1,4 @@
-"""Whether a cast's file is of this session: by the time and the place that it tells of."""
+"""A cast's file: what was made of it, and whether it is of this session, by the time and place that it tells of."""
 
 from collections.abc import Iterator
 from datetime import datetime
@@ -11,6 +11,18 @@ from pipeline.times import NS, unix_ns_from_gps, utc_text
 LONGEST_H = 36.0  # between the cast and the soundings, whatever time zone its file has
 FARTHEST_KM = 5.0
 KM_PER_DEG = 111.2
+
+
+def in_words(used: CastUsed) -> str:
+    """What was made of it, in words."""
+    which = f", cast {used.number} of {used.casts}" if used.casts > 1 else ""
+    taken = f"taken {used.taken}" if used.taken else "without a time"
+    left_out = "".join(f", left out {count} {reason}" for reason, count in used.left_out.items())
+    averaged = f"averaged over {used.averaged_m:g} m, " if used.averaged_m else ""
+    return (
+        f"{used.file}, {used.kind}{which}, {taken}: {used.rows} rows{left_out}; {used.first_m:g} to {used.last_m:g} m, "
+        f"{averaged}thinned within {used.tolerance_m_s:g} m/s"
+    )
 
 
 def doubts(

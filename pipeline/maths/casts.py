@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-SAME_M = 5e-4  # depths nearer than this are one
+SAME_M = 1e-3  # depths are told apart to this
 MOST = 200  # depths of a profile
 TOLERANCE_M_S = 0.02  # of thinning: what a probe resolves; 0.1 mm in a range of 10 m
 LEAST_HEIGHT_M = 0.05  # over which scattered rows are averaged first
@@ -32,12 +32,9 @@ def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> 
 
 
 def ascending(depth_m: Array, speed_m_s: Array) -> tuple[Array, Array]:
-    """Sorted by depth; rows of one depth (to half a millimetre) become their mean."""
-    order = np.argsort(depth_m, kind="stable")
-    depth, speed = depth_m[order], speed_m_s[order]
-    group = np.concatenate([[0], np.cumsum(np.diff(depth) > SAME_M)])
-    count = np.bincount(group)
-    return np.bincount(group, depth) / count, np.bincount(group, speed) / count
+    """Sorted by depth; rows of the same millimetre become its mean."""
+    millimetre, group = np.unique(np.rint(depth_m / SAME_M), return_inverse=True)
+    return millimetre * SAME_M, np.bincount(group, speed_m_s) / np.bincount(group)
 
 
 @dataclass(frozen=True)

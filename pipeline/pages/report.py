@@ -54,6 +54,15 @@ POSITIVE = {
     "roll": "starboard down", "pitch": "bow up", "yaw": "to port",
     "x": "to starboard", "y": "forward", "z": "up",
 }
+SORTED_BY = {  # what residuals are sorted by, in the report
+    "face": "face",
+    "angle": "angle",
+    "step": "step at a receive angle",
+    "distance": "distance",
+    "time": "time",
+    "pass": "pass, against the others",
+    "drift": "drift of a pass, against the others",
+}
 METHODS = {
     "coarse": "coarse mount",
     "patent_sequential": "(1) patent, angles, then offsets",
@@ -87,6 +96,8 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         frame=tables.table(artefacts.POOL_FRAME).to_dict("records")[0],
         largest=_largest(tables.table(artefacts.CELLS)),
         tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
+        level=f"{100 * settings.pool.adjust.test_level:g}",
+        tests=[row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
         given_speed=None if laser else settings.session.sonar.sound_speed_m_s,
         speeds=_speeds(files),
         methods=METHODS,

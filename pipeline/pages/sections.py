@@ -22,6 +22,7 @@ from pipeline.residuals import FEWEST
 Array = NDArray[np.float64]
 MOST_PANELS = 7  # families in one picture
 HALF_SLICE_M = 0.04  # half the thickness of a section
+MAP_HEIGHT_IN = 2.9
 ASIDE_M = 0.3  # a point so far from a face is another's
 DOTS = 6000  # a cloud in one panel, at most
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
@@ -217,7 +218,7 @@ def _legend(figure: Figure, axis: Axes) -> None:
 
 def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
     """Mean residual over each family of faces as one sees it from the boat; level ones from above."""
-    figure = Figure(figsize=(WIDTH_IN, 2.9))
+    figure = Figure(figsize=(WIDTH_IN, MAP_HEIGHT_IN))
     where = {"left": 0.07, "right": 0.87, "bottom": 0.15, "top": 0.92, "wspace": 0.25}
     level = level_families(faces)
     family = dict(zip(faces["face"], faces["family"], strict=True))
@@ -256,7 +257,7 @@ def _few_ticks(axis: Axes) -> None:
     """Of a panel to scale, as many ticks as there is room for numbers beside each other."""
     spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
     box = axis.get_position(original=True)
-    room = box.width * WIDTH_IN, box.height * axis.figure.get_figheight()
+    room = box.width * WIDTH_IN, box.height * MAP_HEIGHT_IN
     scale = min(inches / span for inches, span in zip(room, spans, strict=True))
     for ticks, span, needed in zip((axis.xaxis, axis.yaxis), spans, (0.5, 0.25), strict=True):
         number = int(span * scale / needed)

@@ -60,6 +60,8 @@ def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     names = [path.relative_to(folder).as_posix() for path in paths]
     if len(paths) > 1:
         raise ConfigError(f"{where}.svp = {given!r}: matches {len(paths)} files ({', '.join(names[:3])}); name one")
+    if not names[0].isprintable():
+        raise RawDataError(f"{names[0]!a}: the cast's name has letters that cannot be shown; rename the file")
     svp, used = read_cast(paths[0], names[0], number)
     return dict(content) | {"mbes": block | {"svp": svp, "svp_from": used}}
 

@@ -39,7 +39,7 @@ def unfit(crs: Any) -> str | None:
     if not is_satellites(ellipsoid):
         return (
             f"is on the ellipsoid {ellipsoid.name}, the INS on that of WGS 84, GRS 80 or CGCS2000: points and heights "
-            "would lie tens of metres off; export the points in the INS's datum, such as in EPSG:4978"
+            "would be wrong by metres; export the points in the INS's datum, such as in EPSG:4978"
         )
     if level.prime_meridian.longitude != 0:
         return f"counts longitudes from {level.prime_meridian.name}; export the points with longitudes from Greenwich"

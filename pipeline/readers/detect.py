@@ -22,10 +22,6 @@ E57 = Kind("E57", "e57", ("laser",))
 GSF = Kind("GSF", "gsf", ("mbes",))
 KMALL = Kind("Kongsberg .kmall", "kmall", ("mbes",))
 ALL = Kind("Kongsberg .all", "all", ("mbes",))
-ALL_TURNED = Kind(
-    "Kongsberg .all in big-endian order",
-    advice="convert it to little-endian order, as the sonars of today write it, or export GSF",
-)
 INERTIAL_EXPLORER = Kind("an Inertial Explorer export", "inertial_explorer", ("ins",))
 XTF = Kind("XTF", "r2sonic", ("mbes",))
 PACKETS = Kind("R2Sonic packets", "r2sonic", ("mbes",))
@@ -79,9 +75,8 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
         return XTF
     if re.match(rb"#[A-Z]{3}\x00?", head[4:9]) and int.from_bytes(head[:4], "little") <= max(size, 1 << 20):
         return KMALL
-    for order, of_order in (("<", ALL), (">", ALL_TURNED)):
-        if is_head(head[:20], order):
-            return of_order
+    if is_head(head[:20]):
+        return ALL
     if head.startswith(NOVATEL_SYNCS):
         return NOVATEL
     if head[:4] in (BTH0, *OTHERS) or _has_packet(head[:16]):

@@ -14,7 +14,8 @@ from pipeline.readers.kind import Kind
 
 CLOUD = "export it to LAS or LAZ with GPS time stamps"
 SONAR = (
-    "export GSF with travel times and beam angles, of one head, or give the sonar's own files (R2Sonic packets, .kmall)"
+    "give the sonar's own files (R2Sonic packets, Kongsberg .kmall or .all), or export GSF with travel times and beam "
+    "angles, of one head"
 )
 TRACK = "export the INS's solution as SBET, as a text of Inertial Explorer, or as a table with README.md's columns"
 BY_SENSOR = {"ins": TRACK, "laser": CLOUD, "mbes": SONAR}
@@ -42,7 +43,11 @@ CAPTURE = Kind(
         "mbes": "take the packets of the sonar's bathymetry port out of it, or give the sonar's own files",
     },
 )
-ALL = Kind("Kongsberg .all", advice=SONAR)
+ALL_OF_A_SUN = Kind(
+    "Kongsberg .all in big-endian order",
+    advice="convert it to the order that the sonars of today write, or export GSF with travel times and beam angles",
+    advices={"ins": TRACK, "laser": CLOUD},
+)
 S7K = Kind("a .s7k file (Teledyne Reson, Norbit)", advice=SONAR)
 JSF = Kind("an EdgeTech .jsf file", advice=SONAR)
 HYPACK = Kind(
@@ -126,7 +131,7 @@ def _is_sentence(line: str) -> bool:
 
 
 SHAPES: tuple[tuple[Callable[[bytes, int], bool], Kind], ...] = (
-    (shape.is_all, ALL),
+    (shape.is_all_of_a_sun, ALL_OF_A_SUN),
     (shape.is_s7k, S7K),
     (shape.is_jsf, JSF),
     (shape.is_applanix, POSPAC),

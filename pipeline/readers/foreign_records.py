@@ -3,7 +3,6 @@
 A mark of two or three bytes, which other files may begin with by chance, counts only where the record that it begins is
 whole: its length leads to its end mark, to a checksum that is right, or to the next record. Little-endian:
 
-    Kongsberg .all         u32 length, STX, type, u16 model, u32 date yyyymmdd, u32 ms of the day, ..., ETX, u16 sum
     .s7k                   u16 version, u16 offset 60, u32 0x0000FFFF, u32 size, ..., at byte 32 u32 type of record
     EdgeTech .jsf          u16 0x1601, u8 version, u8 session, u16 type, 4 u8, u16, u32 bytes that follow
     Applanix POS           $GRP or $MSG, u16 number, u16 bytes that follow, the last two $#
@@ -19,16 +18,11 @@ import struct
 
 import numpy as np
 
+from pipeline.readers.all_datagrams import is_head
 
-def is_all(head: bytes, size: int) -> bool:
-    if len(head) < 20 or head[4] != 2:
-        return False
-    for order in "<>":
-        length, date, milliseconds = struct.unpack_from(f"{order}I4x2I", head)
-        possible = 16 <= length <= 1 << 20 and 19900101 <= date <= 21001231 and milliseconds < 86_400_000
-        if possible and (4 + length > len(head) or head[length + 1] == 3):
-            return True
-    return False
+
+def is_all_of_a_sun(head: bytes, size: int) -> bool:
+    return is_head(head[:20], ">")
 
 
 def is_s7k(head: bytes, size: int) -> bool:

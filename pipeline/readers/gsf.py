@@ -7,9 +7,10 @@ factors are those of the last ping that had any; a file begins with them.
 BEAM_ANGLE is, in the specification's words, the "incoming beam angle at transducer face" (table 4-3) and elsewhere the
 "rotation from vertical" (4.3.4.9). The writers looked at (CARIS HIPS, gsfu's own converter) put the former there, not
 roll corrected, whatever ROLL_COMPENSATED says, which is about depths; and positive to port, the first beam's side,
-which the specification leaves open; here starboard +. Where the fan lies along track is not told, so it must be fixed
-to the boat: files that say that pitch or yaw were stabilised, or that have several receivers or swaths (Kongsberg's
-newer sonars say so), are refused.
+which the specification leaves open; here starboard +. How the fan was sent is not told, so it must be fixed to the
+boat: refused are files that say that pitch or yaw were stabilised, that sectors were tilted, or that there are several
+receivers or swaths (Kongsberg's newer sonars say so), and those whose distances along track show it
+(:mod:`pipeline.readers.gsf_fans`); of files without such distances nothing is known.
 
 Angles and times are 16-bit numbers in most files, and some writers overflow them: an angle then jumps by 65536 steps.
 Pings in which two neighbouring beams lie more than 20 degrees apart, and ten times as far as is usual in the ping, are
@@ -29,6 +30,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
+from pipeline.readers.gsf_fans import Fans
 from pipeline.readers.gsf_records import HEADER, PING, PROFILE, records
 from pipeline.readers.sieve import (
     MAX_SPEED_M_S,
@@ -50,6 +52,7 @@ TIME = struct.Struct(">2I")
 MAX_BEAMS = np.iinfo(np.int16).max
 UNUSABLE = 1  # bit of a ping's or a beam's flags
 MAX_STEP_DEG = 20.0
+NO_TILT_DEG = 0.005
 STABILISED = 0b11  # of Kongsberg's modeAndStabilisation: pitch, yaw
 SPEEDS = ("SurfaceVelocity_mps", "SoundSpeed_mps", "SoundVelocity_mps", "SoundSpeedAtTxDepth_mPerSec")
 Scales = dict[int, tuple[float, float, int]]
@@ -64,7 +67,9 @@ class Ping(NamedTuple):
     two_way_time_s: NDArray[np.float64]
     sound_speed_m_s: float | None  # as the sensor's own part of the record has it
     stabilised: bool = False
+    tilt_deg: float = 0.0  # of the sector tilted most, where the sensor's own part tells it
     head: tuple[Any, ...] = ()  # receiver and swath, where the sensor's own part tells them
+    places: tuple[Any, ...] = ()  # along, across, depth (n,) m each; roll, pitch in degrees; where the record has them
     lacks: str = ""  # what the record has not, without which there are no soundings
 
 
@@ -97,6 +102,7 @@ class GsfPart:
         """Pings, their numbers, and the sound speeds at the head."""
         version, scales, profile_m_s, number = 3, Scales(), None, -1
         head: tuple[Any, ...] | None = None
+        fans = Fans()
         for kind, body in records(file, dropped):
             if kind == HEADER:
                 version = _version(body)
@@ -115,6 +121,9 @@ class GsfPart:
                     )
                 head = ping.head if head is None else head
                 self._refuse_other_fans(number, ping, head)
+                if ping.places and _is_smooth(ping.angle_deg):
+                    along, across, depth, *attitude = ping.places
+                    fans.add(along[ping.usable], across[ping.usable], depth[ping.usable], *attitude)
                 speed = ping.sound_speed_m_s or profile_m_s or self.sound_speed_m_s
                 if speed is None:
                     raise RawDataError(
@@ -122,12 +131,24 @@ class GsfPart:
                         "mbes.sound_speed_m_s in session.yaml, the one that its beams were steered with"
                     )
                 yield number, ping, speed
+        fans.refuse(self.name)
 
     def _refuse_other_fans(self, number: int, ping: Ping, head: tuple[Any, ...]) -> None:
         if ping.stabilised:
             raise RawDataError(
                 f"{self.name}: ping {number} was sent with pitch or yaw stabilisation: its fan has another direction "
-                "in each ping; switch both off and sail again"
+                "in each ping, which GSF does not tell; give the sonar's own .kmall or .all, or switch both off and "
+                "sail again"
+            )
+        if abs(ping.tilt_deg) > NO_TILT_DEG:
+            raise RawDataError(
+                f"{self.name}: ping {number} has sectors tilted by {ping.tilt_deg:.2f} degrees, and GSF does not tell "
+                "which way the transmitter looks; give the sonar's own .kmall or .all"
+            )
+        if not number and len(ping.angle_deg) == 1:
+            raise RawDataError(
+                f"{self.name}: its pings are of one beam (a single-beam echo sounder), which sees no planes; give the "
+                "files of a multibeam sonar"
             )
         if ping.head != head:
             raise RawDataError(
@@ -168,7 +189,21 @@ def decode(body: bytes, version: int, scales: Scales) -> Ping | None:
     sensor = record.get("SensorSpecific") or {}
     stabilised = bool(sensor.get("ModeAndStabilisation", 0) & STABILISED)
     head = tuple(sensor.get(name) for name in ("RxTransducerInd", "SwathAlongPosition"))
-    return Ping(t_ns, usable, angles, times, _speed_of(sensor), stabilised, head)
+    return Ping(t_ns, usable, angles, times, _speed_of(sensor), stabilised, _tilt_of(sensor), head, _places_of(record))
+
+
+def _tilt_of(sensor: dict[str, Any]) -> float:
+    """The largest tilt of a sector that a sensor's own part tells; 0 where it tells none."""
+    sectors = sensor.get("TxSectors") or {}
+    tilts = np.ravel(np.asarray(sectors.get("TiltAngleReTx_deg", sectors.get("TiltAngle_deg", 0.0)), dtype=np.float64))
+    return float(tilts[np.argmax(np.abs(tilts))]) if len(tilts) else 0.0
+
+
+def _places_of(record: dict[str, Any]) -> tuple[Any, ...]:
+    found = [record["Beams"][name] for name in ("AlongTrack_m", "AcrossTrack_m", "Depth_m")]
+    if any(values is None or len(values) != record["NumberBeams"] for values in found):
+        return ()
+    return (*found, record["Roll_deg"], record["Pitch_deg"])
 
 
 def _speed_of(sensor: dict[str, Any]) -> float | None:

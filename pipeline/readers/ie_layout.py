@@ -94,9 +94,12 @@ def read_layout(path: Path, name: str) -> Layout:
     given = replace(given, units=tuple(_assumed(given, rows[0] if rows else "")))
     starts = np.cumsum([0, *(3 if unit in THREE else 1 for unit in given.units)]).tolist()
     spans = [tuple(range(start, end)) for start, end in pairwise(starts)]
-    colons = {"hms", "dms"} & set(given.units)
-    separators = b","[: "," in text] + b":"[: bool(colons)] + b"/"[: any(unit in ORDERS for unit in given.units)]
-    words = [re.split(rf"[\s{separators.decode()}]+", row.strip()) for row in rows]
+    between = b","[: "," in text] + b"/"[: any(unit in ORDERS for unit in given.units)]
+    separators = between + b":"[: "hms" in given.units]
+    words = _split(rows, separators)
+    if "dms" in given.units and not any(len(row) == starts[-1] for row in words):
+        separators = between + b":"  # 36:30:15.2
+        words = _split(rows, separators)
     _refuse_three_of_one(given, {len(row) for row in words}, starts[-1], name)
     words = [row for row in words if len(row) == starts[-1]]
     sample = {k: _seconds(words, spans[k]) for k, column in enumerate(given.names) if column in TIMES}
@@ -115,6 +118,10 @@ def read_layout(path: Path, name: str) -> Layout:
     one = [float(sample[k][0]) for k in timed] if words and len(time) == 1 else []
     first_s = float(np.fmax.reduce(one)) if one else np.nan
     return Layout(start, separators, starts[-1], places, scales, clock, order, first_s, steps)
+
+
+def _split(rows: list[str], separators: bytes) -> list[list[str]]:
+    return [re.split(rf"[\s{separators.decode()}]+", row.strip()) for row in rows]
 
 
 def _seconds(rows: list[list[str]], places: tuple[int, ...]) -> NDArray[np.float64]:

@@ -56,7 +56,7 @@ def choose(given: Names, sample: Mapping[int, Array], file: str) -> tuple[list[t
         return columns + week, clock
     if "gpsdate" in dates and (units[dates["gpsdate"]] in ORDERS or not (counted and (week or utc))):
         return [*columns, ("gpsdate", dates["gpsdate"])], "gpsdate"
-    if utc and (of_week or not counted or np.nanmedian(sample[utc[0][1]]) < MOST_S):
+    if utc and (of_week or not counted or np.any(sample[utc[0][1]] < MOST_S)):
         return utc, "utcdate"
     if not counted:
         raise RawDataError(

@@ -130,6 +130,7 @@ class KongsbergPart(ABC):
             sound_speed_m_s=speed,
         )
         angle_rad, tilt_rad, time_s = fan.in_mbes(self.projector_offset_m)
+        recorded = np.isfinite(fan.angle_rad) & np.isfinite(fan.two_way_time_s)
         delay_ns = joined(lambda ping: np.rint(ping.sectors.delay_s * NS).astype(np.int64)[ping.sector])
         sieve = Sieve(
             {
@@ -142,11 +143,13 @@ class KongsbergPart(ABC):
                 "sound_speed_m_s": speed,
                 "extra": joined(lambda ping: ping.extra),
                 "rejected": joined(lambda ping: ping.rejected),
+                "placed": np.isfinite(tilt_rad) & np.isfinite(time_s) | ~recorded,
             },
             dropped,
         )
         sieve.keep(~sieve["extra"], "extra detection")
         sieve.keep(~sieve["rejected"], "rejected detection")
+        sieve.keep(sieve["placed"], "beam, fan and range do not meet")
         sieve.keep(possible_ns(sieve["t_ns"]), "impossible time (clock not set)")
         keep_possible_soundings(sieve)
         sieve.columns["t_ns"] = sieve["t_ns"] - latency_ns(self.latency_s)

@@ -13,6 +13,7 @@ the receiver's I. (of a head IR.); .all: S1X to S1H of the transmitter or head, 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,8 @@ INSIDE: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, and wheth
         "ISX": 0.002, "ISY": 0.10421, "ISZ": -0.01494, "IRX": 0.204, "IRZ": -0.0315,
     },
 }  # fmt: skip
-NEAR = 3.0  # times the transmitter's distance: no shorter path is reduced
-ROUNDS = 6  # of the iteration: the error falls by (distance of the arrays / range)² with each
+NEAR = 3.0  # times the transmitter's distance: no shorter path is possible
+ROUNDS = 4  # of the iteration: the error falls by (distance of the arrays / range)² with each
 NUMBER = re.compile(r"[-+]?\d{1,6}(\.\d{0,9})?")
 
 
@@ -80,7 +81,8 @@ class Fan:
             x_1 = |x - q| sin θ,   (x - t) · axis = |x - t| sin τ,   |x - t| + |x - q| = L = speed · time,
 
         by iteration from the parallel fan. Told are arcsin s, arcsin p and 2 r / speed; where session.yaml gives
-        ``projector_offset_m`` o, (|x| + |x - o|) / speed, from which the range is then taken.
+        ``projector_offset_m`` o, (|x| + |x - o|) / speed, from which the range is then taken. NaN is the time of a
+        path that is too short for it; 0 stays 0, which is no detection.
         """
         if not self.part_m.any() and not self.centre_m.any():
             return self.angle_rad, tilt_in_mbes(self.angle_rad, self.tilt_rad, self.axis), self.two_way_time_s
@@ -98,13 +100,15 @@ class Fan:
             along = sent * np.sin(tilt_in_mbes(angle, self.tilt_rad, self.axis)) + t[:, 1]
             s, p = heard * np.sin(self.angle_rad) / r, along / r
             r = r + (path - sent - heard) / 2
-        away = path > NEAR * (np.linalg.norm(t, axis=1) + np.linalg.norm(q, axis=1))
         from_m = np.array(projector_offset_m or (0.0, 0.0, 0.0))
-        told = r + np.linalg.norm(x - from_m, axis=1)
+        told = (r + np.linalg.norm(x - from_m, axis=1)) / self.sound_speed_m_s
+        told[path < NEAR * (np.linalg.norm(t, axis=1) + np.linalg.norm(q, axis=1))] = np.nan
+        heard_s = np.where(self.two_way_time_s == 0, 0.0, told)
+        found = np.isfinite(heard_s) & (heard_s > 0)
         return (
-            np.where(away, _on_side(np.arcsin(s), side), self.angle_rad),
-            np.where(away, np.arcsin(p), self.tilt_rad),
-            np.where(away, told / self.sound_speed_m_s, self.two_way_time_s),
+            np.where(found, _on_side(np.arcsin(s), side), self.angle_rad),
+            np.where(found, np.arcsin(p), self.tilt_rad),
+            heard_s,
         )
 
 
@@ -133,6 +137,7 @@ def _numbers(values: str) -> dict[str, float]:
     return {key: float(value) for key, _, value in pairs if NUMBER.fullmatch(value)}
 
 
+@lru_cache(maxsize=16)  # asked for with each ping
 def of_all(text: str, serial: int, model: int) -> Arrays | None:
     """Those of the receiver of this serial number; None where the installation does not tell.
 
@@ -145,7 +150,7 @@ def of_all(text: str, serial: int, model: int) -> Arrays | None:
     system = told.get("STC", 1.0 if "S2X" not in told else 0.0)
     if "S1X" not in told or system not in (0, 1, 2, 3, 5):
         return None
-    inside = INSIDE.get((model, system == 5), {})
+    inside = INSIDE.get((model, system == 5), {}) if system in (0, 3, 5) else {}
     if system in (1, 2, 5):
         return _crossed(inside, inside, _place(inside, "IR"))
     serials = [number for number in (2, 3) if told.get(f"R{number - 1}S") == serial] if system == 3 else [2]

@@ -37,6 +37,8 @@ from typing import Any
 
 from pipeline.drawn import agreeing, recording_path
 from pipeline.errors import ArtefactError
+from pipeline.folder import read_settings
+from pipeline.mounts import target_of
 from pipeline.tables import Tables
 from stages import ORDER, names_in
 
@@ -55,7 +57,8 @@ def record(run: Path, stage: str, tabs: Sequence[str]) -> bytes:
     """A stage's recording, as its file's content; shown in these tabs of stages.views.tour."""
     from stages.views.tour import tour
 
-    return content(recording_id(run), tour(tabs), lambda recording: log(recording, stage, Tables(run)))
+    model = target_of(read_settings(run).pool.target)
+    return content(recording_id(run), tour(tabs, model), lambda recording: log(recording, stage, Tables(run)))
 
 
 def log(recording: Any, stage: str, tables: Tables) -> None:

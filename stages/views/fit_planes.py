@@ -31,10 +31,11 @@ def log(recording: Any, tables: Tables) -> None:
             points = np.concatenate(cut).astype(np.float32)
             patch = rr.Mesh3D(vertex_positions=points, triangle_indices=triangles, albedo_factor=(*colour, 110))
             recording.log(f"planes/{sensor}/{family}", patch, static=True)
-            arrow = rr.Arrows3D(
-                origins=[plane.centroid_m], vectors=[plane.normal], radii=0.02, colors=colour, labels=family
-            )
+            arrow = rr.Arrows3D(origins=[plane.centroid_m], vectors=[plane.normal], radii=0.02, colors=colour)
             recording.log(f"planes/{sensor}/{family}/normal", arrow, static=True)
+            tip = plane.centroid_m + plane.normal  # a label has its point's colour, on grey: white can be read
+            name = rr.Points3D([tip], radii=0.001, colors=(255, 255, 255), labels=family)
+            recording.log(f"planes/{sensor}/{family}/normal/name", name, static=True)
 
 
 def cut_out(faces: pd.DataFrame, family: str, plane: Plane) -> list[np.ndarray]:

@@ -5,11 +5,11 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from pipeline.errors import ArtefactError
+from pipeline.files import temporary_folder
 from pipeline.progress import say
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
@@ -24,7 +24,11 @@ def show(paths: Sequence[Path], instead: str) -> int:
     viewer = Path(sys.executable).with_name("rerun")
     places = [str(path.absolute()) for path in paths]
     try:
-        with silent() as environment, tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as told:
+        with (
+            temporary_folder() as place,
+            silent() as environment,
+            (place / "told").open("w+", encoding="utf-8", errors="replace") as told,
+        ):
             command = [str(viewer), "--bind", "127.0.0.1", *places]
             status = subprocess.run(command, check=False, env=environment, stderr=told).returncode
             told.seek(0)
@@ -45,10 +49,10 @@ def silent() -> Iterator[Mapping[str, str]]:
     The viewer knows no option and no variable for that, only its file analytics.json: it is given one of its own, and
     the user's is neither read nor written.
     """
-    with tempfile.TemporaryDirectory() as place:
-        file = Path(place) / "rerun" / "analytics.json"
+    with temporary_folder() as place:
+        file = place / "rerun" / "analytics.json"
         file.parent.mkdir()
         given = {"analytics_enabled": False, "analytics_id": "none", "metadata": {}}
         given |= {"config_file_path": str(file), "data_dir_path": str(file.parent)}
         file.write_text(json.dumps(given), encoding="utf-8")
-        yield os.environ | {"XDG_CONFIG_HOME": place}
+        yield os.environ | {"XDG_CONFIG_HOME": str(place)}

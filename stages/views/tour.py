@@ -1,16 +1,21 @@
 """The blueprint: a crew's tour, from the whole scene to the quality of the data."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pipeline import artefacts
 from pipeline.folder import read_settings
-from pipeline.maths.targets import ROLES
+from pipeline.maths.targets import ROLES, TargetModel
 from pipeline.mounts import target_of
 from pipeline.store import rows_of
 
 PAPER = (255, 255, 255)
+FROM = (-1.0, -0.55, 0.45)  # the eye is in this direction from the target's middle
+DISTANCE = 2.0  # and so far, in halves of its diagonal
 TABS = ("Overview", "Before and after", "Iteration", "Residuals", "Quality")
 
 
@@ -31,25 +36,27 @@ def tabs_of(run: Path) -> tuple[str, ...]:
     return TABS
 
 
-def tour(tabs: Sequence[str] = TABS) -> Any:
-    """TABS: the scene, what the calibration did, how it got there, what is left, the data."""
+def tour(tabs: Sequence[str], model: TargetModel) -> Any:
+    """TABS: the scene, what the calibration did, how it got there, what is left, the data. What shows the target is
+    looked at from one place, from which all of it is seen."""
     import rerun.blueprint as rrb
 
     overview, change, iteration, left, quality = TABS
+    scene = partial(_scene_of, eye=_eye(model))
     every = (
         rrb.Horizontal(
-            _scene("The boat before the target", "/pool/**", "/target/**", "/fans/**"),
+            _scene_of("The boat before the target", "/pool/**", "/target/**", "/fans/**"),
             _words("/tables/summary", "Summary"),
             column_shares=[3, 2],
             name=overview,
         ),
         rrb.Horizontal(
-            _scene("Soundings and their planes with the coarse mount", "/before/**", "/target/**", "/planes/mbes/**"),
-            _scene("Soundings with the calibrated mount", "/after/**", "/target/**"),
+            scene("Soundings and their planes with the coarse mount", "/before/**", "/target/**", "/planes/mbes/**"),
+            scene("Soundings with the calibrated mount", "/after/**", "/target/**"),
             name=change,
         ),
         rrb.Horizontal(
-            _scene("Step by step, offsets not yet applied", "/iteration/**", "/target/model/**"),
+            scene("Step by step, offsets not yet applied", "/iteration/**", "/target/model/**"),
             rrb.Vertical(
                 _curves("/curves/deviation", "Deviation of the sonar's planes, degrees"),
                 _curves("/curves/planes", "Angle between sonar's and laser's planes, degrees"),
@@ -59,8 +66,8 @@ def tour(tabs: Sequence[str] = TABS) -> Any:
             name=iteration,
         ),
         rrb.Horizontal(
-            _scene("Points by residual", "/residuals/**", "/target/model/**"),
-            _scene("Mean residual over the faces", "/maps/**", "/target/model/**"),
+            scene("Points by residual", "/residuals/**", "/target/model/**"),
+            scene("Mean residual over the faces", "/maps/**", "/target/model/**"),
             _words("/tables/residuals", "Residuals"),
             column_shares=[2, 2, 2],
             name=left,
@@ -86,12 +93,12 @@ def side_by_side() -> Any:
 
     return _blueprint(
         rrb.Horizontal(
-            _scene("a: soundings, calibrated", "/a/after/**", "/a/target/model/**"),
-            _scene("b: soundings, calibrated", "/b/after/**", "/b/target/model/**"),
+            _scene_of("a: soundings, calibrated", "/a/after/**", "/a/target/model/**"),
+            _scene_of("b: soundings, calibrated", "/b/after/**", "/b/target/model/**"),
             name="Side by side",
         ),
         rrb.Horizontal(
-            _scene("Both with the mount of a: a blue, b orange", "/both/**", "/a/target/model/**"),
+            _scene_of("Both with the mount of a: a blue, b orange", "/both/**", "/a/target/model/**"),
             name="On one target",
         ),
         rrb.Horizontal(
@@ -110,10 +117,23 @@ def _blueprint(*tabs: Any, timeline: str = "iteration") -> Any:
     return rrb.Blueprint(rrb.Tabs(*tabs, active_tab=0), panel, collapse_panels=True)
 
 
-def _scene(name: str, *contents: str) -> Any:
+def _scene_of(name: str, *contents: str, eye: Any = None) -> Any:
     import rerun.blueprint as rrb
 
-    return rrb.Spatial3DView(origin="/", contents=[f"+ {path}" for path in contents], name=name, background=PAPER)
+    shown = [f"+ {path}" for path in contents]
+    return rrb.Spatial3DView(origin="/", contents=shown, name=name, background=PAPER, eye_controls=eye)
+
+
+def _eye(model: TargetModel) -> Any:
+    """In front of the target, from the south and from above, as far off as a view as high as wide needs."""
+    import rerun.blueprint as rrb
+
+    corners = np.concatenate([face.vertices_m for face in model.faces])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    middle = (low + high) / 2
+    away = DISTANCE * float(np.linalg.norm(high - low)) / 2
+    where = middle + away * np.array(FROM) / np.linalg.norm(FROM)
+    return rrb.EyeControls3D(position=where.tolist(), look_target=middle.tolist(), eye_up=(0, 0, 1))
 
 
 def _curves(origin: str, name: str) -> Any:

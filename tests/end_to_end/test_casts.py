@@ -91,12 +91,19 @@ def _gradient(place: Place) -> dict[str, float]:
 
 
 def test_a_cast_of_another_day_is_named(done: Place) -> None:
-    give(done, day="2026-129")
-    done.calibrate()
-    assert any("cast.svp was taken at 2026-05-09 05:00:00, " in words for words in done.result()["warnings"])
+    """In the report, where the file's name keeps its letters, and by check."""
+    give(done, day="2026-129").rename(done.session / "Cast <b>1.SVP")
+    done.edit_session("mbes", svp="*.SVP")
+    done.calibrate("--report")
+    page = (done.run / "report" / "report.html").read_text(encoding="utf-8")
+    assert "Cast &lt;b&gt;1.SVP, CARIS .svp, taken 2026-05-09 05:00:00" in page
+    assert "<b>1.SVP" not in page
+    assert any("1.SVP was taken at 2026-05-09 05:00:00, " in words for words in done.result()["warnings"])
+    told = poolcal("check", done.session)
+    assert told.out.startswith("mbes.svp: Cast <b>1.SVP, CARIS .svp, taken 2026-05-09 05:00:00: 195 rows; 0.1")
     told = poolcal("check", done.session, "--config", done.config, "--json")
     words = [finding["words"] for finding in json.loads(told.out)["findings"]]
-    assert any("cast.svp was taken at 2026-05-09" in one for one in words)
+    assert any("1.SVP was taken at 2026-05-09" in one for one in words)
     assert not any("km from here" in one for one in words)
 
 

@@ -78,20 +78,25 @@ def test_e57_and_a_sonar_s_files(sonar: str, small: Path, tmp_path: Path, undist
     same(result_of(undisturbed[0]), run(place.session), 0.05)
 
 
-def test_laser_points_in_utm(tmp_path: Path) -> None:
-    """LAS in ECEF as the simulator writes it, and the same points in UTM with ellipsoidal heights."""
+@pytest.mark.parametrize(
+    ("geocentric", "projected"),
+    [("EPSG:4978", "EPSG:32651"), pytest.param("EPSG:4479", "EPSG:4549", marks=pytest.mark.thorough)],
+)
+def test_laser_points_on_a_map(geocentric: str, projected: str, tmp_path: Path) -> None:
+    """LAS in ECEF as the simulator writes it, and the same points in UTM, or in China's Gauss-Krueger zone when the INS
+    is in CGCS2000, with ellipsoidal heights."""
     session = simulate(tmp_path / "session", laser={"frame": "EPSG:4978"})
     in_ecef = run(session)
-    to_utm = Transformer.from_crs("EPSG:4978", CRS("EPSG:32651").to_3d(), always_xy=True)
+    to_utm = Transformer.from_crs(geocentric, CRS(projected).to_3d(), always_xy=True)
     for path in sorted((session / "laser").glob("*.las")):
         points = laspy.read(path)
         east, north, up = to_utm.transform(points.x, points.y, points.z)
         header = laspy.LasHeader(point_format=6, version="1.4")
         header.scales, header.offsets = np.full(3, 1e-4), np.floor([east[0], north[0], up[0]])
         header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
-        header.add_crs(CRS("EPSG:32651"))
+        header.add_crs(CRS(projected))
         moved = laspy.LasData(header)
         moved.x, moved.y, moved.z, moved.gps_time = east, north, up, points.gps_time
         moved.write(str(path))
-    edit(session / "session.yaml", "laser", frame="EPSG:32651", heights="ellipsoidal")
+    edit(session / "session.yaml", "laser", frame=projected, heights="ellipsoidal")
     same(in_ecef, run(session), 0.05)

@@ -7,7 +7,8 @@ import pytest
 
 from stages import ORDER
 from tests.effort import often
-from tests.end_to_end.places import ROOT, Place, digests, poolcal_process
+from tests.end_to_end.places import ROOT, Place, digests, poolcal, poolcal_process
+from tests.end_to_end.refusals import one_line
 
 
 # --- the same bytes --------------------------------------------------------------------------------------------------
@@ -52,10 +53,15 @@ def test_twice_does_nothing(done: Place, right: dict[str, str]) -> None:
 def test_a_changed_setting(
     done: Place, right: dict[str, str], block: str, key: str, value: object, stage: str, reason: str
 ) -> None:
+    accepted = done.run / "report" / "calibration.json"
+    first = accepted.read_bytes()
     done.edit_config(block, **{key: value})
     told = done.calibrate()
     assert told.status == 0, told.err
     assert told.ran == after(stage)
+    kept = [path.read_bytes() for path in done.run.glob("report.*/calibration.json")]
+    assert kept == ([] if accepted.read_bytes() == first else [first])
+    assert bool(kept) == (block != "verdict")  # its limits are not in the result
     assert f"{reason}\n" in told.err
     for name in ORDER[: ORDER.index(stage)]:
         assert f"{name}: up to date\n" in told.err
@@ -82,6 +88,21 @@ def test_a_changed_coarse_mount(done: Place, right: dict[str, str]) -> None:
     assert told.ran[-1] == "report"
     ingested = {name: digest for name, digest in right.items() if name.startswith("ingest/")}
     assert ingested.items() <= digests(done.run).items()
+
+
+def test_another_sessions_raw_files_under_the_same_name(done: Place, right: dict[str, str]) -> None:
+    """session.yaml is soon copied. Cut by a few bytes each, no file has the content of one that was calibrated."""
+    done.session.rename(done.session.with_name("next_day"))
+    other = done.session.with_name("next_day")
+    for path in (other / "mbes").iterdir():
+        path.write_bytes(path.read_bytes()[:-1])
+    words = ("run", other, "--config", done.config, "--run", done.run, "--jobs", 1)
+    told = poolcal(*words)
+    one_line(told, str(done.run), "another session", str(done.template), "--overwrite")
+    assert digests(done.run) == right
+    assert poolcal(*words, "--overwrite").ran[0] == "ingest"
+    assert len(list(done.run.glob("report.1/calibration.*"))) == 2
+    assert poolcal("verify", done.run).status == 0
 
 
 def test_touching_is_no_change(done: Place) -> None:

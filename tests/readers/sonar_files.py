@@ -29,7 +29,7 @@ def subrecord(number: int, body: bytes) -> bytes:
 
 def scale_factors(**factors: tuple[int, int]) -> bytes:
     """Multiplier and offset of times and angles."""
-    numbers = {"time": 4, "angle": 5}
+    numbers = {"depth": 1, "across": 2, "along": 3, "time": 4, "angle": 5}
     table = [struct.pack(">BBHIi", numbers[name], 0, 0, *pair) for name, pair in factors.items()]
     return subrecord(100, struct.pack(">I", len(table)) + b"".join(table))
 
@@ -54,12 +54,15 @@ def gsf_ping(
     checked: bool = False,
     unix_ns: int | None = None,
     wide: bool = False,
+    attitude_deg: tuple[float, float] = (0.0, 0.0),
 ) -> bytes:
-    """By SCALES times are in microseconds and angles in hundredths of a degree, port +. ``wide``: times in 4 bytes."""
+    """By SCALES times are in microseconds and angles in hundredths of a degree, port +. ``wide``: times in 4 bytes;
+    ``attitude_deg``: pitch and roll."""
     place = (1_201_000_000, 360_000_000)
     when = divmod(unix_ns, 10**9) if unix_ns is not None else (seconds + k, 250_000_000)
     body = struct.pack(">2I2i4H", *when, *place, beams, beams // 2, ping_flags, 0)
-    body += struct.pack(">hiH3h2H3ih", 0, 0, 9000, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    pitch, roll = (round(angle * 100) for angle in attitude_deg)
+    body += struct.pack(">hiH3h2H3ih", 0, 0, 9000, pitch, roll, 0, 0, 0, 0, 0, 0, 0)
     body += extra
     if times is not None:
         body += subrecord(4, struct.pack(f">{len(times)}{'I' if wide else 'H'}", *times))
@@ -68,6 +71,20 @@ def gsf_ping(
     if flags:
         body += subrecord(16, bytes(flags))
     return record(2, body, checked)
+
+
+PLACED = scale_factors(depth=(1000, 0), across=(1000, 0), along=(1000, 0), time=(1_000_000, 0), angle=(100, 0))
+
+
+def gsf_placed(k: int, places_m: Sequence[Sequence[float]], attitude_deg: tuple[float, float]) -> bytes:
+    """A ping that tells where its beams lie: along track, across track, depth of each."""
+    along, across, depth = ([round(1000 * value) for value in values] for values in zip(*places_m, strict=True))
+    beams = len(along)
+    extra = PLACED + seabat(1480.0)
+    extra += subrecord(1, struct.pack(f">{beams}H", *depth)) + subrecord(2, struct.pack(f">{beams}h", *across))
+    extra += subrecord(3, struct.pack(f">{beams}h", *along))
+    angles = [6000 - 12_000 * n // (beams - 1) for n in range(beams)]
+    return gsf_ping(k, [9000] * beams, angles, extra, beams=beams, attitude_deg=attitude_deg)
 
 
 def gsf(count: int = 6, speed_m_s: float = 1480.0) -> bytes:

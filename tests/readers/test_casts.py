@@ -1,6 +1,7 @@
 """Casts of sound speed from files: against values written down here, and against decoders of the test's own."""
 
 import hashlib
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -131,9 +132,18 @@ def test_down_and_up_of_two_waters(file: Path) -> None:
 
 
 def test_repeated_depths_become_their_mean(file: Path) -> None:
-    svp, used = read(file, "depth speed\n1.0 1480.0\n2.0 1482.0\n2.0 1482.4\n1.9995 1482.2\n3.0 1480.0\n")
-    is_profile(svp, [(1.0, 1480.0), (1.99983, 1482.2), (3.0, 1480.0)])
+    svp, used = read(file, "depth speed\n1.0 1480.0\n2.0 1482.0\n2.0 1482.4\n1.9996 1482.2\n3.0 1480.0\n")
+    is_profile(svp, [(1.0, 1480.0), (2.0, 1482.2), (3.0, 1480.0)])
     assert used["left_out"] == {"of a depth that is there already: their mean is used": 2}
+
+
+def test_a_probe_that_sinks_slowly(file: Path) -> None:
+    """Rows a third of a millimetre apart are not all of one depth."""
+    rows = [(1 + k / 3000, 1480 + (k / 3000) ** 2) for k in range(6000)]
+    svp, _ = read(file, "depth speed\n" + "".join(f"{depth:.5f} {speed:.4f}\n" for depth, speed in rows))
+    depth, speed = np.array(svp).T
+    truth = np.array(rows)
+    assert np.max(np.abs(np.interp(truth[:, 0], depth, speed) - truth[:, 1])) < 0.025
 
 
 def test_waves_at_the_boat_change_no_order(file: Path) -> None:
@@ -292,6 +302,15 @@ def test_a_session_whose_cast_is_refused(mbes: dict[str, Any], words: str, tmp_p
         (folder / "casts" / "other.svp").write_text(CARIS)
     with pytest.raises((ConfigError, RawDataError), match=words):
         load_session(folder, with_cast)
+
+
+@pytest.mark.parametrize("name", ["a\nb.svp", os.fsdecode(b"\xff.svp"), "a\x1b[1m.svp"])
+def test_names_that_cannot_be_shown(name: str, tmp_path: Path) -> None:
+    folder = session(tmp_path, svp="casts/*.svp")
+    (folder / "casts" / "today.svp").rename(folder / "casts" / name)
+    with pytest.raises(RawDataError, match="letters that cannot be shown; rename") as error:
+        load_session(folder, with_cast)
+    assert str(error.value).isprintable()
 
 
 def test_the_name_of_the_file_stays_in_session_yaml(tmp_path: Path) -> None:

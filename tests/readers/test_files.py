@@ -8,6 +8,7 @@ import pytest
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import raw_files, raw_parts
 from tests.readers import build, ie_files
+from tests.readers.sonar_files import all_installation
 
 
 @pytest.fixture
@@ -138,6 +139,7 @@ def test_content_decides(sensor: str, kind: str, name: str, tmp_path: Path) -> N
         (b"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\n", "PCD.*export"),
         (b"\0\0\0\x14\0\0\0\1GSF-v03.08\0\0" + bytes(99), "GSF"),
         (b"\xa4\0\0\0#IIP\0" + bytes(999), "[Kk]ongsberg|KMALL"),
+        (all_installation() + bytes(999), r"Kongsberg \.all"),
     ],
 )
 @pytest.mark.parametrize(("sensor", "kind"), FORMATS)

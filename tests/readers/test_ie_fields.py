@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.errors import RawDataError
+from pipeline.errors import PoolcalError, RawDataError
 from tests.readers import build
 from tests.readers.ie_files import (
     ATTITUDE,
@@ -60,7 +60,8 @@ def poses_are(found: dict[str, np.ndarray], given: list[Row]) -> None:
     for name in ("latitude", "longitude"):
         assert found[f"{name}_rad"] == pytest.approx(np.radians([getattr(row, name) for row in given]), abs=2e-12), name
     for name, column in (("roll", "roll_rad"), ("pitch", "pitch_rad"), ("heading", "azimuth_rad")):
-        assert found[column] == pytest.approx(np.radians([getattr(row, name) for row in given]), abs=2e-8), name
+        apart = found[column] - np.radians([getattr(row, name) for row in given])
+        assert np.exp(1j * apart) == pytest.approx(np.ones(len(given)), abs=2e-8), name
     assert found["height_m"] == pytest.approx([row.height for row in given], abs=1e-3)
 
 
@@ -200,6 +201,22 @@ def test_units_that_can_be_read_in_two_ways(file: Path) -> None:
         read(file)
 
 
+def test_colons_between_degrees_minutes_and_seconds(file: Path) -> None:
+    """Only where the rows do not fit without: a column of a time that is not read may have colons as well."""
+    colons: Columns = {
+        "Latitude": ("(D:M:S)", lambda row: dms(row.latitude).replace(" ", ":")),
+        "Longitude": ("(D:M:S)", lambda row: dms(row.longitude).replace(" ", ":")),
+    }
+    file.write_bytes(export({**WEEK_SECONDS, **POSE, **colons}, ROWS))
+    found, dropped = read(file)
+    assert not dropped
+    poses_are(found, ROWS)
+    file.write_bytes(export({**LAYOUTS["sixtieths"], "LocTim": ("", lambda row: "12:30:00")}, ROWS))
+    found, dropped = read(file)
+    assert not dropped
+    poses_are(found, ROWS)
+
+
 # --- a time twice ----------------------------------------------------------------------------------------------------
 def twice(first: tuple[str, Callable[[Row], str]], second: tuple[str, Callable[[Row], str]]) -> Columns:
     return {"GPSTime": first, "GPSTime.1": second, **POSE, "AmbStatus": ("", lambda row: "Fixed"), **QUALITY}
@@ -300,6 +317,37 @@ def test_days_of_the_week_that_cannot_be(day: str, file: Path) -> None:
     found, dropped = read(file)
     has_times(found, given[:9] + given[10:])
     assert dropped == {"impossible time": 1}
+
+
+SPLIT: Columns = {
+    "UTCDate": ("(MDY)", lambda row: f"{row.utc:%m/%d/%Y}"), "UT": ("ho", lambda row: f"{row.utc:%H}"),
+    "UT ": ("mi", lambda row: f"{row.utc:%M}"), "UTCTim": ("(sec)", lambda row: f"{row.utc:%S}.0"),
+}  # fmt: skip
+DAMAGED: dict[str, Columns] = {
+    "twice": twice(("(sec)", of_day), ("(HMS)", hms)),
+    "split": {**SPLIT, **POSE},
+    **{name: {**WEEKS, **columns, **POSE} for name, columns in WITNESSES.items()},
+}
+
+
+@pytest.mark.parametrize("what", DAMAGED)
+@pytest.mark.parametrize("commas", [True, False])
+def test_damage_is_refused_or_counted(what: str, commas: bool, file: Path) -> None:
+    """Bytes changed in header and rows, and files cut off: rows of one order in time, or one line, nothing else."""
+    rng = np.random.default_rng(11)
+    good = export(DAMAGED[what], on(3, 30), commas, header="").replace(b"GPSTime.1", b"  GPSTime")
+    for _ in range(40):
+        bad = bytearray(good[: rng.integers(len(good) // 3, len(good) + 1)])
+        reach = len(bad) if rng.random() < 0.5 else 300  # half of them in the two lines of names and units
+        for place in rng.integers(0, reach, rng.integers(0, 6)):
+            bad[place] = rng.choice(list(b"0159 -.,:/()adGPSTimeHMS\n\t\xe4"))
+        file.write_bytes(bytes(bad))
+        try:
+            found, _ = read(file, gps_week=WEEK)
+        except PoolcalError as error:
+            assert "\n" not in str(error)  # noqa: PT017
+        else:
+            assert np.all(np.diff(found["t_ns"]) > 0) if found else True
 
 
 def test_layouts_do_not_depend_on_the_letters_case(file: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import Mbes
+from pipeline.config import Ins, Laser, Mbes, SessionConfig
 from pipeline.errors import RawDataError
 from pipeline.maths.soundings import points_in_mbes
 from pipeline.readers import kmall, kongsberg, raw_parts
@@ -205,7 +205,7 @@ def test_without_an_installation_times_and_angles_stay_as_recorded(file: Path) -
     assert columns["two_way_time_s"].tolist() == [float(np.float32(0.008))] * 5
     file.write_bytes(iip(APART, RECEIVER) + mrz(1, [sounding(0, 0.0, 0.0), sounding(1, 0.0, 1e-5)]))
     _, dropped = read("mbes", file, "kmall")
-    assert dropped == {"no detection": 1}  # also where the arrays lie apart
+    assert dropped == {"no detection": 1, "beam, fan and range do not meet": 1}  # the arrays lie farther apart
 
 
 # --- refused ---------------------------------------------------------------------------------------------------------
@@ -298,3 +298,15 @@ def test_unix_time_is_the_datagram_s() -> None:
     ping = kmall.decode(mrz(1, FAN, seconds=UTC_2024, nanoseconds=5), {})
     assert ping is not None
     assert ping.t_ns == GPS_2024 * NS + 5
+
+
+@pytest.mark.parametrize(("kind", "read_again"), [("kmall", True), ("all", True), ("r2sonic", False)])
+def test_files_are_read_again_where_their_reading_takes_the_transmitter_s_place(kind: str, read_again: bool) -> None:
+    """Of other sonars its place is put in afterwards, without reading."""
+    sonar = Mbes(files=["a"], format=kind, mount=MOUNT)  # type: ignore[arg-type]
+    session = SessionConfig(
+        name="a", ins=Ins(files=["i"], format="sbet"), laser=Laser(files=["l"], format="las", mount=MOUNT), mbes=sonar
+    )
+    moved = sonar.model_copy(update={"projector_offset_m": (0.0, 0.1, 0.0)})
+    other = session.model_copy(update={"mbes": moved})
+    assert (session.recordings != other.recordings) == read_again

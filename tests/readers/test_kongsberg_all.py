@@ -1,6 +1,5 @@
 """Kongsberg .all: signs, times of sectors, tilts, what is left out and what is refused; files made byte by byte."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from pipeline.config import Mbes
 from pipeline.errors import RawDataError
 from pipeline.readers import kongsberg, raw_parts
-from pipeline.readers.detect import kind_of_bytes
 from pipeline.times import GPS_EPOCH_UNIX_S
 from tests.readers.build import MOUNT, read, rows
 from tests.readers.sonar_files import (
@@ -148,14 +146,6 @@ def test_raw_ranges_of_older_sonars(kind: str, file: Path) -> None:
     with pytest.raises(RawDataError, match=r"a\.all: .*older sonars.*3 datagrams.*GSF") as error:
         read("mbes", file, "all")
     assert "\n" not in str(error.value)
-
-
-def test_the_other_order_of_bytes_is_recognised() -> None:
-    size, *head = struct.unpack_from("<IBBHIIHH", all_installation())
-    kind = kind_of_bytes(struct.pack(">IBBHIIHH", size, *head) + bytes(100), 400)
-    assert "big-endian" in kind.title
-    assert kind.format is None
-    assert kind.advice
 
 
 # --- damage ----------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ import laspy
 import numpy as np
 import pytest
 
+from pipeline.config import Ins, Laser, SessionConfig
 from pipeline.errors import ConfigError, PoolcalError, RawDataError
 from pipeline.readers import las as reader
 from pipeline.readers import raw_parts
@@ -148,6 +149,17 @@ def test_times_of_no_kind(time: str | None, file: Path) -> None:
     file.write_bytes(las(some(3, -5e9), adjusted=time == "adjusted_standard"))
     with pytest.raises(RawDataError, match=r"a\.las: .*and no seconds of GPS week or adj.*export it again"):
         read("laser", file, "las", gps_week=WEEK, time=time)
+
+
+def test_another_time_has_the_files_read_again() -> None:
+    """What the files are read by is all in the recordings, by which stage ingest is out of date."""
+    ins, laser = Ins(files=["a.gps"], format="novatel"), Laser(files=["a.las"], format="las", mount=build.MOUNT)
+    as_told, as_said = (
+        SessionConfig(name="a", ins=ins, laser=laser.model_copy(update={"time": time})).recordings
+        for time in (None, "adjusted_standard")
+    )
+    assert as_told != as_said
+    assert as_told.ins == as_said.ins
 
 
 def test_time_belongs_to_las() -> None:

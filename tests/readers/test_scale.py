@@ -25,7 +25,7 @@ def sparse(path: Path, start: bytes, size: int, end: bytes = b"") -> None:
         file.write(end)
 
 
-@pytest.mark.parametrize("shell", ["bare", "xtf", "gsf", "kmall"])
+@pytest.mark.parametrize("shell", ["bare", "xtf", "gsf", "kmall", "all"])
 def test_a_gap_of_zeros_costs_no_memory(shell: str, tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
     ends = build.ping(1), build.ping(2)
@@ -41,7 +41,7 @@ def test_a_gap_of_zeros_costs_no_memory(shell: str, tmp_path: Path) -> None:
     columns, dropped = read("mbes", path, kind)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert np.unique(columns["ping"]).tolist() == {"gsf": [0, 1], "kmall": [500]}.get(shell, [1, 2])
+    assert np.unique(columns["ping"]).tolist() == {"gsf": [0, 1], "kmall": [500], "all": [500]}.get(shell, [1, 2])
     assert rows(columns) == 10
     assert sum(dropped.values()) >= 1
     assert peak < 16 * MEGABYTE
@@ -61,7 +61,7 @@ def test_a_line_without_end_costs_no_memory(size: int, tmp_path: Path) -> None:
     assert peak < 96 * MEGABYTE
 
 
-SONARS = {"gsf": sonar_files.gsf(1), "kmall": sonar_files.kmall(1)}
+SONARS = {"gsf": sonar_files.gsf(1), "kmall": sonar_files.kmall(1), "all": sonar_files.kongsberg_all(1)}
 LIES = {  # what keeps a reader searching: starts of records that are none
     "names": (b"BTH0", "bare"),
     "packets that are too long": (b"BTH0\0\0\xff\xff", "bare"),
@@ -70,6 +70,8 @@ LIES = {  # what keeps a reader searching: starts of records that are none
     "hashes before letters": (b"#MRZ", "kmall"),
     "datagrams of the least length": (b"\x18\0\0\0#MRZ" + bytes(12) + b"\x18\0\0\0", "kmall"),
     "datagrams of another length at their end": (b"\xff\0\0\0#MRZ", "kmall"),
+    "begins of datagrams": (b"\2N", "all"),
+    "long datagrams": (b"\0\0\x0f\0" + sonar_files.kongsberg_all(1)[4:20], "all"),
     "pings of nothing": (b"\0\0\0\4\0\0\0\2\0\0\0\0", "gsf"),
     "kinds of records": (b"\0\0\0\2", "gsf"),
     "long records": (b"\0\7\xff\xff\0\0\0\2", "gsf"),

@@ -160,7 +160,7 @@ def test_mbes_lib_ray_traced_sounding() -> None:
     positions, R_pool_from_body = poses_in_pool(frame, *pose)
     R = R_pool_from_body @ mount_of(_mount((0.62, 0.0, 0.0), (0.0, 0.0, 0.0))).R_body_from_sensor
     speed, times, angle = np.array([1446.4250488]), np.array([2 * 0.0091418369]), np.array([0.7031931281])
-    straight, _ = points_in_mbes(times, angle, speed)
+    straight, _ = points_in_mbes(times, angle, np.zeros(1), speed)
     cast = Cast(*np.array(CAST.split(), dtype=float).reshape(-1, 2).T)
     ray = R[0] @ straight[0] / np.linalg.norm(straight[0])
     level = np.hypot(*ray[:2])

@@ -86,19 +86,31 @@ def pings_of(path: Path) -> list[Any]:
     return [gsf.decode(body, 3, scales) for body in bodies]
 
 
-def test_gsf(data: Path, read: Read) -> None:
-    soundings, dropped = read("mbes", "gsf", GSF)
-    assert len(soundings["t_ns"]) + sum(dropped.values()) == 8 * 432
-    assert dropped == {"flagged as not usable": 1087, "angles of the ping jump": 1046}
-    assert np.all(soundings["sound_speed_m_s"] == 1541.9)  # of the profile: the sensor's own is 0
-    first = pings_of(data / GSF)[0]
+def test_gsf(data: Path) -> None:
+    first, *others = pings = pings_of(data / GSF)
+    assert len(others) == 7
+    assert all(len(ping.angle_deg) == 432 for ping in pings)
     assert first.two_way_time_s[0] == pytest.approx(7.5676, abs=1e-9)
     assert first.angle_deg[[0, -1]] == pytest.approx([43.47, -43.2014], abs=1e-4)
     assert unix_ns_from_gps(np.array([first.t_ns]))[0] == pytest.approx(1_458_759_353.856 * NS, abs=200)
     assert np.count_nonzero(first.usable) == 204
-    beam = int(np.flatnonzero(first.usable)[0])
-    assert soundings["beam"][0] == beam
-    assert np.degrees(soundings["angle_rad"][0]) == pytest.approx(-first.angle_deg[beam])
+    assert sum(np.count_nonzero(~ping.usable) for ping in pings) == 1087
+
+
+def test_gsf_of_a_stabilised_sonar_is_refused(data: Path, read: Read) -> None:
+    """Its fans are turned by ten degrees, each sector otherwise, and lean aft by 1.75 degrees whatever the pitch."""
+    turns, leans = [], []
+    for record in _records(data):
+        beams = record["Beams"]
+        good = np.asarray(beams["BeamFlags"]) & 1 == 0
+        slope, at_nadir = np.polyfit(beams["AcrossTrack_m"][good], beams["AlongTrack_m"][good], 1)
+        turns.append(np.degrees(np.arctan(slope)))
+        leans.append(np.degrees(np.arctan(at_nadir / np.median(beams["Depth_m"][good]))))
+    assert turns == pytest.approx([10.0] * 8, abs=0.5)
+    assert np.std(leans) < 0.1
+    with pytest.raises(RawDataError, match=r"fans are not fixed to the boat.*leave one plane by 0\.8") as error:
+        read("mbes", "gsf", GSF)
+    assert "\n" not in str(error.value)
 
 
 def test_gsf_key_figures_and_sides(data: Path) -> None:

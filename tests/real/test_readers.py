@@ -12,6 +12,7 @@ from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import detect
 from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, GPS_EPOCH_UNIX_S, NS, WEEK_NS
 from tests.real.conftest import Read
+from tests.real.test_kongsberg_all import HE, TURBEAMS
 from tests.real.test_more_formats import BUNNY, GSF, KMALL, MOVED
 
 XTF = "mbes/r2sonic2026_qinsy.xtf"
@@ -306,7 +307,7 @@ REFUSED = {
 }
 FORMATS = {
     "laser": ("las", "e57", "table"),
-    "mbes": ("r2sonic", "gsf", "kmall", "table"),
+    "mbes": ("r2sonic", "gsf", "kmall", "all", "table"),
     "ins": ("novatel", "sbet", "inertial_explorer", "table"),
 }
 
@@ -331,6 +332,7 @@ def test_refused_with_advice(name: str, read: Read) -> None:
         ("laser/test1_4.las", "mbes", "r2sonic", ("LAS", "format")),
         (GSF, "mbes", "r2sonic", ("GSF", "write mbes.format: gsf")),
         (KMALL, "mbes", "table", ("kmall", "write mbes.format: kmall")),
+        (HE, "mbes", "kmall", (".all", "write mbes.format: all")),
         (BUNNY, "laser", "las", ("E57", "write laser.format: e57")),
         (BUNNY, "mbes", "gsf", ("E57", "list it under laser.files")),
     ],
@@ -343,8 +345,8 @@ def test_another_format_than_told(name: str, sensor: Any, kind: str, words: tupl
 
 NO_KIND = {path for path in REFUSED if path.endswith(".bin")}  # a program's own binary, without any mark
 WHOLE_SETTINGS: dict[str, dict[str, Any]] = {"ins": {"gps_week": 2000}, "laser": {"gps_week": 2000}, "mbes": {}}
-REFUSED_LATER = {  # of a format that is read, but damaged, without times, or with a wrong flag
-    "ins/pdal_badfile.sbet", "laser/pdal/pdal_sample_c.las", BUNNY, MOVED,
+REFUSED_LATER = {  # of a format that is read, but damaged, without times, with a wrong flag, of stabilised or two heads
+    "ins/pdal_badfile.sbet", "laser/pdal/pdal_sample_c.las", BUNNY, MOVED, GSF, TURBEAMS,
 }  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,19 +12,14 @@ from pipeline.errors import ArtefactError
 from pipeline.files import remove
 from pipeline.folder import calibration
 from pipeline.verify import verify
+from tests.limits import limited
 from tests.runner.conftest import Pool
 
 
 @pytest.fixture(autouse=True)
-def at_most_ten_seconds() -> Iterator[None]:
-    def late(*_: object) -> None:
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(10)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
+def limits() -> Iterator[None]:
+    with limited():
+        yield
 
 
 def test_a_lock_that_is_a_link_is_not_followed(pool: Pool, tmp_path: Path) -> None:

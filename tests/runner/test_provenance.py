@@ -122,6 +122,9 @@ def test_programs_lie_in_folders_that_are_taken_whole() -> None:
         text = path.read_text(encoding="utf-8")
         if "__main__" in text or "import_module(" in text or "__import__(" in text:
             assert path.relative_to(ROOT).as_posix().startswith("pipeline/readers/"), path
+    for stage in (*load(), *load("laser")):
+        for name in provenance.source_of(stage):
+            assert name == "stages/__init__.py" or "import_module(" not in (ROOT / name).read_text(encoding="utf-8")
 
 
 def test_every_module_that_a_stage_has_loaded_is_in_its_key() -> None:

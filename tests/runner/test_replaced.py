@@ -210,6 +210,17 @@ def test_an_ins_log_in_common_does_not_make_it_the_same(judged: Pool) -> None:
         judged.run()
 
 
+def test_where_the_laser_is_calibrated_its_own_files_tell(judged: Pool) -> None:
+    run = judged.run_folder.with_name("laser")
+    runner.run(judged.stages, judged.session, judged.config, run, calibrated="laser")
+    other = other_session(judged)
+    shutil.copy(judged.session / "mbes" / "0.bin", other / "mbes" / "0.bin")
+    with pytest.raises(ArtefactError, match=r"no laser file of .* poolcal laser --overwrite"):
+        runner.run(judged.stages, other, judged.config, run, calibrated="laser")
+    shutil.copy(judged.session / "laser" / "1.bin", other / "laser" / "7.bin")
+    assert runner.run(judged.stages, other, judged.config, run, calibrated="laser") == ["take", "sift", "tell"]
+
+
 def test_empty_files_have_nothing_in_common(judged: Pool) -> None:
     """A logger that was switched on and off leaves one in each session."""
     (judged.session / "mbes" / "1.bin").write_bytes(b"")

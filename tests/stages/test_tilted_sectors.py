@@ -1,5 +1,5 @@
 """Sessions of a head whose transmit sectors are tilted differently, as a Kongsberg EM2042's are: the mount of the
-receiving array comes back where the tilts are carried."""
+receiving array comes back where the tilts are carried, and where they are hidden the session is rejected."""
 
 import json
 
@@ -88,3 +88,43 @@ def test_a_plan_with_the_sectors_predicts_the_sigmas(key, session, carried):
     found = planned.as_plain(planned.judge(parse(Plan, content, "plan"), pool, settings))["given"][key]
     ratio = [found[name] / carried["methods"]["adjustment"][key][name] for name in SETTINGS]
     assert max(abs(np.log(ratio))) < np.log(1.15), dict(zip(SETTINGS, ratio, strict=True))
+
+
+def without_tilts(session):
+    """What a file says that has no place for them."""
+    return {"mbes": session.mbes | {"transmit_tilt_rad": np.zeros_like(session.mbes["transmit_tilt_rad"])}}
+
+
+def test_with_the_tilts_hidden_it_is_rejected_and_the_step_is_named(session, errors_of):
+    hidden = result_of(session, raw=without_tilts(session))
+    assert not as_its_sigmas_say(hidden, session, errors_of)
+    assert hidden["verdict"] == "rejected"
+    assert "at a receive angle of 40° the sonar's distance from P" in hidden["reasons"][0]
+    assert "likely transmit sectors of different tilt" in hidden["reasons"][0]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("border_deg", [15.0, 30.0, 48.0])
+def test_wherever_the_border_lies_the_step_is_named(border_deg):
+    session = made(symmetrical(border_deg), seed=22)
+    hidden = result_of(session, raw=without_tilts(session))
+    assert hidden["verdict"] == "rejected"
+    assert f"at a receive angle of {border_deg:.0f}° the sonar's distance from P" in hidden["reasons"][0]
+
+
+@pytest.mark.thorough
+def test_hidden_tilts_from_ping_to_ping_are_warned_of():
+    """They shift whole pings, one forward and the next astern: more than the INS's white noise does."""
+    session = made(by_ping(0.0, 0.3), seed=22)
+    hidden = result_of(session, raw=without_tilts(session))
+    assert any("whole pings scatter" in words for words in hidden["warnings"])
+
+
+@pytest.mark.thorough
+def test_one_tilt_hidden_in_all_sectors_shows_nowhere():
+    """README says so: it is taken for a yaw of the head, which is rolled by -48.8°."""
+    session = made({"mbes": {"format": "parquet", "sectors": [{"to_deg": 90.0, "tilt_deg": -0.75}]}}, seed=22)
+    hidden = result_of(session, raw=without_tilts(session))
+    assert hidden["verdict"] == "accepted"
+    yaw_deg = hidden["mbes"]["mount"]["yaw_deg"] - session.truth["mbes"]["mount"]["yaw_deg"]
+    assert yaw_deg == pytest.approx(-0.72, abs=0.05)
