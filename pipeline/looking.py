@@ -25,6 +25,7 @@ from pipeline.times import NS
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # degrees, m, s
+CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may take its modes in turn, from ping to ping
 REACH = 4  # bins on either side of a step
 FEWEST, FEWEST_MOMENTS, FEWEST_FREE = 30, 5, 8.0  # points, moments and degrees of freedom of a mean that is judged
 TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # columns of the drift
@@ -74,7 +75,7 @@ def look(
 
 
 def _means(name: str, moments: Moments) -> list[Cell]:
-    if name == "pass":
+    if name == "pass" or name in CYCLES:
         return against_others(moments)
     return steps_of(moments, REACH) if name == "step" else cells_of(moments)
 
@@ -84,12 +85,13 @@ def _judged(cell: Cell) -> bool:
 
 
 def _row(name: str, sensor: str, family: str, cell: Cell) -> Row:
+    width = WIDTHS.get(name, 1.0)
     return {
         "by": name,
         "sensor": sensor,
         "family": family,
-        "low": cell.key[1] * WIDTHS[name],
-        "width": WIDTHS[name],
+        "low": cell.key[1] * width,
+        "width": width,
         "count": cell.count,
         "mean_m": cell.mean_m,
         "sigma_mean_m": cell.sigma_mean_m,
@@ -138,7 +140,7 @@ def _look(
     # a whole cell off must show, not be cut away: plain weights
     moments = {}
     for name, values in _variables(sensor, seen):
-        place = np.floor(values / WIDTHS[name]).astype(np.int64)
+        place = np.floor(values / WIDTHS.get(name, 1.0)).astype(np.int64)
         moments[name] = moments_of(seen.surface, place, slot, 1 / plain**2, seen.v_m, size)
     some = {name: values[::step] for name, values in batch.items()}
     return moments, scene.sample(sensor, some, state, drift, weighting)
@@ -157,3 +159,5 @@ def _variables(sensor: str, seen: Observations) -> Iterator[tuple[str, Array | I
     yield "time", batch["t_ns"] // NS
     if sensor == "mbes":
         yield "step", angle
+        for name, pings in CYCLES.items():
+            yield name, batch["ping"] % pings

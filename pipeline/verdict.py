@@ -168,7 +168,7 @@ def _causes(freed: pd.DataFrame, alone: bool) -> list[str]:
     if not found:
         return []
     others = f"; {plural(len(found) - 1, 'other parameter')} would explain it less well" if len(found) > 1 else ""
-    unless = ", if it is not what lies off by itself" if alone else ""
+    unless = ", unless the face, step, pass or ping named above is itself the cause" if alone else ""
     return [f"likely cause of residuals{unless} ({found[0][1]:.0f} sigma): {found[0][0]}{others}"]
 
 

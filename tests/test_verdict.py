@@ -310,7 +310,7 @@ def test_steps_to_both_sides_are_transmit_sectors(family, mean_m, low, tilted):
 def test_a_cause_of_all_points_is_told_apart_from_what_is_off_by_itself():
     held = {"value": 6e-4}
     assert "likely cause of residuals (6 sigma)" in judged(evidence(bin_=[OFF], held=held))[1]
-    words = "likely cause of residuals, if it is not what lies off by itself (6 sigma)"
+    words = "likely cause of residuals, unless the face, step, pass or ping named above is itself the cause (6 sigma)"
     assert words in judged(evidence(bin_=[OFF | {"by": "step"}], held=held))[1]
 
 

@@ -29,7 +29,7 @@ from tools.montecarlo import DRIFT, FOLDER, TASKS_OF_A_WORKER, THIN, WHITE
 Array = NDArray[np.float64]
 Raw = dict[str, NDArray[Any]]
 PATH = FOLDER / "residual_tests.parquet"
-BY = ("face", "angle", "step", "distance", "time", "pass", "drift")
+BY = ("face", "angle", "step", "ping_2", "ping_3", "ping_4", "distance", "time", "pass", "drift")
 TILT_DEG = 0.254  # between the sectors of a real head
 APART_NS = 10 * 10**9  # a longer gap divides passes
 LEVELS = (0.001, 0.05)
@@ -69,6 +69,13 @@ class World:
     def longer(self, rows: NDArray[np.bool_], by_m: float) -> None:
         """Ranges."""
         self.mbes["two_way_time_s"] = self.mbes["two_way_time_s"] + rows * 2 * by_m / self.mbes["sound_speed_m_s"]
+
+    def mix(self, other: Raw, taken: Callable[[Raw], NDArray[np.bool_]]) -> None:
+        """Soundings of ``other`` where they are to be taken, its own elsewhere."""
+        own, others = ~taken(self.mbes), taken(other)
+        both = {name: np.concatenate([self.mbes[name][own], other[name][others]]) for name in other}
+        order = np.lexsort((both["beam"], both["ping"]))
+        self.mbes = {name: values[order] for name, values in both.items()}
 
 
 def _face(names: tuple[str, ...]) -> Callable[[World], str]:
@@ -110,14 +117,16 @@ def _sectors(border_deg: float) -> Callable[[World], str]:
     def plant(world: World) -> str:
         """The fan's middle is tilted forward against its flanks, and the file does not tell."""
         tilted = world.again(np.array([np.radians(TILT_DEG), 0.0, 0.0]))
-        inside = np.abs(np.degrees(tilted["angle_rad"])) <= border_deg
-        outside = np.abs(world.angle_deg) > border_deg
-        both = {name: np.concatenate([world.mbes[name][outside], tilted[name][inside]]) for name in tilted}
-        order = np.lexsort((both["beam"], both["ping"]))
-        world.mbes = {name: values[order] for name, values in both.items()}
+        world.mix(tilted, lambda raw: np.abs(np.degrees(raw["angle_rad"])) <= border_deg)
         return "steps by"
 
     return plant
+
+
+def _by_turns(world: World) -> str:
+    """Every other ping is tilted forward, as of two frequencies in turn, and the file does not tell."""
+    world.mix(world.again(np.array([np.radians(TILT_DEG), 0.0, 0.0])), lambda raw: raw["ping"] % 2 == 1)
+    return "in one ping of 2"
 
 
 FAULTS: dict[str, Callable[[World], str]] = {  # each plants itself, and tells what must be named
@@ -129,6 +138,7 @@ FAULTS: dict[str, Callable[[World], str]] = {  # each plants itself, and tells w
     "sectors: 0.254° within 15°": _sectors(15.0),
     "sectors: 0.254° within 30°": _sectors(30.0),
     "sectors: 0.254° within 40°": _sectors(40.0),
+    "tilts: 0.254° every other ping": _by_turns,
 }
 Task = tuple[str, str, int]  # fault or "", kind, number
 

@@ -87,16 +87,18 @@ CELLS = Artefact(
 PATTERNS = Artefact(
     "adjust", "patterns", "table", "mean residuals of all points along one variable at a time, bins of enough moments",
     (
-        Column("by", TEXT, "", "face, angle (2 degrees), distance (1 m), time (10 s); step, pass, drift: differences"),
+        Column("by", TEXT, "",
+               "face, angle (2 degrees), distance (1 m), time (10 s); differences: step, pass, ping_2 to 4, drift"),
         Column("sensor", TEXT, "", "laser or mbes; drift: ins"),
         Column("family", TEXT, "", "P1, P2, P3 or H; drift: turn_x, turn_y or turn_z, about target axes"),
         Column("low", F64, "1, deg, m or s",
-               "number of the face or pass, lower edge of the bin (time: GPS seconds); step: the angle where it is"),
+               "number of the face or pass, lower edge of the bin (time: GPS seconds); step: the angle where it is; "
+               "ping_n: the remainder of the ping's number divided by n"),
         Column("width", F64, "1, deg, m or s", "of the bin"),
         Column("count", I64, "1", "observations (of two means the fewer); drift: knots"),
         Column("mean_m", F64, "m (drift: rad)",
-               "weighted mean residual; step: of the 4 degrees from there on less that of the 4 before; pass: of the "
-               "pass less that of all others; drift: the same of the drift found"),
+               "weighted mean residual; step: of the 4 degrees from there on less that of the 4 before; pass, ping_n: "
+               "of these less that of all others; drift: the same of the drift found"),
         Column("sigma_mean_m", F64, "m (drift: rad)",
                "standard deviation of that from the scatter of the moments; drift: as conceded to the INS"),
         Column("dof", F64, "1", "degrees of freedom of that"),

@@ -16,7 +16,8 @@ import pandas as pd
 from pipeline.maths.excess import limit_of
 
 OF_PASSES = ("drift", "pass")
-ALONE = ("face", "step", "pass")  # what may be off by itself
+CYCLE = "ping_"  # and the number of pings in turn
+ALONE = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # what may be off by itself
 CONCEDED = "{:.1f} times the drift that it is conceded"
 SENSORS = {"laser": "the laser", "mbes": "the sonar"}
 FAR_M = 0.05  # a mean residual beyond this is no drift: the model is another
@@ -154,9 +155,22 @@ def _pattern(row: Row, tables: Tables, over: pd.DataFrame, test: str) -> str:
     if by == "angle":
         what = "receive angles" if row["sensor"] == "mbes" else "elevations"
         return f"residuals go with angle: between {what} {low:.0f}° and {high:.0f}° {lies}"
+    if by.startswith(CYCLE):
+        return _cycle(row, test)
     if by == "distance":
         return f"residuals go with distance: from {low:.0f} to {high:.0f} m {lies}"
     return f"residuals go with time: for ten seconds (GPS {low:.0f}) {lies}"
+
+
+def _cycle(row: Row, test: str) -> str:
+    """Modes that a sonar takes in turn, whose fans are tilted differently, displace whole pings along the track."""
+    pings = int(row["by"].removeprefix(CYCLE))
+    which = f"one ping of {pings} (those whose number divided by {pings} leaves {row['low']:.0f})"
+    return (
+        f"residuals go with pings: in {which} the sonar lies {1000 * row['mean_m']:+.1f} mm off {row['family']} "
+        f"against the other pings ({test}); likely modes taken in turn (frequencies, swaths) whose transmit fans have "
+        "different tilts: give each sounding its tilt (column transmit_tilt_deg of a table), or record in a single mode"
+    )
 
 
 def _step(row: Row, over: pd.DataFrame, test: str) -> str:

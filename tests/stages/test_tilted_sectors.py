@@ -113,11 +113,14 @@ def test_wherever_the_border_lies_the_step_is_named(border_deg):
 
 
 @pytest.mark.thorough
-def test_hidden_tilts_from_ping_to_ping_are_warned_of():
+@pytest.mark.parametrize("tilts_deg", [(0.0, 0.3), (0.0, 0.1, 0.3)])
+def test_hidden_tilts_from_ping_to_ping_are_named(tilts_deg):
     """They shift whole pings, one forward and the next astern: more than the INS's white noise does."""
-    session = made(by_ping(0.0, 0.3), seed=22)
+    session = made(by_ping(*tilts_deg), seed=22)
     hidden = result_of(session, raw=without_tilts(session))
     assert any("whole pings scatter" in words for words in hidden["warnings"])
+    assert hidden["verdict"] == "rejected"
+    assert hidden["reasons"][0].startswith(f"residuals go with pings: in one ping of {len(tilts_deg)} (")
 
 
 @pytest.mark.thorough
