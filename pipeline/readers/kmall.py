@@ -47,7 +47,7 @@ class KmallPart(KongsbergPart):
         installation: Installation = {}
         for datagram in datagrams(file, dropped):
             if datagram[4:8] == IIP:
-                installation = of_kmall(datagram.decode("latin-1")) or installation
+                installation = of_kmall(datagram.decode("latin-1"))
             elif (ping := decode(datagram, installation)) is not None:
                 yield ping
             else:

@@ -58,6 +58,25 @@ def test_tilts_in_the_receiver_s_frame(turned: str, sign: int, file: Path) -> No
     assert np.degrees(columns["transmit_tilt_rad"]) == pytest.approx([sign * 0.5, sign * 1.25, sign * -10.0])
 
 
+@pytest.mark.parametrize("spoilt", ["S1H=", "S1H=1.8e2", "S2P=x", "S2H=180 0"])
+def test_an_angle_that_cannot_be_read_is_not_nothing(spoilt: str, file: Path) -> None:
+    text = f"STC=0,{TRANSMITTER},{RECEIVER}".replace(f"{spoilt[:4]}0.00", spoilt)
+    file.write_bytes(all_installation(text, model=710) + raw_ranges(1, THREE, (0.5, 1.25, -10), (), (), model=710))
+    with pytest.raises(RawDataError, match=r"a\.all: .*tilted.*does not tell"):
+        read("mbes", file, "all")
+
+
+@pytest.mark.parametrize(("model", "turned"), [(3020, 1), (710, -1)])
+def test_the_second_transducer_of_heads_without_configuration(model: int, turned: int, file: Path) -> None:
+    """S2 is another head of an EM 3002, which may not be there; of an EM 710 the receiver."""
+    text = f"{TRANSMITTER},{RECEIVER}".replace("S1X=0.00", "S1X=1.50").replace("S1H=0", "S1H=180")
+    file.write_bytes(all_installation(text, model=model) + raw_ranges(1, FAN, (0.5,), model=model))
+    columns, _ = read("mbes", file, "all")
+    assert np.sign(columns["transmit_tilt_rad"]).tolist() == [turned] * len(columns["ping"])
+    same = bool(np.allclose(columns["two_way_time_s"], [time for *_, time in FAN], rtol=1e-6))
+    assert same == (model == 3020)
+
+
 def test_each_ping_has_its_own_tilts(file: Path) -> None:
     """As with stabilisation, and with two swaths a ping."""
     content = b"".join(raw_ranges(number, FAN, (tilt,), model=710) for number, tilt in ((1, 0.3), (2, -2.0), (3, 5.25)))
