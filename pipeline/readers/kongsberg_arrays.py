@@ -149,8 +149,8 @@ def of_all(text: str, serial: int, model: int) -> Arrays | None:
     """Those of the receiver of this serial number; None where the installation does not tell.
 
     STC is 0 for one transmitter and one receiver, 1, 2 and 5 for heads of both arrays, 3 for one transmitter and two
-    receivers, whose serial numbers are then R1S and R2S; older sonars do not say it (HEADS). Where the parts of an array lie is
-    told by .kmall files of the same sonars alone: of the EM 2040, whose parts send different sectors.
+    receivers, whose serial numbers are then R1S and R2S; older sonars do not say it (HEADS). Where the parts of an
+    array lie is told by .kmall files of the same sonars alone: of the EM 2040, whose parts send different sectors.
     """
     pairs = (pair.partition("=") for pair in text.split(","))
     told = {key.strip("\0 \r\n"): float(value) for key, _, value in pairs if NUMBER.fullmatch(value.strip())}
