@@ -44,6 +44,7 @@ TRAJECTORY_TEXT = Kind(
     advice="export it as SBET (POSPac, Qinertia, Delph INS, OxTS and Inertial Explorer have it), or as a table with "
     "the columns that README.md names; if it is Inertial Explorer's, export it with its header",
 )
+UTF16 = Kind("a text in UTF-16", advice="save it as UTF-8")
 UNKNOWN = Kind(
     "of no kind that is read",
     advice="export it in one of the formats that README.md names; if it should be one of them, copy it again",
@@ -94,7 +95,9 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
         return NOVATEL
     if _has_packet(head):
         return PACKETS
-    return _kind_of_text(head) if text else UNKNOWN
+    if text:
+        return _kind_of_text(head)
+    return UTF16 if head[:2] in (b"\xff\xfe", b"\xfe\xff") and b"\0" in head[:64] else UNKNOWN
 
 
 def _is_xtf(head: bytes) -> bool:
