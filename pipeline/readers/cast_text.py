@@ -229,7 +229,7 @@ def _rows(lines: Sequence[str], number: int, separator: str, place: tuple[int, i
     units_there = any(unit in METRES | METRES_PER_SECOND or OTHER_UNIT.search(unit) for unit in below_place)
     if worded and len(below_place) == len(place) and (units_there or len(under) >= len(names) > 1):
         units = below_place
-    before = next((found[1].lower() for line in lines[:number] if (found := DEPTH_UNIT.search(line))), "")
+    before = next((unit_told[1].lower() for line in lines[:number] if (unit_told := DEPTH_UNIT.search(line))), "")
     for k, known, unit in zip(place, (METRES, METRES_PER_SECOND), units, strict=True):
         told = _unit(names[k]) or unit or (before if known is METRES else "")
         if told not in known:
