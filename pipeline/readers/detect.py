@@ -72,12 +72,12 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
             return kind
     if (other := foreign.marked(head)) is not None:
         return other
-    if head[:1] == b"\x7b" and _is_xtf(head):
-        return XTF
     if re.match(rb"#[A-Z]{3}\x00?", head[4:9]) and int.from_bytes(head[:4], "little") <= max(size, 1 << 20):
         return KMALL
     if is_head(head[:20]):
         return ALL
+    if head[:1] == b"\x7b" and _is_xtf(head):  # which a datagram of 123 bytes begins with as well
+        return XTF
     if head.startswith(NOVATEL_SYNCS):
         return NOVATEL
     if head[:4] in (BTH0, *OTHERS) or _has_packet(head[:16]):

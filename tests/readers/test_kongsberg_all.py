@@ -77,6 +77,23 @@ def test_the_second_transducer_of_heads_without_configuration(model: int, turned
     assert same == (model == 3020)
 
 
+def test_a_ping_that_is_there_twice_counts_once(file: Path) -> None:
+    content = b"".join(raw_ranges(number, FAN) for number in (1, 2))
+    file.write_bytes(content + content)
+    columns, dropped = read("mbes", file, "all")
+    assert columns["ping"].tolist() == [1] * 5 + [2] * 5
+    assert dropped == {"repeated ping": 2}
+
+
+def test_a_first_datagram_of_123_bytes_is_no_xtf(file: Path) -> None:
+    """XTF begins with the byte 123."""
+    content = raw_ranges(1, [(float(n), 0, 0.008) for n in range(3)])
+    content = all_datagram("A", 1, bytes(123 - 16 - 3)) + content
+    assert content[0] == 0x7B
+    file.write_bytes(content)
+    assert len(read("mbes", file, "all")[0]["ping"]) == 3
+
+
 def test_each_ping_has_its_own_tilts(file: Path) -> None:
     """As with stabilisation, and with two swaths a ping."""
     content = b"".join(raw_ranges(number, FAN, (tilt,), model=710) for number, tilt in ((1, 0.3), (2, -2.0), (3, 5.25)))
