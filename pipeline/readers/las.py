@@ -152,7 +152,8 @@ def read_header(path: Path, name: str, told: LasTime = None) -> Header:
         (first_s,) = struct.unpack("<d", read_at(file, time_at, 8).ljust(8, b"\0"))
         here = min(claimed, present)
         adjusted = told == "adjusted_standard" if told else bool(encoding & 1)
-        return Header(adjusted, told, compressed, size, claimed, here, first_s if here else 0.0, scales)
+        first_s = first_s if here and np.isfinite(first_s) else 0.0
+        return Header(adjusted, told, compressed, size, claimed, here, first_s, scales)
 
 
 def parts(

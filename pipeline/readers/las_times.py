@@ -47,7 +47,8 @@ def _refuse(name: str, first: float, adjusted: bool, told: LasTime, likely: bool
         remedy = f"write laser.time: {KEYS[not adjusted]} in session.yaml, or export it again with the right flag"
     elif likely:
         remedy = f"take laser.time out, or write laser.time: {KEYS[not adjusted]}"
-    raise RawDataError(f"{name}: {source} promises {NAMES[adjusted]}, but {first:.6f} is none, {other}; {remedy}")
+    shown = f"{first:.6f}" if abs(first) < 1e12 else f"{first:g}"
+    raise RawDataError(f"{name}: {source} promises {NAMES[adjusted]}, but {shown} is none, {other}; {remedy}")
 
 
 def _is_weekly(seconds: NDArray[np.float64]) -> NDArray[np.bool_]:

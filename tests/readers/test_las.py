@@ -151,6 +151,20 @@ def test_times_of_no_kind(time: str | None, file: Path) -> None:
         read("laser", file, "las", gps_week=WEEK, time=time)
 
 
+def test_a_first_point_at_infinity_moves_no_week(file: Path) -> None:
+    points = [(k, k, k, seconds) for k, seconds in enumerate((float("inf"), 300_000.0001, 300_000.1001))]
+    file.write_bytes(las(points, adjusted=False))
+    columns, dropped = read("laser", file, "las", gps_week=WEEK)
+    assert (columns["t_ns"] // (604_800 * 10**9)).tolist() == [WEEK, WEEK]
+    assert dropped == {"not a finite number": 1}
+
+
+def test_a_huge_time_is_told_in_few_digits(file: Path) -> None:
+    file.write_bytes(las([(1, 2, 3, 1e300)] * 5, adjusted=False))
+    with pytest.raises(RawDataError, match=r"a\.las: its header promises .*but 1e\+300 is none"):
+        read("laser", file, "las", gps_week=WEEK)
+
+
 def test_another_time_has_the_files_read_again() -> None:
     """What the files are read by is all in the recordings, by which stage ingest is out of date."""
     ins, laser = Ins(files=["a.gps"], format="novatel"), Laser(files=["a.las"], format="las", mount=build.MOUNT)
