@@ -5,6 +5,7 @@ unit of the CRS's own axes (feet with feet), with degrees in metres. Heights abo
 """
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -123,7 +124,8 @@ def placing_of(frame: Frame) -> Placing | None:
 
     where = f"session.yaml: laser.frame = {frame.name!r}"
     try:
-        crs = CRS.from_user_input(frame.name)
+        with warnings.catch_warnings(action="ignore", category=FutureWarning):  # of +init=epsg:...
+            crs = CRS.from_user_input(frame.name)
     except ProjError as error:
         raise ConfigError(
             f"{where}: no coordinate reference system is known by that name; write laser, or a CRS by its number, such "

@@ -248,3 +248,9 @@ def test_a_centimetre_is_fine_enough(frame: str, scale: float, tmp_path: Path) -
     heights = "ellipsoidal" if frame == "EPSG:32651" else None
     path = las(tmp_path, points, None, scale, 0.01)
     assert rows(read("laser", path, "las", frame=frame, heights=heights)[0]) == 1
+
+
+def test_an_old_way_of_writing_a_crs_warns_of_nothing(recwarn: pytest.WarningsRecorder) -> None:
+    """The user sees one line at most, and none of the library's."""
+    assert placing_of(Frame("+init=epsg:32651", "ellipsoidal")) is not None
+    assert not recwarn
