@@ -137,7 +137,7 @@ def _asvp(lines: Sequence[str], name: str) -> list[Cast]:
         rows = tuple(_pair(line) for line in lines[start + 1 : end] if line.strip())
         told = int(words[-1]) if words and re.fullmatch("[0-9]{1,9}", words[-1]) else len(rows)
         if told != len(rows):
-            raise RawDataError(f"{name}: its header tells of {told} rows, it has {len(rows)}; copy or export it again")
+            raise RawDataError(f"{name}: its header promises {told} rows, but it has {len(rows)}; export it again")
         taken = _compact(words[3]) if len(words) > 3 else None
         found.append(Cast(rows, taken, _place(words[4:6])))
     return found

@@ -50,7 +50,10 @@ def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     given, number = block.get("svp"), block.get("svp_number")
     if not isinstance(given, str):
         if number is not None:
-            raise ConfigError(f"{where}.svp_number = {number!r}: is of a file of casts, and mbes.svp names none")
+            raise ConfigError(
+                f"{where}.svp_number = {number!r}: belongs to a file of casts, but mbes.svp names none; name the file "
+                "there, or take svp_number out"
+            )
         return dict(content)
     try:
         inside(given)
@@ -141,7 +144,7 @@ def _cleaned(rows: Array, name: str) -> tuple[Array, Array, Counter[str]]:
     if not len(rows):
         raise RawDataError(f"{name}: has no row of a depth and a sound speed; export it again")
     if np.mean(rows[:, 0] < 0) > 0.5:
-        raise RawDataError(f"{name}: its depths are negative ({rows[-1, 0]:g}); give them in metres, positive downward")
+        raise RawDataError(f"{name}: its depths are negative ({rows[:, 0].min():g}); give metres, positive downward")
     _refuse_speeds(rows[:, 1], name)
     keep((rows[:, 1] >= SLOWEST_M_S) & (rows[:, 1] <= FASTEST_M_S), "in air, or a speed that no water has")
     keep(rows[:, 0] >= 0, "above the surface")

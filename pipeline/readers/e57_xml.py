@@ -63,7 +63,7 @@ def _refuse_fetching(xml: bytes, name: str) -> None:
         )
     text = xml.removeprefix(b"\xef\xbb\xbf")
     if not _is_utf8(text) or (text.startswith(b"<?xml") and DECLARATION.match(text) is None):
-        raise RawDataError(f"{name}: its XML part is not in UTF-8, as E57 wants it; {ADVICE}")
+        raise RawDataError(f"{name}: its XML part is not in UTF-8, as E57 requires; {ADVICE}")
 
 
 def _is_utf8(xml: bytes) -> bool:

@@ -41,14 +41,14 @@ def refuse_contradiction(seconds: NDArray[np.float64], name: str, adjusted: bool
 def _refuse(name: str, first: float, adjusted: bool, told: LasTime, likely: bool) -> None:
     """``likely``: the times are possible as the other kind."""
     source = "its header" if told is None else f"laser.time: {told} in session.yaml"
-    other = f"likely {NAMES[not adjusted]}" if likely else "and no seconds of GPS week or adjusted standard time either"
+    other = f"it seems to be {NAMES[not adjusted]}" if likely else "it is neither of the two times that LAS has"
     remedy = "export it again with GPS time stamps"
     if likely and told is None:
         remedy = f"write laser.time: {KEYS[not adjusted]} in session.yaml, or export it again with the right flag"
     elif likely:
         remedy = f"take laser.time out, or write laser.time: {KEYS[not adjusted]}"
     shown = f"{first:.6f}" if abs(first) < 1e12 else f"{first:g}"
-    raise RawDataError(f"{name}: {source} promises {NAMES[adjusted]}, but {shown} is none, {other}; {remedy}")
+    raise RawDataError(f"{name}: {source} promises {NAMES[adjusted]}, but {shown} is not that: {other}; {remedy}")
 
 
 def _is_weekly(seconds: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -182,7 +182,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     ),
     "CARIS without sections": ("[SVP_VERSION_2]\na\n1 1480\n", "has no section"),
     "CARIS of another version": ("[SVP_VERSION_1]\na\n1 1480\n", "export it as .SVP_VERSION_2"),
-    "Kongsberg cut off": (ASVP.rsplit("\n", 2)[0] + "\n", "tells of 5 rows, it has 4; copy"),
+    "Kongsberg cut off": (ASVP.rsplit("\n", 2)[0] + "\n", "promises 5 rows, but it has 4; export"),
     "a log of HYPACK": ("FTP NEW 2\nVER 1\nPOS 1 1.0 2.0 3.0\nEC1 0 1.0 2.0\nPOS 1 2.0 3.0 4\n", "is a log of HYPACK"),
 }  # fmt: skip
 
@@ -309,7 +309,7 @@ def test_a_session_that_names_a_cast(given: str, tmp_path: Path) -> None:
         ({"svp": "../today.svp"}, "mbes.svp = '../today.svp': must be a path or pattern inside the session folder"),
         ({"svp": "/etc/passwd"}, "mbes.svp = '/etc/passwd': must be a path"),
         ({"svp": "casts/*"}, r"matches 2 files \(casts/other.svp, casts/today.svp\); name one"),
-        ({"svp": [[0, 1480], [1, 1480]], "svp_number": 1}, "svp_number = 1: is of a file of casts"),
+        ({"svp": [[0, 1480], [1, 1480]], "svp_number": 1}, "svp_number = 1: belongs to a file.*name the file"),
         ({"svp_from": {}}, "mbes.svp_from: is written by poolcal"),
         ({"svp": "casts/today.svp", "svp_number": "two"}, "has no cast two"),
     ],
