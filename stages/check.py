@@ -6,11 +6,11 @@ from typing import Any
 
 from pipeline.checking import saying
 from pipeline.checking.calibrated import Calibrated, Raw
-from pipeline.checking.cast import in_words
 from pipeline.checking.examine import examine
 from pipeline.config import PoolConfig, SessionConfig, load_session
 from pipeline.errors import PoolcalError
 from pipeline.folder import load_settings
+from pipeline.judging.casts import in_words
 from pipeline.readers.casts import with_cast
 from pipeline.streams import EMPTY
 from stages.campaign import calibrate_in_memory

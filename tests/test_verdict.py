@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 from pipeline.config import Drift, Mbes, Verdict
+from pipeline.judging.casts import cast_doubts
 from pipeline.judging.residual_tests import passes_test, pattern_tests
 from pipeline.maths.excess import limit_of
-from pipeline.verdict import Evidence, Settings, cast_doubts, drift_doubt, one_eyed, reasons, warnings
+from pipeline.verdict import Evidence, Settings, drift_doubt, one_eyed, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 LEVEL = 0.001

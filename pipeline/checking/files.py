@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.cast import doubts
 from pipeline.checking.finding import Finding
 from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
+from pipeline.judging.casts import doubts
 from pipeline.maths.geodesy import ecef_from_geodetic
 from pipeline.screen import plural
 from pipeline.times import utc_text

@@ -1,16 +1,20 @@
-"""A cast's file: what was made of it, and whether it is of this session, by the time and place that it tells of."""
+"""A cast of sound speed: what was made of its file, and whether it is of this session's time, place and water."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import datetime
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from pipeline.session_settings import CastUsed
+from pipeline.config import CastUsed, Mbes
 from pipeline.times import NS, unix_ns_from_gps, utc_text
 
 LONGEST_H = 36.0  # between the cast and the soundings, whatever time zone its file has
 FARTHEST_KM = 5.0
 KM_PER_DEG = 111.2
+ODD_SPEED_M_S = 3.0  # the head's sound speed, so far beyond the cast's, is of other water
+RETRACE_DEG = 2.0  # a coarse mount farther off than this wants its rays traced again
 
 
 def in_words(used: CastUsed) -> str:
@@ -50,3 +54,32 @@ def doubts(
                 f"mbes.svp: {used.file} was taken {away_km:.0f} km from here: the cast is taken for true; take one in "
                 "the water of the session"
             )
+
+
+def cast_doubts(mbes: Mbes, files: pd.DataFrame, correction: Mapping[str, Any]) -> list[str]:
+    """A cast that cannot be of this water by what the head recorded; and rays traced through it with a coarse mount far
+    off: a ray at θ from straight down bends by g t sin θ, of which a share of δ / tan θ is wrong where θ is wrong by δ
+    (a sixtieth for a degree at 45°)."""
+    if mbes.svp is None:
+        return []
+    found = [] if mbes.svp_from is None else list(doubts(mbes.svp_from, _span(files), None))
+    speeds = [speed for _, speed in mbes.svp]
+    low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
+    if max(low - max(speeds), min(speeds) - high) > ODD_SPEED_M_S:
+        found.append(
+            f"mbes.svp lies between {min(speeds):.1f} and {max(speeds):.1f} m/s, the head recorded {low:.1f} to "
+            f"{high:.1f}: the cast is taken for true; was it taken here and now?"
+        )
+    turn = correction["rotation_vector_deg"]
+    if turn is not None and np.linalg.norm(turn) > RETRACE_DEG:
+        found.append(
+            f"rays were traced through mbes.svp with a coarse mount that is {np.linalg.norm(turn):.1f}° off: enter the "
+            "values found as mbes.mount and run again"
+        )
+    return found
+
+
+def _span(files: pd.DataFrame) -> tuple[int, int]:
+    """First and last sounding, GPS time."""
+    own = files[(files["sensor"] == "mbes") & (files["first_ns"] >= 0)]
+    return int(own["first_ns"].min()), int(own["last_ns"].max())
