@@ -148,11 +148,12 @@ def _refuse_apart(ins: tuple[int, int], spans: dict[str, tuple[int, int]]) -> No
         if last < start or first > end:
             apart = first - start
             days = whole_days(ins, (first, last), partial(_meet, ins, (first, last)))
-            hint = f"{sensor} is {days}" if days else (
-                f"they are {abs(apart) / WEEK_NS:.1f} weeks apart: check gps_week"
-                if abs(apart) > WEEK_NS / 2
-                else "check the instruments' clocks and latency_s"
-            )
+            hint = "check the instruments' clocks and latency_s"
+            if days:
+                amount, ahead, why = days
+                hint = f"{sensor} is {amount} {'ahead of' if ahead else 'behind'} the INS: {why}"
+            elif abs(apart) > WEEK_NS / 2:
+                hint = f"they are {abs(apart) / WEEK_NS:.1f} weeks apart: check gps_week"
             raise RawDataError(
                 f"session.yaml: no time overlap: ins {utc_text(start)} to {utc_text(end)}, "
                 f"{sensor} {utc_text(first)} to {utc_text(last)}; {hint}"

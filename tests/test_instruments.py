@@ -183,7 +183,7 @@ def test_unknown_ones_and_those_of_another_sensor(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"settings": {"range_sigma": 0.02}}, "settings: range_sigma: unknown key; known here: angle_sigma_deg, "),
+        ({"settings": {"range_sigma": 0.02}}, "range_sigma: unknown key; is it range_sigma_m? known here: angle_"),
         ({"settings": {"files": ["x"]}}, "settings: files: unknown key"),
         ({"settings": {"mount": MOUNT}}, "settings: mount: unknown key"),
         ({"settings": {"range_sigma_m": -1.0}}, "settings: range_sigma_m = -1.0: input should be greater"),

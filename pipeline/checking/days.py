@@ -28,7 +28,7 @@ def whole_days(
     why = "check the clocks, and the dates that the files were exported with"
     if days > 0 and ins[0] // WEEK_NS == ins[1] // WEEK_NS and ins[1] % WEEK_NS < DAY_NS:
         why = (
-            "the INS's times are all of a Sunday: they are seconds of the day, it seems; export GPSTime in seconds of "
-            "the week, or with its date"
+            "the INS's times are all of a Sunday and seem to be seconds of the day; export GPSTime in seconds of the "
+            "week, or with its date"
         )
     return plural(abs(days), "day"), days > 0, why

@@ -79,6 +79,6 @@ def place_soundings(simulated: SimulatedSession) -> np.ndarray:
     angle = mbes["angle_rad"]
     upright = np.column_stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)])
     forward = np.arcsin(np.sin(mbes["transmit_tilt_rad"]) / np.cos(angle))  # the turn about x that looks so far forward
-    sonar = ranges[:, None] * Rotation.from_euler("x", forward).apply(upright)
+    sonar = ranges[:, None] * Rotation.from_euler("x", forward[:, None]).apply(upright)
     R_body_from_mbes = np.array(truth["mbes"]["R_body_from_mbes"])
     return position + attitude.apply(sonar @ R_body_from_mbes.T + truth["mbes"]["lever_arm_m"])
