@@ -123,15 +123,13 @@ def frames(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
 
 
 def _elsewhere(laser: Seen, files: Sequence[Seen], frame: str) -> Iterator[Finding]:
-    """Points of a CRS, which are in ECEF by now, far from where the boat was: the zone may be another."""
+    """Points of a CRS, which are in ECEF by now, far from every place where the boat was: the zone may be another."""
     of_ins = [seen.columns for seen in files if seen.sensor == "ins" and seen.records]
     if not of_ins:
         return
-    boat = np.median(
-        ecef_from_geodetic(*(np.concatenate([one[name] for one in of_ins]) for name in NAMES)), axis=0
-    )
+    track = ecef_from_geodetic(*(np.concatenate([one[name] for one in of_ins]) for name in NAMES))
     points = np.median(np.column_stack([laser.columns[axis] for axis in ("x_m", "y_m", "z_m")]), axis=0)
-    away = float(np.linalg.norm(points - boat))
+    away = float(np.min(np.linalg.norm(track - points, axis=1)))
     if away > FAR_M:
         yield Finding(
             "frame",
@@ -216,5 +214,5 @@ def missing_sensors(files: Sequence[Seen], session: SessionConfig) -> Iterator[F
     for sensor in SENSORS:
         if getattr(session, sensor) is not None and not any(s.records for s in files if s.sensor == sensor):
             many = plural(sum(s.sensor == sensor for s in files), "file")
-            yield Finding("no records", f"{sensor}: none of its {many} can be used; mend or replace them")
+            yield Finding("no records", f"{sensor}: none of its {many} can be used; repair or replace them")
 
