@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pipeline.checking import examine as asked
@@ -192,6 +193,20 @@ def test_a_pose_found_right_is_not_doubted(blocks: Looked) -> None:
     origin = blocks.pool.target.origin
     lower = origin.model_copy(update={"height_m": origin.height_m - 0.2})
     assert _other_pose(blocks, _pose(0.2, ambiguous=False), origin=lower) == []
+
+
+@pytest.mark.parametrize(("as_found", "questions"), [(0.96, []), (0.94, ["sides"])])
+def test_sides_are_exchanged_where_that_fits_clearly_better(
+    blocks: Looked, monkeypatch: pytest.MonkeyPatch, as_found: float, questions: list[str]
+) -> None:
+    """Sides of which too little was seen fit either way, and chance makes one of them the better."""
+    of_both = iter([as_found, 1.0])
+
+    def profile(*_: object) -> NDArray[np.float64]:
+        return next(of_both) * np.exp(-((tried.SHIFTS_M / 0.1) ** 2))
+
+    monkeypatch.setattr(tried, "profile", profile)
+    assert [one.question for one in _other_pose(blocks, _pose(ambiguous=False))] == questions
 
 
 def test_a_pose_beyond_what_is_searched(blocks: Looked) -> None:
