@@ -106,6 +106,16 @@ def test_a_height_that_is_right_is_not_doubted(looked: Looked) -> None:
         assert looked.missing(height_m=off) == []
 
 
+def test_one_sensor_alone_does_not_tell_a_height_from_its_mount(blocks: Looked) -> None:
+    """The laser, turned away, hits nothing at any height."""
+    mount = blocks.session.laser.mount
+    found = blocks.missing(height_m=3.0, laser={"yaw_deg": mount.yaw_deg + 180.0})
+    (found,) = (one for one in found if one.words.startswith("mbes"))
+    assert "mbes.mount.z_m" in found.words
+    height = found.words.split("; or correct target.origin.height_m (")[1].removesuffix(" in place of 15)")
+    assert float(height) == pytest.approx(12.0, abs=0.4)
+
+
 @pytest.mark.parametrize("off", [-2.0, pytest.param(-1.0, marks=pytest.mark.thorough), 2.0])
 def test_a_wrong_water_level_is_no_wrong_height(looked: Looked, off: float) -> None:
     assert looked.missing(water_m=off) == []

@@ -32,8 +32,8 @@ SIGN_M = 0.5  # a shift as near to twice a lever arm is its sign
 
 @dataclass(frozen=True)
 class Fit:
-    """Of one sensor, by shift: how well its points lie on the target where it can see it (``sided``), and anywhere, as
-    shares of the best."""
+    """How well one sensor's points lie on the target, by shift: where it can see it (``sided``), and anywhere
+    (``free``), as shares of the best."""
 
     sensor: str
     z_m: float  # of its mount
@@ -77,10 +77,12 @@ def wrong_height(
     for fit in off if len(off) == 1 and others_fit else []:
         remedy = "reverse its sign (z is up)" if fit.sign else "measure it again"
         new_m = -fit.z_m if fit.sign else round(fit.z_m + fit.shift_m, 1)
+        unless = f"; or correct target.origin.height_m ({height_m - fit.shift_m:.1f} in place of {height_m:g})"
+        alone = len(fits) < len(samples)  # the other sensor hits nothing at any height
         yield Finding(
             "target",
             f"{fit.sensor}: {NAMES[fit.sensor]} miss the target, but hit it with {fit.sensor}.mount.z_m = {new_m:g} in "
-            f"place of {fit.z_m:g}: {remedy}",
+            f"place of {fit.z_m:g}: {remedy}{unless if alone else ''}",
         )
 
 
