@@ -1,7 +1,7 @@
 """poolcal check on a target that is not where the config says: its height, its sides, its azimuth, signs of mounts."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from pipeline.checking import examine as asked
 from pipeline.checking import hits, passes, tried
 from pipeline.checking.calibrated import Calibrated
 from pipeline.checking.finding import Finding
-from pipeline.checking.placed import Sample, sample
+from pipeline.checking.placed import Sample, put, sample
 from pipeline.checking.survey import Seen, survey
 from pipeline.checking.track import Track, frame_of, joined, track_of
 from pipeline.clouds import ClosestSurface
@@ -114,6 +114,23 @@ def test_one_sensor_alone_does_not_tell_a_height_from_its_mount(blocks: Looked) 
     assert "mbes.mount.z_m" in found.words
     height = found.words.split("; or correct target.origin.height_m (")[1].removesuffix(" in place of 15)")
     assert float(height) == pytest.approx(12.0, abs=0.4)
+
+
+@pytest.mark.parametrize(("off", "said"), [(-9.0, "higher"), (9.0, "lower")])
+def test_heights_of_points_that_others_placed_are_no_mount(blocks: Looked, off: float, said: str) -> None:
+    """The lever arm of a laser whose points are in a CRS moves none of them."""
+    track = blocks.track(blocks.pool)
+    laser, mbes = blocks.samples(track)
+    points = put(track, laser)
+    rows = np.isfinite(points[:, 0])
+    placed = replace(laser, t_ns=laser.t_ns[rows], points_m=points[rows] + [0.0, 0.0, off], georeferenced=True)
+    (found,) = hits.off_target(track, [placed, mbes], blocks.closest, blocks.pool)
+    assert found.words.startswith("laser: laser points miss the target, but hit it if they lay ")
+    shift, way = found.words.split("if they lay ")[1].split(" m ")[:2]
+    assert float(shift) == pytest.approx(abs(off), abs=0.4)
+    assert way.startswith(said)
+    assert "above sea level" in found.words
+    assert "mount" not in found.words
 
 
 @pytest.mark.parametrize("off", [-2.0, pytest.param(-1.0, marks=pytest.mark.thorough), 2.0])
