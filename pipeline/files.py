@@ -1,6 +1,6 @@
 """Files of a run folder: written whole or not at all, hashed once, removed safely.
 
-Whatever the disk refuses (full, read-only, not permitted, something in the way) is the user's to mend, so it becomes
+Whatever the disk refuses (full, read-only, not permitted, something in the way) is the user's to correct, so it becomes
 an :class:`~pipeline.errors.ArtefactError`; nothing else does.
 """
 
@@ -40,7 +40,7 @@ def writing(path: Path) -> Iterator[None]:
         number = error.errno if error.errno is not None else _errno_in(str(error))
         reason = os.strerror(number) if number else str(error)
         where = error.filename if isinstance(error.filename, str) else path
-        remedy = _REMEDIES.get(number or 0, "mend this or name another run folder")
+        remedy = _REMEDIES.get(number or 0, "correct this or name another run folder")
         raise ArtefactError(f"{where}: cannot be written ({reason}); {remedy}") from error
 
 

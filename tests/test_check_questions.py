@@ -140,6 +140,14 @@ def test_a_laser_off_by_a_week_is_odd_against_ins_and_sonar() -> None:
     assert "check gps_week, and the GPS time flag" in found.words  # the week is the file's
 
 
+def test_a_sonar_that_also_missed_the_ins_is_no_witness() -> None:
+    """It ran on for a minute after the INS, for no reason that has a name."""
+    epochs = _epochs(laser=1)
+    epochs["mbes"] = (START + np.arange(10, 160, 0.1) * NS).astype(np.int64)
+    laser, _ = clocks.apart(epochs, 5 * NS, [])
+    assert "laser: its clock is 1 week ahead of the INS's: " in laser.words
+
+
 def test_clocks_that_agree() -> None:
     assert list(clocks.apart(_epochs(), 5 * NS, [], {})) == []
 

@@ -20,7 +20,7 @@ from pipeline.mounts import mount_of, turned
 Array = NDArray[np.float64]
 REACH_M = 0.15  # in the pose found, whose place along x and y is known
 STEP_M = 0.05
-SHIFTS_M = np.arange(-100, 101) * STEP_M
+SHIFTS_M = np.arange(-5.0, 5.0 + STEP_M / 2, STEP_M)
 CLEARLY = 0.95  # of the best agreement: what has less is another
 SMALLEST_M = 0.15  # a height within it is right, as near as this tells
 ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")

@@ -83,7 +83,7 @@ def off(tables: Tables, level: float) -> list[Found]:
 
 
 def _worst(rows: pd.DataFrame) -> list[Row]:
-    """Of each variable the row that lies farthest off; the farthest of all first."""
+    """The row of each variable that lies farthest off; the farthest of all first."""
     found: list[Row] = [
         group.iloc[int(group["normalised"].abs().argmax())].to_dict() for _, group in rows.groupby("by", sort=True)
     ]
