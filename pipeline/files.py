@@ -168,7 +168,7 @@ def sha256(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); mend this and run again") from error
+        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); correct this and run again") from error
 
 
 class Digests:
@@ -195,7 +195,7 @@ def _mark(path: Path) -> list[object]:
     try:
         status = path.stat()
     except OSError as error:
-        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); mend this and run again") from error
+        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); correct this and run again") from error
     return [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
 
 
