@@ -111,7 +111,7 @@ def test_a_good_session_has_no_reason():
         ({"bin_": [OFF | {"by": "step"}]}, "at a receive angle of 20° the sonar's distance from P2 steps by +1.0 mm"),
         (
             {"bin_": [OFF | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "low": 1.0}]},
-            "pass 1, the INS must be wrong there by -0.115° about the vertical more than in the other passes (3.5",
+            "pass 1, the INS must be wrong there by 0.115° in heading more than in the other passes (3.5",
         ),
         ({"held": {"value": 6e-4}}, "the sound speed: it is +0.06 ± 0.01 % above that recorded"),
         ({"held": {"unknown": "mbes_latency", "value": 0.02}}, "the sonar's clock: its latency is +20.0 ± 0.1 ms more"),
