@@ -85,9 +85,9 @@ def _loaded(text: str, path: Path, how: Callable[[_StrictLoader], Any]) -> Any:
     try:
         return how(_StrictLoader(text))
     except (yaml.YAMLError, ValueError) as error:
-        raise ConfigError(f"{path}: not valid YAML: {error}; mend the file") from error
+        raise ConfigError(f"{path}: not valid YAML: {error}; correct the file") from error
     except RecursionError as error:
-        raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; mend the file") from error
+        raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; correct the file") from error
     except Exception as error:  # the library alone runs here, and raises anything at a value it cannot read
         raise ConfigError(
             f"{path}: not valid YAML: a value is not what it is said or seems to be ({type(error).__name__}: {error}); "
@@ -125,7 +125,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
         message += _in_metres(key, fault)
         shown = repr(fault["input"])
         shown = shown if len(shown) <= 60 else shown[:57] + "..."
-        raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; mend this value") from error
+        raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; correct this value") from error
 
 
 def _first(faults: list[Any]) -> Any:
@@ -180,7 +180,7 @@ def _to_json(content: dict[str, Any], where: str) -> str:
             for position, item in enumerate(value):
                 check(item, f"{key}{position}.")
         elif isinstance(value, float) and not math.isfinite(value):
-            raise ConfigError(f"{where}: {key[:-1]} = {value}: is not a finite number; mend this value")
+            raise ConfigError(f"{where}: {key[:-1]} = {value}: is not a finite number; correct this value")
         elif not isinstance(value, (str, int, float, bool, type(None))):
             raise ConfigError(f"{where}: {key[:-1]} = {value}: is a {type(value).__name__}; put it in quotes")
 

@@ -1,8 +1,6 @@
 """Raw instrument files -> canonical streams and tables, with quality control."""
 
-from dataclasses import dataclass, field
-from functools import partial
-from itertools import pairwise
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,14 +8,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline import artefacts, config
-from pipeline.checking.days import whole_days
 from pipeline.errors import RawDataError
 from pipeline.ins_sigmas import thinned
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
-from pipeline.passes import estimate_azimuth, find_passes, pass_of, split_at_gaps
-from pipeline.rates import rate_hz
+from pipeline.passes import estimate_azimuth, find_passes, pass_of
 from pipeline.streams import EMPTY, Chunk, Piece, Stream
-from pipeline.times import NS, WEEK_NS, utc_text
+from pipeline.times import NS, utc_text
+from stages.seen import Seen, counts_of, files_of, gaps_between, refuse_apart, refuse_empty
 
 Columns = dict[str, NDArray[Any]]
 
@@ -49,20 +46,6 @@ class Outputs:
     soundings: Annotated[Stream, artefacts.SOUNDINGS] = EMPTY
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What is kept of one chunk: counts, epochs (INS records or pings; of laser points one a second, and the last)."""
-
-    count: int
-    dropped: dict[str, int]
-    epochs_ns: NDArray[np.int64]
-    trajectory: Columns
-    sigmas: Columns = field(default_factory=dict)  # of the INS, thinned
-    accuracy: bool = False  # of a file of sigmas alone
-    lowest_speed_m_s: float = np.inf  # sound speeds recorded with the pings
-    highest_speed_m_s: float = -np.inf
-
-
 def prepare(inputs: Inputs, config: Config) -> None:
     return None
 
@@ -85,7 +68,7 @@ def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Piec
 
 
 def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config: Config) -> Outputs:
-    _refuse_empty({sensor: seen for sensor, seen in partials.items() if sensor != "mbes" or config.recordings.mbes})
+    refuse_empty({sensor: seen for sensor, seen in partials.items() if sensor != "mbes" or config.recordings.mbes})
     trajectory, backwards = _trajectory([seen.trajectory for _, seen in partials["ins"] if seen.count])
     ins_t = trajectory["t_ns"].to_numpy()
     epochs = {
@@ -93,19 +76,19 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config:
         for sensor in ("laser", "mbes")
         if partials[sensor]
     }
-    _refuse_apart((ins_t[0], ins_t[-1]), {sensor: (t_ns[0], t_ns[-1]) for sensor, t_ns in epochs.items()})
+    refuse_apart((ins_t[0], ins_t[-1]), {sensor: (t_ns[0], t_ns[-1]) for sensor, t_ns in epochs.items()})
     sounded = "mbes" if "mbes" in epochs else "laser"  # by what passes are told
     pool_frame, frame = _pool_frame(trajectory, config.target_place)
     max_gap_ns = round(config.ingest.max_gap_s * NS)
     sigmas, outside = _sigmas(partials["ins"], int(ins_t[0]), int(ins_t[-1]))
-    counts = _counts(partials, {"ins": backwards}, outside)
+    counts = counts_of(partials, {"ins": backwards}, outside)
     return Outputs(
         trajectory=trajectory,
         ins_sigmas=sigmas,
         passes=_passes(trajectory, frame, epochs[sounded], max_gap_ns, config.ingest.reversal_m),
         pool_frame=pool_frame,
-        files=_files(partials),
-        gaps=_gaps({"ins": ins_t, sounded: epochs[sounded]}, max_gap_ns),
+        files=files_of(partials),
+        gaps=gaps_between({"ins": ins_t, sounded: epochs[sounded]}, max_gap_ns),
         counts=counts,
     )
 
@@ -117,47 +100,6 @@ def _seconds(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     ordered = np.sort(t_ns)
     first = np.flatnonzero(np.diff(ordered // NS, prepend=-1))
     return np.append(ordered[first], ordered[-1])
-
-
-def _refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
-    for sensor, seen in partials.items():
-        if not sum(piece.count for _, piece in seen):
-            names = sorted({name.split("#")[0] for name, _ in seen})
-            reasons: dict[str, int] = {}
-            for _, piece in seen:
-                for reason, number in piece.dropped.items():
-                    reasons[reason] = reasons.get(reason, 0) + number
-            why = (
-                ", ".join(f"{number} x {reason}" for reason, number in sorted(reasons.items())) or "the files are empty"
-            )
-            advice = {
-                "ins": "log again after the INS has aligned, with INSPVA(S) on",
-                "laser": "export the scan again, with time stamps",
-                "mbes": "check that bathymetry was logged",
-            }[sensor]
-            raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {advice}")
-
-
-def _meet(ins: tuple[int, int], other: tuple[int, int], offset_ns: int) -> bool:
-    return ins[0] <= other[1] - offset_ns and other[0] - offset_ns <= ins[1]
-
-
-def _refuse_apart(ins: tuple[int, int], spans: dict[str, tuple[int, int]]) -> None:
-    for sensor, (first, last) in spans.items():
-        start, end = ins
-        if last < start or first > end:
-            apart = first - start
-            days = whole_days(ins, (first, last), partial(_meet, ins, (first, last)))
-            hint = "check the instruments' clocks and latency_s"
-            if days:
-                amount, ahead, why = days
-                hint = f"{sensor} is {amount} {'ahead of' if ahead else 'behind'} the INS: {why}"
-            elif abs(apart) > WEEK_NS / 2:
-                hint = f"they are {abs(apart) / WEEK_NS:.1f} weeks apart: check gps_week"
-            raise RawDataError(
-                f"session.yaml: no time overlap: ins {utc_text(start)} to {utc_text(end)}, "
-                f"{sensor} {utc_text(first)} to {utc_text(last)}; {hint}"
-            )
 
 
 def _trajectory(chunks: list[Columns]) -> tuple[pd.DataFrame, int]:
@@ -255,63 +197,4 @@ def _passes(
                 "distance_m": float(np.median(athwart[abeam] if abeam.any() else athwart)) if inside.any() else np.nan,
             }
         )
-    return pd.DataFrame(rows)
-
-
-def _files(partials: dict[str, list[tuple[str, Seen]]]) -> pd.DataFrame:
-    rows = []
-    for sensor, pieces in partials.items():
-        by_file: dict[str, list[Seen]] = {}
-        for name, seen in pieces:
-            by_file.setdefault(name.split("#")[0], []).append(seen)
-        for name, seen_list in by_file.items():
-            epochs = np.concatenate([seen.epochs_ns for seen in seen_list])
-            records = sum(seen.count for seen in seen_list)
-            accuracy = any(seen.accuracy for seen in seen_list)
-            if accuracy:
-                records = len(epochs)
-            rate = rate_hz(sensor, epochs, records)
-            rows.append(
-                {
-                    "sensor": "accuracy" if accuracy else sensor,
-                    "file": name,
-                    "records": records,
-                    "dropped": sum(sum(seen.dropped.values()) for seen in seen_list),
-                    "first_ns": int(epochs.min()) if len(epochs) else -1,
-                    "last_ns": int(epochs.max()) if len(epochs) else -1,
-                    "rate_hz": rate,
-                    "sound_speed_low_m_s": _finite(min(seen.lowest_speed_m_s for seen in seen_list)),
-                    "sound_speed_high_m_s": _finite(max(seen.highest_speed_m_s for seen in seen_list)),
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def _finite(value: float) -> float:
-    return value if np.isfinite(value) else np.nan
-
-
-def _gaps(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.DataFrame:
-    rows: list[dict[str, Any]] = []
-    for sensor, t_ns in epochs_ns.items():
-        stretches = split_at_gaps(t_ns, max_gap_ns)
-        for (_, end), (start, _) in pairwise(stretches):
-            rows.append({"sensor": sensor, "start_ns": end, "end_ns": start, "duration_s": (start - end) / NS})
-    return pd.DataFrame(rows, columns=[column.name for column in artefacts.GAPS.columns])
-
-
-def _counts(
-    partials: dict[str, list[tuple[str, Seen]]], repeated: dict[str, int], sigmas_outside: int
-) -> pd.DataFrame:
-    rows = []
-    for source, pieces in partials.items():
-        total: dict[str, int] = {"used": 0, "repeated time": repeated.get(source, 0)}
-        for _, seen in pieces:
-            total["used"] += seen.count
-            for reason, number in seen.dropped.items():
-                total[reason] = total.get(reason, 0) + number
-        total["used"] -= total["repeated time"]
-        if source == "ins" and sigmas_outside:
-            total["accuracy outside the INS's time"] = sigmas_outside
-        rows += [{"source": source, "reason": reason, "count": number} for reason, number in sorted(total.items())]
     return pd.DataFrame(rows)

@@ -91,16 +91,16 @@ SONAR: dict[str, Any] = {
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"svp": [[0.0, 1500.0]]}, "svp = [[0.0, 1500.0]]: has too few entries: 1 of at least 2; mend"),
+        ({"svp": [[0.0, 1500.0]]}, "svp = [[0.0, 1500.0]]: has too few entries: 1 of at least 2; correct"),
         ({"svp": [[0, 5, 1500], [3, 1501]]}, "svp.0 = [0, 5, 1500]: has more entries than 2; a decimal comma"),
         ({"svp": [[1500.0, 0.0], [1501.0, 3.0]]}, "svp.0.0 = 1500.0: input should be less than or equal to 200"),
         ({"svp": [[2.0, 1500.0], [2.0, 1501.0]]}, "depths must grow"),
         ({"sound_speed_m_s": "1500,5"}, "'1500,5': input should be a valid number, with a point where the comma is"),
-        ({"sound_speed_m_s": "{1}"}, "'{1}': input should be a valid number; mend"),
+        ({"sound_speed_m_s": "{1}"}, "'{1}': input should be a valid number; correct"),
         ({"files": "a.bth"}, "input should be a list, in square brackets"),
     ],
 )
-def test_one_line_says_what_to_mend(change: dict[str, Any], words: str) -> None:
+def test_one_line_says_what_to_correct(change: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigError) as refused:
         parse(Mbes, SONAR | change, "session.yaml")
     (line,) = str(refused.value).splitlines()

@@ -30,6 +30,9 @@ METRES_PER_SECOND = {
     "", "m/s", "m/sec", "m s", "ms-1", "m s-1", "m.s-1", "m*s-1", "m/second", "meter per second", "meters per second",
     "metres per second", "meters/second", "metres/second", "meter/second", "米/秒",
 }  # fmt: skip
+OTHER_UNIT = re.compile(r"\b(ft/s|ft|feet|foot|f/s|fps|fm|fathoms?|yards?|yd|km|dm|cm|mm|dbar)\b|英尺|厘米|毫米")
+DEPTH_UNIT = re.compile(r"\bdepth[ _]?units?\b\W*(\w+)", re.IGNORECASE)  # a line of its own, before the columns
+WIDE = str.maketrans("（），；：", "(),;:")  # as Chinese and Japanese keyboards have them
 ADVICE = "export depth in metres and sound speed in m/s"
 
 
@@ -51,7 +54,7 @@ def casts_of(text: str, name: str) -> tuple[str, list[Cast]]:
     RawDataError
         It is none of the kinds, or not depth in metres and sound speed in m/s.
     """
-    lines = text.splitlines()
+    lines = text.translate(WIDE).splitlines()
     first = next((line.strip() for line in lines if line.strip()), "")
     if first.upper().startswith("[SVP_VERSION"):
         if not first.upper().startswith("[SVP_VERSION_2]"):
@@ -132,7 +135,7 @@ def _asvp(lines: Sequence[str], name: str) -> list[Cast]:
     for start, end in zip(starts, [*starts[1:], len(lines)], strict=True):
         words = lines[start].strip().strip("()").split()
         rows = tuple(_pair(line) for line in lines[start + 1 : end] if line.strip())
-        told = int(words[-1]) if words and words[-1].isdigit() else len(rows)
+        told = int(words[-1]) if words and re.fullmatch("[0-9]{1,9}", words[-1]) else len(rows)
         if told != len(rows):
             raise RawDataError(f"{name}: its header tells of {told} rows, it has {len(rows)}; copy or export it again")
         taken = _compact(words[3]) if len(words) > 3 else None
@@ -221,10 +224,14 @@ def _rows(lines: Sequence[str], number: int, separator: str, place: tuple[int, i
     units = ["", ""]
     under = _cells(lines[below], separator) if below < len(lines) else []
     comma = separator != ","
-    if len(under) >= len(names) > 1 and not any(number_of(cell, comma) == number_of(cell, comma) for cell in under):
-        units = [under[k] for k in place]
+    worded = not any(number_of(cell, comma) == number_of(cell, comma) for cell in under)
+    below_place = [under[k].strip("()[] ").lower() for k in place if k < len(under)]
+    units_there = any(unit in METRES | METRES_PER_SECOND or OTHER_UNIT.search(unit) for unit in below_place)
+    if worded and len(below_place) == len(place) and (units_there or len(under) >= len(names) > 1):
+        units = below_place
+    before = next((unit_told[1].lower() for line in lines[:number] if (unit_told := DEPTH_UNIT.search(line))), "")
     for k, known, unit in zip(place, (METRES, METRES_PER_SECOND), units, strict=True):
-        told = _unit(names[k]) or unit.strip("()[] ").lower()
+        told = _unit(names[k]) or unit or (before if known is METRES else "")
         if told not in known:
             raise RawDataError(f"{name}: its column {names[k]} is in {told}; {ADVICE}")
     found = []
@@ -241,14 +248,15 @@ def _rows(lines: Sequence[str], number: int, separator: str, place: tuple[int, i
 
 def _unit(cell: str) -> str:
     """
-    >>> _unit("Depth (Meter)"), _unit("depth_m"), _unit("Sound Velocity"), _unit("sound_speed_m_s"), _unit("Depth ft")
+    >>> _unit("Depth (Meter)"), _unit("depth_m"), _unit("Sound Velocity"), _unit("sound_speed_m_s"), _unit("Depth ft:")
     ('meter', 'm', '', 'm s', 'ft')
     """
     bracketed = re.search(r"[\[(]([^\])]*)[\])]", cell)
     if bracketed:
         return bracketed.group(1).replace("_", " ").strip().lower()
-    bare = re.search(r"\b(m s|m/s|m/sec|m|ft|feet|ft/s|f/s|fps|dbar)$", cell.lower().replace("_", " "))
-    return bare.group(1) if bare else ""
+    words = cell.lower().replace("_", " ")
+    bare = OTHER_UNIT.search(words) or re.search(r"\b(m s|m/s|m/sec|m)$", words)
+    return bare.group() if bare else ""
 
 
 def _said_time(lines: Sequence[str]) -> datetime | None:

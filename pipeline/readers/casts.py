@@ -152,7 +152,9 @@ def _cleaned(rows: Array, name: str) -> tuple[Array, Array, Counter[str]]:
         keep(np.isin(np.arange(len(rows)), used), "on the way up")
     depth, speed = ascending(*rows.T)
     if len(depth) < 2:
-        raise RawDataError(f"{name}: has {len(depth)} depths that can be used; a cast has two or more")
+        raise RawDataError(
+            f"{name}: the number of its depths that can be used is {len(depth)}, and a cast needs two; export all of it"
+        )
     if len(depth) < len(rows):
         left_out["of a depth that is there already: their mean is used"] = len(rows) - len(depth)
     _refuse_jumps(depth, speed, name)

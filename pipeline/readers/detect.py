@@ -44,6 +44,7 @@ TRAJECTORY_TEXT = Kind(
     advice="export it as SBET (POSPac, Qinertia, Delph INS, OxTS and Inertial Explorer have it), or as a table with "
     "the columns that README.md names; if it is Inertial Explorer's, export it with its header",
 )
+UTF16 = Kind("a text in UTF-16", advice="save it as UTF-8")
 UNKNOWN = Kind(
     "of no kind that is read",
     advice="export it in one of the formats that README.md names; if it should be one of them, copy it again",
@@ -71,12 +72,12 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
             return kind
     if (other := foreign.marked(head)) is not None:
         return other
-    if head[:1] == b"\x7b" and _is_xtf(head):
-        return XTF
     if re.match(rb"#[A-Z]{3}\x00?", head[4:9]) and int.from_bytes(head[:4], "little") <= max(size, 1 << 20):
         return KMALL
     if is_head(head[:20]):
         return ALL
+    if head[:1] == b"\x7b" and _is_xtf(head):  # which a datagram of 123 bytes begins with as well
+        return XTF
     if head.startswith(NOVATEL_SYNCS):
         return NOVATEL
     if head[:4] in (BTH0, *OTHERS) or _has_packet(head[:16]):
@@ -94,7 +95,9 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
         return NOVATEL
     if _has_packet(head):
         return PACKETS
-    return _kind_of_text(head) if text else UNKNOWN
+    if text:
+        return _kind_of_text(head)
+    return UTF16 if head[:2] in (b"\xff\xfe", b"\xfe\xff") and b"\0" in head[:64] else UNKNOWN
 
 
 def _is_xtf(head: bytes) -> bool:

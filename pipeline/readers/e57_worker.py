@@ -118,6 +118,7 @@ if __name__ == "__main__":
     try:
         main(*sys.argv[1:])
     except Exception as error:  # the parent makes one RawDataError of it
-        told = f"{type(error).__name__}: {error}".encode()
+        words = str(error).partition("****")[0].strip()[:300]  # the library's own sources and lines follow
+        told = f"{type(error).__name__}: {words}".encode()
         sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(told)).tobytes() + told)
         sys.stdout.buffer.flush()

@@ -32,6 +32,7 @@ from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
 from pipeline.readers.gsf_fans import Fans
 from pipeline.readers.gsf_records import HEADER, PING, PROFILE, records
+from pipeline.readers.repeats import Repeats
 from pipeline.readers.sieve import (
     MAX_SPEED_M_S,
     MBES_COLUMNS,
@@ -102,7 +103,7 @@ class GsfPart:
         """Pings, their numbers, and the sound speeds at the head."""
         version, scales, profile_m_s, number = 3, Scales(), None, -1
         head: tuple[Any, ...] | None = None
-        fans = Fans()
+        fans, repeats = Fans(), Repeats()
         for kind, body in records(file, dropped):
             if kind == HEADER:
                 version = _version(body)
@@ -116,9 +117,11 @@ class GsfPart:
                     continue
                 if ping.lacks:
                     raise RawDataError(
-                        f"{self.name}: cannot be served: no {ping.lacks} in its pings, positions of soundings alone; "
-                        "export it again with travel times and beam angles, or give the sonar's own files"
+                        f"{self.name}: its pings have no {ping.lacks}, only positions of soundings, and cannot be "
+                        "used; export it again with travel times and beam angles, or give the sonar's own files"
                     )
+                if not repeats.is_new(body, dropped):
+                    continue
                 head = ping.head if head is None else head
                 self._refuse_other_fans(number, ping, head)
                 if ping.places and _is_smooth(ping.angle_deg):
@@ -225,6 +228,7 @@ def top_of_profile(body: bytes) -> float | None:
     return top if MIN_SPEED_M_S <= top <= MAX_SPEED_M_S else None
 
 
+@np.errstate(all="ignore")  # damaged numbers
 def _is_smooth(angle_deg: NDArray[np.float64]) -> bool:
     steps = np.abs(np.diff(angle_deg))
     return bool(len(steps) < 2 or steps.max() <= max(MAX_STEP_DEG, 10 * float(np.median(steps))))

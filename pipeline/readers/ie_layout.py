@@ -91,6 +91,8 @@ def read_layout(path: Path, name: str) -> Layout:
     given = names_and_units(text, _text(lines[rest[0]]) if has_units else None, name)
     first = rest[0] + 1 if has_units else number + 1
     rows = [_text(line) for line in lines[first:-1] if line.strip()][:SAMPLE]
+    if "," not in text and rows and re.search(r"\d,\d", rows[0]):
+        raise RawDataError(f"{name}: its numbers have commas in place of decimal points; export them with points")
     given = replace(given, units=tuple(_assumed(given, rows[0] if rows else "")))
     starts = np.cumsum([0, *(3 if unit in THREE else 1 for unit in given.units)]).tolist()
     spans = [tuple(range(start, end)) for start, end in pairwise(starts)]
@@ -204,6 +206,8 @@ def _scale(column: str, unit: str, file: str) -> float:
         return 1.0
     if unit not in known:
         told = f"has the unit ({unit})" if unit else "has no unit"
+        if unit == "?dy":
+            told = "has no unit, and day and month look alike"
         title = TITLES.get(column, "GPSTime")
         raise RawDataError(f"{file}: column {title} {told}; export it as one of {', '.join(known)}")
     return known[unit]

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
 from pipeline.readers.ie_layout import POSITION, SIGMAS, Layout, read_layout
+from pipeline.readers.ie_names import column_names
 from pipeline.readers.ie_times import SECOND, combine, days_of, keep_times
 from pipeline.readers.sbet import running_weeks
 from pipeline.readers.sieve import (
@@ -85,12 +86,18 @@ def _tables(file: BinaryIO, layout: Layout, name: str, dropped: Counter[str]) ->
         if len(held) > MAX_LINE:
             dropped["line without end"] += 1
             held = b""
+        _refuse_second_header(whole, name)
         rows = _separated(whole + end, layout.separators)
         if not rows.strip():
             continue
         table = _parsed(rows, layout, dropped)
         if not (fitted or table.num_rows):
             count = len(rows.split(b"\n", 1)[0].split())
+            if count == layout.width:
+                raise RawDataError(
+                    f"{name}: its first row has a word where a number should be; export numbers alone, with a minus in "
+                    "place of S and W"
+                )
             raise RawDataError(
                 f"{name}: its header names {layout.width} columns, its first row has {count}; export it again, without "
                 "columns that may be blank, or have blanks within them"
@@ -99,6 +106,18 @@ def _tables(file: BinaryIO, layout: Layout, name: str, dropped: Counter[str]) ->
         yield _columns(table, layout)
     if held.strip():
         dropped["last line without line end"] += 1
+
+
+def _refuse_second_header(block: bytes, name: str) -> None:
+    """Rows below other names would be read in the order, and the units, of the first."""
+    letters, end = block.lower(), 0
+    while (found := letters.find(b"latitude", end)) >= 0:
+        start, end = block.rfind(b"\n", 0, found) + 1, block.find(b"\n", found) % (len(block) + 1)
+        if column_names(block[start:end].decode("latin-1").strip()) is not None:
+            raise RawDataError(
+                f"{name}: has a second line of column names: it is several exports, one after the other; give each in "
+                "a file of its own"
+            )
 
 
 def _separated(block: bytes, separators: bytes) -> bytes:

@@ -31,6 +31,7 @@ import numpy as np
 from pipeline.readers.kmall_datagrams import HEAD, IIP, LENGTH, datagrams
 from pipeline.readers.kongsberg import MAX_BEAMS, KongsbergPart, Ping, Sectors, possible
 from pipeline.readers.kongsberg_arrays import ONE_HEAD, Arrays, of_kmall
+from pipeline.readers.repeats import Repeats
 from pipeline.times import NS, gps_ns_from_unix_utc
 
 LEAST_MRZ = 200  # its heads alone are longer
@@ -45,11 +46,13 @@ class KmallPart(KongsbergPart):
 
     def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[Ping]:
         installation: Installation = {}
+        repeats = Repeats()
         for datagram in datagrams(file, dropped):
             if datagram[4:8] == IIP:
-                installation = of_kmall(datagram.decode("latin-1")) or installation
+                installation = of_kmall(datagram.decode("latin-1"))
             elif (ping := decode(datagram, installation)) is not None:
-                yield ping
+                if repeats.is_new(datagram, dropped):
+                    yield ping
             else:
                 dropped["damaged datagram"] += 1
 

@@ -24,6 +24,7 @@ from pipeline.errors import RawDataError
 from pipeline.readers.all_datagrams import INNER, TAIL, datagrams
 from pipeline.readers.kongsberg import MAX_BEAMS, KongsbergPart, Ping, Sectors, possible
 from pipeline.readers.kongsberg_arrays import of_all
+from pipeline.readers.repeats import Repeats
 from pipeline.times import gps_ns_from_unix_utc
 
 RANGES, INSTALLATION, OLDER = ord("N"), b"Ii", b"Ff"
@@ -47,7 +48,7 @@ class AllPart(KongsbergPart):
     """One file."""
 
     def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[Ping]:
-        installation, found, older = "", False, 0
+        installation, found, older, repeats = "", False, 0, Repeats()
         for datagram in datagrams(file, bytes([RANGES]) + INSTALLATION + OLDER, dropped):
             kind = datagram[1]
             if kind in INSTALLATION:
@@ -56,7 +57,8 @@ class AllPart(KongsbergPart):
                 older += 1
             elif (ping := decode(datagram, installation)) is not None:
                 found = True
-                yield ping
+                if repeats.is_new(datagram, dropped):
+                    yield ping
             else:
                 dropped["damaged datagram"] += 1
         if older and not found:

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 P_MBES = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # starboard, forward, up
 ONE_HEAD = -1
 PARTS = ("P", "C", "S")  # of a transmitter, in the order of their numbers
+HEADS = frozenset({1002, 2000, *range(3000, 3009), 3020})  # models of one head of both arrays; S2: of another head
 LEAST_ALONG = 0.9  # of the transmitter's axis along the receiver's y: else they are no crossed arrays
 INSIDE: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, and whether it is the portable head
     (2040, False): {
@@ -38,7 +39,9 @@ INSIDE: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, and wheth
 }  # fmt: skip
 NEAR = 3.0  # times the transmitter's distance: no shorter path is possible
 ROUNDS = 4  # of the iteration: the error falls by (distance of the arrays / range)² with each
-NUMBER = re.compile(r"[-+]?\d{1,6}(\.\d{0,9})?")
+NUMBER = re.compile(r"[-+]?([0-9]{1,6}(\.[0-9]{0,15})?|\.[0-9]{1,15})")
+SIX = "XYZRPH"  # what is told of an array
+PLACED = re.compile(rf"[{SIX}]|I[PCSR]?[XYZ]")
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,8 @@ def _on_side(angle_rad: Array, side: Array) -> Array:
 
 def of_kmall(text: str) -> dict[tuple[int, int], Arrays]:
     """Those that #IIP tells, by the numbers of transmitter and receiver from 0; of one head (ONE_HEAD, number)."""
-    told = {name: _numbers(values) for name, values in re.findall(r"TRAI_((?:TX|RX|HD)\d):([^,]*)", text)}
+    given = {name: _numbers(values) for name, values in re.findall(r"TRAI_((?:TX|RX|HD)\d):([^,]*)", text)}
+    told = {name: numbers for name, numbers in given.items() if numbers.keys() >= set(SIX)}
     found = {}
     for sender, tx in told.items():
         for receiver, rx in told.items():
@@ -133,8 +137,11 @@ def of_kmall(text: str) -> dict[tuple[int, int], Arrays]:
 
 
 def _numbers(values: str) -> dict[str, float]:
-    pairs = (pair.partition("=") for pair in values.split(";"))
-    return {key: float(value) for key, _, value in pairs if NUMBER.fullmatch(value)}
+    """Nothing where one of them that is needed cannot be read: it is not 0."""
+    pairs = [(key.strip(), value.strip()) for key, _, value in (pair.partition("=") for pair in values.split(";"))]
+    if any(PLACED.fullmatch(key) and not NUMBER.fullmatch(value) for key, value in pairs):
+        return {}
+    return {key: float(value) for key, value in pairs if NUMBER.fullmatch(value)}
 
 
 @lru_cache(maxsize=16)  # asked for with each ping
@@ -142,21 +149,21 @@ def of_all(text: str, serial: int, model: int) -> Arrays | None:
     """Those of the receiver of this serial number; None where the installation does not tell.
 
     STC is 0 for one transmitter and one receiver, 1, 2 and 5 for heads of both arrays, 3 for one transmitter and two
-    receivers, whose serial numbers are then R1S and R2S; older sonars do not say it. Where the parts of an array lie is
-    told by .kmall files of the same sonars alone: of the EM 2040, whose parts send different sectors.
+    receivers, whose serial numbers are then R1S and R2S; older sonars do not say it (HEADS). Where the parts of an
+    array lie is told by .kmall files of the same sonars alone: of the EM 2040, whose parts send different sectors.
     """
     pairs = (pair.partition("=") for pair in text.split(","))
-    told = {key.strip("\0 "): float(value) for key, _, value in pairs if NUMBER.fullmatch(value)}
-    system = told.get("STC", 1.0 if "S2X" not in told else 0.0)
+    told = {key.strip("\0 \r\n"): float(value) for key, _, value in pairs if NUMBER.fullmatch(value.strip())}
+    system = told.get("STC", 1.0 if "S2X" not in told or model in HEADS else 0.0)
     if "S1X" not in told or system not in (0, 1, 2, 3, 5):
         return None
     inside = INSIDE.get((model, system == 5), {}) if system in (0, 3, 5) else {}
     if system in (1, 2, 5):
         return _crossed(inside, inside, _place(inside, "IR"))
     serials = [number for number in (2, 3) if told.get(f"R{number - 1}S") == serial] if system == 3 else [2]
-    if len(serials) != 1 or f"S{serials[0]}X" not in told:
+    if len(serials) != 1 or any(f"S{number}{axis}" not in told for number in (1, serials[0]) for axis in SIX):
         return None
-    tx, rx = ({axis: told.get(f"S{number}{axis}", 0.0) for axis in "XYZRPH"} for number in (1, serials[0]))
+    tx, rx = ({axis: told[f"S{number}{axis}"] for axis in SIX} for number in (1, serials[0]))
     return _crossed(tx | inside, rx, _place(inside, "IR"))
 
 

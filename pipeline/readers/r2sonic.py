@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.readers.files import opened
 from pipeline.readers.packets import Sections, bare_packets, xtf_packets
+from pipeline.readers.repeats import Repeats
 from pipeline.readers.sieve import (
     MBES_COLUMNS,
     Sieve,
@@ -78,13 +79,15 @@ class R2sonicPart:
     def chunks(self) -> Iterator[Chunk]:
         dropped: Counter[str] = Counter()
         pings: list[Ping] = []
-        waiting = 0
+        waiting, repeats = 0, Repeats()
         with opened(self.path, self.name) as file:
             packets = xtf_packets(file, dropped) if self.xtf else bare_packets(file, dropped)
             for sections in packets:
                 ping = decode(sections)
                 if ping is None:
                     dropped["damaged packet"] += 1
+                    continue
+                if not repeats.is_new(b"".join(sections.values()), dropped):
                     continue
                 self._refuse_steered(ping)
                 pings.append(ping)

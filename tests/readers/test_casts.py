@@ -160,6 +160,12 @@ REFUSED: dict[str, tuple[str, str]] = {
     "depth in decibar": ("Depth (dbar),SV (m/s)\n1,1480\n2,1481\n", r"Depth \(dbar\) is in dbar; export"),
     "feet": ("Depth (ft),SV (m/s)\n1,1480\n2,1481\n", "is in ft; export depth in metres"),
     "feet below the names": ("Depth,SV\nft,ft/s\n1,1480\n2,1481\n", "Depth is in ft"),
+    "feet and a colon": ("Depth FEET:,SV (m/s)\n1,1480\n2,1481\n", "Depth FEET: is in feet"),
+    "feet within the name": ("Depth in feet below surface,SV\n1,1480\n2,1481\n", "is in feet"),
+    "fathoms": ("Depth fathoms,SV\n1,1480\n2,1481\n", "is in fathoms"),
+    "feet in wide brackets": ("深度（英尺），声速（m/s）\n1，1480\n2，1481\n", "is in 英尺"),
+    "feet below, and no unit of the last": ("Depth\tSV\tNote\n(ft)\t(m/s)\n1\t1480\ta\n2\t1481\tb\n", "Depth is in ft"),
+    "feet in a line before": ("Depth Units: feet\nDepth,SV\n1,1480\n2,1481\n", "Depth is in feet"),
     "feet a second": ("depth speed\n1 4856\n2 4857\n", "near 4856.*feet a second"),
     "a decimal comma": ("FTP NEW 2\n1,0 1480,2\n2,0 1480,3\n", "water has 1300 to 1700"),
     "columns exchanged": ("speed_m_s,depth_m\n1,1480\n2,1481\n", "near 1.5: water has"),
@@ -168,7 +174,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "no names": (ROWS, "is no cast: .*put the line depth_m,speed_m_s above"),
     "nothing": ("", "is no cast"),
     "names alone": ("depth_m,speed_m_s\n", "has no row"),
-    "one depth": ("depth speed\n1 1480\n1 1481\n", "has 1 depths that can be used"),
+    "one depth": ("depth speed\n1 1480\n1 1481\n", "that can be used is 1, and a cast needs two"),
     "air alone": ("depth speed\n1 340\n2 340.1\n", "near 340.05: water has"),
     "half in air": ("depth speed\n0.1 1380\n0.2 1480\n1 1481\n", "jumps from 1380.0 m/s at 0.10 m to 1480.0 at 0.20"),
     "scatter": (
@@ -187,6 +193,18 @@ def test_refused(what: str, file: Path) -> None:
     with pytest.raises(RawDataError, match=rf"a\.svp: .*{words}") as error:
         read(file, text)
     assert "\n" not in str(error.value)
+
+
+def test_wide_letters_of_a_chinese_keyboard(file: Path) -> None:
+    svp, _ = read(file, "深度（米），声速（米/秒）\n1，1480\n2，1481\n")
+    assert svp == [[1.0, 1480.0], [2.0, 1481.0]]
+
+
+@pytest.mark.parametrize("count", ["\u00b2", "\u2463", "9" * 6000])
+def test_a_count_that_no_number_can_hold(count: str, file: Path) -> None:
+    """What Python calls digits, and int() refuses."""
+    svp, _ = read(file, f"( SoundVelocity 1.0 0 202012121212 36.0 120.0 -1 0 0 A P {count} )\n1 1480\n2 1481\n")
+    assert svp == [[1.0, 1480.0], [2.0, 1481.0]]
 
 
 @pytest.mark.parametrize("content", [b"\0\1\2" * 99, b"\xff\xfe\0", b"(" * 99, b"( SoundVelocity", b"Section " * 9])

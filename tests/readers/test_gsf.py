@@ -105,7 +105,7 @@ def test_impossible_times_and_no_detections(file: Path) -> None:
 @pytest.mark.parametrize(("more", "what"), [({"times": None}, "travel times"), ({"angles": None}, "beam angles")])
 def test_soundings_without_times_or_angles(more: dict[str, None], what: str, file: Path) -> None:
     file.write_bytes(gsf_header() + gsf_ping(extra=SOUND, **more))
-    with pytest.raises(RawDataError, match=rf"a\.gsf: cannot be served: no {what}") as error:
+    with pytest.raises(RawDataError, match=rf"a\.gsf: its pings have no {what}, only positions of soundings") as error:
         read("mbes", file, "gsf")
     assert "\n" not in str(error.value)
     file.write_bytes(gsf_header() + gsf_ping(extra=SOUND) + gsf_ping(1, **more))
@@ -285,3 +285,16 @@ def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file.write_bytes(made(7))
     (part,) = raw_parts("mbes", Mbes(files=[file.name], format="gsf", mount=MOUNT), file.parent)
     assert [len(chunk.columns["beam"]) for chunk in part.chunks()] == [10, 10, 10, 5]
+
+
+def test_a_ping_that_is_there_twice_counts_once(file: Path) -> None:
+    pings = gsf_ping(0, extra=SOUND) + gsf_ping(1, extra=seabat(1480.0))
+    file.write_bytes(gsf_header() + pings + pings)
+    columns, dropped = read("mbes", file, "gsf")
+    assert columns["ping"].tolist() == [0] * 5 + [1] * 5
+    assert dropped == {"repeated ping": 2}
+
+
+def test_angles_that_are_infinite_are_counted_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+    assert not gsf._is_smooth(np.array([60.0, np.inf, np.inf, -60.0]))
+    assert not recwarn

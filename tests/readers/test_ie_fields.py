@@ -353,3 +353,50 @@ def test_damage_is_refused_or_counted(what: str, commas: bool, file: Path) -> No
 def test_layouts_do_not_depend_on_the_letters_case(file: Path) -> None:
     file.write_bytes(export(LAYOUTS["degrees"], ROWS).replace(b"GPSTime", b"GPSTIME").replace(b"(deg)", b"(Deg)"))
     has_times(read(file)[0], ROWS)
+
+
+# --- what an export is not ------------------------------------------------------------------------------------------
+PLAIN: Columns = {**WEEK_SECONDS, **POSE}
+
+
+def test_two_exports_in_one_file(file: Path) -> None:
+    """The second has roll and pitch in another order: its rows would be read by the first one's names."""
+    turned = {name: PLAIN[name] for name in sorted(PLAIN, key=lambda name: (name == "Roll", name == "Heading"))}
+    file.write_bytes(export(PLAIN, on(1)) + export(turned, on(2)))
+    with pytest.raises(RawDataError, match=r"a\.txt: has a second line of column names.*a file of its own"):
+        read(file)
+
+
+@pytest.mark.parametrize("end", [b"latitude" * 20_000, b"Latitude at the end", b"\nLATITUDE\n"])
+def test_a_word_of_the_names_below_them_is_no_second_header(end: bytes, file: Path) -> None:
+    file.write_bytes(export(PLAIN, on(1)) + end)
+    found, _ = read(file)
+    assert len(found["t_ns"]) == len(on(1))
+
+
+def test_decimal_commas_between_blanks(file: Path) -> None:
+    content = export(PLAIN, on(1), header="")
+    file.write_bytes(content.replace(b".", b","))
+    with pytest.raises(RawDataError, match=r"a\.txt: its numbers have commas in place of decimal points; exp") as error:
+        read(file)
+    assert "\n" not in str(error.value)
+
+
+def test_letters_of_hemispheres(file: Path) -> None:
+    signed = dict(PLAIN) | {"Latitude": ("(deg)", lambda row: f"{abs(row.latitude):.10f}S")}
+    file.write_bytes(export(signed, on(1)))
+    with pytest.raises(RawDataError, match=r"a\.txt: its first row has a word where a number should be; exp"):
+        read(file)
+
+
+def test_text_in_utf_16(file: Path) -> None:
+    file.write_bytes(export(PLAIN, on(1)).decode("latin-1").encode("utf-16"))
+    with pytest.raises(RawDataError, match=r"a\.txt: is a text in UTF-16, not inertial_explorer; save it as UTF-8"):
+        read(file)
+
+
+def test_a_date_whose_order_nothing_tells(file: Path) -> None:
+    columns: Columns = {"GPSDate": ("", DATE[1]), "GPSTime": ("(HMS)", lambda row: f"{gps(row):%H:%M:%S.%f}"), **POSE}
+    file.write_bytes(export(columns, on(1)))
+    with pytest.raises(RawDataError, match=r"a\.txt: column GPSDate has no unit, and day and month look alike; export"):
+        read(file)

@@ -122,6 +122,32 @@ def test_tilts_of_unknown_direction_are_refused(file: Path) -> None:
     assert not read("mbes", file, "kmall")[0]["transmit_tilt_rad"].any()
 
 
+@pytest.mark.parametrize("value", ["180.0.0", "1e2", "", "halb", "180 0"])
+def test_an_angle_that_cannot_be_read_is_not_nothing(value: str, file: Path) -> None:
+    """H taken for 0 would turn tilts forward into tilts aft, without a word."""
+    with pytest.raises(RawDataError, match=r"a\.kmall: .*tilted.*does not tell"):
+        tilts(file, transmitter=LEVEL.replace("H=0", f"H={value}"))
+    with pytest.raises(RawDataError, match=r"a\.kmall: .*tilted.*does not tell"):
+        tilts(file, receiver=LEVEL.replace(";H=0", ""))
+
+
+@pytest.mark.parametrize("value", [" 180.0 ", "180.000000000000", "+180", "180."])
+def test_angles_however_written(value: str, file: Path) -> None:
+    assert tilts(file, transmitter=LEVEL.replace("H=0", f"H={value}")) == pytest.approx([0.5, -10.0, -0.25], abs=1e-6)
+
+
+def test_a_second_installation_goes_before_the_first(file: Path) -> None:
+    """As where a file goes on after the boat was changed; one that cannot be read does not leave the first in force."""
+    fan = mrz(1, FANS, delays_s=(0.0, 0.0, 0.0), tilts_deg=(-0.5, 10.0, 0.25))
+    later = mrz(2, FANS, delays_s=(0.0, 0.0, 0.0), tilts_deg=(-0.5, 10.0, 0.25))
+    file.write_bytes(iip(LEVEL, LEVEL) + fan + iip(LEVEL.replace("H=0", "H=180"), LEVEL) + later)
+    found = np.degrees(read("mbes", file, "kmall")[0]["transmit_tilt_rad"])
+    assert found == pytest.approx([-0.5, 10.0, 0.25, 0.5, -10.0, -0.25], abs=1e-6)
+    file.write_bytes(iip(LEVEL, LEVEL) + fan + iip("X=a;Y=b", LEVEL) + later)
+    with pytest.raises(RawDataError, match=r"a\.kmall: .*tilted.*does not tell"):
+        read("mbes", file, "kmall")
+
+
 def test_one_head_of_both_arrays(file: Path) -> None:
     content = iip(LEVEL, LEVEL).replace(b"TRAI_TX1", b"TRAI_HD1").replace(b"TRAI_RX1", b"OTHERRX1")
     file.write_bytes(content + mrz(1, FANS, delays_s=(0.0, 0.0, 0.0), tilts_deg=(-0.5, 10.0, 0.25)))
@@ -209,6 +235,15 @@ def test_without_an_installation_times_and_angles_stay_as_recorded(file: Path) -
 
 
 # --- refused ---------------------------------------------------------------------------------------------------------
+def test_a_ping_that_is_there_twice_counts_once(file: Path) -> None:
+    """Two swaths of one ping have its number as well, and are two."""
+    first, second = (mrz(1, FANS, delays_s=(0.0,) * 3, swath=swath) for swath in (0, 1))
+    file.write_bytes(first + first + second + first)
+    columns, dropped = read("mbes", file, "kmall")
+    assert columns["ping"].tolist() == [1] * 6
+    assert dropped == {"repeated ping": 2}
+
+
 def test_several_receivers_are_refused(file: Path) -> None:
     file.write_bytes(mrz(1, FAN) + mrz(2, FAN, receiver=1))
     with pytest.raises(RawDataError, match=r"a\.kmall: .*dual head.*log one head alone") as error:

@@ -58,6 +58,42 @@ def test_tilts_in_the_receiver_s_frame(turned: str, sign: int, file: Path) -> No
     assert np.degrees(columns["transmit_tilt_rad"]) == pytest.approx([sign * 0.5, sign * 1.25, sign * -10.0])
 
 
+@pytest.mark.parametrize("spoilt", ["S1H=", "S1H=1.8e2", "S2P=x", "S2H=180 0"])
+def test_an_angle_that_cannot_be_read_is_not_nothing(spoilt: str, file: Path) -> None:
+    text = f"STC=0,{TRANSMITTER},{RECEIVER}".replace(f"{spoilt[:4]}0.00", spoilt)
+    file.write_bytes(all_installation(text, model=710) + raw_ranges(1, THREE, (0.5, 1.25, -10), (), (), model=710))
+    with pytest.raises(RawDataError, match=r"a\.all: .*tilted.*does not tell"):
+        read("mbes", file, "all")
+
+
+@pytest.mark.parametrize(("model", "turned"), [(3020, 1), (710, -1)])
+def test_the_second_transducer_of_heads_without_configuration(model: int, turned: int, file: Path) -> None:
+    """S2 is another head of an EM 3002, which may not be there; of an EM 710 the receiver."""
+    text = f"{TRANSMITTER},{RECEIVER}".replace("S1X=0.00", "S1X=1.50").replace("S1H=0", "S1H=180")
+    file.write_bytes(all_installation(text, model=model) + raw_ranges(1, FAN, (0.5,), model=model))
+    columns, _ = read("mbes", file, "all")
+    assert np.sign(columns["transmit_tilt_rad"]).tolist() == [turned] * len(columns["ping"])
+    same = bool(np.allclose(columns["two_way_time_s"], [time for *_, time in FAN], rtol=1e-6))
+    assert same == (model == 3020)
+
+
+def test_a_ping_that_is_there_twice_counts_once(file: Path) -> None:
+    content = b"".join(raw_ranges(number, FAN) for number in (1, 2))
+    file.write_bytes(content + content)
+    columns, dropped = read("mbes", file, "all")
+    assert columns["ping"].tolist() == [1] * 5 + [2] * 5
+    assert dropped == {"repeated ping": 2}
+
+
+def test_a_first_datagram_of_123_bytes_is_no_xtf(file: Path) -> None:
+    """XTF begins with the byte 123."""
+    content = raw_ranges(1, [(float(n), 0, 0.008) for n in range(3)])
+    content = all_datagram("A", 1, bytes(123 - 16 - 3)) + content
+    assert content[0] == 0x7B
+    file.write_bytes(content)
+    assert len(read("mbes", file, "all")[0]["ping"]) == 3
+
+
 def test_each_ping_has_its_own_tilts(file: Path) -> None:
     """As with stabilisation, and with two swaths a ping."""
     content = b"".join(raw_ranges(number, FAN, (tilt,), model=710) for number, tilt in ((1, 0.3), (2, -2.0), (3, 5.25)))

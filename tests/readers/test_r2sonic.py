@@ -267,3 +267,11 @@ def test_cut_at_each_tenth(shell: str, tenth: int, file: Path) -> None:
     assert pings[:before] == list(range(before))
     assert len(pings) <= before + 1  # an XTF record may be cut behind its packet
     assert sum(dropped.values()) >= 1
+
+
+def test_a_packet_that_was_heard_twice_counts_once(file: Path) -> None:
+    """As of a logger that hears the network on two ways."""
+    file.write_bytes(ping(0) + ping(0) + ping(1) + ping(0))
+    columns, dropped = read("mbes", file, "r2sonic")
+    assert columns["ping"].tolist() == [0] * 5 + [1] * 5
+    assert dropped == {"repeated ping": 2}

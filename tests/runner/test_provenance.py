@@ -55,6 +55,7 @@ def is_stale(copy: Path, monkeypatch: pytest.MonkeyPatch, stage: str, changed: s
     ("stage", "changed"),
     [
         ("ingest", "stages/ingest.py"),
+        ("ingest", "stages/seen.py"),
         ("ingest", "pipeline/passes.py"),
         ("ingest", "pipeline/maths/rotations.py"),  # maths/geodesy.py imports it, nothing of ingest does
         ("ingest", "pipeline/readers/detect.py"),  # the runner hands the readers' parts to it
