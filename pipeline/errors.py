@@ -1,4 +1,4 @@
-"""The tree of errors that a user can cause, and mend.
+"""The tree of errors that a user can cause, and correct.
 
 PoolcalError                    every one ends as one line on standard error and status 2
 ├── ConfigError                 a YAML file or an option: names file, key, value and remedy

@@ -91,12 +91,15 @@ SONAR: dict[str, Any] = {
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"svp": [[0.0, 1500.0]]}, "svp = [[0.0, 1500.0]]: has too few entries: 1 of at least 2; mend"),
+        ({"svp": [[0.0, 1500.0]]}, "svp = [[0.0, 1500.0]]: has too few entries: 1 of at least 2; correct"),
         ({"svp": [[0, 5, 1500], [3, 1501]]}, "svp.0 = [0, 5, 1500]: has more entries than 2; a decimal comma"),
         ({"svp": [[1500.0, 0.0], [1501.0, 3.0]]}, "svp.0.0 = 1500.0: input should be less than or equal to 200"),
+        ({"svp": [[0.0, 4855.0], [9.0, 4857.0]]}, "1700 (m/s; is it in feet a second? It is then 1479.8); each row of"),
+        ({"svp": [[0.0, 900.0], [9.0, 901.0]]}, "to 1300; each row of svp is [depth in m, speed in m/s]; correct"),
+        ({"sound_speed_m_s": 1.48}, "to 1300 (m/s; is it in km/s? It is then 1480.0); correct"),
         ({"svp": [[2.0, 1500.0], [2.0, 1501.0]]}, "depths must grow"),
         ({"sound_speed_m_s": "1500,5"}, "'1500,5': input should be a valid number, with a point where the comma is"),
-        ({"sound_speed_m_s": "{1}"}, "'{1}': input should be a valid number; mend"),
+        ({"sound_speed_m_s": "{1}"}, "'{1}': input should be a valid number; correct"),
         ({"files": "a.bth"}, "input should be a list, in square brackets"),
     ],
 )

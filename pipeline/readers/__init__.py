@@ -53,7 +53,7 @@ def found(folder: Path, patterns: Sequence[str], key: str) -> list[Path]:
     for pattern in patterns:
         matches = _matches(folder, pattern, key)
         if not matches:
-            raise RawDataError(f"session.yaml: {key}: {pattern!r} matches no file in {folder}; mend it")
+            raise RawDataError(f"session.yaml: {key}: {pattern!r} matches no file in {folder}; correct it")
         for path, real in matches:
             found[real] = min(path, found.get(real, path))
     return sorted(found.values(), key=_in(folder))
@@ -73,7 +73,7 @@ def _matches(folder: Path, pattern: str, key: str) -> list[tuple[Path, Path]]:
             files.append((path, real))
         _refuse_unreadable(folder, pattern)
     except (ValueError, NotImplementedError) as error:
-        raise ConfigError(f"session.yaml: {key}: {pattern} is no pattern ({error}); mend it") from error
+        raise ConfigError(f"session.yaml: {key}: {pattern} is no pattern ({error}); correct it") from error
     except (OSError, RuntimeError) as error:
         raise RawDataError(f"{folder}: {pattern} cannot be searched ({error}); check the folder") from error
     return files
@@ -175,7 +175,7 @@ def _sbet(files: Files, accuracy: Files, settings: Ins) -> tuple[Part, ...]:
         sbet.check_size(path, name)
     for path, name in accuracy:
         if (kind := detect.kind_of(path, name)) is not detect.ACCURACY:
-            raise RawDataError(f"{name}: is {kind.title}, not a whole accuracy file (SMRMSG); mend ins.accuracy")
+            raise RawDataError(f"{name}: is {kind.title}, not a whole accuracy file (SMRMSG); correct ins.accuracy")
     firsts = [sbet.first_seconds(path, name) for path, name in (*files, *accuracy)]
     weeks = _weeks(firsts, settings.gps_week, "ins", files[0][1])
     solutions = [sbet.SbetPart(*file, week, settings.latency_s) for file, week in zip(files, weeks, strict=False)]

@@ -37,17 +37,17 @@ def _drop_key(place: Place) -> None:
 
 SESSION = "session/session.yaml"
 YAML: dict[str, tuple[Spoil, tuple[str, ...]]] = {
-    "negative dimension": (_config(c=-1.0), ("pool.yaml", "target.c = -1.0", "greater than 0", "mend")),
-    "dimension of no room": (_config(a=0.9), ("pool.yaml", "target", "a must be >= 2 e", "mend")),
-    "text for a number": (_config(a="eight"), ("pool.yaml", "target.a = 'eight'", "mend")),
-    "number in quotes": (_config(a="8.0"), ("pool.yaml", "target.a = '8.0'", "mend")),
-    "truth value for a number": (_config(a=True), ("pool.yaml", "target.a = True", "mend")),
+    "negative dimension": (_config(c=-1.0), ("pool.yaml", "target.c = -1.0", "greater than 0", "correct")),
+    "dimension of no room": (_config(a=0.9), ("pool.yaml", "target", "a must be >= 2 e", "correct")),
+    "text for a number": (_config(a="eight"), ("pool.yaml", "target.a = 'eight'", "correct")),
+    "number in quotes": (_config(a="8.0"), ("pool.yaml", "target.a = '8.0'", "correct")),
+    "truth value for a number": (_config(a=True), ("pool.yaml", "target.a = True", "correct")),
     "dimension missing": (_drop_key, ("pool.yaml", "target.c", "missing", "add")),
     "unknown key": (_config(d=1.0), ("pool.yaml", "target.d", "unknown key", "known here: a, azimuth_deg, b")),
     "unknown block": (_add("pool.yaml", "segmnt: {margin_m: 0.1}\n"), ("pool.yaml", "segmnt", "unknown key")),
     "key twice": (_add("pool.yaml", "target: {a: 6.0}\n"), ("pool.yaml", "'target'", "given twice")),
-    "NaN": (_config(a=float("nan")), ("pool.yaml", "target.a = nan", "finite", "mend")),
-    "infinity": (_config(water_level_m=float("inf")), ("pool.yaml", "target.water_level_m = inf", "finite", "mend")),
+    "NaN": (_config(a=float("nan")), ("pool.yaml", "target.a = nan", "finite", "correct")),
+    "infinity": (_config(water_level_m=float("inf")), ("pool.yaml", "target.water_level_m = inf", "finite", "correct")),
     "alias": (_add("pool.yaml", "verdict: &x {max_sigma_m: 1.0}\nadjust: *x\n"), ("pool.yaml", "alias")),
     "a list": (_write("pool.yaml", b"- 1\n- 2\n"), ("pool.yaml", "list", "mapping")),
     "nothing": (_write("pool.yaml", b""), ("pool.yaml", "is empty")),
@@ -60,7 +60,7 @@ YAML: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "date": (_add("pool.yaml", "verdict: {max_sigma_m: 2026-05-12}\n"), ("pool.yaml", "verdict.max_sigma_m", "date")),
     "session: unknown key": (_add(SESSION, "gps: 1\n"), ("session.yaml", "gps", "unknown key")),
     "session: key twice": (_add(SESSION, "name: b\n"), ("session.yaml", "'name'", "given twice")),
-    "session: NaN": (_mount("mbes", roll_deg=float("nan")), ("session.yaml", "mbes.mount.roll_deg = nan", "mend")),
+    "session: NaN": (_mount("mbes", roll_deg=float("nan")), ("session.yaml", "mbes.mount.roll_deg = nan", "correct")),
     "session: absolute path": (
         lambda place: place.edit_session("ins", files=["/etc/*"]),
         ("session.yaml", "ins.files.0 = '/etc/*'", "inside the session folder"),
