@@ -15,7 +15,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from pipeline import artefacts, config, manifest
-from pipeline.built import by_design
+from pipeline.built import by_design, reference, titled
 from pipeline.drawn import PAGE, agreeing, drawn_from
 from pipeline.families import families_of
 from pipeline.files import write_text
@@ -101,6 +101,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
         level=f"{100 * settings.pool.adjust.test_level:g}",
         tests=[row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
+        traced=not laser and settings.session.sonar.svp is not None,
         given_speed=None if laser else settings.session.sonar.sound_speed_m_s,
         speeds=_speeds(files),
         methods=METHODS,
@@ -236,7 +237,8 @@ def _shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: config.Session
 def _built(found: Row, design: Row) -> list[Row]:
     """What the laser sees of the target, beside its design."""
     rows = [(letter, design[f"{letter}_m"], found[f"{letter}_m"], "m") for letter in ("b", "e")]
-    for words, kind in (("corner to", "corner_deg"), ("leaning of", "lean_deg")):
+    angle_between = f"angle between {titled(reference(design['lean_deg']))} and"
+    for words, kind in ((angle_between, "corner_deg"), ("leaning of", "lean_deg")):
         rows += [(f"{words} {family}", design[kind][family], angle, "deg") for family, angle in found[kind].items()]
     return [
         {"name": name, "design": _Value(design, unit), "found": _Value(value, unit)}
