@@ -53,8 +53,8 @@ class Settings:
     """What it is judged by: limits of the sigmas, level of the tests and what they tolerate, the method that is the
     result; ``farthest``: angle (degrees) and lever arm (m) beyond which no mount is taken for labelling;
     ``drift_doubt``: what speaks against the session's ins.drift, or nothing; ``shape``: the settings that give the
-    target's shape, ``sides``: that which tells its left from its right; ``asked``: what to do about a mount far off
-    that was measured right."""
+    target's shape, ``sides``: that which tells its left from its right; ``asked``: what to do about angles of a mount
+    far off that were measured right, said where nothing else is in doubt."""
 
     limits: config.Verdict
     test_level: float
@@ -124,11 +124,14 @@ def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
             f"{shape} are wrong"
         )
     elif not mount["within"]:
+        beyond = _beyond(mount, farthest)
+        angles_alone = "°" in beyond and " m" not in beyond and not mount["ambiguous"]
+        asked = settings.asked if angles_alone and not found else ""
         found.append(
             f"no mount within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings the soundings onto the "
-            f"target{_beyond(mount, farthest)}: mbes.mount is farther off than segment.search_mount_deg and "
+            f"target{beyond}: mbes.mount is farther off than segment.search_mount_deg and "
             f"search_mount_m allow (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
-            f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{settings.asked}"
+            f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{asked}"
         )
     if mount["ambiguous"]:
         found.append(

@@ -125,6 +125,9 @@ def test_people_see_files_passes_and_that_nothing_was_found(good: Callable[..., 
     assert "100 Hz" in lines[1]
     assert lines[-1] == "Nothing found."
     assert sum("100%    100%" in line for line in lines) == 2
+    unasked = poolcal("check", good()).out.splitlines()
+    assert unasked[-2] == "Nothing found."
+    assert unasked[-1].startswith("Target, mounts and soundings were not checked: give")
 
 
 @pytest.mark.calibrates

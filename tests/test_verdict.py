@@ -127,6 +127,24 @@ def test_each_evidence_is_one_reason(change, words):
     assert words in found[0]
 
 
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"mount": {"rotation_z_deg": -4.6}}, True),
+        ({"mount": {"rotation_z_deg": -4.6, "lever_arm_z_m": 0.6}}, False),
+        ({"mount": {}}, False),
+        ({"mount": {"rotation_z_deg": -4.6, "ambiguous": True}}, False),
+        ({"mount": {"rotation_z_deg": -4.6}, "pose": {"ambiguous": True}}, False),
+        ({"mount": {"rotation_z_deg": -4.6}, "pose": {"within": False}}, False),
+    ],
+)
+def test_angles_to_enter_are_told_only_where_nothing_else_is_in_doubt(change, told):
+    found = evidence(**change | {"mount": change["mount"] | {"within": False}})
+    words = reasons(found, methods(), replace(ADJUSTED, asked="; enter these angles"))
+    assert any("; enter these angles" in one for one in words) == told
+    assert any("no mount within" in one for one in words)
+
+
 def test_where_labels_are_in_doubt_nothing_else_is_judged():
     doubtful = evidence(pose={"ambiguous": True}, summary={"converged": False}, bin_=[PASS_3])
     assert len(reasons(doubtful, methods(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=1e-6)))) == 1

@@ -87,7 +87,11 @@ def apart(
             words = offsets[sensor].words(True, weeks.get(sensor), f"{sensor}.gps_week", whose)
             yield Finding("clock", f"{sensor}: {words} ({spans})")
         elif share < 1 - ENOUGH:
-            yield Finding("clock", f"{sensor}: has no time in common with the INS ({spans}); check the clocks")
+            yield Finding(
+                "clock",
+                f"{sensor}: has no time in common with the INS ({spans}); check the clocks, and that the "
+                "files are of one session",
+            )
         else:
             own = [seen for seen in files if seen.sensor == sensor and len(seen.epochs_ns)]
             outside = [seen.name for seen in own if covered(seen.epochs_ns, running) < 1 - ENOUGH]

@@ -11,7 +11,6 @@ from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
 from pipeline.judging.casts import doubts
 from pipeline.maths.geodesy import ecef_from_geodetic
-from pipeline.screen import plural
 from pipeline.times import utc_text
 
 SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock
@@ -213,6 +212,5 @@ def missing_sensors(files: Sequence[Seen], session: SessionConfig) -> Iterator[F
     """A sensor of which no file at all can be used."""
     for sensor in SENSORS:
         if getattr(session, sensor) is not None and not any(s.records for s in files if s.sensor == sensor):
-            many = plural(sum(s.sensor == sensor for s in files), "file")
-            yield Finding("no records", f"{sensor}: none of its {many} can be used; repair or replace them")
+            yield Finding("no records", f"{sensor}: has no file that can be used; correct {sensor}.files or the files")
 

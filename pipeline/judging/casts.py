@@ -12,9 +12,9 @@ from pipeline.times import NS, unix_ns_from_gps, utc_text
 
 LONGEST_H = 36.0  # between the cast and the soundings, whatever time zone its file has
 FARTHEST_KM = 5.0
-KM_PER_DEG = 111.2
 ODD_SPEED_M_S = 3.0  # the head's sound speed, so far beyond the cast's, is of other water
 RETRACE_DEG = 2.0  # a coarse mount farther off than this wants its rays traced again
+EARTH_KM = 6371.0
 
 
 def in_words(used: CastUsed) -> str:
@@ -46,9 +46,7 @@ def doubts(
                 f"({utc_text(span_ns[0])}): the cast is taken for true; take one at the session"
             )
     if used.place_deg is not None and place_deg is not None:
-        north = used.place_deg[0] - place_deg[0]
-        east = (used.place_deg[1] - place_deg[1] + 180) % 360 - 180
-        away_km = KM_PER_DEG * float(np.hypot(north, east * np.cos(np.radians(place_deg[0]))))
+        away_km = _apart_km(used.place_deg, place_deg)
         if away_km > FARTHEST_KM:
             yield (
                 f"mbes.svp: {used.file} was taken {away_km:.0f} km from here: the cast is taken for true; take one in "
@@ -83,3 +81,14 @@ def _span(files: pd.DataFrame) -> tuple[int, int]:
     """First and last sounding, GPS time."""
     own = files[(files["sensor"] == "mbes") & (files["first_ns"] >= 0)]
     return int(own["first_ns"].min()), int(own["last_ns"].max())
+
+
+def _apart_km(one_deg: tuple[float, float], other_deg: tuple[float, float]) -> float:
+    """Great circle between two places (latitude, longitude) on a sphere, by haversines.
+
+    >>> round(_apart_km((0.0, 179.5), (0.0, -179.5)), 1), round(_apart_km((90.0, 0.0), (0.0, 77.0))), EARTH_KM
+    (111.2, 10008, 6371.0)
+    """
+    (lat, lon), (lat_other, lon_other) = np.radians(one_deg), np.radians(other_deg)
+    across = np.cos(lat) * np.cos(lat_other) * np.sin((lon_other - lon) / 2) ** 2
+    return float(2 * EARTH_KM * np.arcsin(np.sqrt(np.sin((lat_other - lat) / 2) ** 2 + across)))
