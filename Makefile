@@ -88,7 +88,7 @@ lint: $(SETUP) ## style, types, imports
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-logo
 
-format: $(SETUP) ## what ruff can mend by itself
+format: $(SETUP) ## what ruff can correct by itself
 	.venv/bin/ruff check --fix-only .
 
 test: lint ## lint, then every test

@@ -12,7 +12,7 @@ passes (the adjusted ones are the sonar's as well: what is wrong there would tur
 Of the patent's target c has no plane that shows it: the back wall is not the target's.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ def as_found(planes: pd.DataFrame, patterns: pd.DataFrame, model: TargetModel) -
     return {
         "b_m": _width(seen),
         "e_m": _e(patterns, model),
-        "corner_deg": _corners(seen),
+        "corner_deg": _corners(seen, reference(found)),
         "lean_deg": {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in seen.items()},
     }
 
@@ -49,7 +49,7 @@ def by_design(model: TargetModel) -> dict[str, Any]:
     return {
         "b_m": _width(planes),
         "e_m": None if model.repeats_m is None else model.half_period_m,
-        "corner_deg": _corners(planes),
+        "corner_deg": _corners(planes, reference(planes)),
         "lean_deg": {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in planes.items()},
     }
 
@@ -68,14 +68,26 @@ def _width(planes: Mapping[str, Plane]) -> float | None:
     return float(np.linalg.norm(other - one))
 
 
-def _corners(planes: Mapping[str, Plane]) -> dict[str, float]:
-    """Between each family and the wall, or what is first in its place."""
-    against = WALL if WALL in planes else next(iter(planes), "")
+def _corners(planes: Mapping[str, Plane], against: str) -> dict[str, float]:
+    """Between each family and ``against``; nothing where that was not seen."""
+    if against not in planes:
+        return {}
     return {
         family: float(np.degrees(np.arccos(np.clip(n @ planes[against][0], -1, 1))))
         for family, (n, _) in planes.items()
         if family != against
     }
+
+
+def reference(families: Iterable[str]) -> str:
+    """The family that the angles of ``corner_deg`` are counted from: the wall, or the first."""
+    names = list(families)
+    return WALL if WALL in names else next(iter(names), "")
+
+
+def titled(family: str) -> str:
+    """As the screen and the report name it."""
+    return "wall" if family == WALL else family
 
 
 def _e(patterns: pd.DataFrame, model: TargetModel) -> float | None:
@@ -102,7 +114,7 @@ def oddities(found: Mapping[str, Any], design: Mapping[str, Any]) -> list[str]:
             words.append(f"the laser finds {letter} = {value:.4f} m where the config has {given:g} m: measure it")
     for family, angle in found["corner_deg"].items():
         if abs(angle - design["corner_deg"][family]) > ODD_ANGLE_DEG:
-            other = "wall" if WALL in design["lean_deg"] else next(iter(design["lean_deg"]))
             given = design["corner_deg"][family]
-            words.append(f"the laser finds {angle:.2f}° between {other} and {family}, by design {given:g}°")
+            other = reference(design["lean_deg"])
+            words.append(f"the laser finds {angle:.2f}° between {titled(other)} and {family}, by design {given:g}°")
     return words

@@ -122,7 +122,7 @@ def load_marks(path: Path) -> Marks:
                 raise ConfigError(f"{path}: {key}: {name} is in leave_out; name another mark for the axes")
     for name in marks.leave_out:
         if name not in marks.survey.marks:
-            raise ConfigError(f"{path}: leave_out: {name} is not in survey.marks; mend the name")
+            raise ConfigError(f"{path}: leave_out: {name} is not in survey.marks; correct the name")
     return marks
 
 

@@ -20,21 +20,21 @@ from pipeline.quantities import (
     SigmaDeg,
     SigmaM,
 )
-from pipeline.session_settings import INSTRUMENT as INSTRUMENT
 from pipeline.session_settings import Calibrated as Calibrated
-from pipeline.session_settings import CastUsed as CastUsed
 from pipeline.session_settings import Drift as Drift
 from pipeline.session_settings import Ins as Ins
-from pipeline.session_settings import InstrumentTitle as InstrumentTitle
-from pipeline.session_settings import InstrumentUsed as InstrumentUsed
 from pipeline.session_settings import Laser as Laser
 from pipeline.session_settings import Mbes as Mbes
-from pipeline.session_settings import Mount as Mount
-from pipeline.session_settings import MountSigma as MountSigma
 from pipeline.session_settings import Recording as Recording
 from pipeline.session_settings import Recordings as Recordings
 from pipeline.session_settings import SessionConfig as SessionConfig
 from pipeline.session_settings import White as White
+from pipeline.settings.mounts import Mount as Mount
+from pipeline.settings.mounts import MountSigma as MountSigma
+from pipeline.settings.used import INSTRUMENT as INSTRUMENT
+from pipeline.settings.used import CastUsed as CastUsed
+from pipeline.settings.used import InstrumentTitle as InstrumentTitle
+from pipeline.settings.used import InstrumentUsed as InstrumentUsed
 from pipeline.target_settings import Faces as Faces
 from pipeline.target_settings import Letters as Letters
 from pipeline.target_settings import Origin as Origin

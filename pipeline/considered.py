@@ -10,13 +10,13 @@ from pipeline.maths.observations import SPEED_M_S
 from pipeline.maths.unknowns import OF_LASER, SIX
 
 Array = NDArray[np.float64]
-LEAST_SPAN_M = 0.1  # of a cast; less covers nothing
+LEAST_SPAN_M = 0.1  # a cast over less depth covers nothing
 Block = tuple[NDArray[np.int64], Array]  # numbers among all unknowns, covariance
 
 
 def gradient_sigma(mbes: config.Mbes, depth_m: float | None) -> float:
-    """Of the change of the sound speed with depth, (m/s)/m, over the water down to ``depth_m`` (the target's lower end;
-    None: as deep as the cast).
+    """Sigma of the change of the sound speed with depth, (m/s)/m, over the water down to ``depth_m`` (the target's
+    lower end; None: as deep as the cast).
 
     With a cast: its speeds at both ends of the span s that it covers have errors of ``svp_sigma_m_s`` σ of their own
     (what all share is sound_speed_sigma_m_s), so that the slope between them has √(σ² + σ²) / s = √2 σ / s. In the
@@ -40,8 +40,8 @@ def considered_of(
     as_built: config.AsBuilt,
     depth_m: float | None = None,
 ) -> Array:
-    """Sigmas (u,) of the unknowns ``names`` where they are held; zero for the mount and the surfaces. ``depth_m``: of
-    the target's lower end below the water."""
+    """Sigmas (u,) of the unknowns ``names`` where they are held; zero for the mount and the surfaces. ``depth_m``: how
+    far the target's lower end lies below the water."""
     mount = laser.mount_sigma
     six = [float(np.radians(mount.angle_deg))] * 3 + [mount.lever_arm_m] * 3
     if laser.mount_covariance is not None:

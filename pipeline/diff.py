@@ -4,7 +4,7 @@ Nothing is recomputed: both runs are read as they are. What cannot be compared i
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from pipeline.folder import Settings, as_written, calibration, read_settings, re
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.planes import angle_between
 from pipeline.mounts import PARAMETERS
-from pipeline.screen import summary
+from pipeline.screen import plural, summary
 from pipeline.tables import Tables
 from pipeline.verdict import SIX
 
@@ -27,6 +27,7 @@ LEVEL = 0.01  # of the joint test: so many false alarms where nothing has moved
 UNITS = ("deg",) * 3 + ("m",) * 3
 SHOWN = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}
 PLACE = ("origin", "azimuth_deg", "water_level_m")  # of a target, not its shape
+FACES = "target.faces."
 Row = dict[str, Any]
 
 
@@ -103,7 +104,7 @@ def is_moved(found: Mapping[str, Any]) -> bool:
 def _changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Row]:
     one, other = manifest.flattened(first), manifest.flattened(second)
     for key in sorted(one.keys() | other.keys()):
-        if one.get(key) != other.get(key) or (key in one) != (key in other):
+        if one.get(key) != other.get(key):
             yield {"key": key, "a": one.get(key), "b": other.get(key)}
 
 
@@ -241,7 +242,7 @@ def text(found: Mapping[str, Any]) -> str:
         lines += ["", f"raw files: {len(found['inputs']) - new - gone} changed, {new} in b alone, {gone} in a alone"]
     for title, key in (("config and session", "config"), ("software", "software")):
         if found[key]:
-            lines += ["", f"{title}:", *(f"  {r['key']}: {_brief(r['a'])} -> {_brief(r['b'])}" for r in found[key])]
+            lines += ["", f"{title}:", *(f"  {row['key']}: {row['a']} -> {row['b']}" for row in _short(found[key]))]
     if found["counts"]:
         lines += ["", "counts:"]
         lines += [f"  {r['stage']}, {r['source']}, {r['reason']}: {r['a']:,} -> {r['b']:,}" for r in found["counts"]]
@@ -259,6 +260,17 @@ def text(found: Mapping[str, Any]) -> str:
             lines.append(f"  {r['parameter']:<14}{size}{'  moved' if r['moved'] else ''}")
     lines += [f"not compared: {why}" for why in found["not_compared"]]
     return "\n".join([*lines, "", found["sentence"] + "."])
+
+
+def _short(rows: Sequence[Row]) -> Iterator[Row]:
+    """Values that fit a line; faces that only one of the runs has are counted in place of their keys."""
+    faces = [row for row in rows if row["key"].startswith(FACES) and row["key"].endswith(".corners")]
+    alone = {key: [r["key"].removesuffix("corners") for r in faces if r[other] is None] for key, other in ("ab", "ba")}
+    for row in rows:
+        if not row["key"].startswith((*alone["a"], *alone["b"])):
+            yield {"key": row["key"], "a": _brief(row["a"]), "b": _brief(row["b"])}
+    if alone["a"] or alone["b"]:
+        yield {"key": FACES[:-1]} | {key: f"{plural(len(names), 'face')} of its own" for key, names in alone.items()}
 
 
 def _brief(value: Any) -> str:

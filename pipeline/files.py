@@ -1,6 +1,6 @@
 """Files of a run folder: written whole or not at all, hashed once, removed safely.
 
-Whatever the disk refuses (full, read-only, not permitted, something in the way) is the user's to mend, so it becomes
+Whatever the disk refuses (full, read-only, not permitted, something in the way) is the user's to correct, so it becomes
 an :class:`~pipeline.errors.ArtefactError`; nothing else does.
 """
 
@@ -23,8 +23,8 @@ _REMEDIES = {
     errno.ENOSPC: "make room and run again",
     errno.EDQUOT: "make room within the quota and run again",
     errno.EROFS: "name a run folder on a disk that can be written",
-    errno.EACCES: "mend its permissions or name another run folder",
-    errno.EPERM: "mend its permissions or name another run folder",
+    errno.EACCES: "correct its permissions or name another run folder",
+    errno.EPERM: "correct its permissions or name another run folder",
     errno.EEXIST: "move what is in the way, or name another run folder",
     errno.ELOOP: "remove the symbolic link that is in the way, or name another run folder",
     errno.ENOTDIR: "move what is in the way, or name another run folder",
@@ -40,7 +40,7 @@ def writing(path: Path) -> Iterator[None]:
         number = error.errno if error.errno is not None else _errno_in(str(error))
         reason = os.strerror(number) if number else str(error)
         where = error.filename if isinstance(error.filename, str) else path
-        remedy = _REMEDIES.get(number or 0, "mend this or name another run folder")
+        remedy = _REMEDIES.get(number or 0, "correct this or name another run folder")
         raise ArtefactError(f"{where}: cannot be written ({reason}); {remedy}") from error
 
 
@@ -168,7 +168,7 @@ def sha256(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); mend this and run again") from error
+        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); correct this and run again") from error
 
 
 class Digests:
@@ -195,7 +195,7 @@ def _mark(path: Path) -> list[object]:
     try:
         status = path.stat()
     except OSError as error:
-        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); mend this and run again") from error
+        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); correct this and run again") from error
     return [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
 
 

@@ -99,7 +99,7 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
 
 
 def cast_digest(this: Run) -> dict[str, str]:
-    """Of the file that the cast of sound speed came from; its depths are in the settings."""
+    """Digest of the file that the cast of sound speed came from; its depths are in the settings."""
     used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
     if used is None:
         return {}

@@ -74,7 +74,7 @@ def read_history(folder: Path, chosen: Filter) -> History:
     if not finished and not begun:
         itself = (folder / RUN_YAML).is_file()
         remedy = "it is one itself: name the folder that holds it" if itself else "name the folder that holds them"
-        raise ConfigError(f"{folder}: holds no run folder, two levels deep; {remedy}")
+        raise ConfigError(f"{folder}: holds no run folder, nor do the folders in it; {remedy}")
     for run in finished:
         try:
             result = calibration(run)

@@ -96,6 +96,7 @@ def _loaded(text: str, path: Path, how: Callable[[_StrictLoader], Any]) -> Any:
 
 
 LETTERS = tuple(f"target.{letter}" for letter in "abce")
+FOOT_M = 0.3048
 Location = tuple[int | str, ...]
 _WORDS = {  # where pydantic speaks to programmers
     "too_short": "has too few entries: {actual_length} of at least {min_length}",
@@ -122,7 +123,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
         message = message.removeprefix("Value error, ").replace("a valid array", "a list, in square brackets")
         if fault["type"] == "float_type" and "," in str(fault["input"]):
             message += ", with a point where the comma is"
-        message += _in_metres(key, fault)
+        message += _in_metres(key, fault) + _in_m_s(key, fault)
         shown = repr(fault["input"])
         shown = shown if len(shown) <= 60 else shown[:57] + "..."
         raise ConfigError(f"{where}: {key} = {shown}: {message[0].lower()}{message[1:]}; correct this value") from error
@@ -165,6 +166,21 @@ def _in_metres(key: str, fault: Any) -> str:
     if not (length and beyond) or abs(value) / 1000 > abs(bounds.get("le", bounds.get("ge", 0.0))):
         return ""
     return f", in metres: is {value:g} in mm? It is then {value / 1000:.4g}"
+
+
+def _in_m_s(key: str, fault: Any) -> str:
+    """A word where a sound speed is out of bounds in m/s, and would not be in another unit; how a cast's row is read.
+
+    >>> _in_m_s("mbes.svp.0.1", {"type": "less_than_equal", "input": 4855.0})
+    ' (m/s; is it in feet a second? It is then 1479.8); each row of svp is [depth in m, speed in m/s]'
+    """
+    value, row = fault["input"], "svp" in key.split(".")
+    beyond = fault["type"] in ("less_than_equal", "greater_than_equal") and isinstance(value, (int, float))
+    if not beyond or not (row or key.endswith("sound_speed_m_s")):
+        return ""
+    units = ((FOOT_M, "feet a second"), (1000.0, "km/s"))
+    told = (f" (m/s; is it in {unit}? It is then {value * m:.1f})" for m, unit in units if 1300 <= value * m <= 1700)
+    return next(told, "") + ("; each row of svp is [depth in m, speed in m/s]" if row else "")
 
 
 def _to_json(content: dict[str, Any], where: str) -> str:

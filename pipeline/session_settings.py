@@ -4,12 +4,10 @@ from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.errors import ConfigError
 from pipeline.quantities import (
-    Angle,
     BeamWidth,
     Depth,
     Latency,
@@ -21,6 +19,8 @@ from pipeline.quantities import (
     SigmaS,
     SoundSpeed,
 )
+from pipeline.settings.mounts import Covariance, Mount, MountOrigin, MountSigma
+from pipeline.settings.used import CastUsed, InstrumentUsed
 
 Calibrated = Literal["mbes", "laser"]
 
@@ -56,49 +56,6 @@ FIRST_WEEK = 1000  # March 1999
 Week = Annotated[int, AfterValidator(_whole_week), Field(ge=0, le=5000)] | None  # GPS week, not modulo 1024
 
 
-class Mount(Model):
-    """Angles and lever arm of a sensor on the body: R_body_from_sensor = Rz(yaw) Rx(pitch) Ry(roll)."""
-
-    roll_deg: Angle
-    pitch_deg: Angle
-    yaw_deg: Angle
-    x_m: Lever
-    y_m: Lever
-    z_m: Lever
-
-
-def _covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    matrix = np.array(rows)
-    sigma = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    size = np.outer(sigma, sigma)
-    if np.any(np.abs(matrix - matrix.T) > 1e-6 * size) or np.any(np.abs(matrix) > (1 + 1e-6) * size):
-        raise ValueError("must be symmetric, with no covariance above the product of its two sigmas")
-    scale = np.where(sigma > 0, sigma, 1.0)
-    if np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0] < -1e-6:
-        raise ValueError("must be positive semidefinite, as a covariance is")
-    return rows
-
-
-Entry = Annotated[float, Field(ge=-100, le=100)]
-Covariance = Annotated[  # of (ε about body x, y, z; lever arm x, y, z), R_true = Exp(ε) R: rad and m
-    tuple[Annotated[tuple[Entry, ...], Field(min_length=6, max_length=6)], ...],
-    Field(min_length=6, max_length=6),
-    AfterValidator(_covariance),
-]
-
-
-class MountOrigin(Model):
-    """Where a mount comes from: what poolcal has written beside it."""
-
-    method: Literal["coarse", "fine"]
-    file: Annotated[str, Field(max_length=300)]
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
-    software: Annotated[str, Field(max_length=100)]
-    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # of the six what a fine calibration left as it was
-    mount: Mount | None = None  # as it was written: mount_covariance belongs to no other
-
-
 class Drift(Model):
     """First-order Gauss-Markov errors of the INS: standard deviations and correlation time."""
 
@@ -114,20 +71,6 @@ class White(Model):
 
     position_m: SigmaM = 0.002
     attitude_deg: SigmaDeg = 0.002
-
-
-INSTRUMENT = "[a-z0-9_]{1,100}"
-InstrumentTitle = Annotated[str, Field(min_length=1, max_length=100)]
-
-
-class InstrumentUsed(Model):
-    """A preset as applied; session.yaml has its name alone (pipeline/instruments.py), run.yaml all of this."""
-
-    name: Annotated[str, Field(pattern=f"^{INSTRUMENT}$")]
-    title: InstrumentTitle
-    unverified: tuple[str, ...]  # keys of the preset that were taken from no document
-    origins: dict[str, Literal["session", "preset", "default"]]  # where the sensor's figures come from
-    rates: dict[str, int | float | tuple[float, float]]  # for poolcal plan
 
 
 class Ins(Model):
@@ -153,13 +96,6 @@ class Ins(Model):
         if self.accuracy and self.format != "sbet":
             raise ValueError(f"accuracy files belong to an SBET, but format is {self.format}: take accuracy out")
         return self
-
-
-class MountSigma(Model):
-    """Of each of the three angles and of each component of the lever arm."""
-
-    angle_deg: SigmaDeg = 0.005
-    lever_arm_m: SigmaM = 0.0015
 
 
 class Laser(Model):
@@ -202,25 +138,6 @@ class Laser(Model):
                 "mount_covariance out, or put that mount back"
             )
         return self
-
-
-class CastUsed(Model):
-    """A file's cast as it was used; session.yaml has the file's name alone (readers/casts.py), run.yaml all of this."""
-
-    file: Annotated[str, Field(max_length=1000)]  # in the session folder
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    kind: Annotated[str, Field(max_length=50)]
-    number: Annotated[int, Field(ge=1)]  # which of so many in the file
-    casts: Annotated[int, Field(ge=1)]
-    taken: Annotated[str, Field(max_length=50)] | None  # by the file, whose time zone is not known
-    place_deg: tuple[float, float] | None  # latitude, longitude
-    rows: int
-    left_out: dict[str, int]  # by reason
-    first_m: float
-    last_m: float
-    tolerance_m_s: float  # within which the depths that were kept have all rows, or their means
-    averaged_m: float  # over so much of depth rows that scatter were averaged first; 0: not
-    scatter_m_s: float  # of the rows about what was kept, RMS
 
 
 class Mbes(Model):

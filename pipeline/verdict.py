@@ -9,7 +9,6 @@ import pandas as pd
 
 from pipeline import config
 from pipeline.causes import causes, estimated
-from pipeline.checking.cast import doubts
 from pipeline.judging.residual_tests import Tables, off
 from pipeline.mounts import PARAMETERS
 from pipeline.screen import plural
@@ -29,10 +28,8 @@ ODD_FACTOR = 2.0  # a variance factor above this, or below its inverse, is worth
 ODD_COMMON = 4.0  # the same of what an epoch's points share: less is a good INS
 ODD_CUT = 0.01  # and so is a share of cut observations above this
 ODD_OFFSET_M, ODD_TILT_DEG = 0.1, 0.1  # and a target found so far off
-RETRACE_DEG = 2.0  # a coarse mount further off than this wants its rays traced again
 NO_DRIFT = "ins.drift concedes the INS no drift at all: give its figures before anything else is looked for"
 ODD_DRIFT = 1.2  # drift found, in sigmas of ins.drift
-ODD_SPEED_M_S = 3.0  # and a head's sound speed so far beyond the cast's
 FEWEST = 30  # soundings on a family of faces
 
 
@@ -56,8 +53,8 @@ class Settings:
     """What it is judged by: limits of the sigmas, level of the tests and what they tolerate, the method that is the
     result; ``farthest``: angle (degrees) and lever arm (m) beyond which no mount is taken for labelling;
     ``drift_doubt``: what speaks against the session's ins.drift, or nothing; ``shape``: the settings that give the
-    target's shape, ``sides``: that which tells its left from its right; ``asked``: what to do about a mount far off
-    that was measured right."""
+    target's shape, ``sides``: that which tells its left from its right; ``asked``: what to do about angles of a mount
+    far off that were measured right, said where nothing else is in doubt."""
 
     limits: config.Verdict
     test_level: float
@@ -127,11 +124,14 @@ def _ambiguities(evidence: Evidence, settings: Settings) -> list[str]:
             f"{shape} are wrong"
         )
     elif not mount["within"]:
+        beyond = _beyond(mount, farthest)
+        angles_alone = "°" in beyond and " m" not in beyond and not mount["ambiguous"]
+        asked = settings.asked if angles_alone and not found else ""
         found.append(
             f"no mount within {farthest[0]:g}° and {farthest[1]:g} m of the coarse one brings the soundings onto the "
-            f"target{_beyond(mount, farthest)}: mbes.mount is farther off than segment.search_mount_deg and "
+            f"target{beyond}: mbes.mount is farther off than segment.search_mount_deg and "
             f"search_mount_m allow (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
-            f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{settings.asked}"
+            f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{asked}"
         )
     if mount["ambiguous"]:
         found.append(
@@ -275,35 +275,6 @@ def one_eyed(passes: Sequence[Mapping[str, Any]]) -> list[str]:
             which = plural(len(numbers), "pass").partition(" ")[2]
             found.append(f"{which} {', '.join(numbers)}: {words}; was it recording?")
     return found
-
-
-def cast_doubts(mbes: config.Mbes, files: pd.DataFrame, correction: Mapping[str, Any]) -> list[str]:
-    """A cast that cannot be of this water by what the head recorded; and rays traced through it with a coarse mount far
-    off: a ray at θ from straight down bends by g t sin θ, of which a share of δ / tan θ is wrong where θ is wrong by δ
-    (a sixtieth for a degree at 45°)."""
-    if mbes.svp is None:
-        return []
-    found = [] if mbes.svp_from is None else list(doubts(mbes.svp_from, _span(files), None))
-    speeds = [speed for _, speed in mbes.svp]
-    low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
-    if max(low - max(speeds), min(speeds) - high) > ODD_SPEED_M_S:
-        found.append(
-            f"mbes.svp lies between {min(speeds):.1f} and {max(speeds):.1f} m/s, the head recorded {low:.1f} to "
-            f"{high:.1f}: the cast is taken for true; was it taken here and now?"
-        )
-    turn = correction["rotation_vector_deg"]
-    if turn is not None and np.linalg.norm(turn) > RETRACE_DEG:
-        found.append(
-            f"rays were traced through mbes.svp with a coarse mount that is {np.linalg.norm(turn):.1f}° off: enter the "
-            "values found as mbes.mount and run again"
-        )
-    return found
-
-
-def _span(files: pd.DataFrame) -> tuple[int, int]:
-    """First and last sounding, GPS time."""
-    own = files[(files["sensor"] == "mbes") & (files["first_ns"] >= 0)]
-    return int(own["first_ns"].min()), int(own["last_ns"].max())
 
 
 def _so(sigma: Mapping[str, float] | None) -> str:

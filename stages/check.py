@@ -6,14 +6,16 @@ from typing import Any
 
 from pipeline.checking import saying
 from pipeline.checking.calibrated import Calibrated, Raw
-from pipeline.checking.cast import in_words
 from pipeline.checking.examine import examine
 from pipeline.config import PoolConfig, SessionConfig, load_session
 from pipeline.errors import PoolcalError
 from pipeline.folder import load_settings
+from pipeline.judging.casts import in_words
 from pipeline.readers.casts import with_cast
 from pipeline.streams import EMPTY
 from stages.campaign import calibrate_in_memory
+
+WITHOUT_CONFIG = "Target, mounts and soundings were not checked: give the pool's YAML file with --config."
 
 
 def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]:
@@ -25,7 +27,8 @@ def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]
         return saying.as_json(found), found.faulty
     used = None if content.mbes is None else content.mbes.svp_from
     cast = "" if used is None else f"mbes.svp: {in_words(used)}\n\n"
-    return f"{cast}{saying.text(found)}", found.faulty
+    unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"
+    return f"{cast}{saying.text(found)}{unasked}", found.faulty
 
 
 def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrated:

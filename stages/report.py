@@ -23,9 +23,9 @@ from pipeline.blocks import (
     target_block,
 )
 from pipeline.built import as_found, by_design, oddities
-from pipeline.checking.cast import in_words
 from pipeline.closing import closing_table
 from pipeline.ins_sigmas import drift_of, told
+from pipeline.judging.casts import cast_doubts, in_words
 from pipeline.judging.residual_tests import pattern_tests
 from pipeline.mounts import Mounted, mount_of, target_of, turned
 from pipeline.screen import verdict_in_words
@@ -33,7 +33,6 @@ from pipeline.verdict import (
     NO_DRIFT,
     Evidence,
     Settings,
-    cast_doubts,
     drift_doubt,
     one_eyed,
     reasons,

@@ -10,10 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline import artefacts
-from pipeline.checking.days import whole_days
+from pipeline.checking.days import DAY_NS, whole_days
 from pipeline.errors import RawDataError
 from pipeline.passes import split_at_gaps
 from pipeline.rates import rate_hz
+from pipeline.screen import plural
 from pipeline.times import NS, WEEK_NS, utc_text
 
 Columns = dict[str, NDArray[Any]]
@@ -62,12 +63,15 @@ def refuse_apart(ins: tuple[int, int], spans: dict[str, tuple[int, int]]) -> Non
         if last < start or first > end:
             apart = first - start
             days = whole_days(ins, (first, last), partial(_meet, ins, (first, last)))
+            weeks = round(apart / WEEK_NS)
             hint = "check the instruments' clocks and latency_s"
             if days:
                 amount, ahead, why = days
                 hint = f"{sensor} is {amount} {'ahead of' if ahead else 'behind'} the INS: {why}"
+            elif weeks and _meet(ins, (first, last), weeks * WEEK_NS):
+                hint = f"they are {plural(abs(weeks), 'week')} apart: check gps_week"
             elif abs(apart) > WEEK_NS / 2:
-                hint = f"they are {abs(apart) / WEEK_NS:.1f} weeks apart: check gps_week"
+                hint = f"they are {abs(apart) / DAY_NS:.0f} days apart: name files of one session"
             raise RawDataError(
                 f"session.yaml: no time overlap: ins {utc_text(start)} to {utc_text(end)}, "
                 f"{sensor} {utc_text(first)} to {utc_text(last)}; {hint}"

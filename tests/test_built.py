@@ -72,3 +72,9 @@ def test_without_a_flank_there_is_no_width() -> None:
     assert found["b_m"] is None
     assert set(found["corner_deg"]) == {"P1"}
     assert not oddities(found, DESIGN)
+
+
+def test_without_the_wall_no_angle_is_compared_with_the_walls() -> None:
+    found = as_found(planes(1.5).query("plane != 'P2'"), heights(0.0), MODEL)
+    assert found["corner_deg"] == {}
+    assert not oddities(found, DESIGN)

@@ -1,7 +1,7 @@
 """poolcal check on a target that is not where the config says: its height, its sides, its azimuth, signs of mounts."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pipeline.checking import examine as asked
 from pipeline.checking import hits, passes, tried
 from pipeline.checking.calibrated import Calibrated
 from pipeline.checking.finding import Finding
-from pipeline.checking.placed import Sample, sample
+from pipeline.checking.placed import Sample, put, sample
 from pipeline.checking.survey import Seen, survey
 from pipeline.checking.track import Track, frame_of, joined, track_of
 from pipeline.clouds import ClosestSurface
@@ -105,6 +106,33 @@ def test_a_height_that_is_right_is_not_doubted(looked: Looked) -> None:
         assert looked.missing(height_m=off) == []
 
 
+def test_one_sensor_alone_does_not_tell_a_height_from_its_mount(blocks: Looked) -> None:
+    """The laser, turned away, hits nothing at any height."""
+    mount = blocks.session.laser.mount
+    found = blocks.missing(height_m=3.0, laser={"yaw_deg": mount.yaw_deg + 180.0})
+    (found,) = (one for one in found if one.words.startswith("mbes"))
+    assert "mbes.mount.z_m" in found.words
+    height = found.words.split("; or correct target.origin.height_m (")[1].removesuffix(" in place of 15)")
+    assert float(height) == pytest.approx(12.0, abs=0.4)
+
+
+@pytest.mark.parametrize(("off", "said"), [(-9.0, "higher"), (9.0, "lower")])
+def test_heights_of_points_that_others_placed_are_no_mount(blocks: Looked, off: float, said: str) -> None:
+    """The lever arm of a laser whose points are in a CRS moves none of them."""
+    track = blocks.track(blocks.pool)
+    laser, mbes = blocks.samples(track)
+    points = put(track, laser)
+    rows = np.isfinite(points[:, 0])
+    placed = replace(laser, t_ns=laser.t_ns[rows], points_m=points[rows] + [0.0, 0.0, off], georeferenced=True)
+    (found,) = hits.off_target(track, [placed, mbes], blocks.closest, blocks.pool)
+    assert found.words.startswith("laser: laser points miss the target, but hit it if they lay ")
+    shift, way = found.words.split("if they lay ")[1].split(" m ")[:2]
+    assert float(shift) == pytest.approx(abs(off), abs=0.4)
+    assert way.startswith(said)
+    assert "above sea level" in found.words
+    assert "mount" not in found.words
+
+
 @pytest.mark.parametrize("off", [-2.0, pytest.param(-1.0, marks=pytest.mark.thorough), 2.0])
 def test_a_wrong_water_level_is_no_wrong_height(looked: Looked, off: float) -> None:
     assert looked.missing(water_m=off) == []
@@ -192,6 +220,20 @@ def test_a_pose_found_right_is_not_doubted(blocks: Looked) -> None:
     origin = blocks.pool.target.origin
     lower = origin.model_copy(update={"height_m": origin.height_m - 0.2})
     assert _other_pose(blocks, _pose(0.2, ambiguous=False), origin=lower) == []
+
+
+@pytest.mark.parametrize(("as_found", "questions"), [(0.96, []), (0.94, ["sides"])])
+def test_sides_are_exchanged_where_that_fits_clearly_better(
+    blocks: Looked, monkeypatch: pytest.MonkeyPatch, as_found: float, questions: list[str]
+) -> None:
+    """Sides of which too little was seen fit either way, and chance makes one of them the better."""
+    of_both = iter([as_found, 1.0])
+
+    def profile(*_: object) -> NDArray[np.float64]:
+        return next(of_both) * np.exp(-((tried.SHIFTS_M / 0.1) ** 2))
+
+    monkeypatch.setattr(tried, "profile", profile)
+    assert [one.question for one in _other_pose(blocks, _pose(ambiguous=False))] == questions
 
 
 def test_a_pose_beyond_what_is_searched(blocks: Looked) -> None:

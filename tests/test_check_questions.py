@@ -1,6 +1,7 @@
 """Questions of poolcal check to what a survey has seen, each by itself: the INS's own quality, clocks, soundings."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +140,14 @@ def test_a_laser_off_by_a_week_is_odd_against_ins_and_sonar() -> None:
     assert "check gps_week, and the GPS time flag" in found.words  # the week is the file's
 
 
+def test_a_sonar_that_also_missed_the_ins_is_no_witness() -> None:
+    """It ran on for a minute after the INS, for no reason that has a name."""
+    epochs = _epochs(laser=1)
+    epochs["mbes"] = (START + np.arange(10, 160, 0.1) * NS).astype(np.int64)
+    laser, _ = clocks.apart(epochs, 5 * NS, [])
+    assert "laser: its clock is 1 week ahead of the INS's: " in laser.words
+
+
 def test_clocks_that_agree() -> None:
     assert list(clocks.apart(_epochs(), 5 * NS, [], {})) == []
 
@@ -186,6 +195,15 @@ def test_a_latency_is_told_as_an_interval() -> None:
     assert "adjust.free: [mbes_latency]" in found.words
 
 
+@pytest.mark.parametrize(("ahead_s", "said"), [(0.020, "behind"), (-0.020, "ahead of")])
+def test_a_latency_of_the_ins_is_given_with_its_sign(ahead_s: float, said: str) -> None:
+    """Both sensors are ahead of an INS that is behind them; latency is taken off the recorded time."""
+    of = {"estimated": False, "value": ahead_s, "sigma": 0.0008, "considered": 0.0005}
+    (found,) = latencies(pd.DataFrame([{"unknown": f"{sensor}_latency"} | of for sensor in ("laser", "mbes")]))
+    assert f"ins: its clock is 20 ms {said} both sensors' (18.9 to 21.1 ms, 95 %)" in found.words
+    assert f"about {-ahead_s:+.3f} s, to ins.latency_s" in found.words
+
+
 # --- files -----------------------------------------------------------------------------------------------------------
 def _session(folder: Path, **mbes: float) -> SessionConfig:
     return SessionConfig.model_validate({
@@ -215,6 +233,9 @@ def test_points_of_another_zone_are_told_by_how_far_they_lie(tmp_path: Path) -> 
     session = _session(tmp_path).model_copy(update={"laser": settings})
     assert list(files.frames(seen(100.0), session)) == []
     (found,) = files.frames(seen(542_000.0), session)
+    ins, laser = seen(100.0)
+    on_the_road = {name: np.r_[np.full(40, 0.6), values] for name, values in ins.columns.items()}
+    assert list(files.frames([replace(ins, records=41, columns=on_the_road), laser], session)) == []
     assert "its points lie 542 km from the INS's track with laser.frame EPSG:32650: another zone" in found.words
 
 

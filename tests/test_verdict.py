@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 from pipeline.config import Drift, Mbes, Verdict
+from pipeline.judging.casts import cast_doubts
 from pipeline.judging.residual_tests import passes_test, pattern_tests
 from pipeline.maths.excess import limit_of
-from pipeline.verdict import Evidence, Settings, cast_doubts, drift_doubt, one_eyed, reasons, warnings
+from pipeline.verdict import Evidence, Settings, drift_doubt, one_eyed, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
 LEVEL = 0.001
@@ -110,7 +111,7 @@ def test_a_good_session_has_no_reason():
         ({"bin_": [OFF | {"by": "step"}]}, "at a receive angle of 20° the sonar's distance from P2 steps by +1.0 mm"),
         (
             {"bin_": [OFF | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "low": 1.0}]},
-            "pass 1, the INS must be wrong there by -0.115° about the vertical more than in the other passes (3.5",
+            "pass 1, the INS must be wrong there by 0.115° in heading more than in the other passes (3.5",
         ),
         ({"held": {"value": 6e-4}}, "the sound speed: it is +0.06 ± 0.01 % above that recorded"),
         ({"held": {"unknown": "mbes_latency", "value": 0.02}}, "the sonar's clock: its latency is +20.0 ± 0.1 ms more"),
@@ -124,6 +125,24 @@ def test_each_evidence_is_one_reason(change, words):
     found = judged(evidence(**change))
     assert len(found) == 1
     assert words in found[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"mount": {"rotation_z_deg": -4.6}}, True),
+        ({"mount": {"rotation_z_deg": -4.6, "lever_arm_z_m": 0.6}}, False),
+        ({"mount": {}}, False),
+        ({"mount": {"rotation_z_deg": -4.6, "ambiguous": True}}, False),
+        ({"mount": {"rotation_z_deg": -4.6}, "pose": {"ambiguous": True}}, False),
+        ({"mount": {"rotation_z_deg": -4.6}, "pose": {"within": False}}, False),
+    ],
+)
+def test_angles_to_enter_are_told_only_where_nothing_else_is_in_doubt(change, told):
+    found = evidence(**change | {"mount": change["mount"] | {"within": False}})
+    words = reasons(found, methods(), replace(ADJUSTED, asked="; enter these angles"))
+    assert any("; enter these angles" in one for one in words) == told
+    assert any("no mount within" in one for one in words)
 
 
 def test_where_labels_are_in_doubt_nothing_else_is_judged():

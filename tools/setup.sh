@@ -84,7 +84,7 @@ fi
 echo "setup: installing packages into .venv (some minutes the first time)"
 pip() { .venv/bin/python -m pip --disable-pip-version-check "$@" </dev/null; }
 pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e '.[dev]' ||
-    fail "packages could not be installed (see above); mend this and run make setup again"
+    fail "packages could not be installed (see above); correct this and run make setup again"
 .venv/bin/python -c 'import open3d, pyarrow, rerun, stages.cli' || fail "the packages do not load (see above)"
 echo "$wanted" >"$stamp"
 echo "setup: ready; the command is .venv/bin/poolcal"

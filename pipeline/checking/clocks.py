@@ -51,8 +51,8 @@ class Offset:
     weeks: int = 0
 
     def words(self, to_the_ins: bool, week: int | None, key: str, whose: str = "the INS's") -> str:
-        """Of the clock of a sensor against the INS's, or (``to_the_ins`` false) of the INS's against theirs. ``week``:
-        the session's ``key``, from which another may follow."""
+        """What to say of a sensor's clock against the INS's, or (``to_the_ins`` false) of the INS's against theirs.
+        ``week``: the session's ``key``, from which another may follow."""
         ahead = self.ahead == to_the_ins
         why = self.why
         if self.weeks and week is not None:
@@ -66,30 +66,32 @@ def apart(
     """Sensors that did not run while the INS did; what both are off by is the INS's. ``weeks``: gps_week by sensor."""
     ins = epochs["ins"]
     running = split_at_gaps(ins, max_gap_ns)
+    shares = {sensor: covered(t_ns, running) for sensor, t_ns in epochs.items() if sensor != "ins" and len(t_ns)}
+    astray = {sensor: share for sensor, share in shares.items() if share < ENOUGH}
     offsets = {
         sensor: off
-        for sensor, t_ns in epochs.items()
-        if sensor != "ins" and (share := covered(t_ns, running)) < ENOUGH
-        if (off := _offset(t_ns, running, share < 1 - ENOUGH, len(split_at_gaps(t_ns, max_gap_ns)) > 1))
+        for sensor, share in astray.items()
+        if (off := _offset(epochs[sensor], running, share < 1 - ENOUGH, _pauses(epochs[sensor], max_gap_ns)))
     }
     both = list(offsets.values())
     if len(both) == 2 and both[0] == both[1]:
         words = both[0].words(False, weeks.get("ins"), "ins.gps_week", "both sensors'")
         yield Finding("clock", f"ins: {words} (ins from {utc_text(ins[0])}, {_from(epochs)})")
         return
-    third = len(epochs) == 3 and len(both) == 1
-    for sensor in ("laser", "mbes"):
-        t_ns = epochs.get(sensor, np.empty(0, np.int64))
-        share = covered(t_ns, running) if len(t_ns) else 1.0
-        if share >= ENOUGH:
-            continue
+    third = len(shares) == 2 and len(astray) == 1  # the other sensor runs with the INS
+    for sensor, share in sorted(astray.items()):
+        t_ns = epochs[sensor]
         spans = f"ins {utc_text(ins[0])} to {utc_text(ins[-1])}, {sensor} {utc_text(t_ns[0])} to {utc_text(t_ns[-1])}"
         if sensor in offsets:
             whose = f"the INS's and {'the sonar' if sensor == 'laser' else 'the laser'}'s" if third else "the INS's"
             words = offsets[sensor].words(True, weeks.get(sensor), f"{sensor}.gps_week", whose)
             yield Finding("clock", f"{sensor}: {words} ({spans})")
         elif share < 1 - ENOUGH:
-            yield Finding("clock", f"{sensor}: has no time in common with the INS ({spans}); check the clocks")
+            yield Finding(
+                "clock",
+                f"{sensor}: has no time in common with the INS ({spans}); check the clocks, and that the "
+                "files are of one session",
+            )
         else:
             own = [seen for seen in files if seen.sensor == sensor and len(seen.epochs_ns)]
             outside = [seen.name for seen in own if covered(seen.epochs_ns, running) < 1 - ENOUGH]
@@ -101,6 +103,10 @@ def apart(
                 "files, or check the clocks",
                 "fault" if outside or between - share > 1 - ENOUGH else "look",  # on before it, or longer than it
             )
+
+
+def _pauses(t_ns: Times, max_gap_ns: int) -> bool:
+    return len(split_at_gaps(t_ns, max_gap_ns)) > 1
 
 
 def _from(epochs: Mapping[str, Times]) -> str:

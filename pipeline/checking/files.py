@@ -6,12 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.cast import doubts
 from pipeline.checking.finding import Finding
 from pipeline.checking.survey import SENSORS, Seen
 from pipeline.config import SessionConfig
+from pipeline.judging.casts import doubts
 from pipeline.maths.geodesy import ecef_from_geodetic
-from pipeline.screen import plural
 from pipeline.times import utc_text
 
 SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock
@@ -123,15 +122,13 @@ def frames(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
 
 
 def _elsewhere(laser: Seen, files: Sequence[Seen], frame: str) -> Iterator[Finding]:
-    """Points of a CRS, which are in ECEF by now, far from where the boat was: the zone may be another."""
+    """Points of a CRS, which are in ECEF by now, far from every place where the boat was: the zone may be another."""
     of_ins = [seen.columns for seen in files if seen.sensor == "ins" and seen.records]
     if not of_ins:
         return
-    boat = np.median(
-        ecef_from_geodetic(*(np.concatenate([one[name] for one in of_ins]) for name in NAMES)), axis=0
-    )
+    track = ecef_from_geodetic(*(np.concatenate([one[name] for one in of_ins]) for name in NAMES))
     points = np.median(np.column_stack([laser.columns[axis] for axis in ("x_m", "y_m", "z_m")]), axis=0)
-    away = float(np.linalg.norm(points - boat))
+    away = float(np.min(np.linalg.norm(track - points, axis=1)))
     if away > FAR_M:
         yield Finding(
             "frame",
@@ -215,6 +212,5 @@ def missing_sensors(files: Sequence[Seen], session: SessionConfig) -> Iterator[F
     """A sensor of which no file at all can be used."""
     for sensor in SENSORS:
         if getattr(session, sensor) is not None and not any(s.records for s in files if s.sensor == sensor):
-            many = plural(sum(s.sensor == sensor for s in files), "file")
-            yield Finding("no records", f"{sensor}: none of its {many} can be used; mend or replace them")
+            yield Finding("no records", f"{sensor}: has no file that can be used; correct {sensor}.files or the files")
 

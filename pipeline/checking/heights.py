@@ -1,5 +1,5 @@
 """Heights by which a sensor misses the target: both by the same, and it is target.origin.height_m that is wrong; one of
-them alone, and it is the z of its mount.
+them alone, and it is the z of its mount, or, of a laser's points that others have placed, what their heights are above.
 
 The laser sees the target above the water alone, and the sonar below it alone. So points count only on their own side of
 the water: a shift downwards loses the laser's lowest points and the sonar's deepest, one upwards the laser's highest
@@ -32,13 +32,14 @@ SIGN_M = 0.5  # a shift as near to twice a lever arm is its sign
 
 @dataclass(frozen=True)
 class Fit:
-    """Of one sensor, by shift: how well its points lie on the target where it can see it (``sided``), and anywhere, as
-    shares of the best."""
+    """How well one sensor's points lie on the target, by shift: where it can see it (``sided``), and anywhere
+    (``free``), as shares of the best."""
 
     sensor: str
     z_m: float  # of its mount
     sided: Array
     free: Array
+    georeferenced: bool = False  # placed by others: its mount moves nothing
 
     @property
     def shift_m(self) -> float:
@@ -47,7 +48,12 @@ class Fit:
     @property
     def sign(self) -> bool:
         """Whether the reversed sign of z is the shift."""
-        return bool(abs(self.shift_m + 2 * self.z_m) < SIGN_M)
+        return not self.georeferenced and bool(abs(self.shift_m + 2 * self.z_m) < SIGN_M)
+
+    @property
+    def cause(self) -> str:
+        """What may be wrong by the shift."""
+        return f"the heights of {self.sensor}.frame" if self.georeferenced else f"{self.sensor}.mount.z_m"
 
     @property
     def off(self) -> bool:
@@ -70,23 +76,32 @@ def wrong_height(
         both = ", ".join(f"{NAMES[fit.sensor]} if they lay {way(fit.shift_m, 'higher', 'lower')}" for fit in off)
         yield Finding(
             "height",
-            f"heights do not agree: the target is hit by {both}: check target.origin.height_m, laser.mount.z_m and "
-            "mbes.mount.z_m (z is up: a sonar below the INS has a negative one)",
+            f"heights do not agree: the target is hit by {both}: check target.origin.height_m, "
+            f"{' and '.join(fit.cause for fit in off)} (z is up: a sonar below the INS has a negative one)",
         )
     others_fit = all(abs(fit.shift_m) < LEAST_M for fit in fits if not fit.off)
     for fit in off if len(off) == 1 and others_fit else []:
-        remedy = "reverse its sign (z is up)" if fit.sign else "measure it again"
-        new_m = -fit.z_m if fit.sign else round(fit.z_m + fit.shift_m, 1)
+        unless = f"; or correct target.origin.height_m ({height_m - fit.shift_m:.1f} in place of {height_m:g})"
+        alone = len(fits) < len(samples)  # the other sensor hits nothing at any height
         yield Finding(
             "target",
-            f"{fit.sensor}: {NAMES[fit.sensor]} miss the target, but hit it with {fit.sensor}.mount.z_m = {new_m:g} in "
-            f"place of {fit.z_m:g}: {remedy}",
+            f"{fit.sensor}: {NAMES[fit.sensor]} miss the target, but hit it {_remedy(fit)}{unless if alone else ''}",
         )
+
+
+def _remedy(fit: Fit) -> str:
+    if fit.georeferenced:
+        which = f"if they lay {way(fit.shift_m, 'higher', 'lower')}"
+        return f"{which}: are their heights above sea level? Export them above the ellipsoid"
+    remedy = "reverse its sign (z is up)" if fit.sign else "measure it again"
+    new_m = -fit.z_m if fit.sign else round(fit.z_m + fit.shift_m, 1)
+    return f"with {fit.sensor}.mount.z_m = {new_m:g} in place of {fit.z_m:g}: {remedy}"
 
 
 def _target_is_off(fits: Sequence[Fit], shift_m: float, height_m: float) -> str:
     which, all_of_them = " and ".join(NAMES[fit.sensor] for fit in fits), "both hit" if len(fits) > 1 else "hit"
-    alone = f", or if {fits[0].sensor}.mount.z_m is that much {'higher' if shift_m > 0 else 'lower'}"
+    higher = "higher" if shift_m > 0 else "lower"
+    alone = f", or if {fits[0].cause} {'are' if fits[0].georeferenced else 'is'} that much {higher}"
     return (
         f"{which} miss the target, and {all_of_them} it if target.origin.height_m is about "
         f"{way(-shift_m, 'higher', 'lower')} ({height_m - shift_m:.1f} in place of {height_m:g})"
@@ -131,7 +146,9 @@ def _fit(track: Track, some: Sample, closest: ClosestSurface, water_m: float) ->
     if len(points) < FEWEST:
         return None
     sided, free = (profile(points, some.sensor, closest, level, SHIFTS_M) for level in (water_m, None))
-    return None if sided.max() < FIT else Fit(some.sensor, some.mount.z_m, sided / sided.max(), free / free.max())
+    return None if sided.max() < FIT else Fit(
+        some.sensor, some.mount.z_m, sided / sided.max(), free / free.max(), some.georeferenced
+    )
 
 
 def common_shift(fits: Sequence[Fit]) -> float | None:

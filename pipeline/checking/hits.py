@@ -80,7 +80,7 @@ def hypotheses(track: Track, some: Sample, closest: ClosestSurface) -> list[Hit]
 def off_target(
     track: Track, samples: Sequence[Sample], closest: ClosestSurface, pool: config.PoolConfig
 ) -> Iterator[Finding]:
-    """Of each sensor what is wrong, if anything is; a clock that both are off by is the INS's. A height that both are
+    """What is wrong with each sensor, if anything is; a clock that both are off by is the INS's. A height that both are
     off by is the target's, whatever a mount might explain of it."""
     settings, water_m = pool.segment, pool.target.water_level_m
     wrong = list(wrong_height(track, samples, closest, water_m, pool.target.origin.height_m))
@@ -101,12 +101,14 @@ def off_target(
             else:
                 clocks[some.sensor] = best.clock_s
         elif _misses(track, some, closest):
-            check = f"check {some.sensor}.mount, target.origin and target.azimuth_deg"
+            own = f"{some.sensor}.{'frame' if some.georeferenced else 'mount'}"
+            tried = "at another height" if some.georeferenced else "with another sign, clock or height"
+            check = f"check {own}, target.origin and target.azimuth_deg"
             askew = heading(track, pool.target_place)
             yield Finding(
                 "target",
-                f"{some.sensor}: hardly any of its {NAMES[some.sensor]} falls onto the target in its passes, nor would "
-                f"with another sign, clock or height: {f'the boat: {askew}' if askew else check}",
+                f"{some.sensor}: hardly any of its {NAMES[some.sensor]} fall onto the target in its passes, nor would "
+                f"they {tried}: {f'the boat: {askew}' if askew else check}",
             )
     yield from _clocks(clocks, len(samples))
 

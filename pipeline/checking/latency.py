@@ -37,7 +37,7 @@ def latencies(freed: pd.DataFrame) -> Iterator[Finding]:
             yield Finding(
                 "latency",
                 f"ins: its clock is {_said(-both)} both sensors' ({_between(-both, sigma)}), as the target's planes "
-                "sway with the boat: find what delays it, and set ins.latency_s within that",
+                f"sway with the boat: find what delays it, and add its amount, about {-both:+.3f} s, to ins.latency_s",
             )
             return
     for sensor, (seconds, sigma) in found.items():

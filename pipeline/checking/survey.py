@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -164,6 +165,8 @@ def _look(
     except OSError as error:
         return Seen(sensor, name, 0, complaint=f"{name}: cannot be read ({error.strerror}); was it moved meanwhile?")
     if isinstance(parts, RawDataError):
+        with suppress(RawDataError, OSError):
+            seen = replace(seen, kind=detect.kind_of(path, name).title)
         return replace(seen, complaint=str(parts))
     try:
         seen = replace(seen, kind=detect.kind_of(path, name).title)

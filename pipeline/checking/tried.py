@@ -19,7 +19,8 @@ from pipeline.mounts import mount_of, turned
 
 Array = NDArray[np.float64]
 REACH_M = 0.15  # in the pose found, whose place along x and y is known
-SHIFTS_M = np.linspace(-5.0, 5.0, 201)
+STEP_M = 0.05
+SHIFTS_M = np.arange(-5.0, 5.0 + STEP_M / 2, STEP_M)
 CLEARLY = 0.95  # of the best agreement: what has less is another
 SMALLEST_M = 0.15  # a height within it is right, as near as this tells
 ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
@@ -49,7 +50,8 @@ def other_pose(
     alike = _peaks(agreed, higher)
     height, shift = pool.target.origin.height_m, float(higher[place])
     how = f"{way(-shift, 'higher', 'lower')} ({height - shift:.1f} in place of {height:g})"
-    another = bool(exchanged) or abs(SHIFTS_M[place]) > SMALLEST_M
+    as_found = agreed[0, np.abs(SHIFTS_M) <= SMALLEST_M + STEP_M / 2].max()
+    another = bool(as_found < CLEARLY * agreed.max())
     if found["ambiguous"] and len(alike) > 1:
         ways = ", or ".join(_said(*one) for one in alike)
         yield Finding(

@@ -1,1 +1,1 @@
-"""What a session is judged by beside its sigmas: what its residuals say, and in which words."""
+"""What a session is judged by beside its sigmas: what its residuals say, and whether its cast is of its water."""

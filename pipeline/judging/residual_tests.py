@@ -22,7 +22,7 @@ CONCEDED = "{:.1f} times the drift that it is conceded"
 SENSORS = {"laser": "the laser", "mbes": "the sonar"}
 FAR_M = 0.05  # a mean residual beyond this is no drift: the model is another
 ALIKE_DEG = 3.0  # steps nearer to each other than this are one
-AXES = {"turn_x": "about the track's horizontal normal", "turn_y": "about the track", "turn_z": "about the vertical"}
+TURNS = {"turn_x": "pitch", "turn_y": "roll", "turn_z": "heading"}  # y of the target is the track
 Row = Mapping[Any, Any]
 
 
@@ -83,7 +83,7 @@ def off(tables: Tables, level: float) -> list[Found]:
 
 
 def _worst(rows: pd.DataFrame) -> list[Row]:
-    """Of each variable the row that lies farthest off; the farthest of all first."""
+    """The row of each variable that lies farthest off; the farthest of all first."""
     found: list[Row] = [
         group.iloc[int(group["normalised"].abs().argmax())].to_dict() for _, group in rows.groupby("by", sort=True)
     ]
@@ -131,7 +131,7 @@ def _pass(row: Row, tables: Tables, over: pd.DataFrame, test: str) -> str:
 
 
 def _drift(row: Row, test: str) -> str:
-    how = f"{np.degrees(row['mean_m']):+.3f}° {AXES[str(row['family'])]}"
+    how = f"{abs(np.degrees(row['mean_m'])):.3f}° in {TURNS[str(row['family'])]}"
     return (
         f"the passes do not agree: for both sensors to fit in pass {int(row['low'])}, the INS must be wrong there by "
         f"{how} more than in the other passes ({test}); likely a bracket that moved in that pass, a sensor's clock, or "

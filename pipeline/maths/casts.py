@@ -13,8 +13,8 @@ LEAST_HEIGHT_M = 0.05  # over which scattered rows are averaged first
 
 
 def one_way(depth_m: Array) -> NDArray[np.int64]:
-    """Rows of the probe's way down; of its way up, where that alone covers half the depths. ``depth_m`` (n,) as
-    recorded. All rows where it went one way only, however unevenly."""
+    """Rows of the probe's way down, where that and the way up each cover half of the depths; else all rows, for it went
+    one way only, however unevenly. ``depth_m`` (n,) as recorded."""
     turn = int(np.argmax(depth_m))
     rows = np.arange(len(depth_m))
     half = (depth_m.max() - depth_m.min()) / 2
@@ -23,7 +23,7 @@ def one_way(depth_m: Array) -> NDArray[np.int64]:
 
 
 def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[float, float]:
-    """Of two profiles (depths ascending, speeds) over the depths that both have: how much, and where."""
+    """How much two profiles (depths ascending, speeds) differ at most, over the depths that both have, and where."""
     depths = one[0][(one[0] >= other[0][0]) & (one[0] <= other[0][-1])]
     if not len(depths):
         return 0.0, 0.0

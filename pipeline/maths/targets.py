@@ -146,7 +146,7 @@ class TargetModel:
 
     @property
     def depth_m(self) -> float:
-        """Of its lower end below the water."""
+        """How far its lower end lies below the water."""
         return self.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in self.faces)
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline import artefacts, config
+from pipeline.built import reference, titled
 from pipeline.families import families_of
 from pipeline.folder import calibration
 from pipeline.maths.solution import TOGETHER
@@ -151,7 +152,8 @@ def shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: config.SessionC
 def built(found: Row, design: Row) -> list[Row]:
     """What the laser sees of the target, beside its design."""
     rows = [(letter, design[f"{letter}_m"], found[f"{letter}_m"], "m") for letter in ("b", "e")]
-    for words, kind in (("corner to", "corner_deg"), ("leaning of", "lean_deg")):
+    angle_between = f"angle between {titled(reference(design['lean_deg']))} and"
+    for words, kind in ((angle_between, "corner_deg"), ("leaning of", "lean_deg")):
         rows += [(f"{words} {family}", design[kind][family], angle, "deg") for family, angle in found[kind].items()]
     return [
         {"name": name, "design": Value(design, unit), "found": Value(value, unit)}

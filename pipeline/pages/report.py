@@ -72,6 +72,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
         level=f"{100 * settings.pool.adjust.test_level:g}",
         tests=[row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
+        traced=not laser and settings.session.sonar.svp is not None,
         given_speed=None if laser else settings.session.sonar.sound_speed_m_s,
         speeds=_speeds(files),
         methods=METHODS,

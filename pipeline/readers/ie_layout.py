@@ -206,8 +206,7 @@ def _scale(column: str, unit: str, file: str) -> float:
         return 1.0
     if unit not in known:
         told = f"has the unit ({unit})" if unit else "has no unit"
-        if unit == "?dy":
-            told = "has no unit, and day and month look alike"
+        told = "has no unit to tell the day from the month" if unit == "?dy" else told
         title = TITLES.get(column, "GPSTime")
         raise RawDataError(f"{file}: column {title} {told}; export it as one of {', '.join(known)}")
     return known[unit]

@@ -1,4 +1,4 @@
-"""What every reader asks of its rows, whatever the format: finite, possible, in order of time. Nothing is corrected."""
+"""What every reader asks of its rows, whatever the format: finite, possible, in order of time. Nothing is repaired."""
 
 from collections import Counter
 from collections.abc import Mapping

@@ -38,7 +38,7 @@ def refuse_another(this: Run, stages: Sequence[str]) -> None:
 
 
 def _digests_in(run: Path, stages: Sequence[str]) -> set[str]:
-    """Of the raw files that the results in a run folder were made from."""
+    """Digests of the raw files that the results in a run folder were made from."""
     found = {digest for stage in stages if (one := manifest.read(run / stage)) for digest in one.key.raw.values()}
     if not found:  # manifests of another version of the program, say
         try:

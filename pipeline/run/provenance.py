@@ -27,7 +27,7 @@ CARRIES = ("pipeline/runner.py", "pipeline/executor.py")  # carry data in and ou
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Of Python, this program and the libraries that can change a digit."""
+    """Versions of Python, this program and the libraries that can change a digit."""
     found = {"poolcal": pipeline.__version__, "python": platform.python_version()}
     for name in LIBRARIES:
         try:

@@ -98,6 +98,7 @@ def test_a_cast_of_another_day_is_named(done: Place) -> None:
     page = (done.run / "report" / "report.html").read_text(encoding="utf-8")
     assert "Cast &lt;b&gt;1.SVP, CARIS .svp, taken 2026-05-09 05:00:00" in page
     assert "<b>1.SVP" not in page
+    assert "sound speed as in the cast." in " ".join(page.split())
     assert any("1.SVP was taken at 2026-05-09 05:00:00, " in words for words in done.result()["warnings"])
     told = poolcal("check", done.session)
     assert told.out.startswith("mbes.svp: Cast <b>1.SVP, CARIS .svp, taken 2026-05-09 05:00:00: 195 rows; 0.1")

@@ -76,10 +76,10 @@ def test_the_target_by_design_and_as_found(undisturbed: tuple[Path, Told]) -> No
     found = result_of(run)["target"]["as_found"]
     rows = {name: (design, value) for name, design, value in page_of(run).table("the target", "by design")}
     leaning = [f"leaning of {one}" for one in ("P1", "P2", "P3")]
-    assert list(rows) == ["b", "e", "corner to P1", "corner to P3", *leaning]
+    assert list(rows) == ["b", "e", "angle between wall and P1", "angle between wall and P3", *leaning]
     assert rows["b"] == ("3.0000 m", f"{found['b_m']:.4f} m")
     assert rows["e"] == ("0.5000 m", f"{found['e_m']:.4f} m")
-    assert rows["corner to P3"] == ("45.0000 °", f"{found['corner_deg']['P3']:.4f} °")
+    assert rows["angle between wall and P3"] == ("45.0000 °", f"{found['corner_deg']['P3']:.4f} °")
     assert float(rows["leaning of P1"][1].split()[0]) == pytest.approx(found["lean_deg"]["P1"], abs=5.1e-5)
 
 

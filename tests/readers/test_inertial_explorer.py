@@ -262,7 +262,7 @@ REFUSED: dict[str, tuple[Columns, str]] = {
     "feet": (with_unit("H-Ell", "(ft)"), r"column H-Ell has the unit \(ft\); export it as one of m, "),
     "gon": (with_unit("Roll", "(gon)"), r"column Roll has the unit \(gon\)"),
     "sigma in a strange unit": (with_unit("HdngSD", "(mil)", "utc"), r"column HdngSD has the unit \(mil\)"),
-    "date without order": (with_unit("UTCDate", "", "utc"), "UTCDate has no unit, and day and month look alike; .*mdy"),
+    "date without order": (with_unit("UTCDate", "", "utc"), r"UTCDate has no unit to tell the day from .*mdy"),
     "dashes between sixtieths": (with_unit("Latitude", "(D-M-S)"), r"column Latitude has the unit \(d-m-s\)"),
     "hours without a date": (
         LAYOUTS["commas"] | {"GPSTime": ("(HMS)", lambda row: "12:00:00.25")}, "without a date; export GPSDate"

@@ -76,7 +76,7 @@ def test_passes_and_quality_are_recorded(noisy_found):
     ("sensor", "shift_s", "words"),
     [
         ("laser", 86_400, "no time overlap"),
-        ("mbes", -604_800, "weeks apart: check gps_week"),
+        ("mbes", -604_800, "1 week apart: check gps_week"),
         ("mbes", 7_200, "clocks"),
     ],
 )

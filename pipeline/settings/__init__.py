@@ -1,0 +1,1 @@
+"""Blocks that the settings of several sensors have in common."""
