@@ -393,10 +393,3 @@ def test_text_in_utf_16(file: Path) -> None:
     file.write_bytes(export(PLAIN, on(1)).decode("latin-1").encode("utf-16"))
     with pytest.raises(RawDataError, match=r"a\.txt: is a text in UTF-16, not inertial_explorer; save it as UTF-8"):
         read(file)
-
-
-def test_a_date_whose_order_nothing_tells(file: Path) -> None:
-    columns: Columns = {"GPSDate": ("", DATE[1]), "GPSTime": ("(HMS)", lambda row: f"{gps(row):%H:%M:%S.%f}"), **POSE}
-    file.write_bytes(export(columns, on(1)))
-    with pytest.raises(RawDataError, match=r"a\.txt: column GPSDate has no unit, and day and month look alike; export"):
-        read(file)
