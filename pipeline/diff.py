@@ -242,7 +242,8 @@ def text(found: Mapping[str, Any]) -> str:
         lines += ["", f"raw files: {len(found['inputs']) - new - gone} changed, {new} in b alone, {gone} in a alone"]
     for title, key in (("config and session", "config"), ("software", "software")):
         if found[key]:
-            lines += ["", f"{title}:", *(f"  {row['key']}: {row['a']} -> {row['b']}" for row in _short(found[key]))]
+            rows = folded(found[key])
+            lines += ["", f"{title}:", *(f"  {row['key']}: {_brief(row['a'])} -> {_brief(row['b'])}" for row in rows)]
     if found["counts"]:
         lines += ["", "counts:"]
         lines += [f"  {r['stage']}, {r['source']}, {r['reason']}: {r['a']:,} -> {r['b']:,}" for r in found["counts"]]
@@ -262,13 +263,13 @@ def text(found: Mapping[str, Any]) -> str:
     return "\n".join([*lines, "", found["sentence"] + "."])
 
 
-def _short(rows: Sequence[Row]) -> Iterator[Row]:
-    """Values that fit a line; faces that only one of the runs has are counted in place of their keys."""
+def folded(rows: Sequence[Row]) -> Iterator[Row]:
+    """For people: faces that only one of the runs has are counted in place of their keys."""
     faces = [row for row in rows if row["key"].startswith(FACES) and row["key"].endswith(".corners")]
     alone = {key: [r["key"].removesuffix("corners") for r in faces if r[other] is None] for key, other in ("ab", "ba")}
     for row in rows:
         if not row["key"].startswith((*alone["a"], *alone["b"])):
-            yield {"key": row["key"], "a": _brief(row["a"]), "b": _brief(row["b"])}
+            yield row
     if alone["a"] or alone["b"]:
         yield {"key": FACES[:-1]} | {key: f"{plural(len(names), 'face')} of its own" for key, names in alone.items()}
 

@@ -168,9 +168,10 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
                     f"{sensor}: no point could be placed ({why}): INS records lie more than "
                     f"{config.georeference.max_ins_interval_s:g} s apart; log the INS faster, 100 Hz or more"
                 )
+            placing = "laser.frame" if sensor == "laser" and config.laser.frame != "laser" else f"{sensor}.mount"
             raise RawDataError(
                 f"{sensor}: no point within {config.georeference.box_margin_m:g} m of the target ({why}); "
-                f"check target.origin, target.azimuth_deg and {sensor}.mount: poolcal check tells which sign, clock or "
+                f"check target.origin, target.azimuth_deg and {placing}: poolcal check tells which sign, clock or "
                 "height would bring points there"
             )
     quaternion = quaternion_from_rotation(prepared.trajectory.R_frame_from_body)

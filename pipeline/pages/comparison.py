@@ -8,7 +8,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from pipeline.diff import shown
+from pipeline.diff import folded, shown
 from pipeline.mounts import WITHIN_95
 from pipeline.pages import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
 
@@ -20,6 +20,7 @@ def page(found: Mapping[str, Any]) -> str:
         "comparison.html",
         found=found,
         rows=rows,
+        config=list(folded(found["config"])),
         shown=shown,
         plain=lambda value: "–" if value is None else value if isinstance(value, str) else json.dumps(value),
         chart=_chart(rows) if rows else None,

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from pipeline.diff import folded
 from tests.end_to_end.places import Place, Told, poolcal, simulate
 
 
@@ -82,6 +83,18 @@ def test_another_target_compares_the_mount_alone(undisturbed: tuple[Path, Told],
     assert found["planes"] == []
     assert found["not_compared"] == ["planes: the targets differ (target.a, target.b, target.c, target.e)"]
     assert found["joint"]["probability"] > 0.01
+
+
+def test_faces_of_one_run_alone_are_counted_and_others_are_listed() -> None:
+    rows: list[dict[str, Any]] = [
+        {"key": "target.faces.foot.corners", "a": None, "b": [[0, 0, 0]]},
+        {"key": "target.faces.foot.seen", "a": None, "b": "wet"},
+        {"key": "target.faces.foot-2.corners", "a": [[0, 0, 0]], "b": [[0, 0, 1]]},
+        {"key": "target.faces.wall.role", "a": None, "b": "P2"},
+    ]
+    kept, told = rows[2:], {"key": "target.faces", "a": "0 faces of its own", "b": "1 face of its own"}
+    assert list(folded(rows)) == [*kept, told]
+    assert list(folded(kept)) == kept
 
 
 def test_a_rejected_run_answers_nothing(undisturbed: tuple[Path, Told], again: Place) -> None:
