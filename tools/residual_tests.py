@@ -202,8 +202,8 @@ def seed_of(task: Task) -> int:
 
 def read(path: Path) -> pd.DataFrame:
     """The rows so far."""
-    rows = pd.read_csv(path)
-    return rows.assign(fault=rows["fault"].fillna(""), reasons=rows["reasons"].fillna(""))
+    numbers = {f"{start}{by}": "" for start in ("u_", "bare_") for by in BY}  # none of a kind that was not judged
+    return pd.read_csv(path, keep_default_na=False, na_values=numbers)
 
 
 def summary(rows: pd.DataFrame) -> str:

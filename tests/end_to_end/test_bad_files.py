@@ -131,7 +131,7 @@ def weeks(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("sensor", ["ins", "laser"])
-@pytest.mark.parametrize(("week", "words"), [(None, ("is missing",)), (2417, ("weeks apart",))])
+@pytest.mark.parametrize(("week", "words"), [(None, ("is missing",)), (2417, ("1 week apart: check gps_week",))])
 def test_weeks(sensor: str, week: int | None, words: tuple[str, ...], weeks: Path, tmp_path: Path) -> None:
     place = Place(weeks, tmp_path)
     place.mend()
