@@ -1,0 +1,257 @@
+"""Does the tree as it is compute the same bytes as another commit?
+
+A worktree of BASE simulates sessions of several kinds once; BASE and the tree as it is then run the same commands on
+copies of them, each in a folder of its own: ``run`` or ``laser``, ``check --json``, ``plan --yaml``, ``coarse --yaml``,
+``compare``, ``diff --json``, ``verify`` and ``history``. Compared are the SHA-256 of every Parquet file and document
+that these write and of what they print, the exit statuses, and ``calibration.json`` without ``software``. Not compared:
+``manifest.json``, which holds digests of the source, and what is drawn, except with ``--pages`` the HTML pages.
+
+Each difference is a line: session, file, and for JSON and tables what differs in it. Status 1 if anything differs.
+
+    python -m tools.same_bytes BASE [--only NAME ...] [--pages] [--keep FOLDER]
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import yaml
+
+ROOT = Path(__file__).parents[1]
+SMALL: dict[str, Any] = {  # two passes, thinned: a run takes about two seconds
+    "track": {"distances_m": [4.0, 7.0], "half_length_m": 3.6},
+    "laser": {"point_rate_hz": 2000.0, "line_rate_hz": 20.0, "format": "las"},
+    "mbes": {"ping_rate_hz": 8.0},
+    "ins": {"rate_hz": 50.0},
+}
+DRIFT = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03, "time_constant_s": 200}
+SURVEYED = {
+    "face_sigma_deg": 0.001, "plumb_sigma_deg": 0.001, "face_sigma_m": 0.0002, "origin_sigma_m": 0.001,
+    "azimuth_sigma_deg": 0.002,
+}  # fmt: skip
+CAST = [[0.1, 1500.0], [1.0, 1500.2], [2.5, 1501.0], [4.0, 1501.4]]
+PLAN = {
+    "passes": [{"distance_m": 4.0, "speed_m_s": 0.4}, {"distance_m": 7.0}],
+    "laser": {"point_rate_hz": 2000.0},
+    "mbes": {"ping_rate_hz": 8.0},
+}
+PASSED_OVER = ("manifest.json", "digests.json", ".lock")  # digests of the source; paths and times; a process
+TIMES = re.compile(r"\d+(\.\d+)? s\b|\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d+)?)?Z?)?")
+WORK = re.compile(r"/\S*/(base|here)/")  # the folder in which a tree's commands ran
+VERSION = re.compile(r"poolcal \d+\.\d+\.\S+|\b[0-9a-f]{7,40}\b|(?<=calibration.json\", sha256: \")[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A session to simulate, what is then changed in its YAML files, and the command that calibrates it."""
+
+    scenario: dict[str, Any]
+    base: str | None = None  # a scenario of configs/scenarios
+    session: dict[str, dict[str, Any]] = field(default_factory=dict)
+    pool: dict[str, dict[str, Any]] = field(default_factory=dict)
+    command: str = "run"
+
+
+KINDS = {
+    "default": Kind({"laser": {"point_rate_hz": 5000.0}}),
+    "small": Kind(SMALL | {"ins": {"rate_hz": 50.0, "drift": DRIFT}, "target": {"azimuth_deg": 163.0}}, "azimuth_163"),
+    "dock": Kind({"laser": {"point_rate_hz": 5000.0}, "mbes": {"ping_rate_hz": 8.0}}, "dock"),
+    "laser": Kind(
+        SMALL | {"laser": SMALL["laser"] | {"coarse_angle_deg": 0.3, "coarse_lever_m": 0.03}},
+        pool={"laser_fit": SURVEYED},
+        command="laser",
+    ),
+    "tables": Kind(
+        {
+            "laser": SMALL["laser"] | {"frame": "EPSG:4978"},
+            "ins": {"format": "sbet", "files": "pass"},
+            "mbes": {"format": "parquet", "ping_rate_hz": 8.0},
+        },
+        "tilted_sectors",
+    ),
+    "cast": Kind(SMALL, session={"mbes": {"svp": CAST}}, pool={"adjust": {"free": ["mbes_latency", "sound_speed"]}}),
+    "messy": Kind({"laser": {"point_rate_hz": 5000.0}}, "messy"),
+}
+
+
+class Tree:
+    """A checkout whose ``poolcal`` is run from its own source."""
+
+    def __init__(self, source: Path, work: Path) -> None:
+        self.work = work
+        self._environment = os.environ | {"PYTHONPATH": str(source), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def poolcal(self, folder: Path, *words: object) -> tuple[int, str, str]:
+        """Exit status, output and errors of a command run in ``folder``."""
+        command = [sys.executable, "-P", "-m", "stages.cli", *map(str, words)]
+        done = subprocess.run(
+            command, cwd=folder, env=self._environment, capture_output=True, text=True, timeout=1800, check=False
+        )
+        if done.returncode == 3:
+            raise RuntimeError(f"{folder}: poolcal {words[0]} is broken\n{done.stderr}")
+        return done.returncode, done.stdout, done.stderr
+
+
+def simulate(tree: Tree, kind: Kind, folder: Path) -> None:
+    """Session, pool.yaml, truth, plan and marks of a kind below ``folder``."""
+    folder.mkdir(parents=True)
+    scenario = {}
+    if kind.base is not None:
+        scenario = _read(ROOT / "configs" / "scenarios" / f"{kind.base}.yaml")
+    for name, block in kind.scenario.items():
+        scenario[name] = scenario.get(name, {}) | block
+    _write(folder / "scenario.yaml", scenario)
+    status, _, errors = tree.poolcal(folder, "simulate", "session", "--scenario", "scenario.yaml", "--seed", 5)
+    if status:
+        raise RuntimeError(f"{folder.name}: cannot be simulated\n{errors}")
+    shutil.move(folder / "session" / "pool.yaml", folder / "pool.yaml")
+    for path, changes in ((folder / "session" / "session.yaml", kind.session), (folder / "pool.yaml", kind.pool)):
+        content = _read(path)
+        for name, block in changes.items():
+            content[name] = content.get(name, {}) | block
+        _write(path, content)
+    _write(folder / "plan.yaml", PLAN)
+    shutil.copy(ROOT / "configs" / "marks.yaml", folder / "marks.yaml")
+
+
+def calibrate(tree: Tree, kind: Kind, folder: Path, pages: bool) -> None:
+    """All commands on a copied session; what each prints goes to ``printed/``."""
+    config, quiet = ("--config", "pool.yaml"), ("--no-recordings", *(() if pages else ("--no-report",)))
+    calls: dict[str, tuple[object, ...]] = {
+        "check": ("check", "session", *config, "--json"),
+        "check_text": ("check", "session", *config),
+        "run": (kind.command, "session", *config, "--run", "runs/a", "--jobs", 1, *quiet),
+        "verify": ("verify", "runs/a"),
+        "coarse": ("coarse", "marks.yaml", "--session", "session", "--yaml", "coarse.yaml"),
+    }
+    if kind.command == "run":
+        again = ("run", "session", *config, "--run", "runs/b", "--jobs", 2, *quiet)
+        calls |= {
+            "plan": ("plan", "plan.yaml", "--session", "session", *config, "--yaml", "prediction.yaml"),
+            "compare": ("compare", "runs/a", "session.truth.json"),
+            "again": again,  # with the mounts that coarse wrote, which are of another boat: a result, or one line
+            "diff": ("diff", "runs/a", "runs/a", "--json"),
+            "diff_text": ("diff", "runs/a", "runs/a"),
+        }
+    calls["history"] = ("history", "runs", "--out", "history")
+    for name, words in calls.items():
+        status, out, errors = tree.poolcal(folder, *words)
+        said = "\n".join(line for line in errors.splitlines() if not TIMES.search(line))
+        _write_text(folder / "printed" / name, f"status {status}\n{TIMES.sub('TIME', out)}\n{said}\n")
+
+
+def differences(kind: str, one: Path, other: Path, pages: bool) -> Iterator[str]:
+    """A line for each file that differs between two folders in which the same commands ran."""
+    files = {folder: {path.relative_to(folder) for path in folder.rglob("*") if path.is_file()} for folder in (one, other)}
+    for path in sorted(files[one] | files[other]):
+        if path.name in PASSED_OVER or (path.suffix in (".html", ".svg", ".png", ".rrd") and not pages):
+            continue
+        if path not in files[one] or path not in files[other]:
+            yield f"{kind}: {path}: only in {'BASE' if path in files[one] else 'this tree'}"
+        elif _digest(one / path) != _digest(other / path):
+            yield f"{kind}: {path}: {_what_differs(one / path, other / path)}"
+
+
+def _digest(path: Path) -> str:
+    if path.name == "calibration.json":
+        content = json.loads(path.read_text(encoding="utf-8"))
+        content.pop("software", None)
+        data = json.dumps(content, sort_keys=False).encode()
+    elif path.suffix in (".html", ".json", ".csv", ".yaml", ""):
+        text = WORK.sub("WORK", path.read_text(encoding="utf-8", errors="replace"))
+        data = VERSION.sub("VERSION", TIMES.sub("TIME", text)).encode()
+    else:
+        data = path.read_bytes()
+    return hashlib.sha256(data).hexdigest()
+
+
+def _what_differs(one: Path, other: Path) -> str:
+    """The keys, columns or lines in which two files differ, the first few."""
+    if one.suffix == ".json":
+        before, after = (_flat(json.loads(path.read_text(encoding="utf-8"))) for path in (one, other))
+        names = [name for name in {**before, **after} if before.get(name) != after.get(name)]
+        return f"keys {', '.join(sorted(name for name in names if not name.startswith('software'))[:8])}"
+    if one.suffix == ".parquet":
+        before, after = pd.read_parquet(one), pd.read_parquet(other)
+        if list(before) != list(after) or len(before) != len(after):
+            return f"columns or rows: {before.shape} {list(before)} and {after.shape} {list(after)}"
+        names = [name for name in before if not before[name].equals(after[name])]
+        return f"columns {', '.join(names)}" if names else "only what is said of its columns"
+    lines = [path.read_text(encoding="utf-8", errors="replace").splitlines() for path in (one, other)]
+    pairs = [pair for pair in zip(*lines, strict=False) if pair[0] != pair[1]]
+    return f"{len(lines[0])} and {len(lines[1])} lines" + (f", first {pairs[0][0]!r} and {pairs[0][1]!r}" if pairs else "")
+
+
+def _flat(content: Any, name: str = "") -> dict[str, Any]:
+    if isinstance(content, dict):
+        return {key: value for k, v in content.items() for key, value in _flat(v, f"{name}.{k}".lstrip(".")).items()}
+    return {name: content}
+
+
+def _read(path: Path) -> dict[str, Any]:
+    content: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return content
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    _write_text(path, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def compare(base: str, names: list[str], pages: bool, work: Path) -> list[str]:
+    """The lines of ``differences`` of all kinds named, worked out below ``work``."""
+    source = work / "source"
+    subprocess.run(["git", "worktree", "add", "--detach", "-f", "-q", str(source), base], cwd=ROOT, check=True)
+    try:
+        trees = (Tree(source, work / "base"), Tree(ROOT, work / "here"))
+
+        def of_kind(name: str) -> list[str]:
+            simulate(trees[0], KINDS[name], work / "simulated" / name)
+            for tree in trees:
+                shutil.copytree(work / "simulated" / name, tree.work / name)
+                calibrate(tree, KINDS[name], tree.work / name, pages)
+            found = list(differences(name, *(tree.work / name for tree in trees), pages))
+            print("\n".join(found) or f"{name}: the same", flush=True)
+            return found
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return [line for found in pool.map(of_kind, names) for line in found]
+    finally:
+        subprocess.run(["git", "worktree", "remove", "--force", str(source)], cwd=ROOT, check=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("base", metavar="BASE", help="a commit")
+    parser.add_argument("--only", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--pages", action="store_true", help="the HTML pages as well")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep both trees' results here, to look into")
+    given = parser.parse_args()
+    if given.keep is not None:
+        given.keep.mkdir(parents=True)
+        found = compare(given.base, given.only, given.pages, given.keep.resolve())
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            found = compare(given.base, given.only, given.pages, Path(folder))
+    print(f"{len(found)} files differ" if found else "the same bytes")
+    sys.exit(1 if found else 0)
+
+
+if __name__ == "__main__":
+    main()
