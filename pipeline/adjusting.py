@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
+from pipeline.config import Adjust, Ins
 from pipeline.maths.adjustment import moved, normal_equations, settle
 from pipeline.maths.design import of_poses
 from pipeline.maths.drift import Eliminated
@@ -59,7 +59,7 @@ class Adjusted:
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
 
-def noise_of(ins: config.Ins) -> PoseNoise:
+def noise_of(ins: Ins) -> PoseNoise:
     """The INS's noise as the session states it, target frame (z up: heading turns about it)."""
     drift, white = ins.drift, ins.white
     angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
@@ -87,7 +87,7 @@ class Given:
 
 
 def adjust(
-    streams: Mapping[str, Stream], scene: Scene, given: Given, settings: config.Adjust, gap_s: float
+    streams: Mapping[str, Stream], scene: Scene, given: Given, settings: Adjust, gap_s: float
 ) -> Adjusted:
     """From the coarse mount to the solution."""
     noise = given.noise

@@ -9,8 +9,8 @@ import pandas as pd
 import yaml
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.causes import estimated
+from pipeline.config import Ins, Laser, Mbes
 from pipeline.maths.rotations import exp_so3
 from pipeline.maths.unknowns import NAMES, SIX
 from pipeline.mounts import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, six_of
@@ -28,7 +28,7 @@ def plain(value: Any) -> Any:
     return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
 
 
-def instruments_block(sensors: Mapping[str, config.Ins | config.Laser | config.Mbes]) -> dict[str, Any]:
+def instruments_block(sensors: Mapping[str, Ins | Laser | Mbes]) -> dict[str, Any]:
     """The presets that session.yaml names, by sensor; nothing where it names none."""
     used = {sensor: one.instrument for sensor, one in sensors.items() if one.instrument is not None}
     found = {

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
+from pipeline.config import AsBuilt, Laser, Mbes
 from pipeline.maths.observations import SPEED_M_S
 from pipeline.maths.unknowns import OF_LASER, SIX
 
@@ -14,7 +14,7 @@ LEAST_SPAN_M = 0.1  # a cast over less depth covers nothing
 Block = tuple[NDArray[np.int64], Array]  # numbers among all unknowns, covariance
 
 
-def gradient_sigma(mbes: config.Mbes, depth_m: float | None) -> float:
+def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
     """Sigma of the change of the sound speed with depth, (m/s)/m, over the water down to ``depth_m`` (the target's
     lower end; None: as deep as the cast).
 
@@ -35,9 +35,9 @@ def gradient_sigma(mbes: config.Mbes, depth_m: float | None) -> float:
 
 def considered_of(
     names: Sequence[str],
-    laser: config.Laser,
-    mbes: config.Mbes | None,
-    as_built: config.AsBuilt,
+    laser: Laser,
+    mbes: Mbes | None,
+    as_built: AsBuilt,
     depth_m: float | None = None,
 ) -> Array:
     """Sigmas (u,) of the unknowns ``names`` where they are held; zero for the mount and the surfaces. ``depth_m``: how
@@ -62,7 +62,7 @@ def considered_of(
     return np.array([sigmas.get(name, 0.0) for name in names])
 
 
-def correlated(names: Sequence[str], laser: config.Laser) -> tuple[Block, ...]:
+def correlated(names: Sequence[str], laser: Laser) -> tuple[Block, ...]:
     """Those of the unknowns ``names`` whose errors are not independent: the laser's six, where their covariance is
     given."""
     if laser.mount_covariance is None:

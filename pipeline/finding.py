@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.beams import beams_in_target
 from pipeline.clouds import ClosestSurface
+from pipeline.config import Mbes, Segment
 from pipeline.maths.labelling import Beams, label_points
 from pipeline.maths.registration import (
     LaserMount,
@@ -70,7 +70,7 @@ class LaserSample:
 
 
 def find_target(
-    dry: LaserSample, model: TargetModel, settings: config.Segment, azimuth_known: bool
+    dry: LaserSample, model: TargetModel, settings: Segment, azimuth_known: bool
 ) -> FoundTarget:
     """Pose of the target from dry laser points; rivals are other poses, and the mirrored target.
 
@@ -133,7 +133,7 @@ def find_target(
     )
 
 
-def _gate(refined: Refined, settings: config.Segment) -> float:
+def _gate(refined: Refined, settings: Segment) -> float:
     """Distance from a face up to which points are labelled: wide enough that the noise is not cut into."""
     return max(settings.gate_m, GATE_SCALES * refined.scale_m) if np.isfinite(refined.scale_m) else settings.gate_m
 
@@ -181,7 +181,7 @@ def find_laser(
     target: FoundTarget,
     model: TargetModel,
     coarse: Mounted,
-    settings: config.Segment,
+    settings: Segment,
 ) -> tuple[FoundTarget, "FoundMount"]:
     """Where the target stands and how the laser is turned, from the pose found with the coarse mount.
 
@@ -258,8 +258,8 @@ def find_mount(
     model: TargetModel,
     R_body_from_mbes: Array,
     lever_arm_m: Array,
-    mbes: config.Mbes,
-    settings: config.Segment,
+    mbes: Mbes,
+    settings: Segment,
 ) -> FoundMount:
     """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search
     limits.
@@ -322,7 +322,7 @@ def find_mount(
 
 
 def _wall_vote(
-    placement: MountCorrection, model: TargetModel, settings: config.Segment
+    placement: MountCorrection, model: TargetModel, settings: Segment
 ) -> tuple[float, Array] | None:
     """Roll correction (rad) and shift (3,) of the lever arm (m, body) that gather most soundings of the front's middle
     in one plane; None where the target has no front, or it was not seen.

@@ -13,7 +13,8 @@ from typing import Any, TextIO
 import yaml
 from pydantic import BaseModel
 
-from pipeline import config, manifest
+from pipeline import manifest
+from pipeline.config import Calibrated, Mbes, PoolConfig, SessionConfig, Target, load_pool, load_session
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.files import read_json, remove, settle, settle_names, write_text, writing
 from pipeline.mounts import target_of
@@ -30,8 +31,8 @@ class Settings:
     """What a run is made from: both configs, checked, and where the raw files are."""
 
     session_folder: Path
-    pool: config.PoolConfig
-    session: config.SessionConfig
+    pool: PoolConfig
+    session: SessionConfig
 
     def resolved(self) -> dict[str, Any]:
         """Every setting by the name under which a stage's Config asks for it."""
@@ -52,17 +53,17 @@ class Settings:
 
 
 def load_settings(
-    session_folder: Path, config_path: Path, calibrated: config.Calibrated | None = "mbes"
+    session_folder: Path, config_path: Path, calibrated: Calibrated | None = "mbes"
 ) -> Settings:
     """Both YAML files, read and checked, for calibrating the sonar, or the laser by itself: of a session with both the
     sonar is left out then. None: whatever the session can."""
-    pool = config.load_pool(config_path)
+    pool = load_pool(config_path)
     try:
         target_of(pool.target)
     except ConfigError as error:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_faces(pool, config_path)
-    session = config.load_session(session_folder, with_cast)
+    session = load_session(session_folder, with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
     elif calibrated == "mbes" and session.mbes is None:
@@ -73,7 +74,7 @@ def load_settings(
     return Settings(session_folder.resolve(), pool, session)
 
 
-def refuse_faces(pool: config.PoolConfig, path: Path) -> None:
+def refuse_faces(pool: PoolConfig, path: Path) -> None:
     """Faces as built are faces of the target."""
     names = [face.name for face in target_of(pool.target).faces]
     for name in pool.as_built.faces:
@@ -82,7 +83,7 @@ def refuse_faces(pool: config.PoolConfig, path: Path) -> None:
             raise ConfigError(f"{path}: as_built.faces: {name!r}: no face of this target; its faces are {known}")
 
 
-def refuse_cast(target: config.Target, mbes: config.Mbes, path: Path) -> None:
+def refuse_cast(target: Target, mbes: Mbes, path: Path) -> None:
     """A cast is of the water that the rays go through: at least of half the depth down to the target's lower end."""
     if mbes.svp is None:
         return
@@ -112,7 +113,7 @@ def holds_run(run: Path) -> bool:
     return (run / RUN_YAML).is_file()
 
 
-def refuse_other(run: Path, calibrated: config.Calibrated) -> None:
+def refuse_other(run: Path, calibrated: Calibrated) -> None:
     """A run folder is the sonar's or the laser's, not both in turn. (Settings of an older program need not be read.)"""
     try:
         session = read_yaml(run / RUN_YAML)["session"] if holds_run(run) else None
@@ -146,8 +147,8 @@ def read_settings(run: Path) -> Settings:
     folder = content.get("session_folder")
     if set(content) != {"session_folder", "config", "session"} or not isinstance(folder, str):
         raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
-    pool = parse(config.PoolConfig, content["config"], f"{path}: config")
-    return Settings(Path(folder), pool, parse(config.SessionConfig, content["session"], f"{path}: session"))
+    pool = parse(PoolConfig, content["config"], f"{path}: config")
+    return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"))
 
 
 # --- the lock --------------------------------------------------------------------------------------------------------

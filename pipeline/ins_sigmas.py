@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import config
+from pipeline.config import Drift, Ins
 from pipeline.passes import pass_of
 from pipeline.streams import Batch
 from pipeline.times import NS
@@ -31,7 +31,7 @@ def thinned(sigmas: Batch) -> dict[str, NDArray[Any]]:
     return {name: values[kept] for name, values in sigmas.items()}
 
 
-def told(ins: config.Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:
+def told(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:
     """Figures of the drift that the files tell: the medians within the passes; none where the session's go first."""
     if ins.drift_from == "settings":
         return {}
@@ -47,6 +47,6 @@ def rms(sigmas: Mapping[str, NDArray[Any]]) -> dict[str, float]:
     return {name: float(np.sqrt(np.median(values))) for name, values in known.items() if len(values)}
 
 
-def drift_of(ins: config.Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> config.Drift:
+def drift_of(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Drift:
     """The drift to be conceded: the files' figures where there are any, else the session's, as the time constant."""
     return ins.drift.model_copy(update=told(ins, ins_sigmas, passes))

@@ -2,7 +2,7 @@
 
 session.yaml names one by ``instrument: r2sonic_2024`` in the sensor's block. The file is SESSION/instruments/NAME.yaml,
 else configs/instruments/NAME.yaml. Precedence: session, preset, default; nested blocks key by key. What was taken from
-where stays with the sensor's block as :class:`config.InstrumentUsed`, so that run.yaml is read again without presets.
+where stays with the sensor's block as :class:`InstrumentUsed`, so that run.yaml is read again without presets.
 """
 
 import os
@@ -13,7 +13,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, create_model
 
-from pipeline import CONFIGS, config
+from pipeline import CONFIGS
+from pipeline.config import INSTRUMENT, Ins, InstrumentTitle, Laser, Mbes
 from pipeline.errors import ConfigError
 from pipeline.parsing import parse, read_yaml
 from pipeline.plan_settings import LaserFigures, MbesFigures, Plan
@@ -22,7 +23,7 @@ from pipeline.quantities import Model
 Sensor = Literal["ins", "laser", "mbes"]
 Block = dict[str, Any]
 PRESETS = CONFIGS / "instruments"
-SENSORS: Mapping[Sensor, type[Model]] = {"ins": config.Ins, "laser": config.Laser, "mbes": config.Mbes}
+SENSORS: Mapping[Sensor, type[Model]] = {"ins": Ins, "laser": Laser, "mbes": Mbes}
 SETTINGS: Mapping[Sensor, tuple[str, ...]] = {  # what a preset may say, and the report shows
     "ins": ("drift", "white"),
     "laser": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg"),
@@ -34,7 +35,7 @@ MOST_PRESETS = 1000  # that a message looks through
 class Instrument(Model):
     """NAME.yaml"""
 
-    title: config.InstrumentTitle
+    title: InstrumentTitle
     sensor: Sensor
     settings: Block = Field(default_factory=dict)  # keys of the sensor's block
     rates: Block = Field(default_factory=dict)  # keys of PLAN.yaml, of the sensor
@@ -81,7 +82,7 @@ def _with_preset(sensor: Sensor, block: Any, folder: Path) -> Any:
         return block
     instrument = _named(sensor, name, folder)
     own, preset = set(_paths(block)), set(_paths(instrument.settings))
-    used = {  # config.InstrumentUsed
+    used = {  # InstrumentUsed
         "name": name,
         "title": instrument.title,
         "unverified": list(instrument.unverified),
@@ -121,7 +122,7 @@ def _paths(content: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
 # --- files -----------------------------------------------------------------------------------------------------------
 def _named(sensor: Sensor, name: Any, folder: Path) -> Instrument:
     where = f"{folder / 'session.yaml'}: {sensor}.instrument = {str(name)[:60]!r}"
-    if not (isinstance(name, str) and fullmatch(config.INSTRUMENT, name)):
+    if not (isinstance(name, str) and fullmatch(INSTRUMENT, name)):
         raise ConfigError(f"{where}: is no name, of a-z, 0-9 and _; {_known(sensor, folder)}")
     path = _path(name, folder)
     if path is None:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import config
+from pipeline.config import Laser, LaserFit, Verdict
 from pipeline.maths.rigid_design import Design
 from pipeline.maths.solution import solve
 from pipeline.maths.targets import TargetModel
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 VAGUE = 10.0  # rad or m: what is known of an unknown before any point, where nothing is
 
 
-def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: config.LaserFit) -> Design:
+def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: LaserFit) -> Design:
     """The target by design in the frame in which it was found; where it was surveyed to stand, there."""
     planes = {}
     for family in model.families:
@@ -40,7 +40,7 @@ def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: config.La
     )
 
 
-def coarse_covariance(laser: config.Laser, settings: config.LaserFit) -> Array:
+def coarse_covariance(laser: Laser, settings: LaserFit) -> Array:
     """How sure the coarse mount is, (6, 6) in rad and m: as surveyed, else as the pool's config has it.
 
     Of a mount that a fine calibration has written only what that held is as surveyed: the rest is to be found anew.
@@ -57,7 +57,7 @@ def coarse_covariance(laser: config.Laser, settings: config.LaserFit) -> Array:
     return found
 
 
-def bounds_of(coarse: Array, settings: config.LaserFit, limits: config.Verdict) -> Array:
+def bounds_of(coarse: Array, settings: LaserFit, limits: Verdict) -> Array:
     """Sigmas (6,) that the six must come out with to be found: within the verdict's limits, and surer than they were;
     ``coarse`` (6, 6)."""
     wanted = np.repeat([np.radians(limits.max_sigma_deg), limits.max_sigma_m], 3)

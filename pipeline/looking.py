@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.adjusting import Adjusted
+from pipeline.config import Adjust
 from pipeline.maths.consistency import Cell, Moments, against_others, cells_of, merged_moments, moments_of, steps_of
 from pipeline.maths.drift_of_passes import against_other_passes
 from pipeline.maths.excess import standardised
@@ -47,7 +48,7 @@ def look(
     streams: Mapping[str, Stream],
     scene: Scene,
     adjusted: Adjusted,
-    settings: config.Adjust,
+    settings: Adjust,
     of_drift: Iterable[Row],
     at_most: int,
 ) -> Look:

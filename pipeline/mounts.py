@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
+from pipeline.config import Faces, Letters, Mount, Target
 from pipeline.maths.assembly import Outline, Relation, build_target
 from pipeline.maths.letters import lettered
 from pipeline.maths.rotations import exp_so3, mount_from_rotation, mount_partials, rotation_from_mount
@@ -49,13 +49,13 @@ class Mounted:
         return {key: float(six[place]) for _, place, key, _ in PARAMETERS}
 
 
-def turned(mount: config.Mount, turn_deg: Sequence[float]) -> Mounted:
+def turned(mount: Mount, turn_deg: Sequence[float]) -> Mounted:
     """A mount after a correction by a rotation vector about the body's x, y, z, its lever arm as it is."""
     as_given = mount_of(mount)
     return Mounted(exp_so3(np.radians(turn_deg)) @ as_given.R_body_from_sensor, as_given.lever_arm_body_m)
 
 
-def mount_of(mount: config.Mount) -> Mounted:
+def mount_of(mount: Mount) -> Mounted:
     """Radians and matrices from a mount's settings."""
     angles = np.radians([mount.roll_deg, mount.pitch_deg, mount.yaw_deg])
     return Mounted(rotation_from_mount(*map(float, angles)), np.array([mount.x_m, mount.y_m, mount.z_m]))
@@ -76,15 +76,15 @@ def change_of(total: Mapping[str, float], coarse: Mapping[str, float], key: str)
     return change - 360.0 * round(change / 360.0) if key.endswith("_deg") else change
 
 
-def target_of(target: config.Target) -> TargetModel:
+def target_of(target: Target) -> TargetModel:
     """The target's faces; nobody changes them, for they are kept: many ask, and it takes a twentieth of a second."""
     return _built(type(target), target.model_dump_json())
 
 
 @lru_cache(maxsize=16)
-def _built(kind: type[config.Letters] | type[config.Faces], text: str) -> TargetModel:
+def _built(kind: type[Letters] | type[Faces], text: str) -> TargetModel:
     target = kind.model_validate_json(text)
-    if isinstance(target, config.Faces):
+    if isinstance(target, Faces):
         outlines = [Outline(name, one.corners, one.role or "", one.seen) for name, one in target.faces.items()]
         relations = [
             Relation(kind, faces, one.name or "") for one in target.relations for kind, faces in one.given.items()

@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.adjusting import Adjusted
+from pipeline.config import Adjust
 from pipeline.considered import Block
 from pipeline.judging.residual_tests import passes_test
 from pipeline.looking import Cells
@@ -31,7 +32,7 @@ def tables(
     considered: Array,
     together: Sequence[Block],
     coarse: Mounted,
-    settings: config.Adjust,
+    settings: Adjust,
     poses: pd.DataFrame,
     passes: pd.DataFrame,
 ) -> dict[str, pd.DataFrame]:

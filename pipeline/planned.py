@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.adjusting import free_unknowns
+from pipeline.config import PoolConfig, SessionConfig, Verdict
 from pipeline.considered import considered_of, correlated
 from pipeline.errors import ConfigError
 from pipeline.instruments import under
@@ -60,13 +60,13 @@ class Answer:
         return "" if self.given.solution.deficiency else weakest_direction(self.given.random)
 
 
-def setting_of(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Setting:
+def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Setting:
     model = target_of(pool.target)
     state = state_by_design(model, session.sonar)
     return Setting(model, state, plan, pool.segment, session.ins, session.laser, session.sonar)
 
 
-def load_plan(path: Path, session: config.SessionConfig) -> Plan:
+def load_plan(path: Path, session: SessionConfig) -> Plan:
     """A plan that can be sailed, with the sonar under water; rates that it leaves out are those of the instruments."""
     plan = parse(Plan, under(read_yaml(path), _rates(session)), str(path))
     sonar = plan.ins_height_m + session.sonar.mount.z_m
@@ -78,7 +78,7 @@ def load_plan(path: Path, session: config.SessionConfig) -> Plan:
     return plan
 
 
-def _rates(session: config.SessionConfig) -> dict[str, Any]:
+def _rates(session: SessionConfig) -> dict[str, Any]:
     """What the session's instruments can do, as a plan says it."""
     ins, laser, mbes = (
         one.instrument.model_dump(mode="json")["rates"] if one.instrument else {}
@@ -87,7 +87,7 @@ def _rates(session: config.SessionConfig) -> dict[str, Any]:
     return {**ins, "laser": laser, "mbes": mbes}
 
 
-def judge(plan: Plan, pool: config.PoolConfig, session: config.SessionConfig) -> Answer:
+def judge(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Answer:
     setting = setting_of(plan, pool, session)
     depth = setting.model.depth_m
     considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
@@ -147,7 +147,7 @@ def _better(
     lengths as the verdict's usual limits.
     """
     predicted = [predict(setting, [one], phases=1) for one in candidates]
-    usual = config.Verdict()
+    usual = Verdict()
     bounds = np.repeat([np.radians(usual.max_sigma_deg), usual.max_sigma_m], 3)
     vague = np.zeros((setting.state.size, setting.state.size))
     vague[free, free] = VAGUE**-2
@@ -210,14 +210,14 @@ def _faces(setting: Setting, points: dict[str, Array]) -> dict[str, dict[str, in
     }
 
 
-def shares_of_limits(setting: Setting, outlook: Outlook, limits: config.Verdict) -> dict[str, float]:
+def shares_of_limits(setting: Setting, outlook: Outlook, limits: Verdict) -> dict[str, float]:
     """Total sigma ÷ the verdict's limit, by parameter; NaN where a direction stays open."""
     sigma = mount_of(setting.mbes.mount).sigmas(outlook.total)
     bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
     return {name: sigma[key] / bounds[unit] for name, _, key, unit in PARAMETERS}
 
 
-def is_enough(answer: Answer, limits: config.Verdict) -> bool:
+def is_enough(answer: Answer, limits: Verdict) -> bool:
     """Whether the list as given will keep the total sigmas below the verdict's limits."""
     if answer.given.solution.deficiency:
         return False

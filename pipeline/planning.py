@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.adjusting import noise_of
 from pipeline.beams import beams_in_target
 from pipeline.clouds import ClosestSurface
+from pipeline.config import Ins, Laser, Mbes, Segment
 from pipeline.maths.adjustment import Body, normal_equations
 from pipeline.maths.epochs import EpochSums, epoch_sums, merged
 from pipeline.maths.knots import Drift, knots_of
@@ -45,10 +45,10 @@ class Setting:
     model: TargetModel
     state: State
     plan: Plan
-    segment: config.Segment
-    ins: config.Ins
-    laser: config.Laser
-    mbes: config.Mbes
+    segment: Segment
+    ins: Ins
+    laser: Laser
+    mbes: Mbes
 
     @property
     def half_length_m(self) -> float:
@@ -75,7 +75,7 @@ class Predicted:
     seconds: list[float]
 
 
-def state_by_design(model: TargetModel, mbes: config.Mbes) -> State:
+def state_by_design(model: TargetModel, mbes: Mbes) -> State:
     """The mount as configured; surfaces where the design has them, their centres among the faces' corners."""
     surfaces = [
         by_design(family, np.concatenate([model.faces[number].vertices_m for number in family.faces]))

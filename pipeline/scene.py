@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import config
+from pipeline.config import Ins, Laser, Mbes
 from pipeline.fitted import ALL_PASSES, laser_planes
 from pipeline.maths.adjustment import Body, pull_of
 from pipeline.maths.epochs import MOVING, Runs
@@ -113,8 +113,8 @@ class Scene:
     height_of_face: Array
     coarse: State
     white_m: float
-    laser: config.Laser
-    mbes: config.Mbes | None
+    laser: Laser
+    mbes: Mbes | None
 
     def observe(
         self, sensor: str, batch: Batch, state: State, drift: Drift | None = None, weighting: Weighting | None = None
@@ -242,9 +242,9 @@ def scene_of(
     poses: pd.DataFrame,
     target_pose: pd.DataFrame,
     planes: pd.DataFrame,
-    ins: config.Ins,
-    laser: config.Laser,
-    mbes: config.Mbes,
+    ins: Ins,
+    laser: Laser,
+    mbes: Mbes,
     as_built: Mapping[str, float],
 ) -> Scene:
     """Coarse mount of the sonar, and the laser's planes as surfaces; faces ``as_built`` off their surface by so much
@@ -261,8 +261,8 @@ def laser_scene_of(
     poses: pd.DataFrame,
     target_pose: pd.DataFrame,
     planes: pd.DataFrame,
-    ins: config.Ins,
-    laser: config.Laser,
+    ins: Ins,
+    laser: Laser,
     as_built: Mapping[str, float],
 ) -> Scene:
     """The same where the laser is calibrated: its own coarse mount, and no sonar."""

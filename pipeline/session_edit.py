@@ -18,7 +18,7 @@ import yaml
 from numpy.typing import NDArray
 
 import pipeline
-from pipeline import config
+from pipeline.config import SessionConfig
 from pipeline.errors import ConfigError
 from pipeline.files import sha256, write_bytes, writing
 from pipeline.instruments import applied
@@ -44,13 +44,13 @@ def read_session(folder: Path) -> tuple[str, Content]:
     return text, content
 
 
-def _check(content: Content, folder: Path) -> config.SessionConfig:
+def _check(content: Content, folder: Path) -> SessionConfig:
     path = folder / "session.yaml"
     filled = with_cast(applied(content, folder)[0], folder)
     for name in SENSORS:
         if isinstance(filled.get(name), dict):
             filled[name] = {"mount": NOWHERE} | filled[name]
-    return parse(config.SessionConfig, {"name": "session"} | filled, str(path))
+    return parse(SessionConfig, {"name": "session"} | filled, str(path))
 
 
 def origin_of(method: str, file: Path, **more: Any) -> Content:

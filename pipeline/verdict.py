@@ -7,8 +7,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from pipeline import config
 from pipeline.causes import causes, estimated
+from pipeline.config import Drift, Method, Verdict
 from pipeline.judging.residual_tests import Tables, off
 from pipeline.mounts import PARAMETERS
 from pipeline.screen import plural
@@ -56,10 +56,10 @@ class Settings:
     target's shape, ``sides``: that which tells its left from its right; ``asked``: what to do about angles of a mount
     far off that were measured right, said where nothing else is in doubt."""
 
-    limits: config.Verdict
+    limits: Verdict
     test_level: float
     tolerated_m: float
-    chosen: config.Method
+    chosen: Method
     farthest: tuple[float, float]
     drift_doubt: str
     shape: str
@@ -182,7 +182,7 @@ def _away(freed: pd.DataFrame) -> list[str]:
     ]
 
 
-def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict, held: Collection[str]) -> list[str]:
+def _wide_sigmas(sigma: Mapping[str, float] | None, limits: Verdict, held: Collection[str]) -> list[str]:
     if sigma is None:
         return ["the adjustment has no covariance"]
     bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
@@ -194,7 +194,7 @@ def _wide_sigmas(sigma: Mapping[str, float] | None, limits: config.Verdict, held
     ]
 
 
-def _patent(chosen: str, row: Any, methods: Mapping[str, Mapping[str, Any]], limits: config.Verdict) -> list[str]:
+def _patent(chosen: str, row: Any, methods: Mapping[str, Mapping[str, Any]], limits: Verdict) -> list[str]:
     """The patent's forms have no sigma: they must have converged and agree with the adjustment to the limits."""
     if row["reason"]:
         return [f"{chosen} has no result: {row['reason']}"]
@@ -242,7 +242,7 @@ def warnings(
     return found
 
 
-def drift_doubt(drift: pd.DataFrame, conceded: config.Drift, stated: str = "ins.drift says") -> str:
+def drift_doubt(drift: pd.DataFrame, conceded: Drift, stated: str = "ins.drift says") -> str:
     """What the drift found (table ``drift``, at its knots) says of the figures conceded: empty, if nothing.
 
     Root mean square of values ÷ conceded sigmas. What is found is drawn towards zero by those same sigmas: 0.6 to 0.7

@@ -8,8 +8,9 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.adjusting import Adjusted, Given, adjust, noise_of
+from pipeline.config import Adjust, AsBuilt, Ingest, Ins, Laser, Mbes, Segment, Target
 from pipeline.considered import considered_of, correlated
 from pipeline.ins_sigmas import drift_of
 from pipeline.looking import Cells, drift_rows, look
@@ -32,14 +33,14 @@ LEAST_RAD = 1e-7  # nothing is known better
 
 @dataclass(frozen=True)
 class Config:
-    target: config.Target
-    segment: config.Segment
-    adjust: config.Adjust
-    ingest: config.Ingest
-    as_built: config.AsBuilt
-    ins: config.Ins
-    laser: config.Laser
-    mbes: config.Mbes
+    target: Target
+    segment: Segment
+    adjust: Adjust
+    ingest: Ingest
+    as_built: AsBuilt
+    ins: Ins
+    laser: Laser
+    mbes: Mbes
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
 
 
-def _ties(model: TargetModel, as_built: config.AsBuilt) -> Callable[[State], Known] | None:
+def _ties(model: TargetModel, as_built: AsBuilt) -> Callable[[State], Known] | None:
     """Families that are parallel, within what they may be turned as built."""
     if not model.parallel:
         return None
@@ -105,7 +106,7 @@ def _ties(model: TargetModel, as_built: config.AsBuilt) -> Callable[[State], Kno
 
 
 def _geometry_table(
-    found: Adjusted, cells: Cells, inputs: Inputs, config: Config, ins: config.Ins
+    found: Adjusted, cells: Cells, inputs: Inputs, config: Config, ins: Ins
 ) -> pd.DataFrame:
     """What the passes lack, and what would cure it."""
     passes = inputs.passes.set_index("pass").loc[sorted({number for sensor, _, number in cells if sensor == "mbes"})]

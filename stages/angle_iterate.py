@@ -6,7 +6,8 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts, config
+from pipeline import artefacts
+from pipeline.config import AngleIterate, FitPlanes, Mbes
 from pipeline.errors import DegenerateGeometryError
 from pipeline.fitted import angle_passes
 from pipeline.maths.angles import AngleResult, iterate_angles
@@ -15,9 +16,9 @@ from pipeline.mounts import mount_of
 
 @dataclass(frozen=True)
 class Config:
-    fit_planes: config.FitPlanes
-    angle_iterate: config.AngleIterate
-    mbes: config.Mbes
+    fit_planes: FitPlanes
+    angle_iterate: AngleIterate
+    mbes: Mbes
 
 
 @dataclass(frozen=True)

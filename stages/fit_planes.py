@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts, config
+from pipeline import artefacts
+from pipeline.config import FitPlanes, Mbes
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.angles import fourth_normal
 from pipeline.maths.moments import SIZE, lift, plane_moments
@@ -25,8 +26,8 @@ ALL_PASSES = -1
 
 @dataclass(frozen=True)
 class Config:
-    fit_planes: config.FitPlanes
-    mbes: config.Mbes | None
+    fit_planes: FitPlanes
+    mbes: Mbes | None
 
 
 @dataclass(frozen=True)

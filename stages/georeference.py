@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts, config
+from pipeline import artefacts
+from pipeline.config import Georeference, Laser, Mbes, Target
 from pipeline.counting import counts_table
 from pipeline.errors import RawDataError
 from pipeline.maths import soundings
@@ -25,10 +26,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Config:
-    target: config.Target
-    georeference: config.Georeference
-    laser: config.Laser
-    mbes: config.Mbes | None
+    target: Target
+    georeference: Georeference
+    laser: Laser
+    mbes: Mbes | None
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def _traced(
     points: Array,
     recorded_m_s: Array,
     prepared: Prepared,
-    mbes: config.Mbes,
+    mbes: Mbes,
     water_level_m: float,
 ) -> Array:
     """Soundings in the mbes frame, their rays bent by the cast; its depths are below the water's surface."""

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts, config
+from pipeline import artefacts
+from pipeline.config import Ingest, Recordings, TargetPlace
 from pipeline.errors import RawDataError
 from pipeline.ins_sigmas import thinned
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
@@ -21,9 +22,9 @@ Columns = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Config:
-    target_place: config.TargetPlace
-    ingest: config.Ingest
-    recordings: config.Recordings
+    target_place: TargetPlace
+    ingest: Ingest
+    recordings: Recordings
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def _sigmas(pieces: list[tuple[str, Seen]], start: int, end: int) -> tuple[pd.Da
     return table[inside].reset_index(drop=True), int((~inside).sum())
 
 
-def _pool_frame(trajectory: pd.DataFrame, target: config.TargetPlace) -> tuple[pd.DataFrame, PoolFrame]:
+def _pool_frame(trajectory: pd.DataFrame, target: TargetPlace) -> tuple[pd.DataFrame, PoolFrame]:
     origin = target.origin
     place = (np.radians(origin.latitude_deg), np.radians(origin.longitude_deg), origin.height_m)
     azimuth = target.azimuth_deg

@@ -6,7 +6,8 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts, config
+from pipeline import artefacts
+from pipeline.config import FitPlanes, Mbes, Offsets
 from pipeline.errors import DegenerateGeometryError
 from pipeline.fitted import angle_passes, horizontal_faces, offset_passes
 from pipeline.maths.offsets import alternate, offsets
@@ -18,9 +19,9 @@ METHODS = ("patent_sequential", "patent_alternating")
 
 @dataclass(frozen=True)
 class Config:
-    fit_planes: config.FitPlanes
-    offsets: config.Offsets
-    mbes: config.Mbes
+    fit_planes: FitPlanes
+    offsets: Offsets
+    mbes: Mbes
 
 
 @dataclass(frozen=True)

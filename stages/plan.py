@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from pipeline import config, planned
+from pipeline import planned
+from pipeline.config import Verdict
 from pipeline.files import write_text, writing
 from pipeline.folder import load_settings
 from pipeline.mounts import PARAMETERS, mount_of
@@ -34,7 +35,7 @@ def plan(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path
     return said, planned.is_enough(answer, pool.verdict)
 
 
-def table(answer: Answer, limits: config.Verdict) -> str:
+def table(answer: Answer, limits: Verdict) -> str:
     """For the screen."""
     setting, plan = answer.setting, answer.setting.plan
     rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
@@ -55,7 +56,7 @@ def table(answer: Answer, limits: config.Verdict) -> str:
     return "\n".join(lines)
 
 
-def _chosen(answer: Answer, better: Outlook, limits: config.Verdict) -> list[str]:
+def _chosen(answer: Answer, better: Outlook, limits: Verdict) -> list[str]:
     """The list chosen, like passes together, and what it does to the sigmas: not all of them need get smaller."""
     alike: dict[Pass, tuple[int, float, dict[str, planned.Array]]] = {}
     for one, seconds, points in better.each():
@@ -97,7 +98,7 @@ def _passes(setting: Setting, rows: list[tuple[int, Pass, float, dict[str, plann
     return lines
 
 
-def _sigmas(setting: Setting, outlook: Outlook, limits: config.Verdict) -> list[str]:
+def _sigmas(setting: Setting, outlook: Outlook, limits: Verdict) -> list[str]:
     lines = [f"  {'sigma':<8}{'random':>12}{'total':>12}{'limit':>12}"]
     if outlook.solution.deficiency:
         open_ones = plural(outlook.solution.deficiency, "direction")

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.blocks import (
     SCHEMA,
     adjustment_block,
@@ -24,6 +24,7 @@ from pipeline.blocks import (
 )
 from pipeline.built import as_found, by_design, oddities
 from pipeline.closing import closing_table
+from pipeline.config import Adjust, Ins, Laser, Mbes, Method, Mount, Segment, Target, Verdict
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.judging.casts import cast_doubts, in_words
 from pipeline.judging.residual_tests import pattern_tests
@@ -45,14 +46,14 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Config:
     name: str
-    target: config.Target
-    ins: config.Ins
-    laser: config.Laser
-    mbes: config.Mbes
-    segment: config.Segment
-    adjust: config.Adjust
-    verdict: config.Verdict
-    result: config.Method
+    target: Target
+    ins: Ins
+    laser: Laser
+    mbes: Mbes
+    segment: Segment
+    adjust: Adjust
+    verdict: Verdict
+    result: Method
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
 
 
-def _asked(coarse: config.Mount, provisional: pd.DataFrame) -> str:
+def _asked(coarse: Mount, provisional: pd.DataFrame) -> str:
     """What to enter where the coarse angles have been checked, and the soundings yet ask for others."""
     found = provisional.iloc[0]
     settings = turned(coarse, [float(found[f"rotation_{axis}_deg"]) for axis in "xyz"]).settings()
@@ -167,7 +168,7 @@ def _asked(coarse: config.Mount, provisional: pd.DataFrame) -> str:
     return f"; if you have checked the signs, enter {values} as mbes.mount and run again"
 
 
-def _range_note(mbes: config.Mbes) -> str:
+def _range_note(mbes: Mbes) -> str:
     said = "sonar ranges taken as recorded: half the two-way path"
     if mbes.projector_offset_m is not None:
         said = f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
@@ -177,7 +178,7 @@ def _range_note(mbes: config.Mbes) -> str:
     return said if mbes.svp_from is None else f"{said} (mbes.svp {in_words(mbes.svp_from)})"
 
 
-def _cast_block(mbes: config.Mbes) -> dict[str, Any]:
+def _cast_block(mbes: Mbes) -> dict[str, Any]:
     """What of calibration.json tells of the cast; nothing without one."""
     if mbes.svp is None:
         return {}

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.beams import beams_in_target
 from pipeline.clouds import ClosestSurface
+from pipeline.config import Laser, Mbes, Segment, Target
 from pipeline.counting import counts_table
 from pipeline.errors import RawDataError
 from pipeline.finding import (
@@ -41,10 +42,10 @@ RAW_SAMPLE = 50_000  # of these taken singly
 
 @dataclass(frozen=True)
 class Config:
-    target: config.Target
-    segment: config.Segment
-    laser: config.Laser
-    mbes: config.Mbes | None  # none: the laser is calibrated
+    target: Target
+    segment: Segment
+    laser: Laser
+    mbes: Mbes | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     return Piece({"laser_labelled": columns}, counts)
 
 
-def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: config.Mbes) -> Piece:
+def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: Mbes) -> Piece:
     model, segment, mount = prepared.model, config.segment, prepared.mount
     R_body_from_mbes, lever = mount.on(mount_of(mbes.mount))
     sensor = xyz(batch, "mbes_m")

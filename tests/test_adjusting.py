@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 from scipy.stats import chi2
 
-from pipeline import config
 from pipeline.adjusting import Adjusted, Given, adjust, free_unknowns, noise_of
+from pipeline.config import Adjust, AsBuilt, Drift, Ins, Laser, Mbes, Mount, MountSigma, White
 from pipeline.considered import considered_of, correlated
 from pipeline.maths.adjustment import Body
 from pipeline.maths.solution import freed, solve
@@ -31,15 +31,15 @@ FACES = (  # family, normal, a point on it, height above the family's plane
     ("H", (0.0, 0.0, 1.0), (0.5, -1.8, 1.0), 1.0),
 )
 MOUNT = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0}
-LASER = config.Laser(files=["x"], format="las", mount=config.Mount(**MOUNT), angle_sigma_deg=0.003)
-MBES = config.Mbes(files=["x"], format="r2sonic", mount=config.Mount(**MOUNT))
-QUIET = config.Ins(
+LASER = Laser(files=["x"], format="las", mount=Mount(**MOUNT), angle_sigma_deg=0.003)
+MBES = Mbes(files=["x"], format="r2sonic", mount=Mount(**MOUNT))
+QUIET = Ins(
     files=["x"],
     format="table",
-    drift=config.Drift(horizontal_m=0, vertical_m=0, roll_pitch_deg=0, heading_deg=0),
-    white=config.White(position_m=0, attitude_deg=0),
+    drift=Drift(horizontal_m=0, vertical_m=0, roll_pitch_deg=0, heading_deg=0),
+    white=White(position_m=0, attitude_deg=0),
 )
-NOISY = config.Ins(files=["x"], format="table")
+NOISY = Ins(files=["x"], format="table")
 RATE, SECONDS, GAP = 50, 8.0, 60.0
 NS = 1_000_000_000
 
@@ -53,7 +53,7 @@ def motion(t: np.ndarray) -> tuple[np.ndarray, Rotation]:
     return p, Rotation.from_euler("ZXY", angles)
 
 
-def drift_of(rng: np.random.Generator, t: np.ndarray, drift: config.Drift) -> np.ndarray:
+def drift_of(rng: np.random.Generator, t: np.ndarray, drift: Drift) -> np.ndarray:
     """Gauss-Markov, step by step; (n, 6)."""
     angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
     sigma = np.r_[drift.horizontal_m, drift.horizontal_m, drift.vertical_m, angles]
@@ -65,7 +65,7 @@ def drift_of(rng: np.random.Generator, t: np.ndarray, drift: config.Drift) -> np
 
 
 def made(
-    seed: int, ins: config.Ins = QUIET, sensors: float = 1.0, latency_s: float = 0.0, faster: float = 0.0
+    seed: int, ins: Ins = QUIET, sensors: float = 1.0, latency_s: float = 0.0, faster: float = 0.0
 ) -> tuple[dict[str, Stream], Scene]:
     """Points of both sensors; the sonar's clock late by ``latency_s``, the sound faster than recorded by a share."""
     rng = np.random.default_rng(seed)
@@ -144,9 +144,9 @@ def error_of(found: Adjusted) -> np.ndarray:
     return np.concatenate([rotation, LEVER_TRUE - found.state.lever_arm_m])
 
 
-def solved(seed: int, ins: config.Ins = QUIET, settings: Any = None, **options: Any) -> Adjusted:
+def solved(seed: int, ins: Ins = QUIET, settings: Any = None, **options: Any) -> Adjusted:
     streams, scene = made(seed, ins, **options)
-    return adjust(streams, scene, Given(noise_of(ins)), settings or config.Adjust(), 5.0)
+    return adjust(streams, scene, Given(noise_of(ins)), settings or Adjust(), 5.0)
 
 
 def test_without_noise_the_truth_comes_back() -> None:
@@ -158,7 +158,7 @@ def test_without_noise_the_truth_comes_back() -> None:
 
 
 @pytest.mark.parametrize("ins", [QUIET, NOISY], ids=["sensors alone", "INS white noise and drift"])
-def test_errors_are_as_large_as_the_covariance_says(ins: config.Ins) -> None:
+def test_errors_are_as_large_as_the_covariance_says(ins: Ins) -> None:
     """Mean normalised squared error of the six over repeats within its 99.9 % band, and each factor near one."""
     repeats = often(16, 40)
     squared, factors, left = [], [], []
@@ -179,7 +179,7 @@ def test_errors_are_as_large_as_the_covariance_says(ins: config.Ins) -> None:
 def test_drift_taken_for_granted_would_be_seen() -> None:
     """The same data with an INS said to be perfect: errors of many sigmas, and a sum of squares that is too large."""
     streams, scene = made(7, NOISY)
-    trusting = adjust(streams, scene, Given(noise_of(QUIET)), config.Adjust(), 5.0)
+    trusting = adjust(streams, scene, Given(noise_of(QUIET)), Adjust(), 5.0)
     e = error_of(trusting)
     assert e @ np.linalg.solve(trusting.solution.covariance[:6, :6], e) > 100
     assert trusting.equations.squares / trusting.redundancy > 1.2
@@ -195,7 +195,7 @@ def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str
     equations, names = held.equations, held.state.names
     tests = {names[one.unknown]: one for one in freed(equations.normal, equations.right, held.solution)}
     assert abs(tests[name].value) > 10 * tests[name].sigma
-    found = solved(3, NOISY, config.Adjust(free=(name,)), **options)
+    found = solved(3, NOISY, Adjust(free=(name,)), **options)
     values = dict(zip(found.state.names, found.state.values_of_other(), strict=True))
     place = found.solution.free.tolist().index(found.state.names.index(name))
     assert abs(values[name] - value) < 4 * np.sqrt(found.solution.covariance[place, place])
@@ -234,8 +234,8 @@ def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None
     root = np.tril(np.random.default_rng(1).normal(size=(6, 6))) * np.repeat([1e-4, 2e-3], 3)[:, None]
     Q = root @ root.T
     block = tuple(map(tuple, Q.tolist()))
-    laser = LASER.model_copy(update={"mount_covariance": block, "mount_sigma": config.MountSigma(angle_deg=40.0)})
-    sigmas = considered_of(names, laser, MBES, config.AsBuilt())
+    laser = LASER.model_copy(update={"mount_covariance": block, "mount_sigma": MountSigma(angle_deg=40.0)})
+    sigmas = considered_of(names, laser, MBES, AsBuilt())
     six = [names.index(f"laser_{kind}_{axis}") for kind in ("rotation", "lever_arm") for axis in "xyz"]
     np.testing.assert_allclose(sigmas[six], np.sqrt(np.diag(Q)), rtol=1e-12)
     others = sigmas.copy()
@@ -248,10 +248,10 @@ def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None
 
 def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:
     """Where the INS's own attitude tells nothing, both sensors turn as one body: rotation and lever arm."""
-    loose = config.Ins(
+    loose = Ins(
         files=["x"],
         format="table",
-        drift=config.Drift(horizontal_m=0.5, vertical_m=0.5, roll_pitch_deg=3.0, heading_deg=3.0),
+        drift=Drift(horizontal_m=0.5, vertical_m=0.5, roll_pitch_deg=3.0, heading_deg=3.0),
     )
     found = solved(6, loose)
     names, held = found.state.names, found.solution.held.tolist()
@@ -271,7 +271,7 @@ def test_the_wall_alone_leaves_directions_open() -> None:
         Stream((MemoryPart(part.name, {k: v[part.columns["face"] == 1] for k, v in part.columns.items()}),))
         for part in (laser, mbes)
     ]
-    found = adjust(dict(zip(streams, walls, strict=True)), scene, Given(noise_of(QUIET)), config.Adjust(), 5.0)
+    found = adjust(dict(zip(streams, walls, strict=True)), scene, Given(noise_of(QUIET)), Adjust(), 5.0)
     assert found.solution.deficiency > 0
     assert not found.converged
     assert np.all(np.isfinite(found.solution.step))

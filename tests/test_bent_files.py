@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import config
+from pipeline.config import Ins, Laser, Mount, SessionConfig
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.files import read_json, read_regular
 from pipeline.meshes import with_mesh
@@ -39,7 +39,7 @@ def test_a_value_that_cannot_be_read_is_one_line(value: str, tmp_path: Path) -> 
     path = tmp_path / "session.yaml"
     path.write_text(ELSE + f"name: {value}\n", encoding="utf-8")
     with pytest.raises(ConfigError) as told:
-        parse(config.SessionConfig, read_yaml(path), str(path))
+        parse(SessionConfig, read_yaml(path), str(path))
     assert str(path) in str(told.value)
     assert len(str(told.value)) < 2000
 
@@ -97,13 +97,13 @@ def test_a_pattern_may_search_folders_twice_and_no_more(tmp_path: Path) -> None:
     deep = tmp_path.joinpath(*["d"] * 24)
     deep.mkdir(parents=True)
     (deep / "a.gps").write_bytes(b"1")
-    settings = config.Ins.model_validate({"files": ["**/**/*.gps"], "format": "table"})
+    settings = Ins.model_validate({"files": ["**/**/*.gps"], "format": "table"})
     begin = time.monotonic()
     assert raw_files(settings, tmp_path) == [deep / "a.gps"]
     assert time.monotonic() - begin < 5
     for pattern in ("**/**/**/*.gps", "a" * 301):
         with pytest.raises(ValueError, match=r"\*\* twice at most"):
-            config.Ins.model_validate({"files": [pattern], "format": "table"})
+            Ins.model_validate({"files": [pattern], "format": "table"})
 
 
 @pytest.mark.parametrize("pattern", ["ins/*.gps", "*/*.gps", "**/*.gps", "ins/a.gps"])
@@ -114,7 +114,7 @@ def test_a_folder_that_may_not_be_read_is_said(
     for folder in ("ins", "more"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "a.gps").write_bytes(b"1")
-    settings = config.Ins.model_validate({"files": [pattern], "format": "table"})
+    settings = Ins.model_validate({"files": [pattern], "format": "table"})
     assert raw_files(settings, tmp_path)
     scandir = os.scandir
 
@@ -130,8 +130,8 @@ def test_a_folder_that_may_not_be_read_is_said(
 
 def test_a_refused_cell_does_not_fill_the_screen(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t_ns,x_m,y_m,z_m\n1,2,3,4\n1,2,3," + "n" * 5000 + "\n" + "1,2\n")
-    settings = config.Laser.model_validate(
-        {"files": ["a.csv"], "format": "table", "mount": dict.fromkeys(config.Mount.model_fields, 0.0)}
+    settings = Laser.model_validate(
+        {"files": ["a.csv"], "format": "table", "mount": dict.fromkeys(Mount.model_fields, 0.0)}
     )
     with pytest.raises(RawDataError) as told:
         [chunk for part in raw_parts("laser", settings, tmp_path) for chunk in part.chunks()]

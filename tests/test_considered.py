@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from pipeline import config
+from pipeline.config import AsBuilt, Laser, Mbes, Mount
 from pipeline.considered import considered_of, gradient_sigma
 
-MOUNT = config.Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
+MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
 
 
-def sonar(svp: list[list[float]] | None = None, **more: float) -> config.Mbes:
+def sonar(svp: list[list[float]] | None = None, **more: float) -> Mbes:
     cast = None if svp is None else tuple((depth, speed) for depth, speed in svp)
-    return config.Mbes(files=["a"], format="table", mount=MOUNT, svp=cast, **more)  # type: ignore[arg-type]
+    return Mbes(files=["a"], format="table", mount=MOUNT, svp=cast, **more)  # type: ignore[arg-type]
 
 
 def test_it_is_the_scatter_of_the_slope_between_the_ends() -> None:
@@ -37,8 +37,8 @@ def test_where_there_is_no_cast_the_gradient_is_as_unknown_as_without() -> None:
 
 
 def test_it_is_never_nothing_unless_it_is_said_to_be() -> None:
-    laser = config.Laser(files=["a"], format="las", mount=MOUNT)
+    laser = Laser(files=["a"], format="las", mount=MOUNT)
     cast = [[0.0, 1480.0], [4.0, 1480.0]]
     names = ["sound_speed_gradient"]
-    assert considered_of(names, laser, sonar(cast), config.AsBuilt(), 4.0)[0] > 0
-    assert considered_of(names, laser, sonar(cast, svp_sigma_m_s=0.0), config.AsBuilt(), 4.0)[0] == 0.0
+    assert considered_of(names, laser, sonar(cast), AsBuilt(), 4.0)[0] > 0
+    assert considered_of(names, laser, sonar(cast, svp_sigma_m_s=0.0), AsBuilt(), 4.0)[0] == 0.0

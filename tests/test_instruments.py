@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import yaml
 
-from pipeline import config, instruments, planned
+from pipeline import instruments, planned
 from pipeline.blocks import instruments_block
-from pipeline.config import SessionConfig, load_session
+from pipeline.config import Drift, PoolConfig, SessionConfig, White, load_session
 from pipeline.errors import ConfigError
 from pipeline.folder import Settings, read_settings, write_settings
 from pipeline.instruments import PRESETS, applied, load_instrument
@@ -109,8 +109,8 @@ def test_the_sessions_own_key_wins_key_by_key(tmp_path: Path) -> None:
     drift = {"horizontal_m": 0.04, "vertical_m": 0.05, "heading_deg": 0.06}
     preset = {"title": "I", "sensor": "ins", "settings": {"drift": drift}}
     found = session(tmp_path, {"mine": preset}, ins={"instrument": "mine", "drift": {"vertical_m": 0.5}}).ins
-    assert found.drift == config.Drift(horizontal_m=0.04, vertical_m=0.5, heading_deg=0.06)
-    assert found.white == config.White()
+    assert found.drift == Drift(horizontal_m=0.04, vertical_m=0.5, heading_deg=0.06)
+    assert found.white == White()
     assert found.instrument is not None
     assert found.instrument.origins == {
         "drift.horizontal_m": "preset",
@@ -153,7 +153,7 @@ def test_the_projectors_place_is_documented_and_not_applied(tmp_path: Path) -> N
 def test_run_yaml_is_read_again_without_the_preset(tmp_path: Path) -> None:
     preset = SONAR | {"unverified": ["range_sigma_m"], "rates": {"beams": 512, "ping_rate_hz": 12.5}}
     found = session(tmp_path, {"mine": preset}, mbes={"instrument": "mine"}, laser={"instrument": "riegl_vz1000"})
-    pool = parse(config.PoolConfig, {"target": read_yaml(PRESETS.parent / "defaults.yaml")["target"]}, "")
+    pool = parse(PoolConfig, {"target": read_yaml(PRESETS.parent / "defaults.yaml")["target"]}, "")
     (tmp_path / "run").mkdir()
     write_settings(tmp_path / "run", Settings(tmp_path, pool, found))
     (tmp_path / "instruments" / "mine.yaml").unlink()

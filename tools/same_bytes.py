@@ -154,7 +154,7 @@ def calibrate(tree: Tree, kind: Kind, folder: Path, pages: bool) -> None:
 
 def differences(kind: str, one: Path, other: Path, pages: bool) -> Iterator[str]:
     """A line for each file that differs between two folders in which the same commands ran."""
-    files = {folder: {path.relative_to(folder) for path in folder.rglob("*") if path.is_file()} for folder in (one, other)}
+    files = {at: {path.relative_to(at) for path in at.rglob("*") if path.is_file()} for at in (one, other)}
     for path in sorted(files[one] | files[other]):
         if path.name in PASSED_OVER or (path.suffix in (".html", ".svg", ".png", ".rrd") and not pages):
             continue
@@ -191,7 +191,8 @@ def _what_differs(one: Path, other: Path) -> str:
         return f"columns {', '.join(names)}" if names else "only what is said of its columns"
     lines = [path.read_text(encoding="utf-8", errors="replace").splitlines() for path in (one, other)]
     pairs = [pair for pair in zip(*lines, strict=False) if pair[0] != pair[1]]
-    return f"{len(lines[0])} and {len(lines[1])} lines" + (f", first {pairs[0][0]!r} and {pairs[0][1]!r}" if pairs else "")
+    first = f", first {pairs[0][0]!r} and {pairs[0][1]!r}" if pairs else ""
+    return f"{len(lines[0])} and {len(lines[1])} lines{first}"
 
 
 def _flat(content: Any, name: str = "") -> dict[str, Any]:

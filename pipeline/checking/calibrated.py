@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import config
+from pipeline.config import PoolConfig, SessionConfig
 from pipeline.streams import EMPTY, Stream
 
 Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by sensor
@@ -24,4 +24,4 @@ class Calibrated:
     freed: pd.DataFrame | None = None
 
 
-Calibrate = Callable[[config.SessionConfig, config.PoolConfig, Raw], Calibrated]
+Calibrate = Callable[[SessionConfig, PoolConfig, Raw], Calibrated]

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline import config
 from pipeline.checking import clocks, files, hits, passes
 from pipeline.checking.calibrated import Calibrate, Calibrated
 from pipeline.checking.expected import Soundings, missed, soundings
@@ -18,6 +17,7 @@ from pipeline.checking.survey import SENSORS, Seen, Times, survey
 from pipeline.checking.track import Leg, Track, frame_of, joined, track_of
 from pipeline.checking.tried import other_pose, signs
 from pipeline.clouds import ClosestSurface
+from pipeline.config import Ingest, PoolConfig, SessionConfig
 from pipeline.maths.targets import TargetModel
 from pipeline.mounts import target_of
 from pipeline.times import NS
@@ -44,14 +44,14 @@ class Examined:
 @dataclass(frozen=True)
 class _Given:
     seen: Sequence[Seen]
-    session: config.SessionConfig
-    pool: config.PoolConfig
+    session: SessionConfig
+    pool: PoolConfig
     model: TargetModel
     calibrate: Calibrate
 
 
 def examine(
-    folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None, calibrate: Calibrate
+    folder: Path, session: SessionConfig, pool: PoolConfig | None, calibrate: Calibrate
 ) -> Examined:
     """``pool``: where the target is; without it nothing is asked about the target. ``calibrate``: does so in memory."""
     found = _examined(folder, session, pool, calibrate)
@@ -60,14 +60,14 @@ def examine(
 
 
 def _examined(
-    folder: Path, session: config.SessionConfig, pool: config.PoolConfig | None, calibrate: Calibrate
+    folder: Path, session: SessionConfig, pool: PoolConfig | None, calibrate: Calibrate
 ) -> Examined:
     seen, wrong = survey(session, folder)
     findings = list(_of_files(seen, wrong, session))
     epochs = _epochs(seen)
     if "ins" not in epochs:
         return Examined(tuple(seen), (), tuple(findings))
-    max_gap_s = (config.Ingest() if pool is None else pool.ingest).max_gap_s
+    max_gap_s = (Ingest() if pool is None else pool.ingest).max_gap_s
     coarse = max(s.coarseness_ns for s in seen if s.sensor == "ins")
     weeks = {"ins": session.ins.gps_week, "laser": session.laser.gps_week}
     findings += clocks.apart(epochs, max(round(max_gap_s * NS), round(coarse)), seen, weeks)
@@ -81,7 +81,7 @@ def _examined(
     return replace(of_target, findings=(*findings, *of_target.findings))
 
 
-def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: config.SessionConfig) -> Iterator[Finding]:
+def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: SessionConfig) -> Iterator[Finding]:
     yield from files.unreadable(seen, wrong)
     yield from files.missing_sensors(seen, session)
     yield from files.twice(seen)

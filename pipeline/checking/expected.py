@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.finding import Finding
 from pipeline.checking.placed import Sample, put, rows_of
 from pipeline.checking.survey import Columns, Seen, Times
 from pipeline.checking.track import Track
 from pipeline.clouds import ClosestSurface
+from pipeline.config import PoolConfig, SessionConfig
 from pipeline.maths.observations import SPEED_M_S
 from pipeline.maths.soundings import points_in_mbes
 from pipeline.maths.targets import TargetModel
@@ -49,8 +49,8 @@ def soundings(
     sampled: int,
     files: Sequence[Seen],
     model: TargetModel,
-    pool: config.PoolConfig,
-    session: config.SessionConfig,
+    pool: PoolConfig,
+    session: SessionConfig,
 ) -> Soundings | None:
     """``on_faces``: of a calibrated sample of ``sampled`` rows; without it a sounding belongs to the face that it is
     nearest to with the coarse mount. None without a pass in which the sonar ran below the water.
@@ -79,7 +79,7 @@ def soundings(
 
 
 def _met(
-    track: Track, t_ns: Times, rows: Columns, model: TargetModel, pool: config.PoolConfig, session: config.SessionConfig
+    track: Track, t_ns: Times, rows: Columns, model: TargetModel, pool: PoolConfig, session: SessionConfig
 ) -> Array:
     """How many beams of these pings meet each face so that they would be used."""
     fan = _fan(rows)

@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.clocks import named
 from pipeline.checking.files import FAR_ARM_M
 from pipeline.checking.finding import Finding
@@ -16,6 +15,7 @@ from pipeline.checking.passes import heading
 from pipeline.checking.placed import NAMES, Sample, put
 from pipeline.checking.track import Track
 from pipeline.clouds import ClosestSurface
+from pipeline.config import PoolConfig
 
 Array = NDArray[np.float64]
 REACH_M = 0.5  # from a face, beyond which a point counts nothing: coarse mount and origin may be wrong by that
@@ -78,7 +78,7 @@ def hypotheses(track: Track, some: Sample, closest: ClosestSurface) -> list[Hit]
 
 
 def off_target(
-    track: Track, samples: Sequence[Sample], closest: ClosestSurface, pool: config.PoolConfig
+    track: Track, samples: Sequence[Sample], closest: ClosestSurface, pool: PoolConfig
 ) -> Iterator[Finding]:
     """What is wrong with each sensor, if anything is; a clock that both are off by is the INS's. A height that both are
     off by is the target's, whatever a mount might explain of it."""

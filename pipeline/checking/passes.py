@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.finding import Finding
 from pipeline.checking.survey import Columns, Seen
 from pipeline.checking.track import Track, askew_deg
+from pipeline.config import Origin, PoolConfig, TargetPlace
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.targets import TargetModel
 from pipeline.screen import plural
@@ -24,7 +24,7 @@ ASKEW_DEG = 15.0  # between the boat's heading and the target's +y: no coarse az
 HOLE_S = 0.3  # without the INS while a sensor saw the target
 
 
-def place(ins: Columns, pool: config.PoolConfig, model: TargetModel) -> Iterator[Finding]:
+def place(ins: Columns, pool: PoolConfig, model: TargetModel) -> Iterator[Finding]:
     """The track against target.origin; a finding here leaves nothing to ask about the target."""
     origin = pool.target.origin
     away = _away_m(ins, origin.latitude_deg, origin.longitude_deg)
@@ -56,7 +56,7 @@ def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
     return float(np.linalg.norm(frame.points_from_ecef(level), axis=1).min())
 
 
-def _why_astray(ins: Columns, origin: config.Origin) -> str:
+def _why_astray(ins: Columns, origin: Origin) -> str:
     latitude, longitude = origin.latitude_deg, origin.longitude_deg
     for words, place in (
         ("latitude and longitude are interchanged", (longitude, latitude)),
@@ -69,7 +69,7 @@ def _why_astray(ins: Columns, origin: config.Origin) -> str:
     return "check target.origin, and that these are this pool's files"
 
 
-def sailing(track: Track, place: config.TargetPlace) -> Iterator[Finding]:
+def sailing(track: Track, place: TargetPlace) -> Iterator[Finding]:
     """Passes on the wrong side, none at all, all at one distance."""
     sounded = [leg for leg in track.legs if max(leg.ran.values()) > NOT]
     legs = f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')}"
@@ -99,7 +99,7 @@ def sailing(track: Track, place: config.TargetPlace) -> Iterator[Finding]:
         )
 
 
-def heading(track: Track, place: config.TargetPlace) -> str:
+def heading(track: Track, place: TargetPlace) -> str:
     """What to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
     turn = askew_deg(track)
     if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.survey import Columns, Seen, Times
 from pipeline.checking.track import Track
+from pipeline.config import Mount, SessionConfig
 from pipeline.maths.soundings import points_in_mbes
 from pipeline.mounts import mount_of
 from pipeline.sampling import every_nth
@@ -26,7 +26,7 @@ class Sample:
     sensor: str
     t_ns: Times
     points_m: Array
-    mount: config.Mount
+    mount: Mount
     georeferenced: bool = False
 
     def placeable(self, track: Track) -> "Sample":
@@ -61,7 +61,7 @@ def placeable(columns: Columns, track: Track) -> Columns:
 
 
 def sample(
-    files: Sequence[Seen], session: config.SessionConfig, sensor: str, track: Track, rows: int
+    files: Sequence[Seen], session: SessionConfig, sensor: str, track: Track, rows: int
 ) -> Sample | None:
     """About so many points of a sensor; None where it has none."""
     columns = rows_of(files, sensor, rows)
@@ -87,7 +87,7 @@ def sample(
 
 
 def put(
-    track: Track, some: Sample, mount: config.Mount | None = None, ahead_s: float = 0.0, scale: float = 1.0
+    track: Track, some: Sample, mount: Mount | None = None, ahead_s: float = 0.0, scale: float = 1.0
 ) -> Array:
     """Points (n, 3) m in the pool frame; NaN where the INS has no pose. ``ahead_s``: of the sensor's clock.
 

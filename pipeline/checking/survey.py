@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.excerpts import excerpt, stretches
+from pipeline.config import Ins, SessionConfig
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.files import temporary_folder
 from pipeline.ins_sigmas import thinned
@@ -70,7 +70,7 @@ class Seen:
         return 3 * float(self.epochs_ns[-1] - self.epochs_ns[0]) / (self.places - 1)
 
 
-def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], list[str]]:
+def survey(session: SessionConfig, folder: Path) -> tuple[list[Seen], list[str]]:
     """All files, those that cannot be read with their refusal; and what is wrong with the lists themselves."""
     found: list[Seen] = []
     wrong: list[str] = []
@@ -89,7 +89,7 @@ def survey(session: config.SessionConfig, folder: Path) -> tuple[list[Seen], lis
 
 
 def _with_accuracy(
-    found: Sequence[Seen], wrong: Sequence[str], ins: config.Ins, folder: Path
+    found: Sequence[Seen], wrong: Sequence[str], ins: Ins, folder: Path
 ) -> tuple[list[Seen], list[str]]:
     """The first good file of the INS has what its accuracy files say; those that cannot be read, with their refusal."""
     good = next((k for k, seen in enumerate(found) if seen.sensor == "ins" and not seen.complaint), None)
@@ -119,7 +119,7 @@ def _listed(settings: Settings, folder: Path) -> tuple[list[str], list[str]]:
 
 
 def _without_accuracy(settings: Settings) -> dict[str, Any]:
-    return {"accuracy": []} if isinstance(settings, config.Ins) else {}
+    return {"accuracy": []} if isinstance(settings, Ins) else {}
 
 
 def _parts(

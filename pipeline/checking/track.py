@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.survey import Columns, Seen
+from pipeline.config import Ingest, TargetPlace
 from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.targets import TargetModel
 from pipeline.maths.trajectory import Trajectory, poses_in_pool
@@ -60,7 +60,7 @@ def joined(files: Sequence[Seen]) -> Columns:
     return {name: values[rows] for name, values in columns.items()}
 
 
-def frame_of(ins: Columns, place: config.TargetPlace) -> PoolFrame | None:
+def frame_of(ins: Columns, place: TargetPlace) -> PoolFrame | None:
     """The pool frame; None where its azimuth is to follow from the track, and does not."""
     at = (np.radians(place.origin.latitude_deg), np.radians(place.origin.longitude_deg), place.origin.height_m)
     if place.azimuth_deg is not None:
@@ -71,7 +71,7 @@ def frame_of(ins: Columns, place: config.TargetPlace) -> PoolFrame | None:
 
 
 def track_of(
-    ins: Columns, frame: PoolFrame, model: TargetModel, files: Sequence[Seen], settings: config.Ingest
+    ins: Columns, frame: PoolFrame, model: TargetModel, files: Sequence[Seen], settings: Ingest
 ) -> Track:
     positions, R = poses_in_pool(frame, *(ins[name] for name in NAMES))
     t_ns = ins["t_ns"]

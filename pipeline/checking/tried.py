@@ -7,12 +7,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import config
 from pipeline.checking.finding import Finding
 from pipeline.checking.heights import profile, way
 from pipeline.checking.placed import Sample, put
 from pipeline.checking.track import Track
 from pipeline.clouds import ClosestSurface
+from pipeline.config import Letters, Mount, PoolConfig, Target
 from pipeline.maths.rotations import log_so3
 from pipeline.maths.targets import TargetModel
 from pipeline.mounts import mount_of, turned
@@ -30,7 +30,7 @@ HALF = 0.5  # of its error, which a reversed sign must leave at most
 
 
 def other_pose(
-    track: Track, laser: Sample, pose: pd.DataFrame, model: TargetModel, pool: config.PoolConfig
+    track: Track, laser: Sample, pose: pd.DataFrame, model: TargetModel, pool: PoolConfig
 ) -> Iterator[Finding]:
     """Whether the laser's points lie better on the target elsewhere than where they were found to: at another height,
     or with its sides exchanged; and what of that cannot be told."""
@@ -95,15 +95,15 @@ def _said(exchanged: bool, shift_m: float) -> str:
     return f"with left and right exchanged, {height}" if exchanged else height
 
 
-def _sides(target: config.Target) -> str:
-    if isinstance(target, config.Letters):
+def _sides(target: Target) -> str:
+    if isinstance(target, Letters):
         other = {"south": "north", "north": "south"}[target.low_side]
         return f"write target.low_side: {other}"
     return "reverse the sign of the y of all corners, and the order of each face's corners"
 
 
 def signs(
-    given: config.Mount, provisional: pd.DataFrame, model: TargetModel, within_deg: float
+    given: Mount, provisional: pd.DataFrame, model: TargetModel, within_deg: float
 ) -> Iterator[Finding]:
     """Angles whose reversed sign is nearer to the mount that the sample asks for; ``within_deg``: how far off a coarse
     mount may be, so that the calibration finds the rest. Nothing of a target whose faces do not look into three
@@ -117,7 +117,7 @@ def signs(
         return
     wanted = turned(given, turn_deg)
 
-    def off_deg(mount: config.Mount) -> float:
+    def off_deg(mount: Mount) -> float:
         R = mount_of(mount).R_body_from_sensor
         return float(np.degrees(np.linalg.norm(log_so3(wanted.R_body_from_sensor @ R.T))))
 

@@ -6,18 +6,18 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from pipeline import config
+from pipeline.config import Ins, Laser, Mbes, SessionConfig
 from pipeline.instruments import SENSORS, figures
 
 Row = Mapping[str, Any]
 
 
-def figures_used(session: config.SessionConfig) -> list[Row]:
+def figures_used(session: SessionConfig) -> list[Row]:
     """A row a figure; sensor and instrument in the first row of each. Where no preset is named, a value that is the
     default counts as such."""
     rows: list[Row] = []
     for sensor, model in SENSORS.items():
-        block: config.Ins | config.Laser | config.Mbes | None = getattr(session, sensor)
+        block: Ins | Laser | Mbes | None = getattr(session, sensor)
         if block is None:
             continue
         used = block.instrument

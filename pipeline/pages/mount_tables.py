@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.built import reference, titled
+from pipeline.config import SessionConfig, Verdict
 from pipeline.families import families_of
 from pipeline.folder import calibration
 from pipeline.maths.solution import TOGETHER
@@ -78,7 +79,7 @@ class Value:
         return f"{round(number, digits) + 0.0:{sign}.{digits}f} {unit}"
 
 
-def six(table: pd.DataFrame, method: str, limits: config.Verdict, held: Collection[str]) -> list[dict[str, Any]]:
+def six(table: pd.DataFrame, method: str, limits: Verdict, held: Collection[str]) -> list[dict[str, Any]]:
     rows = table[table["method"] == method].to_dict("records")
     bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
     values = ("coarse", "total", "change", "correction", "sigma_random", "sigma_total", "low_95", "high_95")
@@ -124,7 +125,7 @@ def closing(tables: Tables) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: str(row["plane"]))
 
 
-def shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: config.SessionConfig) -> Iterator[Row]:
+def shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) -> Iterator[Row]:
     """What each source of errors does to the six (root of its sum of squares), noise first: together the total sigma,
     of the rotations about the body's axes. A laser's mount whose six correlate is one source: what the total has left
     over.

@@ -13,8 +13,9 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from pipeline import artefacts, config, manifest
+from pipeline import artefacts, manifest
 from pipeline.built import by_design
+from pipeline.config import Letters
 from pipeline.drawn import PAGE, agreeing, drawn_from
 from pipeline.files import write_text
 from pipeline.folder import Settings, calibration, read_settings
@@ -77,7 +78,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         speeds=_speeds(files),
         methods=METHODS,
         laser=laser,
-        letters=isinstance(settings.pool.target, config.Letters),
+        letters=isinstance(settings.pool.target, Letters),
         ways=[method for method in METHODS if method in result["methods"] and result["methods"][method]["mount"]],
         by_method=[] if laser else list(mount_tables.by_method(calibrations)),
         closing=closing,

@@ -8,8 +8,9 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.adjusting import Given, adjust, free_unknowns, noise_of
+from pipeline.config import Adjust, AsBuilt, Ingest, Ins, Laser, LaserFit, Segment, Target, Verdict
 from pipeline.considered import considered_of
 from pipeline.ins_sigmas import drift_of
 from pipeline.laser_fit import bounds_of, coarse_covariance, design_of, held_of
@@ -28,15 +29,15 @@ __all__ = ["Config", "Inputs", "Outputs", "run"]
 
 @dataclass(frozen=True)
 class Config:
-    target: config.Target
-    segment: config.Segment
-    adjust: config.Adjust
-    laser_fit: config.LaserFit
-    verdict: config.Verdict
-    ingest: config.Ingest
-    as_built: config.AsBuilt
-    ins: config.Ins
-    laser: config.Laser
+    target: Target
+    segment: Segment
+    adjust: Adjust
+    laser_fit: LaserFit
+    verdict: Verdict
+    ingest: Ingest
+    as_built: AsBuilt
+    ins: Ins
+    laser: Laser
 
 
 @dataclass(frozen=True)

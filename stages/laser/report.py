@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.blocks import (
     SCHEMA,
     adjustment_block,
@@ -21,6 +21,7 @@ from pipeline.blocks import (
     target_block,
 )
 from pipeline.built import as_found, by_design, oddities
+from pipeline.config import Adjust, Ins, Laser, Segment, Target, Verdict
 from pipeline.finding import FARTHEST
 from pipeline.ins_sigmas import drift_of, told
 from pipeline.judging.residual_tests import pattern_tests
@@ -32,12 +33,12 @@ from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons,
 @dataclass(frozen=True)
 class Config:
     name: str
-    target: config.Target
-    ins: config.Ins
-    laser: config.Laser
-    segment: config.Segment
-    adjust: config.Adjust
-    verdict: config.Verdict
+    target: Target
+    ins: Ins
+    laser: Laser
+    segment: Segment
+    adjust: Adjust
+    verdict: Verdict
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,14 @@ import pipeline.readers
 import pipeline.screen
 import stages
 import stages.drawing
-from pipeline import artefacts, config
+from pipeline import artefacts
+from pipeline.config import Verdict
 from tests.runner import toys
 
 
 @dataclass(frozen=True)
 class Config:
-    verdict: config.Verdict
+    verdict: Verdict
     name: str
 
 

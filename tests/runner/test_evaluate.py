@@ -6,14 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline import config
+from pipeline.config import Segment
 from pipeline.evaluate import declared, run_in_memory
 from pipeline.store import read_table
 from pipeline.streams import EMPTY, Chunk, MemoryPart, Piece, Stream
 from tests.runner import toys
 from tests.runner.conftest import Pool
 
-SETTINGS = toys.SiftConfig(config.Segment())
+SETTINGS = toys.SiftConfig(Segment())
 
 
 def _points(*sizes: int) -> Stream:

@@ -9,9 +9,10 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts, config
+from pipeline import artefacts
 from pipeline.artefacts import Artefact, Column, Document
 from pipeline.artefacts.shared import F64, I16, I64, TEXT
+from pipeline.config import Ingest, Laser, Segment, Verdict
 from pipeline.errors import RawDataError
 from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
 
@@ -59,8 +60,8 @@ def raw_parts(sensor: str, settings: Any, folder: Path) -> tuple[RawPart, ...]:
 # --- take: raw files -> a stream -------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class TakeConfig:
-    laser: config.Laser
-    ingest: config.Ingest
+    laser: Laser
+    ingest: Ingest
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def _take_combine(prepared: None, partials: dict[str, list[tuple[str, int]]], co
 # --- sift: a stream -> a stream and a table --------------------------------------------------------------------------
 @dataclass(frozen=True)
 class SiftConfig:
-    segment: config.Segment
+    segment: Segment
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ def _sift_combine(
 # --- tell: a table -> a document -------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class TellConfig:
-    verdict: config.Verdict
+    verdict: Verdict
     name: str
 
 
