@@ -2,7 +2,7 @@
 
 BLAS is pinned to one thread before numpy is first imported: ``eigh``, ``solve`` and ``matmul`` differ in their last
 bits between thread counts, and the same input must give the same Parquet bytes on any machine. The work is spread
-over parts of a stream instead (:mod:`pipeline.executor`).
+over parts of a stream instead (:mod:`pipeline.run.workers`).
 """
 
 import os

@@ -8,24 +8,42 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.adjusting import Adjusted, Given, adjust, noise_of
-from pipeline.config import Adjust, AsBuilt, Ingest, Ins, Laser, Mbes, Segment, Target
-from pipeline.considered import considered_of, correlated
-from pipeline.ins_sigmas import drift_of
-from pipeline.looking import Cells, drift_rows, look
-from pipeline.maths.rigid_design import Known
-from pipeline.maths.targets import TargetModel
-from pipeline.maths.ties import of_ties
-from pipeline.maths.unknowns import State
-from pipeline.mounts import mount_of, target_of
-from pipeline.observability import Seen, geometry_of
-from pipeline.outcome import tables
-from pipeline.plan_settings import LaserFigures, MbesFigures, Pass, Plan
-from pipeline.planning import Setting
-from pipeline.residuals import bins_table, map_table
-from pipeline.scene import scene_of
-from pipeline.streams import Stream
+from pipeline.adjustment.consider import considered_of, correlated
+from pipeline.adjustment.ins_drift import drift_of
+from pipeline.adjustment.iteration import Adjusted, Given, adjust, noise_of
+from pipeline.adjustment.observation_model import scene_of
+from pipeline.adjustment.residual_statistics import Cells, drift_rows, look
+from pipeline.adjustment.residual_tables import bins_table, map_table
+from pipeline.adjustment.result_tables import tables
+from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES, POSES
+from pipeline.artefacts.catalogue.results import (
+    ADJUST_SUMMARY,
+    CELLS,
+    COVARIANCE,
+    DRIFT,
+    ESTIMATE,
+    FREED,
+    GEOMETRY,
+    GROUPS,
+    PATTERNS,
+    RESIDUAL_BINS,
+    RESIDUAL_MAP,
+    RESIDUALS,
+    SURFACES,
+)
+from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.artefacts.streams import Stream
+from pipeline.config.plan import LaserFigures, MbesFigures, Pass, Plan
+from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
+from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.config.target import Target
+from pipeline.maths.adjustment.design_constraints import Known
+from pipeline.maths.adjustment.parallel_constraints import of_ties
+from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.target.model import TargetModel
+from pipeline.mount import mount_of, target_of
+from pipeline.planning.observability import Seen, geometry_of
+from pipeline.planning.prediction import Setting
 
 SHOWN = 100_000  # points of a sensor in the table residuals, at most
 LEAST_RAD = 1e-7  # nothing is known better
@@ -45,32 +63,32 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    files: Annotated[pd.DataFrame, artefacts.FILES]
-    passes: Annotated[pd.DataFrame, artefacts.PASSES]
-    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    poses: Annotated[pd.DataFrame, artefacts.POSES]
-    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
-    planes: Annotated[pd.DataFrame, artefacts.PLANES]
-    laser_labelled: Annotated[Stream, artefacts.LASER_LABELLED]
-    soundings_labelled: Annotated[Stream, artefacts.SOUNDINGS_LABELLED]
+    files: Annotated[pd.DataFrame, FILES]
+    passes: Annotated[pd.DataFrame, PASSES]
+    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
+    faces: Annotated[pd.DataFrame, FACES]
+    poses: Annotated[pd.DataFrame, POSES]
+    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    planes: Annotated[pd.DataFrame, PLANES]
+    laser_labelled: Annotated[Stream, LASER_LABELLED]
+    soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
-    covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
-    geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
-    surfaces: Annotated[pd.DataFrame, artefacts.SURFACES]
-    drift: Annotated[pd.DataFrame, artefacts.DRIFT]
-    freed: Annotated[pd.DataFrame, artefacts.FREED]
-    groups: Annotated[pd.DataFrame, artefacts.GROUPS]
-    cells: Annotated[pd.DataFrame, artefacts.CELLS]
-    summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
-    patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
-    residuals: Annotated[pd.DataFrame, artefacts.RESIDUALS]
-    residual_bins: Annotated[pd.DataFrame, artefacts.RESIDUAL_BINS]
-    residual_map: Annotated[pd.DataFrame, artefacts.RESIDUAL_MAP]
+    estimate: Annotated[pd.DataFrame, ESTIMATE]
+    covariance: Annotated[pd.DataFrame, COVARIANCE]
+    geometry: Annotated[pd.DataFrame, GEOMETRY]
+    surfaces: Annotated[pd.DataFrame, SURFACES]
+    drift: Annotated[pd.DataFrame, DRIFT]
+    freed: Annotated[pd.DataFrame, FREED]
+    groups: Annotated[pd.DataFrame, GROUPS]
+    cells: Annotated[pd.DataFrame, CELLS]
+    summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+    patterns: Annotated[pd.DataFrame, PATTERNS]
+    residuals: Annotated[pd.DataFrame, RESIDUALS]
+    residual_bins: Annotated[pd.DataFrame, RESIDUAL_BINS]
+    residual_map: Annotated[pd.DataFrame, RESIDUAL_MAP]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:

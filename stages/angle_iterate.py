@@ -6,12 +6,14 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.config import AngleIterate, FitPlanes, Mbes
+from pipeline.artefacts.catalogue.patent import ANGLES, ITERATIONS, PASS_ITERATIONS
+from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
+from pipeline.artefacts.from_tables import angle_passes
+from pipeline.config.pool import AngleIterate, FitPlanes
+from pipeline.config.session import Mbes
 from pipeline.errors import DegenerateGeometryError
-from pipeline.fitted import angle_passes
-from pipeline.maths.angles import AngleResult, iterate_angles
-from pipeline.mounts import mount_of
+from pipeline.maths.patent.angles import AngleResult, iterate_angles
+from pipeline.mount import mount_of
 
 
 @dataclass(frozen=True)
@@ -23,16 +25,16 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    planes: Annotated[pd.DataFrame, artefacts.PLANES]
-    sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
+    faces: Annotated[pd.DataFrame, FACES]
+    planes: Annotated[pd.DataFrame, PLANES]
+    sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    iterations: Annotated[pd.DataFrame, artefacts.ITERATIONS]
-    pass_iterations: Annotated[pd.DataFrame, artefacts.PASS_ITERATIONS]
-    angles: Annotated[pd.DataFrame, artefacts.ANGLES]
+    iterations: Annotated[pd.DataFrame, ITERATIONS]
+    pass_iterations: Annotated[pd.DataFrame, PASS_ITERATIONS]
+    angles: Annotated[pd.DataFrame, ANGLES]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
@@ -52,7 +54,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     angles = {f"rotation_{axis}_deg": vector[k] for k, axis in enumerate("xyz")}
     angles |= {"converged": result.converged, "iterations": result.iterations, "reason": reason}
     return Outputs(
-        pd.DataFrame(result.rows, columns=[column.name for column in artefacts.ITERATIONS.columns]),
-        pd.DataFrame(result.pass_rows, columns=[column.name for column in artefacts.PASS_ITERATIONS.columns]),
+        pd.DataFrame(result.rows, columns=[column.name for column in ITERATIONS.columns]),
+        pd.DataFrame(result.pass_rows, columns=[column.name for column in PASS_ITERATIONS.columns]),
         pd.DataFrame([angles]),
     )

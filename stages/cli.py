@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import pipeline
+from pipeline.console import say
 from pipeline.errors import ConfigError
-from pipeline.progress import say
-from stages import ORDER, calibrated_in, ending, load, names_in
-from stages.comparing import comparison, save_pair
-from stages.saying import answer_of, say_failures
+from stages import ORDER, calibrated_in, load, names_in
+from stages.commands import entry
+from stages.commands.answer import answer_of, say_failures
+from stages.commands.diff import comparison, save_pair
 
 if TYPE_CHECKING:
 
-    from stages.drawing import Painters
+    from stages.commands.draw import Painters
 
 app = typer.Typer(
     name="poolcal",
@@ -67,7 +68,7 @@ def simulate(
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="of all random numbers")] = 1,
 ) -> None:
     """Write a pool session with known truth as instrument files."""
-    from pipeline.files import writing
+    from pipeline.atomic_files import writing
     from pipeline.simulation.session import simulate_to_folder
 
     if seed < 0:
@@ -90,7 +91,7 @@ def run(
     overwrite: Overwrite = False,
 ) -> int:
     """Run all stages that are out of date, and say why each is."""
-    from stages.calibrating import calibrate
+    from stages.commands.run import calibrate
 
     return calibrate("mbes", session, config, run_folder, _go_on, jobs, executor, (report, recordings), overwrite)
 
@@ -111,8 +112,8 @@ def laser(
 
     Of its three angles and lever arm what this target and these passes can give; the rest is held, and said so.
     """
-    from stages.calibrating import calibrate
-    from stages.laser.session import write as write_mount
+    from stages.commands.laser_mount import write as write_mount
+    from stages.commands.run import calibrate
 
     status = calibrate("laser", session, config, run_folder, _go_on, jobs, executor, (report, recordings), overwrite)
     if write and status == 0:
@@ -135,10 +136,10 @@ def stage(
 
     The stages before it must not be.
     """
-    from pipeline import folder, runner
-    from pipeline.executor import workers
-    from pipeline.progress import Progress
-    from stages.drawing import Painters
+    from pipeline.console import Progress
+    from pipeline.run import folder, runner
+    from pipeline.run.workers import workers
+    from stages.commands.draw import Painters
 
     names = names_in(run_folder)
     if name not in names:
@@ -162,9 +163,9 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
 
     Hashes again everything that it read and wrote, and lists what is not as recorded.
     """
-    from pipeline.executor import workers
-    from pipeline.screen import plural
-    from pipeline.verify import verify as problems_of
+    from pipeline.results.screen import plural
+    from pipeline.run.verify import verify as problems_of
+    from pipeline.run.workers import workers
 
     with workers(jobs) as pool:
         problems = problems_of(load(calibrated_in(run_folder)), run_folder, pool)
@@ -184,7 +185,7 @@ def view(
 
     Nothing is served beyond this machine.
     """
-    from stages.viewing import view as open_viewer
+    from stages.commands.view import view as open_viewer
 
     return open_viewer(first, second, stage)
 
@@ -207,15 +208,15 @@ def diff(
     """
     import json
 
-    from pipeline import diff as comparing
-    from pipeline.files import write_text
-    from pipeline.folder import refuse_output
+    from pipeline.atomic_files import write_text
+    from pipeline.results import compare as comparing
+    from pipeline.run.folder import refuse_output
 
     found = comparison(first, second, tolerance_deg, tolerance_mm)
     for option, file in (("--html", html), ("--rrd", rrd)):
         refuse_output(option, file, first, second)
     if html is not None:
-        from pipeline.pages.comparison import page
+        from pipeline.results.pages.comparison import page
 
         write_text(html, page(found))
     if rrd is not None:
@@ -236,8 +237,8 @@ def history(
 
     Writes history.html, history.csv and history.parquet.
     """
-    from pipeline.history import Filter, read_history, write_history
-    from pipeline.screen import plural
+    from pipeline.results.history import Filter, read_history, write_history
+    from pipeline.results.screen import plural
 
     chosen = Filter(name, since.date() if since else None, until.date() if until else None)
     found = read_history(folder, chosen)
@@ -258,7 +259,7 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="print JSON, for programs")] = False,
 ) -> int:
     """Look into a session's files before calibrating, in seconds. Status 1 if something is wrong."""
-    from stages.check import check as check_of
+    from stages.commands.check import check as check_of
 
     said, wrong = check_of(session, config, as_json)
     say(said, sys.stdout)
@@ -274,8 +275,8 @@ def plan(
     rrd: Annotated[Path | None, typer.Option("--rrd", metavar="FILE", help="write a recording of it")] = None,
 ) -> int:
     """Predict what passes will give, before any data, and choose better ones. Status 1 if they will not do."""
-    from pipeline.folder import refuse_output
-    from stages.plan import plan as plan_of
+    from pipeline.run.folder import refuse_output
+    from stages.commands.plan import plan as plan_of
 
     refuse_output("--yaml", out, session, begins=b"given:")
     refuse_output("--rrd", rrd, session)
@@ -292,8 +293,8 @@ def coarse(
     write: Annotated[bool, typer.Option("--write/--no-write", help="put the mounts into session.yaml")] = True,
 ) -> int:
     """Coarse mounts from a survey of marks on bracket and instruments. Status 1 if the marks do not agree."""
-    from pipeline.folder import refuse_output
-    from stages.coarse import coarse as coarse_of
+    from pipeline.run.folder import refuse_output
+    from stages.commands.coarse import coarse as coarse_of
 
     refuse_output("--yaml", out, session, begins=b"agrees:")
     said, agrees = coarse_of(file, session, out, write)
@@ -310,7 +311,7 @@ def compare(
 
     Status 0 if it was accepted and every error is within four sigma.
     """
-    from stages.compare import compare as table_of
+    from stages.commands.truth import compare as table_of
 
     text, good = table_of(run_folder, truth)
     say(text, sys.stdout)
@@ -322,20 +323,20 @@ def call(arguments: list[str]) -> int:
     """The exit status of a command line; nothing is raised."""
     debug = "--debug" in arguments  # accepted anywhere on the line
     words = [word for word in arguments if word != "--debug"] or ["--help"]
-    return ending.status_of(lambda: app(words, prog_name="poolcal", standalone_mode=False), debug)
+    return entry.status_of(lambda: app(words, prog_name="poolcal", standalone_mode=False), debug)
 
 
 def _go_on(drawing: "Painters", run_folder: Path, stage: str) -> None:
     """After a stage; not where somebody interrupted it in a place in which Python ignores that."""
-    if ending.interrupts:
+    if entry.interrupts:
         raise KeyboardInterrupt
     drawing.begin(run_folder, stage)
 
 
 def main() -> None:
     """The console script."""
-    ending.prepare()
-    ending.leave(call(sys.argv[1:]))
+    entry.prepare()
+    entry.leave(call(sys.argv[1:]))
 
 
 if __name__ == "__main__":

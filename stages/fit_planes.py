@@ -8,16 +8,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts
-from pipeline.config import FitPlanes, Mbes
+from pipeline.artefacts.catalogue.points import POSES
+from pipeline.artefacts.catalogue.target import (
+    FACES,
+    LASER_LABELLED,
+    PLANES,
+    SOUNDING_MOMENTS,
+    SOUNDINGS_LABELLED,
+    TARGET_POSE,
+)
+from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.streams import Batch, Stream, xyz
+from pipeline.config.pool import FitPlanes
+from pipeline.config.session import Mbes
 from pipeline.errors import DegenerateGeometryError
-from pipeline.maths.angles import fourth_normal
-from pipeline.maths.moments import SIZE, lift, plane_moments
-from pipeline.maths.planes import Moments, Plane, fit_plane
-from pipeline.maths.trajectory import Trajectory
-from pipeline.mounts import mount_of
-from pipeline.poses import trajectory_in_target
-from pipeline.streams import Batch, Stream, xyz
+from pipeline.maths.geometry.planes import Moments, Plane, fit_plane
+from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.patent.angles import fourth_normal
+from pipeline.maths.patent.lifted_moments import SIZE, lift, plane_moments
+from pipeline.mount import mount_of
 
 Array = NDArray[np.float64]
 Key = tuple[int, int]  # pass, face
@@ -32,17 +41,17 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    poses: Annotated[pd.DataFrame, artefacts.POSES]
-    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
-    laser_labelled: Annotated[Stream, artefacts.LASER_LABELLED]
-    soundings_labelled: Annotated[Stream, artefacts.SOUNDINGS_LABELLED]
+    faces: Annotated[pd.DataFrame, FACES]
+    poses: Annotated[pd.DataFrame, POSES]
+    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    laser_labelled: Annotated[Stream, LASER_LABELLED]
+    soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    planes: Annotated[pd.DataFrame, artefacts.PLANES]
-    sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
+    planes: Annotated[pd.DataFrame, PLANES]
+    sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
@@ -59,7 +68,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         for sensor, moments in (("laser", laser), ("mbes", mbes))
         for row in _planes(sensor, moments, inputs.faces, config.fit_planes.min_points)
     ]
-    columns = [column.name for column in artefacts.PLANES.columns]
+    columns = [column.name for column in PLANES.columns]
     return Outputs(pd.DataFrame(rows, columns=columns), _moments_table(lifted))
 
 
@@ -153,4 +162,4 @@ def _moments_table(lifted: dict[Key, Array]) -> pd.DataFrame:
         {"pass": number, "face": face, "count": round(float(m[-1, -1])), "moments": m.reshape(SIZE * SIZE).tolist()}
         for (number, face), m in lifted.items()
     ]
-    return pd.DataFrame(rows, columns=[column.name for column in artefacts.SOUNDING_MOMENTS.columns])
+    return pd.DataFrame(rows, columns=[column.name for column in SOUNDING_MOMENTS.columns])

@@ -7,19 +7,31 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts
-from pipeline.config import Georeference, Laser, Mbes, Target
-from pipeline.counting import counts_table
+from pipeline.artefacts.catalogue.points import (
+    GEOREFERENCE_COUNTS,
+    LASER_POINTS,
+    LASER_POOL,
+    PASSES,
+    POOL_FRAME,
+    POSES,
+    SOUNDINGS,
+    SOUNDINGS_POOL,
+    TRAJECTORY,
+)
+from pipeline.artefacts.counts import counts_table
+from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream, xyz
+from pipeline.config.pool import Georeference
+from pipeline.config.session import Laser, Mbes
+from pipeline.config.target import Target
 from pipeline.errors import RawDataError
-from pipeline.maths import soundings
-from pipeline.maths.geodesy import PoolFrame
-from pipeline.maths.ray_tracing import Cast
-from pipeline.maths.rotations import quaternion_from_rotation
-from pipeline.maths.trajectory import Trajectory, poses_in_pool
-from pipeline.mounts import mount_of, target_of
-from pipeline.passes import pass_of
-from pipeline.streams import EMPTY, Chunk, Piece, Stream, xyz
-from pipeline.times import NS
+from pipeline.gps_time import NS
+from pipeline.maths.geometry.geodesy import PoolFrame
+from pipeline.maths.geometry.passes import pass_of
+from pipeline.maths.geometry.rotations import quaternion_from_rotation
+from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.sonar import soundings
+from pipeline.maths.sonar.ray_tracing import Cast
+from pipeline.mount import mount_of, target_of
 
 Array = NDArray[np.float64]
 
@@ -34,19 +46,19 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    trajectory: Annotated[pd.DataFrame, artefacts.TRAJECTORY]
-    passes: Annotated[pd.DataFrame, artefacts.PASSES]
-    pool_frame: Annotated[pd.DataFrame, artefacts.POOL_FRAME]
-    laser_points: Annotated[Stream, artefacts.LASER_POINTS]
-    soundings: Annotated[Stream, artefacts.SOUNDINGS]
+    trajectory: Annotated[pd.DataFrame, TRAJECTORY]
+    passes: Annotated[pd.DataFrame, PASSES]
+    pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
+    laser_points: Annotated[Stream, LASER_POINTS]
+    soundings: Annotated[Stream, SOUNDINGS]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    poses: Annotated[pd.DataFrame, artefacts.POSES]
-    counts: Annotated[pd.DataFrame, artefacts.GEOREFERENCE_COUNTS]
-    laser_pool: Annotated[Stream, artefacts.LASER_POOL] = EMPTY
-    soundings_pool: Annotated[Stream, artefacts.SOUNDINGS_POOL] = EMPTY
+    poses: Annotated[pd.DataFrame, POSES]
+    counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
+    laser_pool: Annotated[Stream, LASER_POOL] = EMPTY
+    soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,27 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts
-from pipeline.config import Ingest, Recordings, TargetPlace
+from pipeline.adjustment.ins_drift import thinned
+from pipeline.artefacts.catalogue.points import (
+    FILES,
+    GAPS,
+    INGEST_COUNTS,
+    INS_SIGMAS,
+    LASER_POINTS,
+    PASSES,
+    POOL_FRAME,
+    SOUNDINGS,
+    TRAJECTORY,
+)
+from pipeline.artefacts.schema import Raw
+from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream
+from pipeline.config.pool import Ingest, TargetPlace
+from pipeline.config.session import Recordings
 from pipeline.errors import RawDataError
-from pipeline.ins_sigmas import thinned
-from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
-from pipeline.passes import estimate_azimuth, find_passes, pass_of
-from pipeline.streams import EMPTY, Chunk, Piece, Stream
-from pipeline.times import NS, utc_text
-from stages.seen import Seen, counts_of, files_of, gaps_between, refuse_apart, refuse_empty
+from pipeline.gps_time import NS, utc_text
+from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
+from pipeline.maths.geometry.passes import estimate_azimuth, find_passes, pass_of
+from pipeline.readers.file_summaries import Seen, counts_of, files_of, gaps_between, refuse_apart, refuse_empty
 
 Columns = dict[str, NDArray[Any]]
 
@@ -29,22 +41,22 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    ins: Annotated[Stream, artefacts.Raw("ins")]
-    laser: Annotated[Stream, artefacts.Raw("laser")]
-    mbes: Annotated[Stream, artefacts.Raw("mbes")]
+    ins: Annotated[Stream, Raw("ins")]
+    laser: Annotated[Stream, Raw("laser")]
+    mbes: Annotated[Stream, Raw("mbes")]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    trajectory: Annotated[pd.DataFrame, artefacts.TRAJECTORY]
-    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
-    passes: Annotated[pd.DataFrame, artefacts.PASSES]
-    pool_frame: Annotated[pd.DataFrame, artefacts.POOL_FRAME]
-    files: Annotated[pd.DataFrame, artefacts.FILES]
-    gaps: Annotated[pd.DataFrame, artefacts.GAPS]
-    counts: Annotated[pd.DataFrame, artefacts.INGEST_COUNTS]
-    laser_points: Annotated[Stream, artefacts.LASER_POINTS] = EMPTY
-    soundings: Annotated[Stream, artefacts.SOUNDINGS] = EMPTY
+    trajectory: Annotated[pd.DataFrame, TRAJECTORY]
+    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
+    passes: Annotated[pd.DataFrame, PASSES]
+    pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
+    files: Annotated[pd.DataFrame, FILES]
+    gaps: Annotated[pd.DataFrame, GAPS]
+    counts: Annotated[pd.DataFrame, INGEST_COUNTS]
+    laser_points: Annotated[Stream, LASER_POINTS] = EMPTY
+    soundings: Annotated[Stream, SOUNDINGS] = EMPTY
 
 
 def prepare(inputs: Inputs, config: Config) -> None:
@@ -107,7 +119,7 @@ def _trajectory(chunks: list[Columns]) -> tuple[pd.DataFrame, int]:
     """All INS records in order of time; of equal times the first; how many that left out."""
     chunks = sorted(chunks, key=lambda columns: int(columns["t_ns"][0]))
     table = pd.DataFrame(
-        {c.name: np.concatenate([columns[c.name] for columns in chunks]) for c in artefacts.TRAJECTORY.columns}
+        {c.name: np.concatenate([columns[c.name] for columns in chunks]) for c in TRAJECTORY.columns}
     )
     order = np.argsort(table["t_ns"].to_numpy(), kind="stable")
     table = table.iloc[order]
@@ -126,7 +138,7 @@ def _sigmas(pieces: list[tuple[str, Seen]], start: int, end: int) -> tuple[pd.Da
                 f"{name}: no time overlap: ins {utc_text(start)} to {utc_text(end)}, "
                 f"accuracy {utc_text(int(times.min()))} to {utc_text(int(times.max()))}; give the one of this SBET"
             )
-    names = [column.name for column in artefacts.INS_SIGMAS.columns]
+    names = [column.name for column in INS_SIGMAS.columns]
     told = [seen.sigmas for _, seen in pieces if seen.sigmas]
     if not told:
         return pd.DataFrame(columns=names), 0

@@ -6,13 +6,15 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.config import FitPlanes, Mbes, Offsets
+from pipeline.artefacts.catalogue.patent import ALTERNATION, ANGLES, CORRECTIONS, OFFSET_PAIRS
+from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
+from pipeline.artefacts.from_tables import angle_passes, horizontal_faces, offset_passes
+from pipeline.config.pool import FitPlanes, Offsets
+from pipeline.config.session import Mbes
 from pipeline.errors import DegenerateGeometryError
-from pipeline.fitted import angle_passes, horizontal_faces, offset_passes
-from pipeline.maths.offsets import alternate, offsets
-from pipeline.maths.rotations import exp_so3
-from pipeline.mounts import mount_of
+from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.maths.patent.offsets import alternate, offsets
+from pipeline.mount import mount_of
 
 METHODS = ("patent_sequential", "patent_alternating")
 
@@ -26,17 +28,17 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    planes: Annotated[pd.DataFrame, artefacts.PLANES]
-    sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
-    angles: Annotated[pd.DataFrame, artefacts.ANGLES]
+    faces: Annotated[pd.DataFrame, FACES]
+    planes: Annotated[pd.DataFrame, PLANES]
+    sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
+    angles: Annotated[pd.DataFrame, ANGLES]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    offset_pairs: Annotated[pd.DataFrame, artefacts.OFFSET_PAIRS]
-    alternation: Annotated[pd.DataFrame, artefacts.ALTERNATION]
-    corrections: Annotated[pd.DataFrame, artefacts.CORRECTIONS]
+    offset_pairs: Annotated[pd.DataFrame, OFFSET_PAIRS]
+    alternation: Annotated[pd.DataFrame, ALTERNATION]
+    corrections: Annotated[pd.DataFrame, CORRECTIONS]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
@@ -82,8 +84,8 @@ def _tables(
     corrections: list[dict[str, Any]], pairs: list[dict[str, Any]], alternation: list[dict[str, float]]
 ) -> Outputs:
     return Outputs(
-        pd.DataFrame(pairs, columns=[column.name for column in artefacts.OFFSET_PAIRS.columns]),
-        pd.DataFrame(alternation, columns=[column.name for column in artefacts.ALTERNATION.columns]),
+        pd.DataFrame(pairs, columns=[column.name for column in OFFSET_PAIRS.columns]),
+        pd.DataFrame(alternation, columns=[column.name for column in ALTERNATION.columns]),
         pd.DataFrame(corrections),
     )
 

@@ -7,8 +7,33 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts
-from pipeline.blocks import (
+from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.artefacts.catalogue.patent import CORRECTIONS
+from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES
+from pipeline.artefacts.catalogue.results import (
+    ADJUST_SUMMARY,
+    CALIBRATION,
+    CALIBRATION_JSON,
+    CALIBRATION_YAML,
+    CELLS,
+    CLOSING,
+    COVARIANCE,
+    DRIFT,
+    ESTIMATE,
+    FREED,
+    GEOMETRY,
+    GROUPS,
+    PATTERNS,
+)
+from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT, SOUNDING_MOMENTS, TARGET_POSE
+from pipeline.artefacts.schema import Provenance
+from pipeline.config.mount import Mount
+from pipeline.config.pool import Adjust, Method, Segment, Verdict
+from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.config.target import Target
+from pipeline.mount import Mounted, mount_of, target_of, turned
+from pipeline.report.as_built import as_found, by_design, oddities
+from pipeline.report.calibration_document import (
     SCHEMA,
     adjustment_block,
     calibration_table,
@@ -22,23 +47,11 @@ from pipeline.blocks import (
     plain,
     target_block,
 )
-from pipeline.built import as_found, by_design, oddities
-from pipeline.closing import closing_table
-from pipeline.config import Adjust, Ins, Laser, Mbes, Method, Mount, Segment, Target, Verdict
-from pipeline.ins_sigmas import drift_of, told
-from pipeline.judging.casts import cast_doubts, in_words
-from pipeline.judging.residual_tests import pattern_tests
-from pipeline.mounts import Mounted, mount_of, target_of, turned
-from pipeline.screen import verdict_in_words
-from pipeline.verdict import (
-    NO_DRIFT,
-    Evidence,
-    Settings,
-    drift_doubt,
-    one_eyed,
-    reasons,
-    warnings,
-)
+from pipeline.report.cast_checks import cast_doubts, in_words
+from pipeline.report.plane_agreement import closing_table
+from pipeline.report.residual_tests import pattern_tests
+from pipeline.report.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, one_eyed, reasons, warnings
+from pipeline.results.screen import verdict_in_words
 
 Array = NDArray[np.float64]
 
@@ -58,33 +71,33 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    files: Annotated[pd.DataFrame, artefacts.FILES]
-    passes: Annotated[pd.DataFrame, artefacts.PASSES]
-    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    planes: Annotated[pd.DataFrame, artefacts.PLANES]
-    sounding_moments: Annotated[pd.DataFrame, artefacts.SOUNDING_MOMENTS]
-    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
-    provisional_mount: Annotated[pd.DataFrame, artefacts.PROVISIONAL_MOUNT]
-    corrections: Annotated[pd.DataFrame, artefacts.CORRECTIONS]
-    estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
-    covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
-    geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
-    drift: Annotated[pd.DataFrame, artefacts.DRIFT]
-    freed: Annotated[pd.DataFrame, artefacts.FREED]
-    patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
-    cells: Annotated[pd.DataFrame, artefacts.CELLS]
-    groups: Annotated[pd.DataFrame, artefacts.GROUPS]
-    summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
-    provenance: Annotated[dict[str, Any], artefacts.Provenance]
+    files: Annotated[pd.DataFrame, FILES]
+    passes: Annotated[pd.DataFrame, PASSES]
+    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
+    faces: Annotated[pd.DataFrame, FACES]
+    planes: Annotated[pd.DataFrame, PLANES]
+    sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
+    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
+    corrections: Annotated[pd.DataFrame, CORRECTIONS]
+    estimate: Annotated[pd.DataFrame, ESTIMATE]
+    covariance: Annotated[pd.DataFrame, COVARIANCE]
+    geometry: Annotated[pd.DataFrame, GEOMETRY]
+    drift: Annotated[pd.DataFrame, DRIFT]
+    freed: Annotated[pd.DataFrame, FREED]
+    patterns: Annotated[pd.DataFrame, PATTERNS]
+    cells: Annotated[pd.DataFrame, CELLS]
+    groups: Annotated[pd.DataFrame, GROUPS]
+    summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+    provenance: Annotated[dict[str, Any], Provenance]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    calibration: Annotated[pd.DataFrame, artefacts.CALIBRATION]
-    closing: Annotated[pd.DataFrame, artefacts.CLOSING]
-    calibration_json: Annotated[str, artefacts.CALIBRATION_JSON]
-    calibration_yaml: Annotated[str, artefacts.CALIBRATION_YAML]
+    calibration: Annotated[pd.DataFrame, CALIBRATION]
+    closing: Annotated[pd.DataFrame, CLOSING]
+    calibration_json: Annotated[str, CALIBRATION_JSON]
+    calibration_yaml: Annotated[str, CALIBRATION_YAML]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:

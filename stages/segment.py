@@ -9,13 +9,28 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts
-from pipeline.beams import beams_in_target
-from pipeline.clouds import ClosestSurface
-from pipeline.config import Laser, Mbes, Segment, Target
-from pipeline.counting import counts_table
+from pipeline.artefacts.catalogue.points import GEOREFERENCE_COUNTS, LASER_POOL, POOL_FRAME, POSES, SOUNDINGS_POOL
+from pipeline.artefacts.catalogue.target import (
+    FACES,
+    LASER_LABELLED,
+    PROVISIONAL_MOUNT,
+    SEGMENT_COUNTS,
+    SOUNDINGS_LABELLED,
+    TARGET_POSE,
+)
+from pipeline.artefacts.counts import counts_table
+from pipeline.artefacts.poses import trajectory_in_pool
+from pipeline.artefacts.sampling import Voxels, every_nth, points_above, voxel_means, voxel_sums
+from pipeline.artefacts.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
+from pipeline.config.pool import Segment
+from pipeline.config.session import Laser, Mbes
+from pipeline.config.target import Target
 from pipeline.errors import RawDataError
-from pipeline.finding import (
+from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.target.labelling import Beams, Labels, hidden_in_part, label_points, near_planes
+from pipeline.maths.target.model import TargetModel
+from pipeline.mount import mount_of, target_of
+from pipeline.target.pose_search import (
     VOXEL_M,
     FoundMount,
     FoundTarget,
@@ -26,13 +41,8 @@ from pipeline.finding import (
     find_mount,
     find_target,
 )
-from pipeline.maths.labelling import Beams, Labels, hidden_in_part, label_points, near_planes
-from pipeline.maths.targets import TargetModel
-from pipeline.maths.trajectory import Trajectory
-from pipeline.mounts import mount_of, target_of
-from pipeline.poses import trajectory_in_pool
-from pipeline.sampling import Voxels, every_nth, points_above, voxel_means, voxel_sums
-from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
+from pipeline.target.sonar_beams import beams_in_target
+from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
 SOUNDING_SAMPLE = 8_000  # soundings to search with
@@ -50,21 +60,21 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    pool_frame: Annotated[pd.DataFrame, artefacts.POOL_FRAME]
-    poses: Annotated[pd.DataFrame, artefacts.POSES]
-    counts: Annotated[pd.DataFrame, artefacts.GEOREFERENCE_COUNTS]
-    laser_pool: Annotated[Stream, artefacts.LASER_POOL]
-    soundings_pool: Annotated[Stream, artefacts.SOUNDINGS_POOL]
+    pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
+    poses: Annotated[pd.DataFrame, POSES]
+    counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
+    laser_pool: Annotated[Stream, LASER_POOL]
+    soundings_pool: Annotated[Stream, SOUNDINGS_POOL]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
-    provisional_mount: Annotated[pd.DataFrame, artefacts.PROVISIONAL_MOUNT]
-    counts: Annotated[pd.DataFrame, artefacts.SEGMENT_COUNTS]
-    laser_labelled: Annotated[Stream, artefacts.LASER_LABELLED] = EMPTY
-    soundings_labelled: Annotated[Stream, artefacts.SOUNDINGS_LABELLED] = EMPTY
+    faces: Annotated[pd.DataFrame, FACES]
+    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
+    counts: Annotated[pd.DataFrame, SEGMENT_COUNTS]
+    laser_labelled: Annotated[Stream, LASER_LABELLED] = EMPTY
+    soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED] = EMPTY
 
 
 @dataclass(frozen=True)

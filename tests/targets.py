@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from pipeline.maths.assembly import build_target
-from pipeline.maths.letters import lettered
-from pipeline.maths.targets import TargetModel
+from pipeline.maths.target.model import TargetModel
+from pipeline.maths.target.outlines import build_target
+from pipeline.maths.target.patent_target import lettered
 
 
 def by_letters(a: float, b: float, c: float, e: float, water_level_m: float = 0.0, **more: object) -> TargetModel:

@@ -7,15 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 from scipy.stats import chi2
 
-from pipeline.adjusting import Adjusted, Given, adjust, free_unknowns, noise_of
-from pipeline.config import Adjust, AsBuilt, Drift, Ins, Laser, Mbes, Mount, MountSigma, White
-from pipeline.considered import considered_of, correlated
-from pipeline.maths.adjustment import Body
-from pipeline.maths.solution import freed, solve
-from pipeline.maths.trajectory import Trajectory
-from pipeline.maths.unknowns import State, Surface
-from pipeline.scene import Scene
-from pipeline.streams import MemoryPart, Stream
+from pipeline.adjustment.consider import considered_of, correlated
+from pipeline.adjustment.iteration import Adjusted, Given, adjust, free_unknowns, noise_of
+from pipeline.adjustment.observation_model import Scene
+from pipeline.artefacts.streams import MemoryPart, Stream
+from pipeline.config.mount import Mount, MountSigma
+from pipeline.config.pool import Adjust, AsBuilt
+from pipeline.config.session import Drift, Ins, Laser, Mbes, White
+from pipeline.maths.adjustment.normal_equations import Body
+from pipeline.maths.adjustment.parameters import State, Surface
+from pipeline.maths.adjustment.solution import freed, solve
+from pipeline.maths.geometry.trajectory import Trajectory
 from tests.effort import often
 
 R_TRUE = Rotation.from_euler("ZXY", np.radians([-2.0, 1.2, -48.8])).as_matrix()

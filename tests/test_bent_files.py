@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.config import Ins, Laser, Mount, SessionConfig
+from pipeline.atomic_files import read_json, read_regular
+from pipeline.config.mount import Mount
+from pipeline.config.session import Ins, Laser, SessionConfig
+from pipeline.config.target_mesh import with_mesh
+from pipeline.config.yaml_models import MAX_YAML_BYTES, parse, read_yaml
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.files import read_json, read_regular
-from pipeline.meshes import with_mesh
-from pipeline.parsing import MAX_YAML_BYTES, parse, read_yaml
-from pipeline.readers import raw_files, raw_parts
+from pipeline.readers.dispatch import raw_files, raw_parts
 from tests.limits import limited
 from tests.runner.conftest import MOUNT
 

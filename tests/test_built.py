@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.built import as_found, by_design, oddities
-from pipeline.config import Letters, Origin
-from pipeline.mounts import target_of
+from pipeline.config.target import Letters, Origin
+from pipeline.mount import target_of
+from pipeline.report.as_built import as_found, by_design, oddities
 
 ROOT = np.sqrt(0.5)
 TARGET = Letters(a=8.0, b=3.0, c=1.0, e=0.5, origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0))

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import stages.check
+import stages.commands.check
 from pipeline.checking import excerpts
-from pipeline.checking.calibrated import Calibrated
+from pipeline.checking.trial_calibration import Calibrated
 from tests.effort import often
 from tests.end_to_end.places import SCENARIOS, edit, poolcal, simulate
 
@@ -50,7 +50,7 @@ def spoilt(good: Callable[..., Path], tmp_path: Path) -> Callable[..., Path]:
 def _calibrated(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Seconds are spent on calibrating a sample only where it is asked what that tells."""
     if not request.node.get_closest_marker("calibrates"):
-        monkeypatch.setattr(stages.check, "_calibrated", lambda *_: Calibrated())
+        monkeypatch.setattr(stages.commands.check, "_calibrated", lambda *_: Calibrated())
 
 
 def checked(session: Path) -> tuple[int, list[dict[str, Any]]]:

@@ -12,18 +12,20 @@ import yaml
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pipeline.checking import examine as asked
-from pipeline.checking import hits, passes, tried
-from pipeline.checking.calibrated import Calibrated
-from pipeline.checking.finding import Finding
-from pipeline.checking.placed import Sample, put, sample
-from pipeline.checking.survey import Seen, survey
+from pipeline.checking import check_session as asked
+from pipeline.checking import target_hits, track_checks, trial_findings
+from pipeline.checking.file_survey import Seen, survey
+from pipeline.checking.findings import Finding
+from pipeline.checking.point_samples import Sample, put, sample
 from pipeline.checking.track import Track, frame_of, joined, track_of
-from pipeline.clouds import ClosestSurface
-from pipeline.config import Mount, PoolConfig, SessionConfig, load_pool, load_session
-from pipeline.maths.targets import TargetModel
-from pipeline.mounts import mount_of, target_of
-from pipeline.target_settings import Letters, Origin
+from pipeline.checking.trial_calibration import Calibrated
+from pipeline.config.mount import Mount
+from pipeline.config.pool import PoolConfig, load_pool, load_session
+from pipeline.config.session import SessionConfig
+from pipeline.config.target import Letters, Origin
+from pipeline.maths.target.model import TargetModel
+from pipeline.mount import mount_of, target_of
+from pipeline.target.surface import ClosestSurface
 from tests.effort import often
 from tests.end_to_end.places import SCENARIOS, poolcal, simulate
 
@@ -63,7 +65,7 @@ class Looked:
         changed = {"origin": origin, "water_level_m": target.water_level_m + water_m}
         pool = self.pool.model_copy(update={"target": target.model_copy(update=changed)})
         track = self.track(pool)
-        return list(hits.off_target(track, self.samples(track, **mounts), self.closest, pool))
+        return list(target_hits.off_target(track, self.samples(track, **mounts), self.closest, pool))
 
 
 @pytest.fixture(scope="module", params=["default", "small_target", "dock"])
@@ -124,7 +126,7 @@ def test_heights_of_points_that_others_placed_are_no_mount(blocks: Looked, off: 
     points = put(track, laser)
     rows = np.isfinite(points[:, 0])
     placed = replace(laser, t_ns=laser.t_ns[rows], points_m=points[rows] + [0.0, 0.0, off], georeferenced=True)
-    (found,) = hits.off_target(track, [placed, mbes], blocks.closest, blocks.pool)
+    (found,) = target_hits.off_target(track, [placed, mbes], blocks.closest, blocks.pool)
     assert found.words.startswith("laser: laser points miss the target, but hit it if they lay ")
     shift, way = found.words.split("if they lay ")[1].split(" m ")[:2]
     assert float(shift) == pytest.approx(abs(off), abs=0.4)
@@ -155,7 +157,7 @@ def test_a_lever_arm_in_centimetres(blocks: Looked) -> None:
 @pytest.mark.parametrize(("turn", "said"), [(90, "never passes"), (-90, "never passes"), (40, "does not sail along")])
 def test_a_wrong_azimuth_is_proposed(blocks: Looked, turn: float, said: str) -> None:
     pool = blocks.pool.model_copy(update={"target": blocks.pool.target.model_copy(update={"azimuth_deg": turn})})
-    (found,) = passes.sailing(blocks.track(pool), pool.target_place)
+    (found,) = track_checks.sailing(blocks.track(pool), pool.target_place)
     assert said in found.words
     assert f"target.azimuth_deg is {turn:g}" in found.words
     assert "write 0," in found.words
@@ -164,7 +166,7 @@ def test_a_wrong_azimuth_is_proposed(blocks: Looked, turn: float, said: str) -> 
 @pytest.mark.parametrize("turn", [-12.0, 12.0])
 def test_an_azimuth_about_right_is_not_doubted(blocks: Looked, turn: float) -> None:
     pool = blocks.pool.model_copy(update={"target": blocks.pool.target.model_copy(update={"azimuth_deg": turn})})
-    assert list(passes.sailing(blocks.track(pool), pool.target_place)) == []
+    assert list(track_checks.sailing(blocks.track(pool), pool.target_place)) == []
 
 
 def test_a_target_to_port_is_not_one_from_behind(blocks: Looked) -> None:
@@ -173,7 +175,7 @@ def test_a_target_to_port_is_not_one_from_behind(blocks: Looked) -> None:
 
     def said(**changed: Any) -> str:
         legs = tuple(type(leg)(**{**leg.__dict__, **changed}) for leg in track.legs)
-        (found,) = passes.sailing(type(track)(track.frame, track.trajectory, legs), blocks.pool.target_place)
+        (found,) = track_checks.sailing(type(track)(track.frame, track.trajectory, legs), blocks.pool.target_place)
         assert found.question == "side"
         return found.words
 
@@ -195,7 +197,7 @@ def _pose(z_m: float = 0.0, ambiguous: bool = True, within: bool = True) -> pd.D
 def _other_pose(looked: Looked, pose: pd.DataFrame, **target: Any) -> list[Finding]:
     pool = looked.pool.model_copy(update={"target": looked.pool.target.model_copy(update=target)})
     track = looked.track(pool)
-    return list(tried.other_pose(track, looked.samples(track)[0], pose, target_of(pool.target), pool))
+    return list(trial_findings.other_pose(track, looked.samples(track)[0], pose, target_of(pool.target), pool))
 
 
 @pytest.mark.parametrize("off", [-1.0, -0.5, 0.5, 1.0])
@@ -230,9 +232,9 @@ def test_sides_are_exchanged_where_that_fits_clearly_better(
     of_both = iter([as_found, 1.0])
 
     def profile(*_: object) -> NDArray[np.float64]:
-        return next(of_both) * np.exp(-((tried.SHIFTS_M / 0.1) ** 2))
+        return next(of_both) * np.exp(-((trial_findings.SHIFTS_M / 0.1) ** 2))
 
-    monkeypatch.setattr(tried, "profile", profile)
+    monkeypatch.setattr(trial_findings, "profile", profile)
     assert [one.question for one in _other_pose(blocks, _pose(ambiguous=False))] == questions
 
 
@@ -264,7 +266,7 @@ SIGNS = [
 @pytest.mark.parametrize(("wrong", "said", "severity"), SIGNS)
 def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severity: str) -> None:
     given = TRUE.model_copy(update=wrong)
-    (found,) = tried.signs(given, _provisional(given), BLOCKS, 3.0)
+    (found,) = trial_findings.signs(given, _provisional(given), BLOCKS, 3.0)
     assert said in found.words
     assert "roll_deg -48.8, pitch_deg 1.2, yaw_deg -2.0" in found.words
     assert found.severity == severity
@@ -273,14 +275,14 @@ def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severit
 @pytest.mark.parametrize("near", [{"pitch_deg": 2.0, "yaw_deg": -2.8}, {"yaw_deg": -4.9}, {"pitch_deg": -0.2}])
 def test_coarse_angles_are_no_wrong_signs(near: dict[str, float]) -> None:
     given = TRUE.model_copy(update=near)
-    assert list(tried.signs(given, _provisional(given), BLOCKS, 3.0)) == []
+    assert list(trial_findings.signs(given, _provisional(given), BLOCKS, 3.0)) == []
 
 
 def test_a_plain_wall_says_nothing_of_signs() -> None:
     """Its soundings leave yaw and more to chance."""
     given = TRUE.model_copy(update={"yaw_deg": 2.8})
     flat = TargetModel(BLOCKS.faces[:1], BLOCKS.families[:1], (), BLOCKS.water_level_m, None)
-    assert list(tried.signs(given, _provisional(given), flat, 3.0)) == []
+    assert list(trial_findings.signs(given, _provisional(given), flat, 3.0)) == []
 
 
 def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:

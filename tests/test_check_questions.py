@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.checking import clocks, expected, files, ins_quality, saying
-from pipeline.checking.examine import Examined
+from pipeline.checking import clocks, expected_soundings, file_checks, ins_quality, rendering
+from pipeline.checking.check_session import Examined
+from pipeline.checking.file_survey import Seen, survey
 from pipeline.checking.latency import latencies
-from pipeline.checking.survey import Seen, survey
 from pipeline.checking.track import Leg
-from pipeline.config import SessionConfig
-from pipeline.mounts import target_of
-from pipeline.target_settings import Letters, Origin
-from pipeline.times import NS, WEEK_NS
+from pipeline.config.session import SessionConfig
+from pipeline.config.target import Letters, Origin
+from pipeline.gps_time import NS, WEEK_NS
+from pipeline.mount import target_of
 
 START = 2418 * WEEK_NS + 200_000 * NS
 SIGMAS = {"north_m": 0.01, "east_m": 0.01, "up_m": 0.02, "roll_deg": 0.01, "pitch_deg": 0.01, "heading_deg": 0.04}
@@ -106,11 +106,11 @@ def test_the_kind_of_positions(kind: int, doubted: bool) -> None:
 def test_people_and_programs_see_states_and_sigmas() -> None:
     seen = _ins(np.r_[np.full(100, COMPLETE), np.full(300, GOOD)], SIGMAS)
     examined = Examined((seen,), (), (), quality=ins_quality.quality([seen], []))
-    text = saying.text(examined)
+    text = rendering.text(examined)
     assert "ins/a.gps: INS_SOLUTION_GOOD 75%, INS_ALIGNMENT_COMPLETE 25%" in text
     assert "horizontal 0.01 m" in text
     assert "heading 0.04°" in text
-    assert '"INS_ALIGNMENT_COMPLETE": 100' in saying.as_json(examined)
+    assert '"INS_ALIGNMENT_COMPLETE": 100' in rendering.as_json(examined)
 
 
 # --- clocks ----------------------------------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ def _blocks() -> Letters:
 def test_how_many_soundings_are_too_few(share: float, severity: str | None) -> None:
     model = target_of(_blocks())
     wanted = np.full(len(model.faces), 1000.0)
-    found = list(expected.missed(model, expected.Soundings(wanted, share * wanted)))
+    found = list(expected_soundings.missed(model, expected_soundings.Soundings(wanted, share * wanted)))
     assert {one.severity for one in found} == ({severity} if severity else set())
     assert all(f"({share:.0%}; usual: 60 to 120 %)" in one.words for one in found)
 
@@ -171,18 +171,18 @@ def test_one_face_that_is_bare_is_to_be_looked_at() -> None:
     wanted = np.full(len(model.faces), 1000.0)
     there = wanted.copy()
     there[3] = 20.0
-    (found,) = expected.missed(model, expected.Soundings(wanted, there))
+    (found,) = expected_soundings.missed(model, expected_soundings.Soundings(wanted, there))
     assert found.severity == "look"
     name = model.faces[3].name
     assert f"about 20 soundings on the face {name}, where these pings should give about 1000" in found.words
     wanted[3] = 100.0  # too few to tell
-    assert list(expected.missed(model, expected.Soundings(wanted, there))) == []
+    assert list(expected_soundings.missed(model, expected_soundings.Soundings(wanted, there))) == []
 
 
 def test_families_of_soundings_stand_in_their_order_with_their_share() -> None:
     model = target_of(_blocks())
     many = np.full(len(model.faces), 1000.0)
-    lines = saying._soundings_lines(Examined((), (), (), model, expected.Soundings(many, 0.8 * many)))
+    lines = rendering._soundings_lines(Examined((), (), (), model, expected_soundings.Soundings(many, 0.8 * many)))
     assert [line.split()[0] for line in lines[2:]] == ["P1", "P2", "P3", "H"]
     assert all(line.endswith("80%") for line in lines[2:])
 
@@ -216,7 +216,7 @@ def _session(folder: Path, **mbes: float) -> SessionConfig:
 
 @pytest.mark.parametrize(("arm_m", "doubted"), [(4.9, False), (-5.1, True), (38.0, True)])
 def test_a_lever_arm_as_long_as_a_boat_is_doubted(tmp_path: Path, arm_m: float, doubted: bool) -> None:
-    found = list(files.far_arms(_session(tmp_path, x_m=arm_m)))
+    found = list(file_checks.far_arms(_session(tmp_path, x_m=arm_m)))
     assert [one.severity for one in found] == (["look"] if doubted else [])
     assert all("is it in cm" in one.words for one in found)
 
@@ -231,16 +231,16 @@ def test_points_of_another_zone_are_told_by_how_far_they_lie(tmp_path: Path) -> 
 
     settings = _session(tmp_path).laser.model_copy(update={"frame": "EPSG:32650"})
     session = _session(tmp_path).model_copy(update={"laser": settings})
-    assert list(files.frames(seen(100.0), session)) == []
-    (found,) = files.frames(seen(542_000.0), session)
+    assert list(file_checks.frames(seen(100.0), session)) == []
+    (found,) = file_checks.frames(seen(542_000.0), session)
     ins, laser = seen(100.0)
     on_the_road = {name: np.r_[np.full(40, 0.6), values] for name, values in ins.columns.items()}
-    assert list(files.frames([replace(ins, records=41, columns=on_the_road), laser], session)) == []
+    assert list(file_checks.frames([replace(ins, records=41, columns=on_the_road), laser], session)) == []
     assert "its points lie 542 km from the INS's track with laser.frame EPSG:32650: another zone" in found.words
 
 
 def test_a_file_that_goes_away_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from pipeline.checking import survey as surveying
+    from pipeline.checking import file_survey as surveying
 
     for sensor in ("ins", "laser", "mbes"):
         (tmp_path / sensor).mkdir()
@@ -265,7 +265,7 @@ def test_overlapping_files_are_found_among_many_quickly() -> None:
         return Seen("laser", name, 1, records=9, epochs_ns=t_ns)
 
     many = [seen(number, f"laser/{number}.las") for number in range(10_000)] + [seen(5_000, "laser/again.las")]
-    pairs = list(files._overlapping(many))
+    pairs = list(file_checks._overlapping(many))
     assert [(one.name, other.name) for one, other in pairs] == [("laser/5000.las", "laser/again.las")]
-    (found,) = files.twice(many)
+    (found,) = file_checks.twice(many)
     assert found.words.startswith("laser/again.las: is the same recording as laser/5000.las")

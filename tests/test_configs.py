@@ -7,9 +7,11 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from pipeline.config import Letters, Mbes, PoolConfig, load_pool
+from pipeline.config.pool import PoolConfig, load_pool
+from pipeline.config.session import Mbes
+from pipeline.config.target import Letters
+from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.errors import ConfigError
-from pipeline.parsing import parse, read_yaml
 from pipeline.simulation.scenario import Scenario
 
 CONFIGS = Path(__file__).parents[1] / "configs"

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.config import AsBuilt, Laser, Mbes, Mount
-from pipeline.considered import considered_of, gradient_sigma
+from pipeline.adjustment.consider import considered_of, gradient_sigma
+from pipeline.config.mount import Mount
+from pipeline.config.pool import AsBuilt
+from pipeline.config.session import Laser, Mbes
 
 MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.config import Drift, Ins
-from pipeline.ins_sigmas import drift_of, thinned, told
-from pipeline.parsing import parse
+from pipeline.adjustment.ins_drift import drift_of, thinned, told
+from pipeline.config.session import Drift, Ins
+from pipeline.config.yaml_models import parse
 
 NS = 1_000_000_000
 INS: dict[str, Any] = {"files": ["a"], "format": "novatel"}

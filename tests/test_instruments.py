@@ -9,15 +9,17 @@ from typing import Any
 import pytest
 import yaml
 
-from pipeline import instruments, planned
-from pipeline.blocks import instruments_block
-from pipeline.config import Drift, PoolConfig, SessionConfig, White, load_session
+from pipeline.config import instruments
+from pipeline.config.instruments import PRESETS, applied, load_instrument
+from pipeline.config.pool import PoolConfig, load_session
+from pipeline.config.session import Drift, SessionConfig, White
+from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.errors import ConfigError
-from pipeline.folder import Settings, read_settings, write_settings
-from pipeline.instruments import PRESETS, applied, load_instrument
-from pipeline.pages import render
-from pipeline.pages.figures import figures_used
-from pipeline.parsing import parse, read_yaml
+from pipeline.planning import assessment
+from pipeline.report.calibration_document import instruments_block
+from pipeline.results.pages.instrument_table import figures_used
+from pipeline.results.pages.rendering import render
+from pipeline.run.folder import Settings, read_settings, write_settings
 from tests.end_to_end.pages import Page
 
 FILES = sorted(PRESETS.glob("*.yaml"))
@@ -226,13 +228,13 @@ def test_a_plan_takes_the_rates_that_it_leaves_out(tmp_path: Path) -> None:
     (tmp_path / "PLAN.yaml").write_text(
         "passes: [{distance_m: 4}]\nins_height_m: 0.5\nmbes: {beams: 100}\n", encoding="utf-8"
     )
-    plain = planned.load_plan(tmp_path / "PLAN.yaml", session(tmp_path))
+    plain = assessment.load_plan(tmp_path / "PLAN.yaml", session(tmp_path))
     assert (plain.mbes.ping_rate_hz, plain.mbes.beams) == (20, 100)
     assert (plain.laser.line_rate_hz, plain.ins_rate_hz) == (50, 200)
     ins = {"title": "I", "sensor": "ins", "rates": {"ins_rate_hz": 100}}
     names = {"ins": "mine", "laser": "riegl_vz1000", "mbes": "r2sonic_2024"}
     named = {sensor: {"instrument": name} for sensor, name in names.items()}
-    plan = planned.load_plan(tmp_path / "PLAN.yaml", session(tmp_path, {"mine": ins}, **named))
+    plan = assessment.load_plan(tmp_path / "PLAN.yaml", session(tmp_path, {"mine": ins}, **named))
     assert (plan.mbes.ping_rate_hz, plan.mbes.beams, plan.mbes.max_range_m) == (60, 100, 15)
     assert (plan.laser.line_rate_hz, plan.laser.field_deg, plan.ins_rate_hz) == (120, (30, 130), 100)
 
@@ -256,7 +258,7 @@ def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
     }
     mbes = {"instrument": "mine", "angle_sigma_deg": 0.09}
     found = session(tmp_path, {"mine": preset}, mbes=mbes, laser={"range_sigma_m": 0.006})
-    html = render("figures.html", figures=figures_used(found))
+    html = render("instrument_table.html", figures=figures_used(found))
     shown = Page(html).table("sensor", "instrument", "figure")
     assert [row for row in shown if row[0]] == [
         ["ins", "–", "drift.horizontal_m", "0.015", "default"],

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.config import Faces, load_pool
+from pipeline.config.pool import load_pool
+from pipeline.config.target import Faces
 from pipeline.errors import ConfigError
-from pipeline.mounts import target_of
+from pipeline.mount import target_of
 from pipeline.simulation.scenario import load_scenario
 
 CORNERS = {

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 import yaml
 
-from pipeline.config import load_pool, load_session
+from pipeline.config.pool import load_pool, load_session
+from pipeline.config.target import Letters
 from pipeline.errors import ConfigError
-from pipeline.target_settings import Letters
-from pipeline.verdict import Evidence, Settings, _ambiguities
+from pipeline.report.verdict import Evidence, Settings, _ambiguities
 from tests.end_to_end.places import poolcal
 
 MOUNT = {"roll_deg": -48.0, "pitch_deg": 2.0, "yaw_deg": -2.8, "x_m": 0.38, "y_m": 0.12, "z_m": -2.09}

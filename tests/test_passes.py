@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.passes import estimate_azimuth, find_passes, pass_of, reversals, split_at_gaps
+from pipeline.maths.geometry.passes import estimate_azimuth, find_passes, pass_of, reversals, split_at_gaps
 
 NS = 1_000_000_000
 

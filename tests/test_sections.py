@@ -12,11 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pipeline.config import PoolConfig
-from pipeline.maths.targets import TargetModel
-from pipeline.mounts import target_of
-from pipeline.pages import maps, sections, style
-from pipeline.parsing import parse, read_yaml
+from pipeline.config.pool import PoolConfig
+from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.maths.target.model import TargetModel
+from pipeline.mount import target_of
+from pipeline.results.pages import face_maps, target_plots
+from pipeline.results.pages.rendering import style
 from tests.targets import by_letters
 
 ROOT = Path(__file__).parents[1]
@@ -71,14 +72,14 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         found.append(figure)
         return Markup()
 
-    for module in (sections, maps):
+    for module in (target_plots, face_maps):
         monkeypatch.setattr(module, "picture", kept)
     return found
 
 
 def draw(model: TargetModel, residuals: pd.DataFrame, solved: bool = True) -> None:
     with style():
-        sections.sections(residuals, faces_of(model), solved)
+        target_plots.sections(residuals, faces_of(model), solved)
 
 
 @pytest.mark.parametrize(
@@ -130,9 +131,9 @@ def test_no_letters_are_printed_over_others(name: str, drawn: list[Figure]) -> N
     family = faces["family"].to_numpy()[residuals["face"]]
     draw(model, residuals)
     with style():
-        sections.distances(residuals, faces, family, True)
+        target_plots.distances(residuals, faces, family, True)
         for sensor in ("laser", "mbes"):
-            maps.maps(cells_of(residuals, faces), faces, sensor)
+            face_maps.maps(cells_of(residuals, faces), faces, sensor)
     for figure in drawn:
         canvas = FigureCanvasAgg(figure)
         for axis in figure.axes:
@@ -155,8 +156,8 @@ def test_families_without_points_have_no_panel(drawn: list[Figure]) -> None:
     names = faces["family"].to_numpy()
     residuals = residuals[names[residuals["face"]] != "return-north"]
     with style():
-        sections.distances(residuals, faces, names[residuals["face"]], True)
-        maps.maps(cells_of(residuals, faces), faces, "mbes")
+        target_plots.distances(residuals, faces, names[residuals["face"]], True)
+        face_maps.maps(cells_of(residuals, faces), faces, "mbes")
     for figure in drawn:
         titles = [axis.get_title(loc="left").removesuffix(" (height)") for axis in figure.axes]
         assert sorted(filter(None, titles)) == ["fronts", "ledges", "return-south"]

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from pipeline.pages import picture, style
-from pipeline.parsing import parse
+from pipeline.config.yaml_models import parse
+from pipeline.results.pages.rendering import picture, style
 from pipeline.simulation.scenario import Scenario
 from tools.bound import bound
 from tools.montecarlo import CAMPAIGNS, FOLDER, NAMES, UNITS, Campaign, path_of, scenario_of

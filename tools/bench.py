@@ -61,16 +61,17 @@ print(time.perf_counter() - start, points)
 ACCUMULATE = """
 import resource, sys, time
 from pathlib import Path
-from pipeline import artefacts
+from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.artefacts.catalogue.points import POSES
 from pipeline.folder import read_settings
 from pipeline.reading import read
 from pipeline.scene import Weighting, scene_of
 from pipeline.tables import Tables
 run = Path(sys.argv[1]); tables, settings = Tables(run), read_settings(run)
-given = (tables.table(one) for one in (artefacts.FACES, artefacts.POSES, artefacts.TARGET_POSE, artefacts.PLANES))
+given = (tables.table(one) for one in (FACES, POSES, TARGET_POSE, PLANES))
 session = settings.session
 scene = scene_of(*given, session.ins, session.laser, session.mbes, settings.pool.as_built.faces)
-streams = {"laser": tables.stream(artefacts.LASER_LABELLED), "mbes": tables.stream(artefacts.SOUNDINGS_LABELLED)}
+streams = {"laser": tables.stream(LASER_LABELLED), "mbes": tables.stream(SOUNDINGS_LABELLED)}
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 start = time.perf_counter()
 reading = read(streams, scene, scene.coarse, None, Weighting(robust=(3.0, 6.0)))

@@ -31,19 +31,19 @@ from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, hstack, iden
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import Segment
+from pipeline.config.pool import Segment
+from pipeline.gps_time import NS
 from pipeline.simulation.beams import directions_in_mbes, fan, swing_rad, transmit_tilts_rad
-from pipeline.simulation.earth import Site
 from pipeline.simulation.ins import sigmas
 from pipeline.simulation.laser import direction
 from pipeline.simulation.mbes import CLOCK_RATE_ERROR, UPWARD_RAD
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.motion import Movement, R_level_from_body
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
-from pipeline.simulation.noise import generator
+from pipeline.simulation.random_streams import generator
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import Scenario, load_scenario
-from pipeline.times import NS
+from pipeline.simulation.site import Site
 
 Array = NDArray[np.float64]
 SETTINGS = Segment()

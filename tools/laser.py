@@ -45,9 +45,10 @@ def scenario_of(number: int) -> dict[str, Any]:
 
 
 def calibrate(session: dict[str, Any], pool: dict[str, Any], made: Any) -> dict[str, Any]:
-    from pipeline.config import PoolConfig, SessionConfig
-    from pipeline.parsing import parse
-    from stages.campaign import calibrate_in_memory
+    from pipeline.config.pool import PoolConfig
+    from pipeline.config.session import SessionConfig
+    from pipeline.config.yaml_models import parse
+    from stages.in_memory import calibrate_in_memory
 
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
     found = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
@@ -57,7 +58,7 @@ def calibrate(session: dict[str, Any], pool: dict[str, Any], made: Any) -> dict[
 
 def one(number: int) -> dict[str, Any]:
     """A row: errors and sigmas of the laser, of the sonar, and what is held with the usual limits."""
-    from pipeline.parsing import parse
+    from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate
 
@@ -94,7 +95,7 @@ def _columns(whose: str, error: Array, covariance: Array) -> dict[str, float]:
 
 
 def laser_bound_of(number: int) -> Array:
-    from pipeline.parsing import parse
+    from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from tools.bound import laser_bound
 

@@ -113,12 +113,13 @@ MISTAKES: dict[str, Change] = {
 
 def one(task: tuple[str, int]) -> dict[str, Any]:
     """What came of one session, as a row."""
-    from pipeline.config import PoolConfig, SessionConfig
+    from pipeline.config.pool import PoolConfig
+    from pipeline.config.session import SessionConfig
+    from pipeline.config.yaml_models import parse
     from pipeline.errors import PoolcalError
-    from pipeline.parsing import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate
-    from stages.campaign import calibrate_in_memory
+    from stages.in_memory import calibrate_in_memory
 
     name, seed = task
     scenario: dict[str, Any] = {"name": "mistake", **copy.deepcopy(THIN)}

@@ -146,11 +146,12 @@ def errors_of(R_body_from_sensor: Array, lever_arm_m: Array, truth: Mapping[str,
 
 
 def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
-    from pipeline.config import PoolConfig, SessionConfig
-    from pipeline.parsing import parse
+    from pipeline.config.pool import PoolConfig
+    from pipeline.config.session import SessionConfig
+    from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate
-    from stages.campaign import calibrate_in_memory
+    from stages.in_memory import calibrate_in_memory
 
     scenario = parse(Scenario, scenario_of(campaign, number), campaign.name)
     made = simulate(scenario, campaign.first_seed + number)
@@ -226,9 +227,9 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
 
 def pairs(table: pd.DataFrame) -> str:
     """Sessions 0 and 1, 2 and 3, … compared as poolcal diff does: as they are, and with one of the six moved."""
-    from pipeline.diff import LEVEL
     from pipeline.maths.comparison import Estimate, compare
-    from pipeline.maths.rotations import exp_so3
+    from pipeline.maths.geometry.rotations import exp_so3
+    from pipeline.results.compare import LEVEL
 
     def estimate(row: Any, moved: Array) -> Estimate:
         """As found on a mount of zero moved by ``moved``: found = Exp(-error) · true."""

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from stages.views.opening import silent
+from stages.views.viewer import silent
 from tools.pipeline_picture import picture
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
@@ -29,7 +29,7 @@ WIDTH = 1280
 TITLE_BAR_PX = 36  # of the viewer's window, with its warnings about this machine
 ROOT = Path(__file__).parents[1]
 DRAWN_FROM = "drawn_from.txt"  # beside the pictures
-SOURCES = {"report": "pipeline/pages", "recordings": "stages/views"}  # what each is drawn by
+SOURCES = {"report": "pipeline/results/pages", "recordings": "stages/views"}  # what each is drawn by
 
 
 def missing() -> str:
@@ -102,8 +102,8 @@ def tabs(run: Path, out: Path) -> None:
     """A picture of each tab; of the iteration at its beginning and at its end; of the quality over time."""
     import pandas as pd
 
-    from stages.views import recordings_of
-    from stages.views.tour import tabs_of
+    from stages.views.blueprint import tabs_of
+    from stages.views.recording import recordings_of
 
     steps = pd.read_parquet(run / "angle_iterate" / "iterations.parquet")["iteration"]
     last = int(steps.max()) if len(steps) else 0

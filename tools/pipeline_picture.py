@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
-from pipeline.artefacts import Artefact, Document, Raw
-from pipeline.evaluate import declared, name_of
-from pipeline.pages import INK, LASER, QUIET, SONAR, style
+from pipeline.artefacts.schema import Artefact, Document, Raw
+from pipeline.results.pages.rendering import INK, LASER, QUIET, SONAR, style
+from pipeline.run.stage_protocol import declared, name_of
 from stages import load
 
 STEP, HEIGHT, WIDTH = 1.15, 0.62, 2.3

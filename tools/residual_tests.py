@@ -154,12 +154,13 @@ def scenario_of(kind: str, number: int) -> dict[str, Any]:
 
 def one(task: Task) -> dict[str, Any]:
     """What came of one session, as a row."""
-    from pipeline.config import PoolConfig, SessionConfig
-    from pipeline.maths.excess import standardised
-    from pipeline.parsing import parse
+    from pipeline.config.pool import PoolConfig
+    from pipeline.config.session import SessionConfig
+    from pipeline.config.yaml_models import parse
+    from pipeline.maths.adjustment.mean_tests import standardised
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate
-    from stages.campaign import calibrate_in_memory
+    from stages.in_memory import calibrate_in_memory
 
     fault, kind, number = task
     seed = seed_of(task)
@@ -208,7 +209,7 @@ def read(path: Path) -> pd.DataFrame:
 
 def summary(rows: pd.DataFrame) -> str:
     """False alarms at two levels, with and without the tolerance; then each fault."""
-    from pipeline.maths.excess import limit_of
+    from pipeline.maths.adjustment.mean_tests import limit_of
 
     heads = [f"{100 * level:g} %, {what}" for what in ("tolerance 0", "as it is") for level in LEVELS]
     lines = [f"| good sessions | number | {' | '.join(heads)} | accepted |", "|---|---:|---:|---:|---:|---:|---:|"]

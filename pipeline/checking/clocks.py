@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.days import whole_days
-from pipeline.checking.finding import Finding
-from pipeline.checking.survey import Seen
-from pipeline.passes import pass_of, split_at_gaps
-from pipeline.screen import plural
-from pipeline.times import NS, WEEK_NS, utc_text
+from pipeline.checking.file_survey import Seen
+from pipeline.checking.findings import Finding
+from pipeline.gps_time import NS, WEEK_NS, utc_text
+from pipeline.maths.geometry.passes import pass_of, split_at_gaps
+from pipeline.readers.whole_days import whole_days
+from pipeline.results.screen import plural
 
 Times = NDArray[np.int64]
 LEAPS = {  # s

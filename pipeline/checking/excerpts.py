@@ -12,11 +12,11 @@ from typing import BinaryIO
 
 import numpy as np
 
-from pipeline.config import Ins, Laser, Mbes
-from pipeline.readers.files import opened, read_at, size_of
+from pipeline.artefacts.streams import Part
+from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.readers.las import LasPart
+from pipeline.readers.raw_file import opened, read_at, size_of
 from pipeline.readers.sbet import RECORD
-from pipeline.streams import Part
 
 POINTS = 4_000_000  # of a laser, over all its files
 STRETCH = 8_192  # points read at one place

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.finding import Finding
-from pipeline.checking.placed import NAMES, Sample, put
+from pipeline.checking.findings import Finding
+from pipeline.checking.point_samples import NAMES, Sample, put
 from pipeline.checking.track import Track
-from pipeline.clouds import ClosestSurface
+from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
 REACH_M = 0.5  # from a face, beyond which a point counts nothing

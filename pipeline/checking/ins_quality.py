@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.finding import Finding
-from pipeline.checking.survey import Seen
+from pipeline.adjustment.ins_drift import rms
+from pipeline.checking.file_survey import Seen
+from pipeline.checking.findings import Finding
 from pipeline.checking.track import Leg
-from pipeline.ins_sigmas import rms
-from pipeline.passes import pass_of
+from pipeline.maths.geometry.passes import pass_of
 from pipeline.readers.novatel import STATES
 
 Mask = NDArray[np.bool_]

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from pipeline.checking.finding import Finding
-from pipeline.mounts import WITHIN_95
+from pipeline.checking.findings import Finding
+from pipeline.mount import WITHIN_95
 
 SIGMAS, LEAST_S = 4.0, 0.005  # far enough from zero, and worth a word
 SAME = 3.0  # sigmas within which two offsets are one, of the INS

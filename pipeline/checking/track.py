@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.survey import Columns, Seen
-from pipeline.config import Ingest, TargetPlace
-from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic
-from pipeline.maths.targets import TargetModel
-from pipeline.maths.trajectory import Trajectory, poses_in_pool
-from pipeline.passes import beside, estimate_azimuth, find_passes
-from pipeline.times import NS
+from pipeline.checking.file_survey import Columns, Seen
+from pipeline.config.pool import Ingest, TargetPlace
+from pipeline.gps_time import NS
+from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
+from pipeline.maths.geometry.passes import beside, estimate_azimuth, find_passes
+from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]

@@ -10,7 +10,7 @@ is chi-square with six degrees of freedom: one test of all six at one level, whe
 times as many false alarms. (Errors that both sessions share, the laser's mount above all, cancel in d.)
 
 People read a mount as pitch, roll, yaw, so what differs is named by these: their differences, with the covariance
-J_A C_A J_Aᵀ + J_B C_B J_Bᵀ, J = ∂(pitch, roll, yaw)/∂ε (:func:`pipeline.maths.rotations.mount_partials`); each
+J_A C_A J_Aᵀ + J_B C_B J_Bᵀ, J = ∂(pitch, roll, yaw)/∂ε (:func:`pipeline.maths.geometry.rotations.mount_partials`); each
 z_i = d_i / root(C_ii) is standard normal. For a head near zero yaw these are the rotations about body x, y, z; for one
 turned by 90° pitch and roll are the other way round.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
-from pipeline.maths.rotations import log_so3, mount_from_rotation, mount_partials
+from pipeline.maths.geometry.rotations import log_so3, mount_from_rotation, mount_partials
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,8 @@
 What is done to its rows is told in :class:`config.CastUsed` (run.yaml, calibration.json): rows above the surface, of
 speeds that no water has, or deeper than 200 m are left out and counted; of a way down and up the way down is used, and
 a file in which the two differ by more than 2 m/s is refused; rows of one depth become their mean; and the rest is
-thinned (``maths/casts.py``). Nothing is filled in: beyond the cast's ends the speed stays (``maths/ray_tracing.py``).
+thinned (``maths/sonar/cast_profile.py``). Nothing is filled in: beyond the cast's ends the speed stays
+(``maths/sonar/ray_tracing.py``).
 """
 
 import hashlib
@@ -15,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.config.session import inside
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.maths.casts import TOLERANCE_M_S, ascending, largest_difference, one_way, thinned
-from pipeline.readers import found
+from pipeline.maths.sonar.cast_profile import TOLERANCE_M_S, ascending, largest_difference, one_way, thinned
 from pipeline.readers.cast_text import Cast, casts_of
-from pipeline.readers.files import opened
-from pipeline.session_settings import inside
+from pipeline.readers.dispatch import found
+from pipeline.readers.raw_file import opened
 
 Array = NDArray[np.float64]
 LARGEST = 20_000_000  # bytes

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.datums import geocentric_of, horizontal_of, unfit, vertical_of
-from pipeline.readers.sieve import Sieve
+from pipeline.readers.row_checks import Sieve
 
 Array = NDArray[np.float64]
 Transform = Callable[[Array, Array, Array], tuple[Array, Array, Array]]

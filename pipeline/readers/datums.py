@@ -1,8 +1,8 @@
 """A coordinate reference system's own way to ECEF: within its datum, over its own ellipsoid.
 
 The INS's positions and the points are taken to be in one datum, whichever that is. No step from datum to datum is ever
-made: for most of them the parameters depend on place and date. "ECEF" is then the geocentric form of that datum.
-The INS's latitudes and longitudes go through the ellipsoid of WGS 84 (``pipeline.maths.geodesy``), points through
+made: for most of them the parameters depend on place and date. "ECEF" is then the geocentric form of that datum. The
+INS's latitudes and longitudes go through the ellipsoid of WGS 84 (``pipeline.maths.geometry.geodesy``), points through
 that of their CRS: GRS 80 and CGCS2000 differ from it by 0.12 mm at most. Others differ by metres.
 """
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.readers import foreign
-from pipeline.readers.all_datagrams import is_head
-from pipeline.readers.files import opened, size_of
-from pipeline.readers.ie_layout import names_line
-from pipeline.readers.kind import Kind
-from pipeline.readers.packets import BTH0, OTHERS, packet_size
-from pipeline.readers.sieve import through_float32
+from pipeline.readers import unread_formats
+from pipeline.readers.file_kind import Kind
+from pipeline.readers.inertial_explorer_layout import names_line
+from pipeline.readers.kongsberg_all_datagrams import is_head
+from pipeline.readers.r2sonic_packets import BTH0, OTHERS, packet_size
+from pipeline.readers.raw_file import opened, size_of
+from pipeline.readers.row_checks import through_float32
 
 HEAD = 65_536
 
@@ -51,7 +51,7 @@ UNKNOWN = Kind(
 )
 
 MAGICS = ((0, b"LASF", LAS), (0, b"PAR1", PARQUET), (0, b"ASTM-E57", E57), (8, b"GSF-v", GSF))
-RDBX = Kind("a RIEGL .rdbx file", advice=f"{foreign.CLOUD} (RiSCAN PRO or RiPROCESS)")
+RDBX = Kind("a RIEGL .rdbx file", advice=f"{unread_formats.CLOUD} (RiSCAN PRO or RiPROCESS)")
 NOVATEL_SYNCS = (b"\xaa\x44\x12\x1c", b"\xaa\x44\x13")
 _NOVATEL_TEXT = re.compile(rb"(?:^|[\r\n\] \t,])[#%][A-Z][A-Z0-9_]+A,[^\r\n;]*;")
 
@@ -70,7 +70,7 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
     for offset, magic, kind in MAGICS:
         if head[offset : offset + len(magic)] == magic:
             return kind
-    if (other := foreign.marked(head)) is not None:
+    if (other := unread_formats.marked(head)) is not None:
         return other
     if re.match(rb"#[A-Z]{3}\x00?", head[4:9]) and int.from_bytes(head[:4], "little") <= max(size, 1 << 20):
         return KMALL
@@ -89,7 +89,7 @@ def kind_of_bytes(head: bytes, size: int) -> Kind:
     text = _is_text(head)
     if not text and (doubles := _kind_of_doubles(head, size)) is not None:
         return doubles
-    if not text and (other := foreign.binary(head, size)) is not None:
+    if not text and (other := unread_formats.binary(head, size)) is not None:
         return other
     if any(sync in head for sync in NOVATEL_SYNCS) or _NOVATEL_TEXT.search(head):
         return NOVATEL
@@ -146,13 +146,13 @@ def _is_text(head: bytes) -> bool:
 
 
 def _kind_of_text(head: bytes) -> Kind:
-    from pipeline.readers.tabular import column_names
+    from pipeline.readers.table_columns import column_names
 
     lines = [line for line in head.decode("utf-8-sig", "replace").splitlines() if line.strip()]
     rows = [line for line in lines if not line.startswith(("#", "//"))]
     if rows and column_names(rows[0]) is not None:
         return CSV
-    if (other := foreign.text("\n".join(lines))) is not None:
+    if (other := unread_formats.text("\n".join(lines))) is not None:
         return other
     if any(_names_trajectory(line) for line in lines):
         return TRAJECTORY_TEXT

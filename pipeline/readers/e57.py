@@ -10,7 +10,8 @@ scan's pose brings them into the frame of the file, which ``laser.frame`` names.
 invalid are left out.
 
 The library sees a file only after :mod:`pipeline.readers.e57_xml` has looked at its header and its XML part. Where
-integers of a constant take no bits, a damaged count of points would be endless: see :mod:`pipeline.readers.claims`.
+integers of a constant take no bits, a damaged count of points would be endless: see
+:mod:`pipeline.readers.claimed_counts`.
 """
 
 import json
@@ -23,14 +24,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import BATCH_ROWS, Chunk
 from pipeline.errors import RawDataError
-from pipeline.maths.rotations import rotation_from_quaternion
+from pipeline.gps_time import NS, WEEK_NS
+from pipeline.maths.geometry.rotations import rotation_from_quaternion
 from pipeline.readers import e57_xml
-from pipeline.readers.claims import refuse_claim
+from pipeline.readers.claimed_counts import refuse_claim
 from pipeline.readers.crs import AXES, Array, Frame, keep_placed
-from pipeline.readers.declared import refuse_another
-from pipeline.readers.files import opened, size_of
-from pipeline.readers.sieve import (
+from pipeline.readers.declared_crs import refuse_another
+from pipeline.readers.decoder_process import ADVICE, Numbers, batches, text
+from pipeline.readers.raw_file import opened, size_of
+from pipeline.readers.row_checks import (
     LASER_COLUMNS,
     LAST_WEEK,
     Sieve,
@@ -40,9 +44,6 @@ from pipeline.readers.sieve import (
     possible_ns,
     through_float32,
 )
-from pipeline.readers.worker import ADVICE, Numbers, batches, text
-from pipeline.streams import BATCH_ROWS, Chunk
-from pipeline.times import NS, WEEK_NS
 
 WORKER = Path(__file__).with_name("e57_worker.py")
 MAX_TEXT = 1 << 24

@@ -5,7 +5,7 @@ libE57Format can die of a damaged file, or allocate what a damaged number claims
 
 FILE alone: a text, JSON, of what the scans are. With SCAN: its points as stored, batch by batch: seconds, the three
 coordinates, and whether point and time are marked as invalid; what the scan has not is 0. Both are written as
-:mod:`pipeline.readers.worker` says.
+:mod:`pipeline.readers.decoder_process` says.
 """
 
 import json

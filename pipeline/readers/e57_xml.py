@@ -14,8 +14,8 @@ import struct
 from pathlib import Path
 
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened, read_at, size_of
-from pipeline.readers.worker import ADVICE
+from pipeline.readers.decoder_process import ADVICE
+from pipeline.readers.raw_file import opened, read_at, size_of
 
 HEADER = struct.Struct("<8s2I4Q")
 MAX_XML = 1 << 26

@@ -28,12 +28,14 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened
+from pipeline.gps_time import NS, gps_ns_from_unix_utc
 from pipeline.readers.gsf_fans import Fans
 from pipeline.readers.gsf_records import HEADER, PING, PROFILE, records
-from pipeline.readers.repeats import Repeats
-from pipeline.readers.sieve import (
+from pipeline.readers.raw_file import opened
+from pipeline.readers.repeated_pings import Repeats
+from pipeline.readers.row_checks import (
     MAX_SPEED_M_S,
     MBES_COLUMNS,
     MIN_SPEED_M_S,
@@ -44,8 +46,6 @@ from pipeline.readers.sieve import (
     no_rows,
     possible_ns,
 )
-from pipeline.streams import Chunk
-from pipeline.times import NS, gps_ns_from_unix_utc
 
 SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 PINGS = 8_192

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.maths.rotations import rotation_x, rotation_y
+from pipeline.maths.geometry.rotations import rotation_x, rotation_y
 
 Array = NDArray[np.float64]
 LEAST_PINGS, LEAST_BEAMS = 3, 5  # of a ping

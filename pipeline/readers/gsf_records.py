@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import BinaryIO
 
-from pipeline.readers.files import read_at, size_of
+from pipeline.readers.raw_file import read_at, size_of
 
 HEAD = struct.Struct(">2I")
 CHECKED, KIND = 1 << 31, (1 << 22) - 1

@@ -24,13 +24,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened
-from pipeline.readers.ie_layout import POSITION, SIGMAS, Layout, read_layout
-from pipeline.readers.ie_names import column_names
-from pipeline.readers.ie_times import SECOND, combine, days_of, keep_times
-from pipeline.readers.sbet import running_weeks
-from pipeline.readers.sieve import (
+from pipeline.readers.inertial_explorer_layout import POSITION, SIGMAS, Layout, read_layout
+from pipeline.readers.inertial_explorer_names import column_names
+from pipeline.readers.inertial_explorer_times import SECOND, combine, days_of, keep_times
+from pipeline.readers.raw_file import opened
+from pipeline.readers.row_checks import (
     INS_COLUMNS,
     Order,
     Sieve,
@@ -41,8 +41,8 @@ from pipeline.readers.sieve import (
     refuse_float32,
     sigma_rows,
 )
-from pipeline.readers.tabular import CSV_BLOCK, MAX_LINE
-from pipeline.streams import Chunk
+from pipeline.readers.sbet import running_weeks
+from pipeline.readers.table_columns import CSV_BLOCK, MAX_LINE
 
 WORST_Q = 3
 NUMBER = r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"

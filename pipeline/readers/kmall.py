@@ -28,11 +28,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from pipeline.gps_time import NS, gps_ns_from_unix_utc
 from pipeline.readers.kmall_datagrams import HEAD, IIP, LENGTH, datagrams
 from pipeline.readers.kongsberg import MAX_BEAMS, KongsbergPart, Ping, Sectors, possible
 from pipeline.readers.kongsberg_arrays import ONE_HEAD, Arrays, of_kmall
-from pipeline.readers.repeats import Repeats
-from pipeline.times import NS, gps_ns_from_unix_utc
+from pipeline.readers.repeated_pings import Repeats
 
 LEAST_MRZ = 200  # its heads alone are longer
 SOUNDING = 88  # bytes of one that are needed

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import BinaryIO
 
-from pipeline.readers.files import read_at, size_of
+from pipeline.readers.raw_file import read_at, size_of
 
 HEAD = struct.Struct("<I4s2BH2I")
 LENGTH = struct.Struct("<I")

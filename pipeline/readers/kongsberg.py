@@ -10,12 +10,20 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened
+from pipeline.gps_time import NS
 from pipeline.readers.kongsberg_arrays import SAME, Arrays, Fan
-from pipeline.readers.sieve import MBES_COLUMNS, Sieve, chunk, keep_possible_soundings, latency_ns, no_rows, possible_ns
-from pipeline.streams import Chunk
-from pipeline.times import NS
+from pipeline.readers.raw_file import opened
+from pipeline.readers.row_checks import (
+    MBES_COLUMNS,
+    Sieve,
+    chunk,
+    keep_possible_soundings,
+    latency_ns,
+    no_rows,
+    possible_ns,
+)
 
 SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 PINGS = 8_192

@@ -21,11 +21,11 @@ from typing import BinaryIO
 import numpy as np
 
 from pipeline.errors import RawDataError
-from pipeline.readers.all_datagrams import INNER, TAIL, datagrams
+from pipeline.gps_time import gps_ns_from_unix_utc
 from pipeline.readers.kongsberg import MAX_BEAMS, KongsbergPart, Ping, Sectors, possible
+from pipeline.readers.kongsberg_all_datagrams import INNER, TAIL, datagrams
 from pipeline.readers.kongsberg_arrays import of_all
-from pipeline.readers.repeats import Repeats
-from pipeline.times import gps_ns_from_unix_utc
+from pipeline.readers.repeated_pings import Repeats
 
 RANGES, INSTALLATION, OLDER = ord("N"), b"Ii", b"Ff"
 RAW = struct.Struct("<4HfI")

@@ -18,8 +18,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.crossed import tilt_in_mbes
-from pipeline.maths.rotations import rotation_x, rotation_y, rotation_z
+from pipeline.maths.geometry.rotations import rotation_x, rotation_y, rotation_z
+from pipeline.maths.sonar.crossed_arrays import tilt_in_mbes
 
 Array = NDArray[np.float64]
 P_MBES = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # starboard, forward, up

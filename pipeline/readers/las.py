@@ -21,17 +21,17 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import BATCH_ROWS, Chunk
+from pipeline.config.session import LasTime
 from pipeline.errors import RawDataError
+from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, gps_ns_from_week_seconds
 from pipeline.readers.crs import Frame, keep_placed, placing_of
-from pipeline.readers.declared import refuse_another
-from pipeline.readers.files import opened, read_at, size_of
+from pipeline.readers.declared_crs import refuse_another
+from pipeline.readers.decoder_process import Numbers
 from pipeline.readers.las_times import WEEK_S, refuse_useless
 from pipeline.readers.laz import points_at_most, unpack
-from pipeline.readers.sieve import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns
-from pipeline.readers.worker import Numbers
-from pipeline.session_settings import LasTime
-from pipeline.streams import BATCH_ROWS, Chunk
-from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, NS, gps_ns_from_week_seconds
+from pipeline.readers.raw_file import opened, read_at, size_of
+from pipeline.readers.row_checks import LASER_COLUMNS, Sieve, chunk, latency_ns, no_rows, possible_ns
 
 STRETCH = 4_000_000
 MAX_OFFSET = 1 << 26

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from pipeline.errors import RawDataError
-from pipeline.readers.files import read_at
-from pipeline.readers.worker import ADVICE, Numbers, batches
+from pipeline.readers.decoder_process import ADVICE, Numbers, batches
+from pipeline.readers.raw_file import read_at
 
 WORKER = Path(__file__).with_name("laz_worker.py")
 VLR_HEAD = 54

@@ -3,7 +3,7 @@
 lazrs 0.8 can die of a damaged file (segmentation fault, failed allocation, panic) instead of raising. Here only this
 process dies, and :mod:`pipeline.readers.laz` says which file it was. It imports nothing of the project.
 
-It writes what :mod:`pipeline.readers.worker` says.
+It writes what :mod:`pipeline.readers.decoder_process` says.
 """
 
 import sys

@@ -24,8 +24,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from pipeline.readers.files import opened
-from pipeline.readers.sieve import (
+from pipeline.artefacts.streams import Chunk
+from pipeline.gps_time import gps_ns_from_week_seconds
+from pipeline.readers.raw_file import opened
+from pipeline.readers.row_checks import (
     INS_COLUMNS,
     SIGMA_COLUMNS,
     Order,
@@ -37,8 +39,6 @@ from pipeline.readers.sieve import (
     possible_week_time,
     sigma_rows,
 )
-from pipeline.streams import Chunk
-from pipeline.times import gps_ns_from_week_seconds
 
 NAMES = {507: "INSPVA", 508: "INSPVAS", 1465: "INSPVAX"}
 SIGMAS = {2051: "INSSTDEV", 2052: "INSSTDEVS", 1465: "INSPVAX"}  # the first that is there

@@ -26,11 +26,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened
-from pipeline.readers.packets import Sections, bare_packets, xtf_packets
-from pipeline.readers.repeats import Repeats
-from pipeline.readers.sieve import (
+from pipeline.gps_time import NS, gps_ns_from_unix_utc
+from pipeline.readers.r2sonic_packets import Sections, bare_packets, xtf_packets
+from pipeline.readers.raw_file import opened
+from pipeline.readers.repeated_pings import Repeats
+from pipeline.readers.row_checks import (
     MBES_COLUMNS,
     Sieve,
     chunk,
@@ -39,8 +41,6 @@ from pipeline.readers.sieve import (
     no_rows,
     possible_ns,
 )
-from pipeline.streams import Chunk
-from pipeline.times import NS, gps_ns_from_unix_utc
 
 SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 PINGS = 8_192

@@ -17,9 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
-from pipeline.readers.files import opened, size_of
-from pipeline.readers.sieve import (
+from pipeline.gps_time import NS, WEEK_NS, gps_ns_from_week_seconds
+from pipeline.readers.raw_file import opened, size_of
+from pipeline.readers.row_checks import (
     INS_COLUMNS,
     Order,
     Sieve,
@@ -30,8 +32,6 @@ from pipeline.readers.sieve import (
     possible_week_time,
     through_float32,
 )
-from pipeline.streams import Chunk
-from pipeline.times import NS, WEEK_NS, gps_ns_from_week_seconds
 
 RECORD = 17 * 8
 ROWS = 65_536

@@ -25,9 +25,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Chunk
+from pipeline.gps_time import gps_ns_from_week_seconds
 from pipeline.readers.crs import Frame, keep_placed
-from pipeline.readers.files import opened
-from pipeline.readers.sieve import (
+from pipeline.readers.raw_file import opened
+from pipeline.readers.row_checks import (
     INS_COLUMNS,
     LASER_COLUMNS,
     MBES_COLUMNS,
@@ -42,9 +44,7 @@ from pipeline.readers.sieve import (
     possible_week_time,
     refuse_float32,
 )
-from pipeline.readers.tabular import WHOLE, Sensor, batches
-from pipeline.streams import Chunk
-from pipeline.times import gps_ns_from_week_seconds
+from pipeline.readers.table_columns import WHOLE, Sensor, batches
 
 CANONICAL = {"ins": INS_COLUMNS, "laser": LASER_COLUMNS, "mbes": MBES_COLUMNS}
 

@@ -1,1 +1,1 @@
-"""What a run folder's results follow from, and how none of them is lost."""
+"""Run folders: what is out of date and why, stages run and written whole, no result lost."""

@@ -11,18 +11,18 @@ from pathlib import Path
 from types import ModuleType
 
 import pipeline
-from pipeline.artefacts import Raw
-from pipeline.evaluate import declared
-from pipeline.files import sha256
-from pipeline.run.reach import file_of, imported, reached
+from pipeline.artefacts.schema import Raw
+from pipeline.atomic_files import sha256
+from pipeline.run.import_closure import file_of, imported, reached
+from pipeline.run.stage_protocol import declared
 
 LIBRARIES = (  # that can change a digit: they compute, or decode raw files, meshes or tables
     "numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "lazrs", "novatel-edie", "pye57", "gsfu",
     "pykmall", "trimesh",
 )  # fmt: skip
 ROOT = Path(pipeline.__file__).parent.parent
-CALLS = ("pipeline.evaluate",)  # calls every stage, and writes its streams
-CARRIES = ("pipeline/runner.py", "pipeline/executor.py")  # carry data in and out; all else they import decides when
+CALLS = ("pipeline.run.stage_protocol",)  # calls every stage, and writes its streams
+CARRIES = ("pipeline/run/runner.py", "pipeline/run/workers.py")  # carry data in and out; what else they import does not
 
 
 @functools.cache

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulation.earth import Floats
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import MbesScenario
+from pipeline.simulation.site import Floats
 
 LEAST_WEIGHT = 0.3  # this share of a beam must meet something, else there is no detection
 LONGEST_STEP = 60_000  # section A2: of 65535

@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 from scipy.signal import lfilter
 
-from pipeline.config import Drift
-from pipeline.simulation.earth import Floats
+from pipeline.config.session import Drift
+from pipeline.gps_time import NS
 from pipeline.simulation.motion import Movement, Times
-from pipeline.simulation.noise import generator
+from pipeline.simulation.random_streams import generator
 from pipeline.simulation.scenario import InsScenario
-from pipeline.times import NS
+from pipeline.simulation.site import Floats
 
 Columns = dict[str, np.ndarray]
 NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from pipeline.simulation.earth import Floats
+from pipeline.gps_time import NS
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
-from pipeline.simulation.noise import generator
+from pipeline.simulation.random_streams import generator
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import LaserScenario
-from pipeline.times import NS
+from pipeline.simulation.site import Floats
 
 CHUNK = 200_000
 SHORTEST_M = 0.5

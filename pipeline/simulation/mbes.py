@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.gps_time import NS
 from pipeline.simulation.beams import Beams, directions_in_mbes, fan, swing_rad, transmit_tilts_rad
-from pipeline.simulation.earth import Floats
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
-from pipeline.simulation.noise import generator
+from pipeline.simulation.random_streams import generator
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import MbesScenario
-from pipeline.times import NS
+from pipeline.simulation.site import Floats
 
 RAYS_AT_ONCE = 400_000
 CLOCK_RATE_ERROR = 3.7e-5  # the sonar's own clock: pings never fall into step with the INS

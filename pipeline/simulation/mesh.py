@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import Faces, Letters, Target
-from pipeline.simulation.earth import Floats
+from pipeline.config.target import Faces, Letters, Target
 from pipeline.simulation.scenario import Surroundings
+from pipeline.simulation.site import Floats
 
 SIDES = {"south": -1.0, "north": 1.0}
 BEHIND_M = 30.0  # the floor reaches this far toward the vessel

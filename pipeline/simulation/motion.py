@@ -6,10 +6,10 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulation.earth import Floats, Site
-from pipeline.simulation.noise import generator
+from pipeline.gps_time import NS, gps_ns_from_unix_utc
+from pipeline.simulation.random_streams import generator
 from pipeline.simulation.scenario import Scenario
-from pipeline.times import NS, gps_ns_from_unix_utc
+from pipeline.simulation.site import Floats, Site
 
 Times = NDArray[np.int64]
 WAVES = ("sway", "surge", "heave", "roll", "pitch", "heading")  # x, y, z, and the three angles

@@ -3,10 +3,10 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import Mount
-from pipeline.simulation.earth import Floats
-from pipeline.simulation.noise import generator
+from pipeline.config.mount import Mount
+from pipeline.simulation.random_streams import generator
 from pipeline.simulation.scenario import LaserScenario, MbesScenario
+from pipeline.simulation.site import Floats
 
 
 def R_body_from_sensor(mount: Mount) -> Rotation:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.gps_time import NS, WEEK_NS
 from pipeline.simulation.ins import Columns
-from pipeline.times import NS, WEEK_NS
 
 SHORT_HEADER = np.dtype([("sync", "u1", 3), ("length", "u1"), ("id", "<u2"), ("week", "<u2"), ("ms", "<u4")])
 LONG_HEADER = np.dtype(

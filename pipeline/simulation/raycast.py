@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulation.earth import Floats
 from pipeline.simulation.mesh import Mesh
+from pipeline.simulation.site import Floats
 
 
 class RayCaster:

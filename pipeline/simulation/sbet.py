@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from pipeline.gps_time import NS, WEEK_NS
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.novatel import velocities
-from pipeline.times import NS, WEEK_NS
 
 WANDER_RAD = np.radians(-1.25)
 

@@ -7,11 +7,23 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline import CONFIGS
-from pipeline.config import Drift, Letters, Mount, Origin, Target, White
+from pipeline.config.mount import Mount
+from pipeline.config.quantities import (
+    Angle,
+    Latency,
+    Length,
+    Lever,
+    Model,
+    NotNegative,
+    Positive,
+    SoundSpeed,
+    TransmitSectors,
+)
+from pipeline.config.session import Drift, White
+from pipeline.config.target import Letters, Origin, Target
+from pipeline.config.target_mesh import with_mesh
+from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.errors import ConfigError
-from pipeline.meshes import with_mesh
-from pipeline.parsing import parse, read_yaml
-from pipeline.quantities import Angle, Latency, Length, Lever, Model, NotNegative, Positive, SoundSpeed, TransmitSectors
 
 SCENARIOS = CONFIGS / "scenarios"
 Share = Annotated[float, Field(ge=0, le=1)]

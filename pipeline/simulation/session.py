@@ -15,7 +15,7 @@ import yaml
 
 from pipeline.errors import ConfigError
 from pipeline.simulation.beams import fan
-from pipeline.simulation.bth0 import packets, xtf_bytes
+from pipeline.simulation.documents import INS_SUFFIX, pool_text, session_text, truth_text
 from pipeline.simulation.georeferenced import laser_in_ecef
 from pipeline.simulation.ins import Columns, record_ins
 from pipeline.simulation.las import write_las
@@ -24,11 +24,11 @@ from pipeline.simulation.mbes import Pool, record_mbes
 from pipeline.simulation.mesh import build_mesh, corner_lines
 from pipeline.simulation.motion import Movement
 from pipeline.simulation.novatel import aligning_bodies, bodies, novatel_bytes
+from pipeline.simulation.r2sonic_packets import packets, xtf_bytes
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.sbet import sbet_bytes
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.tables import write_soundings
-from pipeline.simulation.texts import INS_SUFFIX, pool_text, session_text, truth_text
 
 
 @dataclass(frozen=True)

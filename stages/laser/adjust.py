@@ -8,20 +8,23 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.adjusting import Given, adjust, free_unknowns, noise_of
-from pipeline.config import Adjust, AsBuilt, Ingest, Ins, Laser, LaserFit, Segment, Target, Verdict
-from pipeline.considered import considered_of
-from pipeline.ins_sigmas import drift_of
-from pipeline.laser_fit import bounds_of, coarse_covariance, design_of, held_of
-from pipeline.looking import drift_rows, look
-from pipeline.maths.rigid_design import of_design
-from pipeline.maths.unknowns import SIX
-from pipeline.mounts import PARAMETERS, mount_of, target_of
-from pipeline.outcome import tables
-from pipeline.residuals import bins_table, map_table
-from pipeline.scene import laser_scene_of
-from pipeline.streams import Stream
+from pipeline.adjustment.consider import considered_of
+from pipeline.adjustment.ins_drift import drift_of
+from pipeline.adjustment.iteration import Given, adjust, free_unknowns, noise_of
+from pipeline.adjustment.laser_design import bounds_of, coarse_covariance, design_of, held_of
+from pipeline.adjustment.observation_model import laser_scene_of
+from pipeline.adjustment.residual_statistics import drift_rows, look
+from pipeline.adjustment.residual_tables import bins_table, map_table
+from pipeline.adjustment.result_tables import tables
+from pipeline.artefacts.catalogue.points import INS_SIGMAS, PASSES, POSES
+from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, TARGET_POSE
+from pipeline.artefacts.streams import Stream
+from pipeline.config.pool import Adjust, AsBuilt, Ingest, LaserFit, Segment, Verdict
+from pipeline.config.session import Ins, Laser
+from pipeline.config.target import Target
+from pipeline.maths.adjustment.design_constraints import of_design
+from pipeline.maths.adjustment.parameters import SIX
+from pipeline.mount import PARAMETERS, mount_of, target_of
 from stages.adjust import SHOWN, Outputs
 
 __all__ = ["Config", "Inputs", "Outputs", "run"]
@@ -42,13 +45,13 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
-    passes: Annotated[pd.DataFrame, artefacts.PASSES]
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    poses: Annotated[pd.DataFrame, artefacts.POSES]
-    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
-    planes: Annotated[pd.DataFrame, artefacts.PLANES]
-    laser_labelled: Annotated[Stream, artefacts.LASER_LABELLED]
+    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
+    passes: Annotated[pd.DataFrame, PASSES]
+    faces: Annotated[pd.DataFrame, FACES]
+    poses: Annotated[pd.DataFrame, POSES]
+    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    planes: Annotated[pd.DataFrame, PLANES]
+    laser_labelled: Annotated[Stream, LASER_LABELLED]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:

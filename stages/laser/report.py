@@ -7,8 +7,30 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.blocks import (
+from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.artefacts.catalogue.points import INS_SIGMAS, PASSES
+from pipeline.artefacts.catalogue.results import (
+    ADJUST_SUMMARY,
+    CALIBRATION,
+    CALIBRATION_JSON,
+    CALIBRATION_YAML,
+    CELLS,
+    COVARIANCE,
+    DRIFT,
+    ESTIMATE,
+    FREED,
+    GEOMETRY,
+    GROUPS,
+    PATTERNS,
+)
+from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT, TARGET_POSE
+from pipeline.artefacts.schema import Provenance
+from pipeline.config.pool import Adjust, Segment, Verdict
+from pipeline.config.session import Ins, Laser
+from pipeline.config.target import Target
+from pipeline.mount import PARAMETERS, mount_of, target_of
+from pipeline.report.as_built import as_found, by_design, oddities
+from pipeline.report.calibration_document import (
     SCHEMA,
     adjustment_block,
     calibration_table,
@@ -20,14 +42,10 @@ from pipeline.blocks import (
     plain,
     target_block,
 )
-from pipeline.built import as_found, by_design, oddities
-from pipeline.config import Adjust, Ins, Laser, Segment, Target, Verdict
-from pipeline.finding import FARTHEST
-from pipeline.ins_sigmas import drift_of, told
-from pipeline.judging.residual_tests import pattern_tests
-from pipeline.mounts import PARAMETERS, mount_of, target_of
-from pipeline.screen import verdict_in_words
-from pipeline.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons, warnings
+from pipeline.report.residual_tests import pattern_tests
+from pipeline.report.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons, warnings
+from pipeline.results.screen import verdict_in_words
+from pipeline.target.pose_search import FARTHEST
 
 
 @dataclass(frozen=True)
@@ -43,29 +61,29 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    ins_sigmas: Annotated[pd.DataFrame, artefacts.INS_SIGMAS]
-    passes: Annotated[pd.DataFrame, artefacts.PASSES]
-    faces: Annotated[pd.DataFrame, artefacts.FACES]
-    planes: Annotated[pd.DataFrame, artefacts.PLANES]
-    target_pose: Annotated[pd.DataFrame, artefacts.TARGET_POSE]
-    provisional_mount: Annotated[pd.DataFrame, artefacts.PROVISIONAL_MOUNT]
-    estimate: Annotated[pd.DataFrame, artefacts.ESTIMATE]
-    covariance: Annotated[pd.DataFrame, artefacts.COVARIANCE]
-    geometry: Annotated[pd.DataFrame, artefacts.GEOMETRY]
-    drift: Annotated[pd.DataFrame, artefacts.DRIFT]
-    freed: Annotated[pd.DataFrame, artefacts.FREED]
-    patterns: Annotated[pd.DataFrame, artefacts.PATTERNS]
-    cells: Annotated[pd.DataFrame, artefacts.CELLS]
-    groups: Annotated[pd.DataFrame, artefacts.GROUPS]
-    summary: Annotated[pd.DataFrame, artefacts.ADJUST_SUMMARY]
-    provenance: Annotated[dict[str, Any], artefacts.Provenance]
+    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
+    passes: Annotated[pd.DataFrame, PASSES]
+    faces: Annotated[pd.DataFrame, FACES]
+    planes: Annotated[pd.DataFrame, PLANES]
+    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
+    estimate: Annotated[pd.DataFrame, ESTIMATE]
+    covariance: Annotated[pd.DataFrame, COVARIANCE]
+    geometry: Annotated[pd.DataFrame, GEOMETRY]
+    drift: Annotated[pd.DataFrame, DRIFT]
+    freed: Annotated[pd.DataFrame, FREED]
+    patterns: Annotated[pd.DataFrame, PATTERNS]
+    cells: Annotated[pd.DataFrame, CELLS]
+    groups: Annotated[pd.DataFrame, GROUPS]
+    summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+    provenance: Annotated[dict[str, Any], Provenance]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    calibration: Annotated[pd.DataFrame, artefacts.CALIBRATION]
-    calibration_json: Annotated[str, artefacts.CALIBRATION_JSON]
-    calibration_yaml: Annotated[str, artefacts.CALIBRATION_YAML]
+    calibration: Annotated[pd.DataFrame, CALIBRATION]
+    calibration_json: Annotated[str, CALIBRATION_JSON]
+    calibration_yaml: Annotated[str, CALIBRATION_YAML]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:

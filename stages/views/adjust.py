@@ -7,18 +7,28 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline import artefacts
-from pipeline.families import families_of, shown_as
-from pipeline.folder import read_settings
-from pipeline.maths.residuals import face_axes
-from pipeline.maths.rotations import exp_so3
-from pipeline.mounts import PARAMETERS, Mounted, mount_of
-from pipeline.poses import trajectory_in_target
-from pipeline.residuals import FEWEST
-from pipeline.tables import Tables
-from pipeline.times import NS
-from stages.views import COLOURS, DOT_M, GREY, LASER, SONAR, curve, words
+from pipeline.adjustment.residual_tables import FEWEST
+from pipeline.artefacts.catalogue.points import POSES
+from pipeline.artefacts.catalogue.results import (
+    COVARIANCE,
+    ESTIMATE,
+    GROUPS,
+    RESIDUAL_BINS,
+    RESIDUAL_MAP,
+    RESIDUALS,
+    SURFACES,
+)
+from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
+from pipeline.artefacts.families import families_of, shown_as
+from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.gps_time import NS
+from pipeline.maths.geometry.face_grid import face_axes
+from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.mount import PARAMETERS, Mounted, mount_of
+from pipeline.run.folder import read_settings
+from pipeline.run.results import Tables
 from stages.views.ingest import moments_of
+from stages.views.recording import COLOURS, DOT_M, GREY, LASER, SONAR, curve, words
 
 Array = NDArray[np.float64]
 Shades = dict[str, tuple[int, int, int]]  # by family
@@ -29,13 +39,13 @@ MOMENT_NS = NS // 50  # points of one fan lie within this time
 
 
 def log(recording: Any, tables: Tables) -> None:
-    faces, residuals = tables.table(artefacts.FACES), tables.table(artefacts.RESIDUALS)
+    faces, residuals = tables.table(FACES), tables.table(RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span, steps = _span(residuals), _steps(tables, residuals)
     _clouds(recording, tables, residuals, family, span, steps, shown_as(families_of(faces), COLOURS))
-    _maps(recording, tables.table(artefacts.RESIDUAL_MAP), faces, span)
+    _maps(recording, tables.table(RESIDUAL_MAP), faces, span)
     _fans(recording, tables, residuals)
-    _over_time(recording, tables.table(artefacts.RESIDUAL_BINS), steps, shown_as(families_of(faces), COLOURS))
+    _over_time(recording, tables.table(RESIDUAL_BINS), steps, shown_as(families_of(faces), COLOURS))
     _words(recording, tables, span)
 
 
@@ -52,7 +62,7 @@ def _span(residuals: pd.DataFrame) -> dict[str, float]:
 def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
     """One in how many observations of each sensor is in the table residuals."""
     total = dict.fromkeys(SENSORS, 0)
-    for row in tables.table(artefacts.GROUPS).to_dict("records"):
+    for row in tables.table(GROUPS).to_dict("records"):
         sensor = str(row["group"]).partition("_")[0]
         if sensor in total:
             total[sensor] += row["count"]
@@ -77,10 +87,10 @@ def _clouds(
 ) -> None:
     import rerun as rr
 
-    surfaces: Any = tables.table(artefacts.SURFACES).to_dict("records")
+    surfaces: Any = tables.table(SURFACES).to_dict("records")
     # shown on its surface: in front of it a point would hide those behind, and all would look as if they stood before
     normals = {row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in surfaces}
-    solved = bool(np.isfinite(tables.table(artefacts.ESTIMATE)["value"].to_numpy()[:6]).all())
+    solved = bool(np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all())
     for sensor in SENSORS:
         of_sensor = (residuals["sensor"] == sensor).to_numpy()
         step = rr.AnyValues(one_in=steps[sensor])
@@ -135,7 +145,7 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
     import rerun as rr
 
     session = read_settings(tables.run).session
-    trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
+    trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
     mounts = {"laser": mount_of(session.laser.mount)}
     calibrated = "laser" if session.mbes is None else "mbes"
     mounts[calibrated] = _calibrated(tables, mount_of((session.mbes or session.laser).mount))
@@ -154,7 +164,7 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
 
 def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
     """The mount by the adjustment's estimate; the coarse one where there is none."""
-    values = tables.table(artefacts.ESTIMATE)["value"].to_numpy()[:6]
+    values = tables.table(ESTIMATE)["value"].to_numpy()[:6]
     if not np.all(np.isfinite(values)):
         return coarse
     return Mounted(exp_so3(values[:3]) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + values[3:])
@@ -188,12 +198,12 @@ def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades
 
 
 def _words(recording: Any, tables: Tables, span: dict[str, float]) -> None:
-    matrix = tables.table(artefacts.COVARIANCE)["correlation"].to_numpy().reshape(6, 6)
+    matrix = tables.table(COVARIANCE)["correlation"].to_numpy().reshape(6, 6)
     places = [place for _, place, *_ in PARAMETERS]
     lines = ["Colours: blue, grey, orange from minus to plus; the strongest at"]
     lines += [f"  {s}: {1000 * span[s]:.1f} mm (points), {1000 * span[s] / 3:.1f} mm (means)" for s in SENSORS]
     lines += ["Plus: towards the boat, of horizontal faces up.", "", "Observations, and their variance factors:"]
-    for row in tables.table(artefacts.GROUPS).to_dict("records"):
+    for row in tables.table(GROUPS).to_dict("records"):
         lines.append(f"  {row['group']:<16}{row['count']:>10,}{row['variance_factor']:>8.3f}")
     lines += ["", "Correlations", " " * 6 + "".join(f"{name:>7}" for name, *_ in PARAMETERS)]
     for name, row_of, *_ in PARAMETERS:

@@ -6,42 +6,44 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.closing import families_of
-from pipeline.fitted import ALL_PASSES, laser_planes
-from pipeline.folder import read_settings
-from pipeline.maths.moments import plane_moments
-from pipeline.maths.planes import fit_plane
-from pipeline.maths.rotations import exp_so3
-from pipeline.mounts import mount_of
-from pipeline.poses import trajectory_in_target
-from pipeline.streams import xyz
-from pipeline.tables import Tables
-from stages.views import COLOURS, GREY, SONAR, curve, words
+from pipeline.artefacts.catalogue.patent import ANGLES, ITERATIONS
+from pipeline.artefacts.catalogue.points import POSES
+from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.artefacts.from_tables import ALL_PASSES, laser_planes
+from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.streams import xyz
+from pipeline.maths.geometry.planes import fit_plane
+from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.maths.patent.lifted_moments import plane_moments
+from pipeline.mount import mount_of
+from pipeline.report.plane_agreement import families_of
+from pipeline.run.folder import read_settings
+from pipeline.run.results import Tables
 from stages.views.fit_planes import cut_out
+from stages.views.recording import COLOURS, GREY, SONAR, curve, words
 
 SOUNDINGS = 20_000  # for all the family's points of one step
 STEPS = 60  # that are replayed
 FAMILIES = ("P1", "P2", "P3")
-ANGLES = dict(zip((*FAMILIES, "P4"), COLOURS.values(), strict=False))
+ANGLE_COLOURS = dict(zip((*FAMILIES, "P4"), COLOURS.values(), strict=False))
 
 
 def log(recording: Any, tables: Tables) -> None:
     import rerun as rr
 
-    faces, iterations = tables.table(artefacts.FACES), tables.table(artefacts.ITERATIONS)
+    faces, iterations = tables.table(FACES), tables.table(ITERATIONS)
     mount = mount_of(read_settings(tables.run).session.sonar.mount)
-    trajectory = trajectory_in_target(tables.table(artefacts.POSES), tables.table(artefacts.TARGET_POSE))
+    trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
     columns, step = tables.sample(
-        artefacts.SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", "face", *(f"{axis}_mbes_m" for axis in "xyz")
+        SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", "face", *(f"{axis}_mbes_m" for axis in "xyz")
     )
     positions, R_target_from_body = trajectory.poses_at(columns["t_ns"].astype(np.int64))
     body = xyz(columns, "mbes_m") @ mount.R_body_from_sensor.T
     family = faces["family"].to_numpy()[columns["face"].astype(int)]
-    laser = laser_planes(tables.table(artefacts.PLANES))
-    lifted = families_of(faces, tables.table(artefacts.SOUNDING_MOMENTS))
+    laser = laser_planes(tables.table(PLANES))
+    lifted = families_of(faces, tables.table(SOUNDING_MOMENTS))
     _curves(recording, iterations)
-    say_why(recording, "angles", tables.table(artefacts.ANGLES))
+    say_why(recording, "angles", tables.table(ANGLES))
     for row in iterations.iloc[:: max(1, -(-len(iterations) // STEPS))].to_dict("records"):
         recording.set_time("iteration", sequence=int(row["iteration"]))
         correction = exp_so3(np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"]))
@@ -70,7 +72,7 @@ def _curves(recording: Any, iterations: pd.DataFrame) -> None:
     import rerun as rr
 
     deviations = dict(zip(("roll", "pitch", "yaw"), COLOURS.values(), strict=False))
-    for folder, stem, colours in (("deviation", "deviation", deviations), ("planes", "angle", ANGLES)):
+    for folder, stem, colours in (("deviation", "deviation", deviations), ("planes", "angle", ANGLE_COLOURS)):
         for name, colour in colours.items():
             column = f"{stem}_{name}_deg"
             if column in iterations:

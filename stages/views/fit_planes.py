@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.families import families_of
-from pipeline.fitted import ALL_PASSES, planes_of
-from pipeline.maths.planes import Plane
-from pipeline.tables import Tables
-from stages.views import GREY, SONAR
+from pipeline.artefacts.catalogue.target import FACES, PLANES
+from pipeline.artefacts.families import families_of
+from pipeline.artefacts.from_tables import ALL_PASSES, planes_of
+from pipeline.maths.geometry.planes import Plane
+from pipeline.run.results import Tables
+from stages.views.recording import GREY, SONAR
 
 SHOWN = {"laser": GREY, "mbes": SONAR}
 
@@ -18,7 +18,7 @@ SHOWN = {"laser": GREY, "mbes": SONAR}
 def log(recording: Any, tables: Tables) -> None:
     import rerun as rr
 
-    faces, planes = tables.table(artefacts.FACES), tables.table(artefacts.PLANES)
+    faces, planes = tables.table(FACES), tables.table(PLANES)
     for sensor, colour in SHOWN.items():
         found = planes_of(planes, sensor)
         for family in families_of(faces):

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import artefacts
-from pipeline.passes import pass_of
-from pipeline.streams import xyz
-from pipeline.tables import Tables
-from stages.views import AT_MOST, DOT_M, GREY, SONAR
+from pipeline.artefacts.catalogue.points import LASER_POOL, PASSES, POSES, SOUNDINGS_POOL
+from pipeline.artefacts.streams import xyz
+from pipeline.maths.geometry.passes import pass_of
+from pipeline.run.results import Tables
+from stages.views.recording import AT_MOST, DOT_M, GREY, SONAR
 
 TRACK_POINTS = 2000  # a pass
 
@@ -16,7 +16,7 @@ TRACK_POINTS = 2000  # a pass
 def log(recording: Any, tables: Tables) -> None:
     import rerun as rr
 
-    poses, passes = tables.table(artefacts.POSES), tables.table(artefacts.PASSES)
+    poses, passes = tables.table(POSES), tables.table(PASSES)
     number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
     track = poses[["x_pool_m", "y_pool_m", "z_pool_m"]].to_numpy()
     for one in passes["pass"].tolist():
@@ -26,8 +26,8 @@ def log(recording: Any, tables: Tables) -> None:
             line = rr.LineStrips3D([points.astype(np.float32)], radii=0.02, colors=GREY)
             recording.log(f"pool/trajectory/pass_{one}", line, static=True)
     for name, artefact, colour in (
-        ("laser", artefacts.LASER_POOL, GREY),
-        ("soundings", artefacts.SOUNDINGS_POOL, SONAR),
+        ("laser", LASER_POOL, GREY),
+        ("soundings", SOUNDINGS_POOL, SONAR),
     ):
         columns, step = tables.sample(artefact, AT_MOST, *(f"{axis}_pool_m" for axis in "xyz"))
         cloud = rr.Points3D(xyz(columns, "pool_m").astype(np.float32), radii=DOT_M, colors=colour)

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import artefacts
-from pipeline.tables import Tables
-from pipeline.times import NS, unix_ns_from_gps, utc_text
-from stages.views import curve, words
+from pipeline.artefacts.catalogue.points import FILES, TRAJECTORY
+from pipeline.gps_time import NS, unix_ns_from_gps, utc_text
+from pipeline.run.results import Tables
+from stages.views.recording import curve, words
 
 RECORDS = 20_000  # of a curve
 HOLE_NS = 2 * NS
@@ -30,7 +30,7 @@ Residual   mean of a second by family of faces, plus
 def log(recording: Any, tables: Tables) -> None:
     import rerun as rr
 
-    whole = tables.table(artefacts.TRAJECTORY)
+    whole = tables.table(TRAJECTORY)
     t_ns = whole["t_ns"].to_numpy()
     trajectory = whole.iloc[:: max(1, -(-len(whole) // RECORDS))]
     after = np.searchsorted(trajectory["t_ns"].to_numpy(), t_ns[1:][np.diff(t_ns) > HOLE_NS])
@@ -47,7 +47,7 @@ def log(recording: Any, tables: Tables) -> None:
         moments = trajectory["t_ns"].to_numpy()
         curve(recording, f"quality/attitude/{name}", style, partial(moments_of, moments), shown)
     lines = [f"{'sensor':<8}{'records':>12}{'left out':>10}  {'from (UTC)':<22}{'rate, Hz':>10}  file"]
-    for row in tables.table(artefacts.FILES).to_dict("records"):
+    for row in tables.table(FILES).to_dict("records"):
         first = utc_text(int(row["first_ns"]))
         numbers = f"{row['records']:>12,}{row['dropped']:>10,}  {first:<22}{row['rate_hz']:>10.1f}"
         lines.append(f"{row['sensor']:<8}{numbers}  {row['file']}")

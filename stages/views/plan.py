@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.families import shown_as
-from pipeline.files import write_bytes
-from pipeline.planned import Answer, Outlook
-from pipeline.planning import track
-from stages.views import COLOURS, GREY, LASER, SONAR, content, words
+from pipeline.artefacts.families import shown_as
+from pipeline.atomic_files import write_bytes
+from pipeline.planning.assessment import Answer, Outlook
+from pipeline.planning.prediction import track
+from stages.views.recording import COLOURS, GREY, LASER, SONAR, content, words
 
 PLENTY = 1000  # soundings on a face, from which on it is coloured in full
 

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from pipeline.folder import calibration
-from pipeline.screen import summary
-from pipeline.tables import Tables
-from stages.views import words
+from pipeline.results.screen import summary
+from pipeline.run.folder import calibration
+from pipeline.run.results import Tables
+from stages.views.recording import words
 
 
 def log(recording: Any, tables: Tables) -> None:

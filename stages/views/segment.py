@@ -4,26 +4,26 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import artefacts
-from pipeline.families import families_of, shown_as
-from pipeline.streams import xyz
-from pipeline.tables import Tables
-from stages.views import AT_MOST, COLOURS, DOT_M
+from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, TARGET_POSE
+from pipeline.artefacts.families import families_of, shown_as
+from pipeline.artefacts.streams import xyz
+from pipeline.run.results import Tables
+from stages.views.recording import AT_MOST, COLOURS, DOT_M
 
 
 def log(recording: Any, tables: Tables) -> None:
     import rerun as rr
 
-    pose = tables.table(artefacts.TARGET_POSE).iloc[0]
+    pose = tables.table(TARGET_POSE).iloc[0]
     R_target_from_pool = np.array(pose["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
     origin = np.array([pose[f"origin_{axis}_pool_m"] for axis in "xyz"], dtype=np.float64)
     placed = rr.Transform3D(translation=-R_target_from_pool @ origin, mat3x3=R_target_from_pool)
     recording.log("pool", placed, static=True)
 
-    faces = tables.table(artefacts.FACES)
+    faces = tables.table(FACES)
     family_of = faces["family"].to_numpy()
     laser, step = tables.sample(
-        artefacts.LASER_LABELLED, AT_MOST, "face", *(f"{axis}_target_m" for axis in "xyz")
+        LASER_LABELLED, AT_MOST, "face", *(f"{axis}_target_m" for axis in "xyz")
     )
     points, family = xyz(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
     for name, colour in shown_as(families_of(faces), COLOURS).items():

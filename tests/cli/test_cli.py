@@ -14,7 +14,7 @@ import pytest
 import pipeline
 from stages import ORDER
 from stages.cli import _go_on, call
-from stages.drawing import Painters
+from stages.commands.draw import Painters
 from tests.runner.conftest import Pool
 
 COMMANDS = ("simulate", "run", "stage", "verify", "view", "diff", "history", "plan", "coarse", "compare")
@@ -262,7 +262,7 @@ def test_an_interrupt_that_a_library_made_an_error_of(
 
     monkeypatch.setattr("stages.cli.app", fails)
     assert call(["run"]) == 3
-    monkeypatch.setattr("stages.ending.interrupts", [2])
+    monkeypatch.setattr("stages.commands.entry.interrupts", [2])
     capsys.readouterr()
     assert call(["run"]) == 130
     assert capsys.readouterr().err == "poolcal: interrupted; what was complete is kept\n"
@@ -274,7 +274,7 @@ def test_an_interrupt_that_python_ignored(monkeypatch: pytest.MonkeyPatch) -> No
     drawing = Painters(report=False, recordings=False)
     monkeypatch.setattr(drawing, "begin", lambda _, stage: drawn.append(stage))
     _go_on(drawing, Path("run"), "ingest")
-    monkeypatch.setattr("stages.ending.interrupts", [2])
+    monkeypatch.setattr("stages.commands.entry.interrupts", [2])
     with pytest.raises(KeyboardInterrupt):
         _go_on(drawing, Path("run"), "georeference")
     assert drawn == ["ingest"]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline import folder
 from pipeline.errors import ArtefactError, ConfigError
-from stages.compare import compare, errors_of, read_truth
+from pipeline.run import folder
+from stages.commands.truth import compare, errors_of, read_truth
 from tests.runner.conftest import Pool
 
 EPSILON_DEG, LEVER_ERROR_M = np.array([0.01, -0.02, 0.03]), np.array([0.001, -0.002, 0.003])

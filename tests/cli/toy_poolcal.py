@@ -15,12 +15,13 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import pandas as pd
 
-import pipeline.readers
-import pipeline.screen
+import pipeline.readers.dispatch
+import pipeline.results.screen
 import stages
-import stages.drawing
-from pipeline import artefacts
-from pipeline.config import Verdict
+import stages.commands.draw
+from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
+from pipeline.artefacts.schema import Provenance
+from pipeline.config.pool import Verdict
 from tests.runner import toys
 
 
@@ -33,12 +34,12 @@ class Config:
 @dataclass(frozen=True)
 class Inputs:
     means: Annotated[pd.DataFrame, toys.MEANS]
-    provenance: Annotated[dict[str, Any], artefacts.Provenance]
+    provenance: Annotated[dict[str, Any], Provenance]
 
 
 @dataclass(frozen=True)
 class Outputs:
-    calibration_json: Annotated[str, artefacts.CALIBRATION_JSON]
+    calibration_json: Annotated[str, CALIBRATION_JSON]
 
 
 def _run(inputs: Inputs, config: Config) -> Outputs:
@@ -63,16 +64,16 @@ def install() -> None:
     report = types.ModuleType("stages.report")
     report.__file__ = __file__
     vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
-    stages.drawing.Painters.begin = lambda *_: None  # type: ignore[method-assign]  # toys have nothing to show
-    stages.drawing.Painters.draw = lambda *_: []  # type: ignore[method-assign]
-    pipeline.screen.summary = lambda result: f"{result['session']}: {result['verdict']}"
+    stages.commands.draw.Painters.begin = lambda *_: None  # type: ignore[method-assign]  # toys have nothing to show
+    stages.commands.draw.Painters.draw = lambda *_: []  # type: ignore[method-assign]
+    pipeline.results.screen.summary = lambda result: f"{result['session']}: {result['verdict']}"
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
     for module in (take, sift, report):
         sys.modules[module.__name__] = module
     stages.ORDER = ("take", "sift", "report")  # type: ignore[assignment]
-    pipeline.readers.raw_files = toys.raw_files  # type: ignore[attr-defined,assignment]
-    pipeline.readers.raw_parts = toys.raw_parts  # type: ignore[attr-defined,assignment]
+    pipeline.readers.dispatch.raw_files = toys.raw_files  # type: ignore[attr-defined,assignment]
+    pipeline.readers.dispatch.raw_parts = toys.raw_parts  # type: ignore[attr-defined,assignment]
 
 
 if __name__ == "__main__":

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.config import Laser, load_session
+from pipeline.coarse.session_edit import edited, refuse_other
+from pipeline.config.pool import load_session
+from pipeline.config.session import Laser
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from pipeline.parsing import parse
-from pipeline.session_edit import edited, refuse_other
 from tests.coarse.conftest import KEYS, PLAIN, marks_of, mounts_in, run
 from tests.maths.surveys import World
 

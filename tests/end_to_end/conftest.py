@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from stages import ORDER
-from stages.drawing import Painters
+from stages.commands.draw import Painters
 from tests.end_to_end.places import Place, Told, digests, poolcal, simulate
 
 

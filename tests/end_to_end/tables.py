@@ -10,8 +10,8 @@ import yaml
 from pyproj import Transformer
 from scipy.spatial.transform import Rotation, Slerp
 
+from pipeline.gps_time import WEEK_NS
 from pipeline.simulation.session import SimulatedSession
-from pipeline.times import WEEK_NS
 
 
 def write_tables(

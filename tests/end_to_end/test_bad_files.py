@@ -7,8 +7,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from pipeline.gps_time import NS
 from pipeline.simulation.novatel import aligning_bodies, novatel_bytes
-from pipeline.times import NS
 from tests.end_to_end.places import Place, Told, poolcal, simulate
 from tests.end_to_end.refusals import Spoil, as_if_nothing_had_been, nothing_is_left, one_line
 

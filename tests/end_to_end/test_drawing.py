@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import stages.painter
-import stages.views
-from pipeline.folder import locked
-from pipeline.streams import serial
+import stages.commands.draw_process
+import stages.views.recording
+from pipeline.artefacts.streams import serial
+from pipeline.run.folder import locked
 from stages import ORDER
-from stages.drawing import Painters, Prepared, paint, painters
-from stages.views.tour import tabs_of
+from stages.commands.draw import Painters, Prepared, paint, painters
+from stages.views.blueprint import tabs_of
 from tests.effort import often
 from tests.end_to_end.places import Place, digests, poolcal
 from tests.end_to_end.recordings import points, read
@@ -49,7 +49,7 @@ def _draws(process: Path) -> bool:
         words, given = (process / "cmdline").read_bytes(), (process / "environ").read_bytes()
     except OSError:  # gone, or not ours
         return False
-    return b"stages.painter" in words and MARK.encode() in given
+    return b"stages.commands.draw_process" in words and MARK.encode() in given
 
 
 def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,7 +59,7 @@ def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], m
         def fails(*_: object, error: Exception = error) -> bool:
             raise error
 
-        monkeypatch.setattr(stages.views, "record", fails)
+        monkeypatch.setattr(stages.views.recording, "record", fails)
         told = place.calibrate("--recordings")
         assert told.status == 0
         last = f"recordings: not drawn ({type(error).__name__}: no room); the calibration is complete"
@@ -172,8 +172,8 @@ def test_no_shared_memory_no_copies(monkeypatch: pytest.MonkeyPatch) -> None:
     def none(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, "Read-only file system")
 
-    monkeypatch.setattr(stages.painter, "ProcessPoolExecutor", none)
-    assert stages.painter._others() is serial
+    monkeypatch.setattr(stages.commands.draw_process, "ProcessPoolExecutor", none)
+    assert stages.commands.draw_process._others() is serial
 
 
 def _children(found: Painters) -> list[int]:

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.gps_time import NS, WEEK_NS
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import simulate as simulate_in_memory
-from pipeline.times import NS, WEEK_NS
 from tests.effort import often
 from tests.end_to_end.places import Place, errors, poolcal, result_of, sigmas, simulate
 from tests.end_to_end.tables import write_tables

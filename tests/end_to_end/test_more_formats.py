@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pyproj import CRS, Transformer
 
+from pipeline.gps_time import NS, unix_ns_from_gps
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import SimulatedSession
 from pipeline.simulation.session import simulate as simulate_in_memory
-from pipeline.times import NS, unix_ns_from_gps
 from tests.end_to_end.places import Place, edit, result_of, simulate
 from tests.end_to_end.test_formats import run, same
 from tests.readers import e57_files, sonar_files

@@ -14,10 +14,10 @@ import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
 
-import stages.views
+import stages.views.recording
 from stages import ORDER
-from stages.drawing import Painters
-from stages.views.tour import tabs_of
+from stages.commands.draw import Painters
+from stages.views.blueprint import tabs_of
 from tests.end_to_end.places import Told, poolcal
 from tests.end_to_end.recordings import Chunks, points, read, rows_in, text
 
@@ -152,7 +152,7 @@ def test_the_iteration_closes_the_planes(drawn: Path) -> None:
 
 def test_one_scene_a_run_and_sound_files(drawn: Path) -> None:
     ids = set()
-    for stage in stages.views.DRAWN:
+    for stage in stages.views.recording.DRAWN:
         path = drawn / stage / f"{stage}.rrd"
         (entry,) = RrdReader(path).recordings()
         ids.add((entry.application_id, entry.recording_id))
@@ -160,7 +160,7 @@ def test_one_scene_a_run_and_sound_files(drawn: Path) -> None:
         command = [Path(sys.executable).with_name("rerun"), "rrd", "verify", path]
         assert subprocess.run(command, capture_output=True, check=False, timeout=60).returncode == 0
     assert len(ids) == 1
-    assert ids != {("poolcal", stages.views.recording_id(drawn.with_name("other")))}
+    assert ids != {("poolcal", stages.views.recording.recording_id(drawn.with_name("other")))}
 
 
 def test_drawn_once_and_again_when_gone(drawn: Path) -> None:
@@ -339,13 +339,13 @@ def test_nothing_is_sent_of_curves_without_values() -> None:
 
         return rr.TimeColumn("iteration", sequence=[0])
 
-    stages.views.curve(Recording(), "empty", None, times, np.empty(0))
+    stages.views.recording.curve(Recording(), "empty", None, times, np.empty(0))
     assert sent == []
-    stages.views.curve(Recording(), "one", None, times, np.zeros(1))
+    stages.views.recording.curve(Recording(), "one", None, times, np.zeros(1))
     assert sent == ["one", "one"]
-    folder = Path(stages.views.__file__).parent
+    folder = Path(stages.views.recording.__file__).parent
     callers = [path.name for path in folder.glob("*.py") if ".send_columns(" in path.read_text(encoding="utf-8")]
-    assert sorted(callers) == ["__init__.py", "pair.py"]  # pair: hands on what it is given
+    assert sorted(callers) == ["recording.py", "two_runs.py"]  # two_runs: hands on what it is given
 
 
 def test_recordings_drawn_before_know_the_tabs_of_now(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from stages import ORDER
-from stages.drawing import Painters
+from stages.commands.draw import Painters
 from tests.effort import often
 from tests.end_to_end.pages import Page, assert_self_contained
 from tests.end_to_end.places import Place, Told, digests, poolcal, result_of
@@ -221,12 +221,12 @@ def test_what_lies_in_the_pages_place_is_no_matter(done: Place) -> None:
 def test_a_page_that_cannot_be_drawn_spoils_nothing(
     done: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import pipeline.pages.report
+    import pipeline.results.pages.report
 
     def fails(*_: object) -> str:
         raise ValueError("no ink")
 
-    monkeypatch.setattr(pipeline.pages.report, "page", fails)
+    monkeypatch.setattr(pipeline.results.pages.report, "page", fails)
     told = done.calibrate("--report")
     assert told.status == 0
     assert told.complaints[-1] == "report.html: not drawn (ValueError: no ink); the calibration is complete"

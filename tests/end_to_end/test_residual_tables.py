@@ -8,7 +8,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation, Slerp
 
-from pipeline.residuals import step_for
+from pipeline.adjustment.residual_tables import step_for
 from tests.end_to_end.places import Told, result_of
 
 XYZ = [f"{axis}_target_m" for axis in "xyz"]

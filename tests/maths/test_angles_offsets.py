@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import DegenerateGeometryError
-from pipeline.maths.angles import PassPlanes, deviations, fourth_normal, iterate_angles, look, patent_cosines
-from pipeline.maths.moments import lift
-from pipeline.maths.offsets import DryFace, PassOffsets, WetFace, alternate, offsets
-from pipeline.maths.planes import Moments, fit_plane
+from pipeline.maths.geometry.planes import Moments, fit_plane
+from pipeline.maths.patent.angles import PassPlanes, deviations, fourth_normal, iterate_angles, look, patent_cosines
+from pipeline.maths.patent.lifted_moments import lift
+from pipeline.maths.patent.offsets import DryFace, PassOffsets, WetFace, alternate, offsets
 from tests.targets import by_letters, members
 
 DOWN = np.array([0.0, 0.0, -1.0])

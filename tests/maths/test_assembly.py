@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError
-from pipeline.maths.assembly import Outline, Relation, build_target
+from pipeline.maths.target.outlines import Outline, Relation, build_target
 from tests.targets import by_letters
 
 WALL = Outline("wall", [(0, 2, -3), (0, -2, -3), (0, -2, 2), (0, 2, 2)])

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.crossed import tilt_in_mbes
-from pipeline.maths.soundings import points_in_mbes
+from pipeline.maths.sonar.crossed_arrays import tilt_in_mbes
+from pipeline.maths.sonar.soundings import points_in_mbes
 
 
 def met(angle: float, tilt: float, axis: np.ndarray) -> np.ndarray:

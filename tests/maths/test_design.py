@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.design import Poses, of_poses, of_unknowns
-from pipeline.maths.rotations import exp_so3
-from pipeline.maths.unknowns import OF_LASER, OF_MBES, State, Surface
+from pipeline.maths.adjustment.design_matrix import Poses, of_poses, of_unknowns
+from pipeline.maths.adjustment.parameters import OF_LASER, OF_MBES, State, Surface
+from pipeline.maths.geometry.rotations import exp_so3
 
 STEP = 1e-6
 ROOT = np.sqrt(0.5)

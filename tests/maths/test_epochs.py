@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.maths.epochs import EpochSums, epoch_sums, merged
-from pipeline.maths.variance import common, rescaled, scatter
+from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
+from pipeline.maths.adjustment.variance_components import common, rescaled, scatter
 
 FEATURES = 5
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.maths.consistency import against_others, cells_of, merged_moments, moments_of, steps_of
-from pipeline.maths.drift_of_passes import against_other_passes
-from pipeline.maths.excess import limit_of, standardised
-from pipeline.maths.knots import Drift, Knots, PoseNoise
+from pipeline.maths.adjustment.drift_test import against_other_passes
+from pipeline.maths.adjustment.mean_tests import limit_of, standardised
+from pipeline.maths.adjustment.pose_errors import Drift, Knots, PoseNoise
+from pipeline.maths.adjustment.residual_means import against_others, cells_of, merged_moments, moments_of, steps_of
 
 TOLERATED = 0.003
 

@@ -5,8 +5,8 @@ import pytest
 from pyproj import Transformer
 from scipy.spatial.transform import Rotation, Slerp
 
-from pipeline.maths.geodesy import PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
-from pipeline.maths.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
+from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
 
 PLACES = np.array([[0.0, 0.0, 0.0], [36.0, 120.1, 12.0], [-72.3, -179.9, 3000.0], [89.999, 10.0, -50.0]])
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.rigid_design import Design, of_design
-from pipeline.maths.ties import of_ties
-from pipeline.maths.unknowns import State, Surface
+from pipeline.maths.adjustment.design_constraints import Design, of_design
+from pipeline.maths.adjustment.parallel_constraints import of_ties
+from pipeline.maths.adjustment.parameters import State, Surface
 
 RANDOM = np.random.default_rng(5)
 PLANES = {

@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.epochs import Runs
-from pipeline.maths.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
-from pipeline.maths.planes import tangents_of
-from pipeline.maths.soundings import points_in_mbes
+from pipeline.maths.adjustment.interval_sums import Runs
+from pipeline.maths.adjustment.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
+from pipeline.maths.geometry.planes import tangents_of
+from pipeline.maths.sonar.soundings import points_in_mbes
 
 NORMAL = np.array([-np.sqrt(0.5), -np.sqrt(0.4), np.sqrt(0.1)])
 AXES = np.vstack([tangents_of(NORMAL), NORMAL])

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import DegenerateGeometryError
-from pipeline.maths.moments import attitude_sum, lift, plane_moments
-from pipeline.maths.planes import Moments, fit_plane, tangents_of
+from pipeline.maths.geometry.planes import Moments, fit_plane, tangents_of
+from pipeline.maths.patent.lifted_moments import attitude_sum, lift, plane_moments
 
 
 def patch(rng, tilt_rad, n=1000, noise=0.01):

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.maths.drift import eliminate_drift
-from pipeline.maths.epochs import EpochSums, epoch_sums, merged
-from pipeline.maths.knots import Drift, Knots, PoseNoise, knots_of
-from pipeline.maths.white_noise import Observed, reduce_white
+from pipeline.maths.adjustment.eliminate_drift import eliminate_drift
+from pipeline.maths.adjustment.eliminate_white_noise import Observed, reduce_white
+from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
+from pipeline.maths.adjustment.pose_errors import Drift, Knots, PoseNoise, knots_of
 
 RATE_HZ = 10.0
 UNKNOWNS, SIX, FEATURES, POINTS = 7, 6, 4, 9
@@ -131,7 +131,7 @@ def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.Mon
     knots = knots_of(np.unique(np.concatenate([one.record for one in found])), seconds, 0.5, 2.0)
     white = np.full(SIX, 0.4)
     whole = reduce_white(found, UNKNOWNS, knots, seconds, white)
-    monkeypatch.setattr("pipeline.maths.white_noise.SIDE_BY_SIDE", 3)
+    monkeypatch.setattr("pipeline.maths.adjustment.eliminate_white_noise.SIDE_BY_SIDE", 3)
     parts = reduce_white(found, UNKNOWNS, knots, seconds, white)
     np.testing.assert_allclose(parts.normal, whole.normal, rtol=1e-12, atol=1e-12)
     assert parts.log_determinant == pytest.approx(whole.log_determinant)

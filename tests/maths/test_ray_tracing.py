@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.maths.ray_tracing import Cast, trace
+from pipeline.maths.sonar.ray_tracing import Cast, trace
 
 CAST = Cast(np.array([0.0, 1.0, 2.5, 4.0]), np.array([1500.0, 1497.0, 1503.0, 1499.0]))
 
@@ -55,7 +55,7 @@ def test_water_of_one_speed_bends_nothing() -> None:
 
 
 def test_the_first_order_of_the_adjustment_is_its_limit() -> None:
-    """(g r² / 2c)(e_z - 2 d_z d) of maths/observations.py, z up."""
+    """(g r² / 2c)(e_z - 2 d_z d) of maths/adjustment/observations.py, z up."""
     g, c, r = 0.2, 1480.0, 9.0
     cast = Cast(np.array([0.0, 30.0]), np.array([c - 15 * g, c + 15 * g]))
     for angle in np.radians([10.0, 45.0, 75.0, 100.0]):

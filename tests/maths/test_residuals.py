@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.planes import angle_between
-from pipeline.maths.residuals import binned, cell_centres, cells_on_face, face_axes
-from pipeline.maths.rotations import mount_partials
+from pipeline.maths.geometry.face_grid import binned, cell_centres, cells_on_face, face_axes
+from pipeline.maths.geometry.planes import angle_between
+from pipeline.maths.geometry.rotations import mount_partials
 
 HALF = np.sqrt(0.5)
 NORMALS = [(-1.0, 0.0, 0.0), (-HALF, -HALF, 0.0), (-HALF, HALF, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom, chi2
 
-from pipeline.maths import rigid, snooping
-from pipeline.maths.rigid import FORWARD, STARBOARD, Axes, Frame, Survey
+from pipeline.maths.survey import data_snooping, frame_adjustment
+from pipeline.maths.survey.frame_adjustment import FORWARD, STARBOARD, Axes, Frame, Survey
 from tests.effort import often
 from tests.maths.surveys import ALONG, ON_BODY, PLACE, World, attitude_rotation, error
 
@@ -91,11 +91,11 @@ def test_errors_are_as_the_covariance_says(name: str) -> None:
     few, many = binom.ppf([0.0005, 0.9995], DRAWS, 0.95)
     inside, squared, statistics = [], [], []
     for _ in range(DRAWS):
-        found = rigid.adjust(*case.drawn(rng))
+        found = frame_adjustment.adjust(*case.drawn(rng))
         statistics.append(found.squares)
         row, squares = [], []
         for number, sensor in enumerate(case.frames[1:], 1):
-            R, lever_arm, C = rigid.mounted_on(found, 0, number)
+            R, lever_arm, C = frame_adjustment.mounted_on(found, 0, number)
             e = error(case.world, sensor, R, lever_arm)
             row.append(np.abs(e) < 1.959964 * np.sqrt(np.diag(C)))
             squares.append(e @ np.linalg.solve(C, e))
@@ -128,9 +128,9 @@ def exact(case: Case) -> tuple[Survey, list[Frame]]:
 def test_without_errors_the_mounts_are_exact(name: str) -> None:
     """Marks, or a roll starboard down +, or a pitch bow up +: any slip of a sign turns the mount by degrees."""
     case = CASES[name]
-    found = rigid.adjust(*exact(case))
+    found = frame_adjustment.adjust(*exact(case))
     for number, sensor in enumerate(case.frames[1:], 1):
-        R, lever_arm, _ = rigid.mounted_on(found, 0, number)
+        R, lever_arm, _ = frame_adjustment.mounted_on(found, 0, number)
         assert np.abs(error(case.world, sensor, R, lever_arm)).max() < 1e-10
     assert found.squares < 1e-9
     level = attitude_rotation(*case.world.attitude).as_matrix()
@@ -142,22 +142,23 @@ def test_without_errors_the_mounts_are_exact(name: str) -> None:
 def test_the_design_is_the_derivative_of_the_residuals(name: str) -> None:
     survey, frames = CASES[name].drawn(np.random.default_rng(3))
     survey = replace(survey, at_m=survey.at_m - PLACE)
-    poses = [rigid._start(survey, frame).moved(np.full(6, 0.02)) for frame in frames]
-    system = rigid._system(survey, frames, poses)
+    poses = [frame_adjustment._start(survey, frame).moved(np.full(6, 0.02)) for frame in frames]
+    system = frame_adjustment._system(survey, frames, poses)
     for column in range(system.design.shape[1]):
         number, place = divmod(column, 6)
         ends = []
         for h in (1e-5, -1e-5):
             turn = Rotation.from_rotvec(h * np.eye(6)[place, :3]).as_matrix()
-            moved = rigid.Pose(
+            moved = frame_adjustment.Pose(
                 turn @ poses[number].R_survey_from_frame, poses[number].origin_m + h * np.eye(6)[place, 3:]
             )
-            ends.append(rigid._system(survey, frames, [*poses[:number], moved, *poses[number + 1 :]]).residuals)
+            changed = [*poses[:number], moved, *poses[number + 1 :]]
+            ends.append(frame_adjustment._system(survey, frames, changed).residuals)
         np.testing.assert_allclose((ends[0] - ends[1]) / 2e-5, system.design[:, column], atol=1e-8)
     for mark in range(len(survey.at_m)):
         shifted = survey.at_m.copy()
         shifted[mark] += [1e-4, -2e-4, 3e-4]
-        change = rigid._system(replace(survey, at_m=shifted), frames, poses).residuals - system.residuals
+        change = frame_adjustment._system(replace(survey, at_m=shifted), frames, poses).residuals - system.residuals
         np.testing.assert_allclose(change, system.by_survey[:, mark] @ [1e-4, -2e-4, 3e-4], atol=1e-12)
 
 
@@ -165,13 +166,13 @@ def test_the_closed_form_never_mirrors_unless_asked() -> None:
     rng = np.random.default_rng(5)
     for _ in range(50):
         x, R_true, weight = rng.normal(size=(5, 3)), Rotation.random(random_state=rng).as_matrix(), rng.uniform(1, 9, 5)
-        R, t = rigid.closed_form(x, x @ R_true.T + [1.0, 2.0, 3.0], weight)
+        R, t = frame_adjustment.closed_form(x, x @ R_true.T + [1.0, 2.0, 3.0], weight)
         np.testing.assert_allclose(R, R_true, atol=1e-12)
         np.testing.assert_allclose(t, [1.0, 2.0, 3.0], atol=1e-12)
         flipped = x * [1, -1, 1]
-        R, _ = rigid.closed_form(flipped, x @ R_true.T, weight)
+        R, _ = frame_adjustment.closed_form(flipped, x @ R_true.T, weight)
         assert np.linalg.det(R) == pytest.approx(1.0)
-        R, _ = rigid.closed_form(flipped, x @ R_true.T, weight, mirrored=True)
+        R, _ = frame_adjustment.closed_form(flipped, x @ R_true.T, weight, mirrored=True)
         np.testing.assert_allclose(R, R_true * [1, -1, 1], atol=1e-12)
 
 
@@ -179,19 +180,19 @@ def test_a_shared_mark_ties_two_frames_whatever_the_survey_says() -> None:
     """Three marks shared by body and laser: however bad the survey, the two agree by their drawings."""
     marks = ("B1", "B2", "I1", "I4")
     case = Case(World(shared=tuple((mark, "body", "laser") for mark in marks)), 0.02, 0.0002)
-    _, _, C = rigid.mounted_on(rigid.adjust(*case.drawn(np.random.default_rng(1))), 0, 1)
+    _, _, C = frame_adjustment.mounted_on(frame_adjustment.adjust(*case.drawn(np.random.default_rng(1))), 0, 1)
     own = {f"L{k}": ON_BODY[mark] for k, mark in enumerate(marks)}
     apart = Case(World(frames={**EVERY.frames, "laser": own}), 0.02, 0.0002)
-    _, _, loose = rigid.mounted_on(rigid.adjust(*apart.drawn(np.random.default_rng(1))), 0, 1)
+    _, _, loose = frame_adjustment.mounted_on(frame_adjustment.adjust(*apart.drawn(np.random.default_rng(1))), 0, 1)
     assert np.all(np.diag(C) < np.diag(loose) / 400)
 
 
 def test_origin_and_heading_of_the_survey_do_not_matter() -> None:
     survey, frames = CASES["shared marks"].drawn(np.random.default_rng(2))
-    one = rigid.mounted_on(rigid.adjust(survey, frames), 0, 2)
+    one = frame_adjustment.mounted_on(frame_adjustment.adjust(survey, frames), 0, 2)
     turn = Rotation.from_euler("z", 77.0, degrees=True).as_matrix()
     moved = Survey(survey.at_m @ turn.T + [5e5, 4e6, -3], survey.covariance)
-    other = rigid.mounted_on(rigid.adjust(moved, frames), 0, 2)
+    other = frame_adjustment.mounted_on(frame_adjustment.adjust(moved, frames), 0, 2)
     for a, b, atol in zip(one, other, (1e-8, 1e-8, 1e-12), strict=True):
         np.testing.assert_allclose(a, b, atol=atol)
 
@@ -223,14 +224,14 @@ def test_a_mark_wrong_by_5_cm_is_named(name: str, of_survey: bool) -> None:
         frame = 2 if case.axes else draw % 3
         place = draw % len(frames[frame].marks)
         mark = int(frames[frame].marks[place])
-        found = snooping.snoop(*spoilt(case, rng, frame, place, of_survey))
+        found = data_snooping.snoop(*spoilt(case, rng, frame, place, of_survey))
         first = found.suspects[0]
         named = {(test.frame, test.mark) for test in (first.test, *first.rivals)}
         assert mark in {of for _, of in named}, (draw, named)
         shared = sum(mark in one.marks for one in frames) > 1
         if not first.rivals and not (shared and case.axes):
             alone += 1
-            right = snooping.SURVEY if shared and of_survey else frame
+            right = data_snooping.SURVEY if shared and of_survey else frame
             assert (first.test.frame, first.test.mark) == (right, mark)
             assert found.agrees
             more += len(found.suspects) > 1
@@ -243,22 +244,22 @@ def test_false_alarms_are_as_rare_as_the_level() -> None:
     alarms = 0
     for _ in range(DRAWS):
         survey, frames = case.drawn(rng)
-        found = rigid.adjust(survey, frames)
-        worst = snooping.mark_tests(found, frames)[0]
-        alarms += found.squares > snooping.limit(found.redundancy) or worst.ratio > 1
-    assert alarms <= binom.ppf(0.999, DRAWS, 2 * snooping.LEVEL)
+        found = frame_adjustment.adjust(survey, frames)
+        worst = data_snooping.mark_tests(found, frames)[0]
+        alarms += found.squares > data_snooping.limit(found.redundancy) or worst.ratio > 1
+    assert alarms <= binom.ppf(0.999, DRAWS, 2 * data_snooping.LEVEL)
 
 
 def test_a_marks_statistic_is_what_the_squares_fall_by_without_it() -> None:
     survey, frames = CASES["shared marks"].drawn(np.random.default_rng(17))
-    found = rigid.adjust(survey, frames)
-    for test in snooping.mark_tests(found, frames):
-        if test.frame == snooping.SURVEY:  # as if it had not been measured
+    found = frame_adjustment.adjust(survey, frames)
+    for test in data_snooping.mark_tests(found, frames):
+        if test.frame == data_snooping.SURVEY:  # as if it had not been measured
             covariance = survey.covariance.copy()
             covariance[test.mark] *= 1e6
-            less = rigid.adjust(replace(survey, covariance=covariance), frames)
+            less = frame_adjustment.adjust(replace(survey, covariance=covariance), frames)
         else:
-            less = rigid.adjust(survey, snooping._without(tuple(frames), test))
+            less = frame_adjustment.adjust(survey, data_snooping._without(tuple(frames), test))
         assert found.squares - less.squares == pytest.approx(test.statistic, rel=0.02, abs=0.02)
         assert test.rank == 3
 
@@ -266,7 +267,7 @@ def test_a_marks_statistic_is_what_the_squares_fall_by_without_it() -> None:
 def test_of_three_marks_a_misfit_shows_and_cannot_be_pinned() -> None:
     world = World(frames={frame: dict(list(marks.items())[:3]) for frame, marks in EVERY.frames.items()})
     case = Case(world)
-    found = snooping.snoop(*spoilt(case, np.random.default_rng(1), 1, 0, True))
+    found = data_snooping.snoop(*spoilt(case, np.random.default_rng(1), 1, 0, True))
     assert (found.agrees, found.suspects) == (False, ())
     assert {test.frame for test in found.tests if test.ratio > 1} == {1}
     assert all(test.rank == 2 for test in found.tests)  # what lies across their plane does not show
@@ -276,7 +277,7 @@ def test_two_wrong_marks_of_six_are_both_named() -> None:
     survey, frames = CASES["marks"].drawn(np.random.default_rng(23))
     at = survey.at_m.copy()
     at[[1, 4]] += [[0.0, 0.03, 0.0], [0.02, 0.0, 0.02]]
-    found = snooping.snoop(replace(survey, at_m=at), frames)
+    found = data_snooping.snoop(replace(survey, at_m=at), frames)
     assert {one.test.mark for one in found.suspects} == {1, 4}
     assert found.agrees
 
@@ -285,7 +286,7 @@ def test_on_a_line_nothing_tells_the_turn_about_it() -> None:
     def sigma(across: float) -> float:
         at = np.array([[0.0, 0, 0], [0.5, 0, 0], [1.0, across, 0]])
         frame = Frame(np.arange(3), at, np.tile(np.eye(3) * 1e-6, (3, 1, 1)))
-        return snooping.sigma_about_line(Survey(at, np.tile(np.eye(3) * 3e-6, (3, 1, 1))), frame)
+        return data_snooping.sigma_about_line(Survey(at, np.tile(np.eye(3) * 3e-6, (3, 1, 1))), frame)
 
     assert sigma(0.0) == np.inf
     h = 0.1  # residuals from the nearest line h (1/6, -1/3, 1/6): information Σ d² / σ²

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths import rotations as r
+from pipeline.maths.geometry import rotations as r
 
 vectors = arrays(np.float64, 3, elements=st.floats(-3.0, 3.0))
 angles = st.floats(-np.pi, np.pi)

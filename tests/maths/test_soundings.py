@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.ray_tracing import Cast
-from pipeline.maths.soundings import across_beam, beam_half_widths, points_in_mbes, receive_angle, traced
+from pipeline.maths.sonar.ray_tracing import Cast
+from pipeline.maths.sonar.soundings import across_beam, beam_half_widths, points_in_mbes, receive_angle, traced
 from pipeline.simulation.beams import directions_in_mbes, swing_rad
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.motion import Movement

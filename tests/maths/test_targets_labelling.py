@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.maths.labelling import Beams, label_points
+from pipeline.maths.target.labelling import Beams, label_points
 from tests.targets import by_letters, members
 
 
@@ -162,7 +162,7 @@ def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
 
 
 def test_what_lies_behind_a_face_is_hidden():
-    from pipeline.clouds import ClosestSurface
+    from pipeline.target.surface import ClosestSurface
 
     surface = ClosestSurface(by_letters(8.0, 3.0, 1.0, 0.5))
     origin = np.array([[-5.0, 0.0, 1.0]])

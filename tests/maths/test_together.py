@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.solution import TOGETHER, together, weakest_direction
+from pipeline.maths.adjustment.solution import TOGETHER, together, weakest_direction
 
 YAW, ARM_Y = 2, 4
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.config import load_session
+from pipeline.coarse.session_edit import read_session
+from pipeline.config.pool import load_session
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.maths.casts import MOST, ascending, one_way, thinned
+from pipeline.maths.sonar.cast_profile import MOST, ascending, one_way, thinned
 from pipeline.readers.casts import read_cast, with_cast
-from pipeline.session_edit import read_session
 
 PROFILE = [(0.5, 1480.0), (1.0, 1480.3), (1.5, 1481.2), (2.0, 1481.0), (3.0, 1483.5)]  # nothing that thins
 ROWS = "\n".join(f"{depth:.3f} {speed:.3f}" for depth, speed in PROFILE) + "\n"

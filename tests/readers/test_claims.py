@@ -11,8 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.readers import e57, las, raw_parts, tabular
-from pipeline.readers.claims import RECORDS_PER_BYTE, refuse_claim
+from pipeline.readers import e57, las, table_columns
+from pipeline.readers.claimed_counts import RECORDS_PER_BYTE, refuse_claim
+from pipeline.readers.dispatch import raw_parts
 from tests.readers import build, e57_files
 from tests.readers.build import read, rows
 from tests.readers.test_e57 import POINTS, START_S, TIMES
@@ -84,8 +85,8 @@ def test_all_scans_of_an_e57_count_together(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sensor", ["ins", "mbes"])
 def test_the_other_sensors_tables(sensor: str, tmp_path: Path) -> None:
-    names = tabular.INS if sensor == "ins" else (*tabular.MBES, "range_m")
-    columns = {name: np.full(COUNT, 5 if name in tabular.WHOLE else 5.0) for name in names}
+    names = table_columns.INS if sensor == "ins" else (*table_columns.MBES, "range_m")
+    columns = {name: np.full(COUNT, 5 if name in table_columns.WHOLE else 5.0) for name in names}
     pq.write_table(pa.table({"gps_ns": np.full(COUNT, TIME)} | columns), tmp_path / "a.parquet", compression="zstd")
     (part,) = raw_parts(sensor, build.settings(sensor, ["a.parquet"], "table"), tmp_path)  # type: ignore[arg-type]
     with pytest.raises(RawDataError, match=rf"a\.parquet: claims .* write {sensor}\.max_records"):

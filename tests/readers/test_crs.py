@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pyproj import CRS
 
-from pipeline.config import Laser
+from pipeline.config.session import Laser
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.crs import Frame, placing_of
 from tests.readers.build import MOUNT, read, rows

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.maths.geodesy import ecef_from_geodetic
+from pipeline.maths.geometry.geodesy import ecef_from_geodetic
 from pipeline.readers.crs import Frame, placing_of
 from tests.readers.build import read, rows
 from tests.readers.test_crs import las, placed, table

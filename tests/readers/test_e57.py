@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.config import Laser
+from pipeline.config.session import Laser
 from pipeline.errors import RawDataError
-from pipeline.readers import e57, raw_parts
+from pipeline.readers import e57
+from pipeline.readers.dispatch import raw_parts
 from tests.readers.build import MOUNT, read, rows
 from tests.readers.e57_files import Scan, edited, write
 

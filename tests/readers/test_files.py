@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.readers import raw_files, raw_parts
+from pipeline.readers.dispatch import raw_files, raw_parts
 from tests.readers import build, ie_files
 from tests.readers.sonar_files import all_installation
 

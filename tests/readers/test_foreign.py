@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.readers import detect, foreign, raw_parts
+from pipeline.readers import detect, unread_formats
 from pipeline.readers.detect import HEAD, kind_of_bytes
+from pipeline.readers.dispatch import raw_parts
 from tests.readers import build
 from tests.readers.test_fuzz import WHOLE
 
@@ -155,8 +156,8 @@ def test_what_is_read_is_not_taken_for_another(form: str) -> None:
     found = kind_of_bytes(whole[:HEAD], len(whole))
     assert found.format == kind
     assert sensor in found.sensors
-    assert foreign.marked(whole) is None
-    assert foreign.binary(whole, len(whole)) is None
+    assert unread_formats.marked(whole) is None
+    assert unread_formats.binary(whole, len(whole)) is None
 
 
 MARKS = {"jsf": b"\x01\x16", "sbg": b"\xff\x5a", "sbf": b"$@", "ubx": b"\xb5\x62", "gsof": b"\x02\x28\x40\x28"}

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import Mbes
+from pipeline.config.session import Mbes
 from pipeline.errors import RawDataError
-from pipeline.readers import gsf, raw_parts
+from pipeline.readers import gsf
+from pipeline.readers.dispatch import raw_parts
 from tests.readers.build import GPS_2024, MOUNT, read, rows
 from tests.readers.sonar_files import SCALES, gsf_header, gsf_ping, gsf_placed, profile, record, scale_factors, seabat
 from tests.readers.sonar_files import gsf as made

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.readers import raw_parts
 from pipeline.readers.detect import INERTIAL_EXPLORER, kind_of_bytes
+from pipeline.readers.dispatch import raw_parts
 from tests.readers import build
 from tests.readers.build import rows
 from tests.readers.ie_files import HEADER, LAYOUTS, WEEK, Columns, Row, export, truth, whole

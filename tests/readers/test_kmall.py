@@ -11,10 +11,11 @@ import pytest
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import Ins, Laser, Mbes, SessionConfig
+from pipeline.config.session import Ins, Laser, Mbes, SessionConfig
 from pipeline.errors import RawDataError
-from pipeline.maths.soundings import points_in_mbes
-from pipeline.readers import kmall, kongsberg, raw_parts
+from pipeline.maths.sonar.soundings import points_in_mbes
+from pipeline.readers import kmall, kongsberg
+from pipeline.readers.dispatch import raw_parts
 from pipeline.readers.kmall_datagrams import datagrams
 from tests.readers.build import GPS_2024, MOUNT, UTC_2024, read, rows
 from tests.readers.sonar_files import ANGLES_DEG, datagram, iip, mrz, sounding

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.config import Mbes
+from pipeline.config.session import Mbes
 from pipeline.errors import RawDataError
-from pipeline.readers import kongsberg, raw_parts
-from pipeline.times import GPS_EPOCH_UNIX_S
+from pipeline.gps_time import GPS_EPOCH_UNIX_S
+from pipeline.readers import kongsberg
+from pipeline.readers.dispatch import raw_parts
 from tests.readers.build import MOUNT, read, rows
 from tests.readers.sonar_files import (
     RECEIVER,

@@ -8,10 +8,10 @@ import laspy
 import numpy as np
 import pytest
 
-from pipeline.config import Ins, Laser, SessionConfig
+from pipeline.config.session import Ins, Laser, SessionConfig
 from pipeline.errors import ConfigError, PoolcalError, RawDataError
 from pipeline.readers import las as reader
-from pipeline.readers import raw_parts
+from pipeline.readers.dispatch import raw_parts
 from tests.readers import build
 from tests.readers.build import WEEK, las, read, rows
 

@@ -8,10 +8,12 @@ import laspy
 import numpy as np
 import pytest
 
-from pipeline.config import Laser, Mount
+from pipeline.artefacts.streams import Chunk
+from pipeline.config.mount import Mount
+from pipeline.config.session import Laser
 from pipeline.errors import RawDataError
-from pipeline.readers import laz, raw_parts
-from pipeline.streams import Chunk
+from pipeline.readers import laz
+from pipeline.readers.dispatch import raw_parts
 
 COUNT = 120_000  # more than two of LASzip's chunks of 50,000
 LEVEL = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)

@@ -133,7 +133,7 @@ def test_chunks_are_of_bounded_size(tmp_path: Path) -> None:
     table = np.tile(np.array(build.sbet_row(0.0)), (200_000, 1))
     table[:, 0] = 1000 + np.arange(200_000) / 200
     path.write_bytes(table.tobytes())
-    from pipeline.readers import raw_parts
+    from pipeline.readers.dispatch import raw_parts
 
     (part,) = raw_parts("ins", build.settings("ins", ["a.out"], "sbet", gps_week=build.WEEK), tmp_path)
     lengths = [len(chunk.columns["t_ns"]) for chunk in part.chunks()]

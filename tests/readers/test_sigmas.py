@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import PoolcalError, RawDataError
-from pipeline.readers import raw_files, raw_parts
+from pipeline.readers.dispatch import raw_files, raw_parts
 from tests.readers import build
 from tests.readers.build import (
     ALIGNING,

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.config import Ins, Laser, Mbes, Mount
-from pipeline.readers import Sensor, raw_parts
+from pipeline.config.mount import Mount
+from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.readers.dispatch import Sensor, raw_parts
 
 DEFAULT = Path(__file__).parents[3] / "shared" / "data"
 MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.checking.file_survey import survey
 from pipeline.checking.ins_quality import Quality, quality, told
-from pipeline.checking.survey import survey
-from pipeline.config import Ins, Laser, SessionConfig
+from pipeline.config.session import Ins, Laser, SessionConfig
 from tests.real.conftest import MOUNT
 
 

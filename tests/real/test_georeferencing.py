@@ -14,13 +14,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.config import Mount
-from pipeline.maths.geodesy import FLATTENING, SEMI_MAJOR_M, PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
-from pipeline.maths.ray_tracing import Cast, trace
-from pipeline.maths.rotations import mount_from_rotation, rotation_from_attitude, rotation_from_mount
-from pipeline.maths.soundings import points_in_mbes, traced
-from pipeline.maths.trajectory import Trajectory, poses_in_pool
-from pipeline.mounts import mount_of
+from pipeline.config.mount import Mount
+from pipeline.maths.geometry.geodesy import (
+    FLATTENING,
+    SEMI_MAJOR_M,
+    PoolFrame,
+    ecef_from_geodetic,
+    rotation_ecef_from_level,
+)
+from pipeline.maths.geometry.rotations import mount_from_rotation, rotation_from_attitude, rotation_from_mount
+from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.sonar.ray_tracing import Cast, trace
+from pipeline.maths.sonar.soundings import points_in_mbes, traced
+from pipeline.mount import mount_of
 
 # x east, y north, z up from x north, y west, z up; and x starboard, y forward, z up from x forward, y port, z up.
 R_OURS_FROM_NWU = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from pipeline.maths.soundings import points_in_mbes
+from pipeline.maths.sonar.soundings import points_in_mbes
 from tests.real.conftest import Columns, Read
 
 OS03 = "mbes/kongsberg_OS03_4033476991022010987.kmall"

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.maths.soundings import points_in_mbes
-from pipeline.times import GPS_EPOCH_UNIX_S, NS
+from pipeline.gps_time import GPS_EPOCH_UNIX_S, NS
+from pipeline.maths.sonar.soundings import points_in_mbes
 from tests.real.conftest import Read
 from tests.real.test_kongsberg import KONGSBERG_FROM_MBES, turned
 

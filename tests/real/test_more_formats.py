@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from pipeline.errors import RawDataError
+from pipeline.gps_time import NS, unix_ns_from_gps
 from pipeline.readers import e57, gsf, kmall
 from pipeline.readers.gsf_records import PING, records
 from pipeline.readers.kmall_datagrams import datagrams
-from pipeline.times import NS, unix_ns_from_gps
 from tests.real.conftest import Read
 
 GSF = "mbes/GSF3_08_test_file.gsf"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError, RawDataError
+from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, GPS_EPOCH_UNIX_S, NS, WEEK_NS
 from pipeline.readers import detect
-from pipeline.times import ADJUSTED_STANDARD_OFFSET_S, GPS_EPOCH_UNIX_S, NS, WEEK_NS
 from tests.real.conftest import Read
 from tests.real.test_kongsberg_all import HE, TURBEAMS
 from tests.real.test_more_formats import BUNNY, GSF, KMALL, MOVED

@@ -8,9 +8,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline import runner
-from pipeline.executor import SERIAL, Workers
-from pipeline.progress import Progress
+from pipeline.console import Progress
+from pipeline.run import runner
+from pipeline.run.workers import SERIAL, Workers
 from tests.runner import toys
 
 SESSION = """
@@ -49,8 +49,8 @@ class Pool:
 
 @pytest.fixture
 def pool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pool:
-    monkeypatch.setattr("pipeline.readers.raw_files", toys.raw_files, raising=False)
-    monkeypatch.setattr("pipeline.readers.raw_parts", toys.raw_parts, raising=False)
+    monkeypatch.setattr("pipeline.readers.dispatch.raw_files", toys.raw_files, raising=False)
+    monkeypatch.setattr("pipeline.readers.dispatch.raw_parts", toys.raw_parts, raising=False)
     session = tmp_path / "session"
     rng = np.random.default_rng(1)
     for sensor, names in {"laser": ("0.bin", "1.bin"), "ins": ("0.bin",), "mbes": ("0.bin",)}.items():

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.config import Segment
-from pipeline.evaluate import declared, run_in_memory
-from pipeline.store import read_table
-from pipeline.streams import EMPTY, Chunk, MemoryPart, Piece, Stream
+from pipeline.artefacts.parquet import read_table
+from pipeline.artefacts.streams import EMPTY, Chunk, MemoryPart, Piece, Stream
+from pipeline.config.pool import Segment
+from pipeline.run.stage_protocol import declared, run_in_memory
 from tests.runner import toys
 from tests.runner.conftest import Pool
 

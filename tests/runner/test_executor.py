@@ -5,9 +5,9 @@ import time
 
 import pytest
 
+from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.executor import SERIAL, Workers, default_jobs, workers
-from pipeline.streams import MemoryPart, Stream
+from pipeline.run.workers import SERIAL, Workers, default_jobs, workers
 
 
 def test_results_come_in_order() -> None:

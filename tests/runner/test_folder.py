@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import store
+from pipeline.artefacts import parquet
 from pipeline.errors import ArtefactError, ConfigError
-from pipeline.executor import workers
-from pipeline.verify import verify
+from pipeline.run.verify import verify
+from pipeline.run.workers import workers
 from tests.runner.conftest import Pool
 
 Contents = Callable[[Path], dict[str, bytes]]
@@ -128,12 +128,12 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_complete(
     before = contents(pool.run_folder)
     pool.margin(0.5)
 
-    class Full(store.pq.ParquetWriter):  # type: ignore[misc]
+    class Full(parquet.pq.ParquetWriter):  # type: ignore[misc]
         def write_table(self, *arguments: object, **options: object) -> None:
             raise OSError("Error writing bytes to file. Detail: [errno 28] No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(store.pq, "ParquetWriter", Full)
+        patch.setattr(parquet.pq, "ParquetWriter", Full)
         with pytest.raises(ArtefactError, match=r"written \(No space left on device\); make room and run again"):
             pool.run()
     assert contents(pool.run_folder) == before

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import manifest
+from pipeline.atomic_files import remove
 from pipeline.errors import ArtefactError
-from pipeline.files import remove
-from pipeline.folder import calibration
-from pipeline.verify import verify
+from pipeline.run import manifest
+from pipeline.run.folder import calibration
+from pipeline.run.verify import verify
 from tests.limits import limited
 from tests.runner.conftest import Pool
 

@@ -12,9 +12,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline import runner
-from pipeline.run import provenance
-from pipeline.run.reach import reached
+from pipeline.run import provenance, runner
+from pipeline.run.import_closure import reached
 from stages import load
 from tests.runner import toys
 from tests.runner.conftest import Pool
@@ -55,20 +54,20 @@ def is_stale(copy: Path, monkeypatch: pytest.MonkeyPatch, stage: str, changed: s
     ("stage", "changed"),
     [
         ("ingest", "stages/ingest.py"),
-        ("ingest", "stages/seen.py"),
-        ("ingest", "pipeline/passes.py"),
-        ("ingest", "pipeline/maths/rotations.py"),  # maths/geodesy.py imports it, nothing of ingest does
+        ("ingest", "pipeline/readers/file_summaries.py"),
+        ("ingest", "pipeline/maths/geometry/passes.py"),
+        ("ingest", "pipeline/maths/geometry/rotations.py"),  # imported by geodesy.py, by nothing of ingest
         ("ingest", "pipeline/readers/detect.py"),  # the runner hands the readers' parts to it
         ("ingest", "pipeline/readers/laz_worker.py"),  # a program: imported by nobody
         ("ingest", "pipeline/readers/las.py"),
-        ("ingest", "pipeline/store.py"),
-        ("ingest", "pipeline/runner.py"),
+        ("ingest", "pipeline/artefacts/parquet.py"),
+        ("ingest", "pipeline/run/runner.py"),
         ("ingest", "pipeline/__init__.py"),  # BLAS's threads
-        ("segment", "pipeline/maths/registration.py"),
-        ("adjust", "pipeline/maths/white_noise.py"),
+        ("segment", "pipeline/maths/target/registration.py"),
+        ("adjust", "pipeline/maths/adjustment/eliminate_white_noise.py"),
         ("laser.adjust", "stages/adjust.py"),  # its sibling
-        ("laser.adjust", "pipeline/laser_fit.py"),
-        ("report", "pipeline/verdict.py"),
+        ("laser.adjust", "pipeline/adjustment/laser_design.py"),
+        ("report", "pipeline/report/verdict.py"),
     ],
 )
 def test_what_a_stage_can_reach_makes_it_stale(
@@ -80,14 +79,14 @@ def test_what_a_stage_can_reach_makes_it_stale(
 @pytest.mark.parametrize(
     ("stage", "changed"),
     [
-        ("ingest", "pipeline/checking/examine.py"),
-        ("ingest", "pipeline/coarse.py"),
-        ("ingest", "pipeline/verdict.py"),
-        ("ingest", "pipeline/maths/adjustment.py"),
+        ("ingest", "pipeline/checking/check_session.py"),
+        ("ingest", "pipeline/coarse/mounts_from_marks.py"),
+        ("ingest", "pipeline/report/verdict.py"),
+        ("ingest", "pipeline/maths/adjustment/normal_equations.py"),
         ("ingest", "stages/adjust.py"),
         ("georeference", "pipeline/readers/las.py"),  # its inputs tell whether that made a difference
         ("adjust", "stages/laser/adjust.py"),
-        ("report", "pipeline/pages/report.html"),
+        ("report", "pipeline/results/pages/report.html"),
         ("report", "pipeline/simulation/laser.py"),
     ],
 )
@@ -131,7 +130,7 @@ def test_programs_lie_in_folders_that_are_taken_whole() -> None:
 def test_every_module_that_a_stage_has_loaded_is_in_its_key() -> None:
     """Python's own list of what was imported is the judge."""
     code = (
-        "import sys, json; import {0}; import pipeline.evaluate; ours = ('pipeline', 'stages');"
+        "import sys, json; import {0}; import pipeline.run.stage_protocol; ours = ('pipeline', 'stages');"
         "print(json.dumps([m.__file__ for name, m in sys.modules.items() if name.split('.')[0] in ours]))"
     )
     for stage in (load("laser")[-2], load()[0]):

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline import files, folder, runner
+from pipeline import atomic_files
 from pipeline.errors import ArtefactError
-from pipeline.verify import verify
+from pipeline.run import folder, runner
+from pipeline.run.verify import verify
 from tests.effort import often
 from tests.runner import toys
 from tests.runner.conftest import Pool
@@ -98,12 +99,12 @@ def test_a_full_disk_while_it_is_kept_loses_nothing(judged: Pool, monkeypatch: p
     def full(path: Path, content: bytes) -> None:
         if path.name == "report.html":
             path.write_bytes(content[:3])
-            with files.writing(path):
+            with atomic_files.writing(path):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         path.write_bytes(content)
 
     with monkeypatch.context() as patch:
-        patch.setattr("pipeline.run.kept.write_bytes", full)
+        patch.setattr("pipeline.run.kept_results.write_bytes", full)
         with pytest.raises(ArtefactError, match="No space left on device"):
             judged.run()
     assert contents(judged.run_folder / "tell") == before
@@ -137,15 +138,15 @@ def test_killed_at_any_step_the_accepted_result_is_there(
     with monkeypatch.context():
         for name in ("rename", "replace", "mkdir"):
             counted(name)
-        monkeypatch.setattr("pipeline.runner._remove_quietly", lambda _: None)
+        monkeypatch.setattr("pipeline.run.runner._remove_quietly", lambda _: None)
         done = True
         try:
             judged.run()
         except KeyboardInterrupt:
             done = False
     monkeypatch.undo()
-    monkeypatch.setattr("pipeline.readers.raw_files", toys.raw_files)
-    monkeypatch.setattr("pipeline.readers.raw_parts", toys.raw_parts)
+    monkeypatch.setattr("pipeline.readers.dispatch.raw_files", toys.raw_files)
+    monkeypatch.setattr("pipeline.readers.dispatch.raw_parts", toys.raw_parts)
     found = [path.read_bytes() for path in judged.run_folder.glob("tell*/calibration.json")]
     assert before in found
     assert done or steps < 11

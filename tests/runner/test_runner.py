@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import runner
 from pipeline.errors import ArtefactError, RawDataError
-from pipeline.executor import Workers, workers
-from pipeline.run import provenance
+from pipeline.run import provenance, runner
+from pipeline.run.workers import Workers, workers
 from tests.runner import toys
 from tests.runner.conftest import Pool
 
@@ -146,7 +145,8 @@ def test_the_size_of_batches_does_not_show_in_the_bytes(
 ) -> None:
     pool.run()
     by_thousand, pool.run_folder = contents(pool.run_folder / "take"), pool.run_folder.with_name("b")
-    monkeypatch.setattr("pipeline.readers.raw_parts", lambda sensor, settings, folder: _parts(settings, folder, 77))
+    parts = "pipeline.readers.dispatch.raw_parts"
+    monkeypatch.setattr(parts, lambda sensor, settings, folder: _parts(settings, folder, 77))
     pool.run()
     assert {n: b for n, b in contents(pool.run_folder / "take").items() if n.startswith("points")} == {
         n: b for n, b in by_thousand.items() if n.startswith("points")

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import store
-from pipeline.artefacts import Artefact, Column
-from pipeline.artefacts.shared import BOOL, F64, FLOATS, I16, I64, TEXT
+from pipeline.artefacts import parquet
+from pipeline.artefacts.columns import BOOL, F64, FLOATS, I16, I64, TEXT
+from pipeline.artefacts.parquet import PartWriter, from_arrow, read_table, to_arrow, write_table
+from pipeline.artefacts.schema import Artefact, Column
+from pipeline.artefacts.streams import ParquetPart
 from pipeline.errors import ArtefactError
-from pipeline.store import PartWriter, from_arrow, read_table, to_arrow, write_table
-from pipeline.streams import ParquetPart
 
 ROWS = Artefact(
     "toy", "rows", "stream", "rows",
@@ -47,16 +47,16 @@ def _write(folder: Path, cuts: list[int]) -> list[Path]:
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Row groups of 100 rows, files of 250."""
-    monkeypatch.setattr(store, "BATCH_ROWS", 100)
-    monkeypatch.setattr(store, "PART_ROWS", 250)
+    monkeypatch.setattr(parquet, "BATCH_ROWS", 100)
+    monkeypatch.setattr(parquet, "PART_ROWS", 250)
 
 
 @given(st.lists(st.integers(0, 720), max_size=12))
 def test_batches_do_not_show(tmp_path_factory: pytest.TempPathFactory, cuts: list[int]) -> None:
     folder = tmp_path_factory.mktemp("parts")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(store, "BATCH_ROWS", 100)
-        patch.setattr(store, "PART_ROWS", 250)
+        patch.setattr(parquet, "BATCH_ROWS", 100)
+        patch.setattr(parquet, "PART_ROWS", 250)
         whole, pieces = _write(folder / "a", [0, 720]), _write(folder / "b", [0, *sorted(cuts), 720])
     assert [p.name for p in pieces] == ["part-00007-000.parquet", "part-00007-001.parquet", "part-00007-002.parquet"]
     assert [p.read_bytes() for p in pieces] == [p.read_bytes() for p in whole]
@@ -77,7 +77,7 @@ def test_a_part_without_rows_writes_no_file(tmp_path: Path) -> None:
 
 
 def test_a_stream_without_rows_can_be_read(tmp_path: Path) -> None:
-    path = store.write_empty_part(tmp_path, ROWS)
+    path = parquet.write_empty_part(tmp_path, ROWS)
     assert list(ParquetPart(path).chunks()) == []
     assert pq.read_schema(path).equals(ROWS.schema, check_metadata=True)
 

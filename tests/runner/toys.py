@@ -9,12 +9,12 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pipeline import artefacts
-from pipeline.artefacts import Artefact, Column, Document
-from pipeline.artefacts.shared import F64, I16, I64, TEXT
-from pipeline.config import Ingest, Laser, Segment, Verdict
+from pipeline.artefacts.columns import F64, I16, I64, TEXT
+from pipeline.artefacts.schema import Artefact, Column, Document, Provenance, Raw
+from pipeline.artefacts.streams import EMPTY, Batch, Chunk, Piece, Stream
+from pipeline.config.pool import Ingest, Segment, Verdict
+from pipeline.config.session import Laser
 from pipeline.errors import RawDataError
-from pipeline.streams import EMPTY, Batch, Chunk, Piece, Stream
 
 POINTS = Artefact(
     "take", "points", "stream", "points", (Column("t_ns", I64, "ns", "time"), Column("x_m", F64, "m", "x"))
@@ -66,7 +66,7 @@ class TakeConfig:
 
 @dataclass(frozen=True)
 class TakeInputs:
-    laser: Annotated[Stream, artefacts.Raw("laser")]
+    laser: Annotated[Stream, Raw("laser")]
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class TellConfig:
 @dataclass(frozen=True)
 class TellInputs:
     means: Annotated[pd.DataFrame, MEANS]
-    provenance: Annotated[dict[str, Any], artefacts.Provenance]
+    provenance: Annotated[dict[str, Any], Provenance]
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ import pytest
 from pyproj import Transformer
 from scipy.spatial.transform import Rotation
 
-from pipeline.simulation.earth import R_ecef_from_level
 from pipeline.simulation.motion import R_level_from_body
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
+from pipeline.simulation.site import R_ecef_from_level
 
 LEVEL = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": -2.0}
 STILL = {name: {"amplitude": 0.0, "period_s": 5.0} for name in ("surge", "sway", "heave", "roll", "pitch", "heading")}

@@ -9,9 +9,9 @@ import laspy
 import numpy as np
 import pytest
 
-from pipeline.config import load_pool, load_session
+from pipeline.config.pool import load_pool, load_session
+from pipeline.config.yaml_models import read_yaml
 from pipeline.errors import ConfigError
-from pipeline.parsing import read_yaml
 from pipeline.simulation import session as session_module
 from pipeline.simulation.ins import drift
 from pipeline.simulation.motion import Movement

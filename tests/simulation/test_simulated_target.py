@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.config import Letters, Origin
+from pipeline.config.target import Letters, Origin
 from pipeline.simulation.mesh import block_bases_m, build_mesh, corner_lines, target_polygons
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import Surroundings

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.config import PoolConfig, SessionConfig
-from pipeline.parsing import parse
+from pipeline.config.pool import PoolConfig
+from pipeline.config.session import SessionConfig
+from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
-from stages.campaign import calibrate_in_memory
+from stages.in_memory import calibrate_in_memory
 
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 4000.0}, "mbes": {"ping_rate_hz": 10.0}}
 QUIET: dict[str, Any] = {

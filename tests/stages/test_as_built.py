@@ -6,10 +6,11 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.config import Mbes, PoolConfig
+from pipeline.config.pool import PoolConfig
+from pipeline.config.session import Mbes
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from pipeline.folder import load_settings, refuse_cast
-from pipeline.parsing import parse
+from pipeline.run.folder import load_settings, refuse_cast
 from tests.effort import often
 from tests.stages.conftest import QUIET, calibrated, made
 

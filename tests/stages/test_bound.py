@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.parsing import parse
+from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
 from tests.effort import often
 from tests.stages.conftest import THIN, calibrated, made, merged

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.parsing import parse, read_yaml
+from pipeline.artefacts.streams import Stream
+from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import simulate
-from pipeline.streams import Stream
 from tests.end_to_end.places import errors, sigmas
 from tests.stages.conftest import THIN, calibrated, made, merged
 from tests.targets import as_faces

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.streams import MemoryPart, Stream
+from pipeline.artefacts.streams import MemoryPart, Stream
 from tests.effort import often
 from tests.stages.conftest import calibrated, made
 

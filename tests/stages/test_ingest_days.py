@@ -3,8 +3,8 @@
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.times import NS, WEEK_NS
-from stages.seen import refuse_apart
+from pipeline.gps_time import NS, WEEK_NS
+from pipeline.readers.file_summaries import refuse_apart
 
 HOUR_NS, DAY_NS = 3600 * NS, 86_400 * NS
 SUNDAY = (2400 * WEEK_NS + 10 * HOUR_NS, 2400 * WEEK_NS + 11 * HOUR_NS)

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.config import Ingest, Recording, Recordings, TargetPlace
+from pipeline.artefacts.streams import Chunk, MemoryPart, Stream
+from pipeline.config.pool import Ingest, TargetPlace
+from pipeline.config.session import Recording, Recordings
 from pipeline.errors import RawDataError
-from pipeline.evaluate import run_in_memory
+from pipeline.run.stage_protocol import run_in_memory
 from pipeline.simulation.session import SimulatedSession
-from pipeline.streams import Chunk, MemoryPart, Stream
 from stages import ingest
 from tests.stages.conftest import calibrated, made
 

@@ -4,10 +4,11 @@ import json
 
 import numpy as np
 
-from pipeline.config import FitPlanes, Mbes
-from pipeline.evaluate import run_in_memory
-from pipeline.parsing import parse
-from pipeline.streams import MemoryPart, Stream
+from pipeline.artefacts.streams import MemoryPart, Stream
+from pipeline.config.pool import FitPlanes
+from pipeline.config.session import Mbes
+from pipeline.config.yaml_models import parse
+from pipeline.run.stage_protocol import run_in_memory
 from stages import fit_planes
 from tests.stages.conftest import QUIET, calibrated, made
 

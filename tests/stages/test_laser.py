@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.config import PoolConfig, SessionConfig
-from pipeline.laser_fit import bounds_of, coarse_covariance, held_of
-from pipeline.maths.rotations import exp_so3, log_so3
-from pipeline.mounts import Mounted, mount_of
-from pipeline.parsing import parse, read_yaml
+from pipeline.adjustment.laser_design import bounds_of, coarse_covariance, held_of
+from pipeline.config.pool import PoolConfig
+from pipeline.config.session import SessionConfig
+from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.maths.geometry.rotations import exp_so3, log_so3
+from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
-from stages.campaign import calibrate_in_memory
+from stages.in_memory import calibrate_in_memory
 from tests.effort import often
 from tests.stages.conftest import THIN, made, merged
 from tests.stages.test_faces import SCENARIOS

@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.config import Mount
+from pipeline.config.mount import Mount
 from pipeline.errors import RawDataError
-from pipeline.mounts import change_of, mount_of
+from pipeline.mount import change_of, mount_of
 from tests.effort import often
 from tests.stages.conftest import QUIET, calibrated, made
 

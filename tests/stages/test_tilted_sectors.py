@@ -6,10 +6,11 @@ import json
 import numpy as np
 import pytest
 
-from pipeline import planned
-from pipeline.config import PoolConfig, SessionConfig
-from pipeline.parsing import parse
-from pipeline.plan_settings import Plan
+from pipeline.config.plan import Plan
+from pipeline.config.pool import PoolConfig
+from pipeline.config.session import SessionConfig
+from pipeline.config.yaml_models import parse
+from pipeline.planning import assessment
 from tests.effort import often
 from tests.stages.conftest import QUIET, THIN, calibrated, made
 
@@ -85,7 +86,7 @@ def test_a_plan_with_the_sectors_predicts_the_sigmas(key, session, carried):
     figures = {"ping_rate_hz": THIN["mbes"]["ping_rate_hz"], "sectors": symmetrical(40.0)["mbes"]["sectors"]}
     content = {"laser": THIN["laser"], "mbes": figures, "passes": [{"distance_m": d} for d in (4.0, 8.0, 5.0, 7.0)]}
     pool, settings = parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
-    found = planned.as_plain(planned.judge(parse(Plan, content, "plan"), pool, settings))["given"][key]
+    found = assessment.as_plain(assessment.judge(parse(Plan, content, "plan"), pool, settings))["given"][key]
     ratio = [found[name] / carried["methods"]["adjustment"][key][name] for name in SETTINGS]
     assert max(abs(np.log(ratio))) < np.log(1.15), dict(zip(SETTINGS, ratio, strict=True))
 

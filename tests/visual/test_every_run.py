@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from stages.views import recordings_of
-from stages.views.tour import TABS, tabs_of
+from stages.views.blueprint import TABS, tabs_of
+from stages.views.recording import recordings_of
 from tests.end_to_end.places import SCENARIOS, poolcal, simulate
 from tests.visual.test_viewer import views_of
 from tools.pictures import show_tab, viewer

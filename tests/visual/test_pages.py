@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.pages import SMALLEST_PT
+from pipeline.results.pages.rendering import SMALLEST_PT
 from tests.end_to_end.pages import Page
 from tests.end_to_end.places import poolcal
 from tools.pictures import chromium

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from stages.drawing import Painters
-from stages.views import recordings_of
-from stages.views.tour import TABS
+from stages.commands.draw import Painters
+from stages.views.blueprint import TABS
+from stages.views.recording import recordings_of
 from tools.pictures import picture_of, show_tab, viewer
 
 LEAST_COLOURS = 40

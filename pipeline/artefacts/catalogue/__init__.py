@@ -1,0 +1,1 @@
+"""Every table that a stage writes, two stages a module: owner, name, columns, units."""

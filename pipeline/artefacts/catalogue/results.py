@@ -1,0 +1,196 @@
+"""Tables of stages adjust and report: the rigorous solution and the answer."""
+
+# fmt: off: the tables are laid out by hand
+from pipeline.artefacts.columns import BOOL, F32, F64, I16, I32, I64, PASS, T_NS, TEXT, near, xyz
+from pipeline.artefacts.schema import Artefact, Column, Document
+
+# --- adjust ----------------------------------------------------------------------------------------------------------
+ESTIMATE = Artefact(
+    "adjust", "estimate", "table", "every unknown of the adjustment",
+    (
+        Column("unknown", TEXT, "", "rotation_x … lever_arm_z, each surface's turn_1, turn_2, shift, what is freed"),
+        Column("value", F64, "rad or m", "estimate (rotation: vector from coarse; surfaces: from the laser's planes)"),
+        Column("sigma", F64, "rad or m", "standard deviation from the sensors' and the INS's noise"),
+        Column("sigma_total", F64, "rad or m", "the same with what is considered, not estimated"),
+    ),
+)
+COVARIANCE = Artefact(
+    "adjust", "covariance", "table", "covariance and correlation of the six",
+    (
+        Column("row", TEXT, "", "unknown"), Column("column", TEXT, "", "unknown"),
+        Column("covariance", F64, "rad², rad m, m²", "from noise"), Column("correlation", F64, "1", "of noise alone"),
+        Column("covariance_total", F64, "rad², rad m, m²", "with what is considered, not estimated"),
+    ),
+)
+GEOMETRY = Artefact(
+    "adjust", "geometry", "table", "what the passes cannot tell, and what would cure it",
+    (
+        Column("kind", TEXT, "", "gap or remedy; of a laser that is calibrated: held"),
+        Column("words", TEXT, "", "in words; of what is held its name"),
+        Column("sigma", F64, "deg or m", "of what is held: its standard deviation, had it not been (else NaN)"),
+    ),
+)
+DRIFT = Artefact(
+    "adjust", "drift", "table", "slow errors of the recorded poses, at knots: to be added to the recorded ones",
+    (
+        T_NS, *xyz("target"),
+        *(Column(f"turn_{axis}_target_deg", F64, "deg", f"about target {axis}") for axis in "xyz"),
+    ),
+)
+FREED = Artefact(
+    "adjust", "freed", "table", "what is held: its value, were it freed alone, and what an error of it does",
+    (
+        Column("unknown", TEXT, "", "parameter of a sensor, or of a family's wet faces"),
+        Column("estimated", BOOL, "", "named in adjust.free: not held; value and total sigma are the solution's"),
+        Column("considered", F64, "rad, m, s, 1 or 1/s", "sigma with which it may be wrong"),
+        Column("value", F64, "rad, m, s, 1 or 1/s", "its value, had it alone been freed (NaN: nothing tells it)"),
+        Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of that"),
+        *(
+            Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount for an error of one sigma considered")
+            for kind, unit in (("rotation", "rad"), ("lever_arm", "m")) for axis in "xyz"
+        ),
+    ),
+)
+SURFACES = Artefact(
+    "adjust", "surfaces", "table", "the adjusted surfaces, shared by both sensors",
+    (
+        Column("family", TEXT, "", "P1, P2, P3 or H"),
+        *xyz("target", "1", "normal_"),
+        Column("distance_m", F64, "m", "normal · x = distance; H: shift against the design heights"),
+        Column("laser_points", I64, "1", "observations"), Column("soundings", I64, "1", "observations"),
+    ),
+)
+GROUPS = Artefact(
+    "adjust", "groups", "table", "variance factors by group of observations",
+    (
+        Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping"),
+        Column("count", I64, "1", "observations; of the last two: epochs"),
+        Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
+        Column("scale", F64, "1", "robust scale of residual / what is expected of it, INS's noise included"),
+        Column("cut", I64, "1", "observations whose weight became zero"),
+        Column("reduced", I64, "1", "observations whose weight was reduced"),
+    ),
+)
+CELLS = Artefact(
+    "adjust", "cells", "table", "mean residual of each sensor on each surface in each pass",
+    (
+        Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H"), PASS,
+        Column("count", I64, "1", "observations"), Column("mean_m", F64, "m", "weighted mean residual"),
+        Column("rms_m", F64, "m", "RMS residual"),
+        Column("sigma_mean_m", F64, "m", "standard deviation of the mean from the scatter of its moments"),
+        Column("normalised", F64, "1", "of what differs from all other passes: as in patterns (NaN: too few moments)"),
+        Column("largest", F64, "1", "largest |residual| / what is expected, of those with a weight"),
+        Column("redundancy", F64, "1", "observations, less a shift and turn of its own of each moment"),
+        Column("variance_factor", F64, "1", "of the scatter about these, against that of its group"),
+    ),
+)
+PATTERNS = Artefact(
+    "adjust", "patterns", "table", "mean residuals of all points along one variable at a time, bins of enough moments",
+    (
+        Column("by", TEXT, "",
+               "face, angle (2 degrees), distance (1 m), time (10 s); differences: step, pass, ping_2 to 4, drift"),
+        Column("sensor", TEXT, "", "laser or mbes; drift: ins"),
+        Column("family", TEXT, "", "P1, P2, P3 or H; drift: turn_x, turn_y or turn_z, about target axes"),
+        Column("low", F64, "1, deg, m or s",
+               "number of the face or pass, lower edge of the bin (time: GPS seconds); step: the angle where it is; "
+               "ping_n: the remainder of the ping's number divided by n"),
+        Column("width", F64, "1, deg, m or s", "of the bin"),
+        Column("count", I64, "1", "observations (of two means the fewer); drift: knots"),
+        Column("mean_m", F64, "m (drift: rad)",
+               "weighted mean residual; step: of the 4 degrees from there on less that of the 4 before; pass, ping_n: "
+               "of these less that of all others; drift: the same of the drift found"),
+        Column("sigma_mean_m", F64, "m (drift: rad)",
+               "standard deviation of that from the scatter of the moments; drift: as conceded to the INS"),
+        Column("dof", F64, "1", "degrees of freedom of that"),
+        Column("normalised", F64, "1", "normal deviate of what exceeds the tolerance (drift: zero), signed"),
+    ),
+)
+RESIDUALS = Artefact(
+    "adjust", "residuals", "table", "residuals of all points, or of evenly taken ones in a long session",
+    (
+        Column("sensor", TEXT, "", "laser or mbes"), T_NS, PASS,
+        Column("face", I16, "1", "number of the face"),
+        *near("target"),
+        *xyz("target", "m", "coarse_", F32),
+        Column("range_m", F32, "m", "distance from the sensor"),
+        Column("angle_deg", F32, "deg", "sonar: across track, starboard +; laser: above the scanner's xy plane"),
+        Column("residual_m", F32, "m", "distance from the adjusted surface along its normal (toward the boat, or up)"),
+        Column("coarse_residual_m", F32, "m", "the same with the coarse mount (laser: as residual_m)"),
+        Column("weight", F32, "1", "robust weight: 1 in full, 0 cut"),
+    ),
+)
+RESIDUAL_BINS = Artefact(
+    "adjust", "residual_bins", "table", "mean residuals along one variable at a time, of the points in residuals",
+    (
+        Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H"),
+        PASS,
+        Column("by", TEXT, "", "angle (degrees), range (m) or time (s)"),
+        Column("low", F64, "deg, m or s", "lower edge of the bin; time: GPS seconds since 1980-01-06"),
+        Column("width", F64, "deg, m or s", "of the bin"),
+        Column("count", I64, "1", "points"),
+        Column("mean_m", F64, "m", "mean residual, robust weights"),
+        Column("rms_m", F64, "m", "RMS residual, robust weights"),
+    ),
+)
+RESIDUAL_MAP = Artefact(
+    "adjust", "residual_map", "table", "mean residuals by square cell of each face, of the points in residuals",
+    (
+        Column("sensor", TEXT, "", "laser or mbes"), Column("face", I16, "1", "number of the face"),
+        *near("target"),
+        Column("size_m", F64, "m", "side of the cell whose centre x, y, z is"),
+        Column("count", I64, "1", "points"),
+        Column("mean_m", F64, "m", "mean residual, robust weights"),
+        Column("rms_m", F64, "m", "RMS residual, robust weights"),
+    ),
+)
+ADJUST_SUMMARY = Artefact(
+    "adjust", "summary", "table", "the adjustment as a whole (one row)",
+    (
+        Column("converged", BOOL, "", "the step became negligible"), Column("iterations", I32, "1", "steps"),
+        Column("observations", I64, "1", "observations"), Column("redundancy", F64, "1", "observations - unknowns"),
+        Column("sigma0", F64, "1", "root of the variance factor over all groups, session sigmas"),
+        Column("between", F64, "1", "variance between epochs / expected from all noise: 1 if epochs and sensors agree"),
+        Column("between_dof", F64, "1", "its degrees of freedom"),
+        Column("condition", F64, "1", "condition number of the scaled normal matrix"),
+        Column("rank_deficiency", I32, "1", "unknown directions that the data leave open"),
+        Column("weakest", TEXT, "", "the weakest direction in words"),
+        Column("test_statistic", F64, "1", "consistency of passes: largest |normalised| in patterns by pass or drift"),
+        Column("test_dof", I32, "1", "how many of them"),
+        Column("test_limit", F64, "1", "limit of it at the test's level, for all rows of patterns together"),
+        Column("test_passed", BOOL, "", "statistic <= limit"),
+        Column("reason", TEXT, "", "why there is no result; empty when there is"),
+    ),
+)
+
+# --- report ----------------------------------------------------------------------------------------------------------
+CALIBRATION = Artefact(
+    "report", "calibration", "table", "each method's six values: totals that replace the coarse mount, and corrections",
+    (
+        Column("method", TEXT, "", "patent_sequential, patent_alternating, adjustment"),
+        Column("parameter", TEXT, "", "roll, pitch, yaw, x, y, z"),
+        Column("unit", TEXT, "", "deg or m"),
+        Column("coarse", F64, "deg or m", "mount as configured"), Column("total", F64, "deg or m", "calibrated mount"),
+        Column("change", F64, "deg or m", "total - coarse: the difference of the mount's settings"),
+        Column("correction", F64, "deg or m", "rotation vector (about the same body axis) or lever arm correction"),
+        Column("sigma", F64, "deg or m", "standard deviation of the correction"),
+        Column("sigma_random", F64, "deg or m", "standard deviation of the calibrated mount's setting, from noise"),
+        Column("sigma_total", F64, "deg or m", "the same with errors that do not average: considered, not estimated"),
+        Column("low_95", F64, "deg or m", "lower end of the 95 % interval by sigma_total"),
+        Column("high_95", F64, "deg or m", "upper end of it"),
+    ),
+)
+CLOSING = Artefact(
+    "report", "closing", "table", "how the sonar's planes lie on the laser's, over all passes, with each mount",
+    (
+        Column("mount", TEXT, "", "coarse, patent_sequential, patent_alternating, adjustment"),
+        Column("plane", TEXT, "", "P1, P2 or P3"),
+        Column("angle_deg", F64, "deg", "between the two sensors' normals"),
+        Column("distance_m", F64, "m", "of the soundings' centroid from the laser's plane, + toward the boat"),
+        Column("rms_m", F64, "m", "RMS distance of the soundings from their own plane"),
+        Column("soundings", I64, "1", "number of them"),
+        Column("laser_points", I64, "1", "number of them"),
+    ),
+)
+
+CALIBRATION_JSON = Document("report", "calibration.json")
+CALIBRATION_YAML = Document("report", "calibration.yaml")

@@ -1,0 +1,59 @@
+"""Small, reproducible samples of streams for searching: never for a result."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts.streams import Batch, xyz
+
+Array = NDArray[np.float64]
+KEY_BITS = 20
+
+
+Voxels = tuple[NDArray[np.int64], Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
+
+
+def points_above(batch: Batch, suffix: str, lowest_m: float) -> Array:
+    """A batch's points above ``lowest_m``, (n, 3) m."""
+    points = xyz(batch, suffix)
+    return np.asarray(points[points[:, 2] >= lowest_m])
+
+
+def voxel_sums(points: Array, voxel_m: float) -> Voxels:
+    """Points (n, 3) summed by voxel."""
+    cells = np.floor(points / voxel_m).astype(np.int64) + (1 << (KEY_BITS - 1))
+    keys, inverse = np.unique(
+        (cells[:, 0] << (2 * KEY_BITS)) | (cells[:, 1] << KEY_BITS) | cells[:, 2], return_inverse=True
+    )
+    return keys, _sums(inverse, len(keys), np.column_stack([np.ones(len(points)), points]))
+
+
+def voxel_means(partials: Iterable[Voxels]) -> Array:
+    """Mean points (n, 3) of the voxels that hold a fair share of points: lone outliers fall away."""
+    keys, sums = np.empty(0, np.int64), np.empty((0, 4))
+    for more_keys, more_sums in partials:
+        keys, inverse = np.unique(np.concatenate([keys, more_keys]), return_inverse=True)
+        sums = _sums(inverse, len(keys), np.concatenate([sums, more_sums]))
+    if len(keys) == 0:
+        return np.empty((0, 3))
+    counts = np.sort(sums[:, 0])
+    typical = counts[np.searchsorted(np.cumsum(counts), counts.sum() / 2)]  # half of all points lie in fuller voxels
+    fair = sums[:, 0] >= max(2.0, 0.02 * typical)
+    return np.asarray(sums[fair, 1:] / sums[fair, :1])
+
+
+def _sums(group: NDArray[np.int64], groups: int, rows: Array) -> Array:
+    return np.column_stack([np.bincount(group, weights=column, minlength=groups) for column in rows.T])
+
+
+def every_nth(batch: Batch, one_in: float) -> Batch:
+    """About one in ``one_in`` rows, chosen by a hash of time and beam: the same rows whatever the batches are."""
+    if one_in <= 1:
+        return batch
+    mixed = batch["t_ns"].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    if "beam" in batch:
+        mixed += batch["beam"].astype(np.uint64)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    chosen = np.flatnonzero((mixed >> np.uint64(40)) < np.uint64((1 << 24) / one_in))
+    return {name: values[chosen] for name, values in batch.items()}

@@ -1,0 +1,137 @@
+"""What was seen and found, for people and for programs."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from pipeline.checking.check_session import Examined
+from pipeline.checking.expected_soundings import USUAL
+from pipeline.checking.file_survey import Seen
+from pipeline.checking.ins_quality import Quality
+from pipeline.gps_time import utc_text
+from pipeline.maths.target.model import names_in_order
+
+
+def text(examined: Examined) -> str:
+    """Files, passes, findings."""
+    width = max([4, *(len(seen.name) for seen in examined.files)])
+    lines = [f"{'sensor':<7}{'file':<{width + 2}}{'kind':<24}{'records':>11}  {'from (UTC)':<21}{'to':<10}{'rate':>9}"]
+    lines += [_file_line(seen, width) for seen in examined.files]
+    if any(seen.share < 1 or not seen.ended for seen in examined.files):
+        lines.append("~: read in part")
+    lines += _quality_lines(examined.quality)
+    if examined.legs:
+        head = f"{'pass':<6}{'from (UTC)':<22}{'seconds':>8}{'distance':>10}{'speed':>10}{'laser':>8}{'sonar':>8}"
+        lines += ["", head]
+    for number, leg in enumerate(examined.legs):
+        seconds = (leg.end_ns - leg.start_ns) / 1e9
+        side = "" if leg.good else "  the wall is not to starboard"
+        lines.append(
+            f"{number:<6}{utc_text(leg.start_ns):<22}{seconds:>8.1f}{leg.distance_m:>8.2f} m{leg.speed_m_s:>6.2f} m/s"
+            f"{leg.ran['laser']:>8.0%}{leg.ran['mbes']:>8.0%}{side}"
+        )
+    lines += _soundings_lines(examined)
+    lines.append("")
+    for severity, head in (("fault", "Wrong"), ("look", "But look")):
+        lines += [f"{head}: {one.words}." for one in examined.findings if one.severity == severity]
+    if not examined.findings:
+        lines.append("Nothing found.")
+    return "\n".join(lines)
+
+
+def _quality_lines(found: Quality) -> list[str]:
+    """What the INS says of itself; nothing where it says nothing."""
+    lines = []
+    for name, kinds in found.by_file.items():
+        for counts in kinds.values():
+            shares = (f"{state} {number / counts.total():.0%}" for state, number in counts.most_common())
+            lines.append(f"{name}: {', '.join(shares)}")
+    if found.sigmas:
+        units = {name: "°" if name.endswith("deg") else " m" for name in found.sigmas}
+        axes = {name: name.rpartition("_")[0].replace("_", " and ") for name in found.sigmas}
+        said = ", ".join(f"{axes[name]} {sigma:.2g}{units[name]}" for name, sigma in found.sigmas.items())
+        lines.append(f"ins, by its own sigmas {'in the passes' if found.of_passes else 'in the whole log'}: {said}")
+    return lines
+
+
+def _by_face(examined: Examined) -> list[dict[str, Any]]:
+    """Wet faces with the soundings expected and found on them; none where they were not counted."""
+    if examined.model is None or examined.soundings is None:
+        return []
+    both = zip(examined.model.faces, examined.soundings.expected, examined.soundings.found, strict=True)
+    wet = examined.model.water_level_m
+    return [
+        {"face": face.name, "family": face.family, "expected": round(float(expected)), "found": round(float(found))}
+        for face, expected, found in both
+        if face.seen != "dry" and face.vertices_m[:, 2].min() < wet
+    ]
+
+
+def _soundings_lines(examined: Examined) -> list[str]:
+    """By family; by face they are in the JSON."""
+    faces = _by_face(examined)
+    if not faces:
+        return []
+    lines = ["", f"{'soundings on':<22}{'expected':>10}{'found':>10}   share ({USUAL})"]
+    order = names_in_order(examined.model.families) if examined.model is not None else ()
+    for family in [family.name for family in order if any(face["family"] == family.name for face in faces)]:
+        expected, found = (sum(f[key] for f in faces if f["family"] == family) for key in ("expected", "found"))
+        share = f"{found / expected:.0%}" if expected else "-"
+        lines.append(f"{family:<22}{'~' + str(expected):>10}{'~' + str(found):>10}{share:>8}")
+    return lines
+
+
+def _file_line(seen: Seen, width: int) -> str:
+    about = "" if seen.share == 1.0 and seen.ended else "~"
+    first, last = (utc_text(t) for t in seen.span_ns) if len(seen.epochs_ns) else ("-", "-")
+    last = last[11:] if last[:10] == first[:10] else last
+    rate = _rate(seen.rate_hz) if np.isfinite(seen.rate_hz) else "-"
+    records = f"{about}{seen.records}"
+    return f"{seen.sensor:<7}{seen.name:<{width + 2}}{seen.kind:<24}{records:>11}  {first:<21}{last:<10}{rate:>9}"
+
+
+def _rate(rate_hz: float) -> str:
+    """
+    >>> _rate(10638.7), _rate(199.98), _rate(9.9)
+    ('10600 Hz', '200 Hz', '9.9 Hz')
+    """
+    return f"{float(f'{rate_hz:.3g}'):.15g} Hz"
+
+
+def as_json(examined: Examined) -> str:
+    """The same, times as GPS nanoseconds."""
+    content: dict[str, Any] = {
+        "faulty": examined.faulty,
+        "findings": [{"question": f.question, "severity": f.severity, "words": f.words} for f in examined.findings],
+        "files": [
+            {
+                "sensor": seen.sensor,
+                "file": seen.name,
+                "kind": seen.kind,
+                "bytes": seen.size,
+                "share_read": seen.share if seen.ended else None,
+                "records": seen.records,
+                "dropped": {reason: number for reason, number in sorted(seen.dropped.items()) if number},
+                "first_ns": seen.span_ns[0] if len(seen.epochs_ns) else None,
+                "last_ns": seen.span_ns[1] if len(seen.epochs_ns) else None,
+                "rate_hz": seen.rate_hz if np.isfinite(seen.rate_hz) else None,
+            }
+            for seen in examined.files
+        ],
+        "ins_states": examined.quality.by_file,
+        "ins_sigmas": examined.quality.sigmas,
+        "soundings": _by_face(examined),
+        "passes": [
+            {
+                "start_ns": leg.start_ns,
+                "end_ns": leg.end_ns,
+                "distance_m": leg.distance_m,
+                "speed_m_s": leg.speed_m_s,
+                "good": leg.good,
+                "ran": dict(leg.ran),
+            }
+            for leg in examined.legs
+        ],
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False)

@@ -1,0 +1,151 @@
+"""Questions to the track: is the boat where the target is, does it pass it as it should, did everything run."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.checking.file_survey import Columns, Seen
+from pipeline.checking.findings import Finding
+from pipeline.checking.track import Track, askew_deg
+from pipeline.config.pool import PoolConfig, TargetPlace
+from pipeline.config.target import Origin
+from pipeline.gps_time import NS, utc_text
+from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
+from pipeline.maths.target.model import TargetModel
+from pipeline.results.screen import plural
+
+Times = NDArray[np.int64]
+ASTRAY_M = 1_000.0
+NEARBY_M = 60.0
+HIGHEST_M = 15.0  # of the INS above the target's upper end, or below its lower one
+ALIKE_M = 0.5  # passes whose distances differ by less tell yaw and lever arm badly apart
+RAN, NOT = 0.6, 0.2  # of a pass: a sensor ran, or did not
+ASKEW_DEG = 15.0  # between the boat's heading and the target's +y: no coarse azimuth
+HOLE_S = 0.3  # without the INS while a sensor saw the target
+
+
+def place(ins: Columns, pool: PoolConfig, model: TargetModel) -> Iterator[Finding]:
+    """The track against target.origin; a finding here leaves nothing to ask about the target."""
+    origin = pool.target.origin
+    away = _away_m(ins, origin.latitude_deg, origin.longitude_deg)
+    if away > ASTRAY_M:
+        given = f"{origin.latitude_deg:g}, {origin.longitude_deg:g}"
+        middle = np.degrees([np.median(ins["latitude_rad"]), np.median(ins["longitude_rad"])])
+        track = f"the INS's track ({middle[0]:.5f}, {middle[1]:.5f})"
+        words = f"target.origin ({given}) is {away / 1000:.4g} km from {track}: {_why_astray(ins, origin)}"
+        yield Finding("origin", words)
+    elif away > NEARBY_M:
+        yield Finding("origin", f"the INS never comes nearer to target.origin than {away:.0f} m; check target.origin")
+    above = float(np.median(ins["height_m"])) - origin.height_m
+    low, high = model.bounds()
+    if away <= ASTRAY_M and not low[2] - HIGHEST_M <= above <= high[2] + HIGHEST_M:
+        yield Finding(
+            "height",
+            f"the INS runs {abs(above):.1f} m {'above' if above > 0 else 'below'} target.origin.height_m = "
+            f"{origin.height_m:g}: one of the two is above sea level, not above the ellipsoid (the undulation would be "
+            f"{abs(above):.0f} m, less the INS's height above the origin); give both ellipsoidal",
+        )
+
+
+def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
+    """Nearest horizontal distance of the track from a place."""
+    if not -90 <= latitude_deg <= 90:
+        return np.inf
+    frame = PoolFrame.at(np.radians(latitude_deg), np.radians(longitude_deg), 0.0, 0.0)
+    level = ecef_from_geodetic(ins["latitude_rad"], ins["longitude_rad"], np.zeros(len(ins["t_ns"])))
+    return float(np.linalg.norm(frame.points_from_ecef(level), axis=1).min())
+
+
+def _why_astray(ins: Columns, origin: Origin) -> str:
+    latitude, longitude = origin.latitude_deg, origin.longitude_deg
+    for words, place in (
+        ("latitude and longitude are interchanged", (longitude, latitude)),
+        ("latitude_deg has the wrong sign", (-latitude, longitude)),
+        ("longitude_deg has the wrong sign", (latitude, -longitude)),
+        ("latitude_deg and longitude_deg have the wrong sign", (-latitude, -longitude)),
+    ):
+        if _away_m(ins, *place) < ASTRAY_M:
+            return f"{words}; correct it"
+    return "check target.origin, and that these are this pool's files"
+
+
+def sailing(track: Track, place: TargetPlace) -> Iterator[Finding]:
+    """Passes on the wrong side, none at all, all at one distance."""
+    sounded = [leg for leg in track.legs if max(leg.ran.values()) > NOT]
+    legs = f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')}"
+    if not track.legs:
+        yield Finding("passes", f"the boat never passes the target: {heading(track, place) or 'check target.origin'}")
+    elif all(leg.distance_m < 0 for leg in track.legs):
+        given = place.azimuth_deg
+        turned = "" if given is None else f" ({(given + 180) % 360:g} in place of {given:g})"
+        words = f"{legs} the boat sails behind the target (x > 0): turn target.azimuth_deg by 180°{turned}"
+        yield Finding("side", f"{words}, or check target.origin")
+    elif not any(leg.good for leg in track.legs):
+        astern = [leg for leg in track.legs if leg.astern]
+        words = f"{legs} the boat sails with the target to port"
+        if len(astern) > len(track.legs) / 2:
+            yield Finding("side", f"{words}, stern first by its heading: is the INS's heading turned by 180°?")
+        else:
+            yield Finding("side", f"{words}: sail the other way, with the target's front to starboard")
+    elif askew := heading(track, place):
+        yield Finding("azimuth", f"the boat does not sail along the target: {askew}")
+    distances = [leg.distance_m for leg in sounded if leg.good]
+    if distances and np.ptp(distances) < ALIKE_M:
+        yield Finding(
+            "distances",
+            f"all passes are {np.mean(distances):.1f} m from the wall (within {np.ptp(distances):.1f} m): yaw and "
+            "lever arm y are told apart by different distances; sail some more, 2 m nearer or farther",
+            "look",
+        )
+
+
+def heading(track: Track, place: TargetPlace) -> str:
+    """What to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
+    turn = askew_deg(track)
+    if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:
+        return ""
+    sailed = round(place.azimuth_deg + turn) % 360
+    return (
+        f"it heads {sailed}° with target.origin to starboard, but target.azimuth_deg is {place.azimuth_deg:g} (the "
+        f"direction of the target's +y, along which it is sailed): write {sailed}, or check target.origin"
+    )
+
+
+def missing(track: Track, files: Sequence[Seen]) -> Iterator[Finding]:
+    """A pass of which one sensor has nothing, or not all."""
+    there = {seen.sensor for seen in files if seen.records} - {seen.sensor for seen in files if not seen.ended}
+    for leg in track.legs:
+        if not leg.good or not {"laser", "mbes"} <= there:
+            continue
+        for one, other in (("laser", "mbes"), ("mbes", "laser")):
+            when = f"{utc_text(leg.start_ns)}, at {leg.distance_m:.1f} m"
+            if leg.ran[one] >= RAN and leg.ran[other] < RAN:
+                part = "did not run" if leg.ran[other] < NOT else f"ran for only {leg.ran[other]:.0%} of the time"
+                yield Finding(
+                    "missing pass",
+                    f"{other}: {part} in the pass of {when}, while {one} did: find its file, or sail the pass again",
+                )
+
+
+def holes(track: Track, epochs: dict[str, Times], max_interval_s: float, coarse_ns: float) -> Iterator[Finding]:
+    """Holes in the INS's log while the boat was by the target and a sensor ran."""
+    t_ns, y = track.trajectory.t_ns, track.trajectory.positions_m[:, 1]
+    by = [np.abs(y[(t_ns >= leg.start_ns) & (t_ns <= leg.end_ns)]).max() for leg in track.legs]
+    reach = float(max(by, default=0.0))
+    first = np.flatnonzero(np.diff(t_ns) > max(max_interval_s * NS, 1.5 * coarse_ns))
+    runs = np.unique(np.concatenate([np.empty(0, np.int64), *epochs.values()]))
+    lost = []
+    for k in first.tolist():
+        ran = np.count_nonzero((runs > t_ns[k]) & (runs < t_ns[k + 1]))
+        beside = min(y[k], y[k + 1]) < reach and max(y[k], y[k + 1]) > -reach and y[k + 1] >= y[k]
+        if ran and beside and (t_ns[k + 1] - t_ns[k]) / NS >= HOLE_S:
+            lost.append((int(t_ns[k]), (t_ns[k + 1] - t_ns[k]) / NS))
+    if lost:
+        longest = max(lost, key=lambda hole: hole[1])
+        yield Finding(
+            "ins hole",
+            f"ins: {plural(len(lost), 'hole')} in its log while the boat passed the target, "
+            f"{sum(s for _, s in lost):.1f} s together, the longest {longest[1]:.1f} s from {utc_text(longest[0])}: "
+            "points in them are lost; log without pause, or give the files that are missing",
+        )

@@ -1,0 +1,28 @@
+"""What calibrating a sample of the session gives, as far as it gets."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline.artefacts.streams import EMPTY, Stream
+from pipeline.config.pool import PoolConfig
+from pipeline.config.session import SessionConfig
+
+Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by sensor
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """Soundings, each with the face that it is on, and tables: the target's pose, the mount that the labels are by, and
+    the adjustment's ``freed``; none where it got no farther."""
+
+    soundings: Stream = EMPTY
+    target_pose: pd.DataFrame | None = None
+    provisional_mount: pd.DataFrame | None = None
+    freed: pd.DataFrame | None = None
+
+
+Calibrate = Callable[[SessionConfig, PoolConfig, Raw], Calibrated]

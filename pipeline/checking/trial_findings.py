@@ -1,0 +1,142 @@
+"""What the calibration of a sample says against the settings: another pose of the target, other signs of the mount."""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline.checking.findings import Finding
+from pipeline.checking.heights import profile, way
+from pipeline.checking.point_samples import Sample, put
+from pipeline.checking.track import Track
+from pipeline.config.mount import Mount
+from pipeline.config.pool import PoolConfig
+from pipeline.config.target import Letters, Target
+from pipeline.maths.geometry.rotations import log_so3
+from pipeline.maths.target.model import TargetModel
+from pipeline.mount import mount_of, turned
+from pipeline.target.surface import ClosestSurface
+
+Array = NDArray[np.float64]
+REACH_M = 0.15  # in the pose found, whose place along x and y is known
+STEP_M = 0.05
+SHIFTS_M = np.arange(-5.0, 5.0 + STEP_M / 2, STEP_M)
+CLEARLY = 0.95  # of the best agreement: what has less is another
+SMALLEST_M = 0.15  # a height within it is right, as near as this tells
+ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
+LEAST_DEG, SMALL_DEG = 1.5, 0.3  # off by less the coarse mount is as good as may be; a sign of less changes nothing
+DIRECTIONS = 0.3  # smallest singular value of normals that span all directions
+HALF = 0.5  # of its error, which a reversed sign must leave at most
+
+
+def other_pose(
+    track: Track, laser: Sample, pose: pd.DataFrame, model: TargetModel, pool: PoolConfig
+) -> Iterator[Finding]:
+    """Whether the laser's points lie better on the target elsewhere than where they were found to: at another height,
+    or with its sides exchanged; and what of that cannot be told."""
+    found = pose.iloc[0]
+    R = np.array(found["R_target_from_pool"]).reshape(3, 3)
+    origin = np.array([found[f"origin_{axis}_pool_m"] for axis in "xyz"])
+    points = put(track, laser.near(track))
+    points = (points[np.isfinite(points[:, 0])] - origin) @ R.T
+    if not len(points):
+        return
+    models = [model] if model.symmetric else [model, model.mirrored()]
+    agreed = np.array(
+        [profile(points, "laser", ClosestSurface(one), model.water_level_m, SHIFTS_M, REACH_M) for one in models]
+    )
+    exchanged, place = map(int, np.unravel_index(int(agreed.argmax()), agreed.shape))
+    higher = SHIFTS_M - origin[2]  # than the target is configured
+    alike = _peaks(agreed, higher)
+    height, shift = pool.target.origin.height_m, float(higher[place])
+    how = f"{way(-shift, 'higher', 'lower')} ({height - shift:.1f} in place of {height:g})"
+    as_found = agreed[0, np.abs(SHIFTS_M) <= SMALLEST_M + STEP_M / 2].max()
+    another = bool(as_found < CLEARLY * agreed.max())
+    if found["ambiguous"] and len(alike) > 1:
+        ways = ", or ".join(_said(*one) for one in alike)
+        yield Finding(
+            "target",
+            f"target: the laser's points fit it as well {ways}: its upper end was not seen clearly enough to tell; let "
+            "the laser see it, and check target.origin.height_m",
+        )
+    elif another and exchanged:
+        also = f", and target.origin.height_m {how}" if abs(shift) > SMALLEST_M else ""
+        words = "target: the laser's points fit it with left and right exchanged"
+        yield Finding("sides", f"{words}{also}: {_sides(pool.target)}")
+    elif another:
+        yield Finding(
+            "height",
+            f"target: the laser's points fit it with target.origin.height_m {how}: correct it, or the target's shape",
+        )
+    elif not found["within"]:
+        away = ", ".join(f"{value:+.2f}" for value in origin)
+        yield Finding(
+            "origin",
+            f"target: the laser's points fit it best {away} m (x, y, z) from target.origin, turned by "
+            f"{found['azimuth_correction_deg']:+.1f}°, which is more than segment.search_... allow: correct "
+            "target.origin and target.azimuth_deg, or check laser.mount",
+        )
+
+
+def _peaks(agreed: Array, shifts: Array) -> list[tuple[bool, float]]:
+    """Sides exchanged or not, and shift, of all that agree as well as the best but for a neighbour of it."""
+    found = []
+    for exchanged, row in enumerate(agreed):
+        for k in np.flatnonzero(row >= CLEARLY * agreed.max()).tolist():
+            around = row[np.abs(shifts - shifts[k]) < 2 * REACH_M]
+            if row[k] == around.max():
+                found.append((bool(exchanged), float(shifts[k])))
+    return found
+
+
+def _said(exchanged: bool, shift_m: float) -> str:
+    height = f"with target.origin.height_m {way(-shift_m, 'higher', 'lower')}"
+    height = "as it is given" if abs(shift_m) <= SMALLEST_M else height
+    return f"with left and right exchanged, {height}" if exchanged else height
+
+
+def _sides(target: Target) -> str:
+    if isinstance(target, Letters):
+        other = {"south": "north", "north": "south"}[target.low_side]
+        return f"write target.low_side: {other}"
+    return "reverse the sign of the y of all corners, and the order of each face's corners"
+
+
+def signs(
+    given: Mount, provisional: pd.DataFrame, model: TargetModel, within_deg: float
+) -> Iterator[Finding]:
+    """Angles whose reversed sign is nearer to the mount that the sample asks for; ``within_deg``: how far off a coarse
+    mount may be, so that the calibration finds the rest. Nothing of a target whose faces do not look into three
+    directions: with a plain wall some angles are free, and come out as chance has it."""
+    normals = np.array([face.normal for face in model.faces if face.seen != "dry"])
+    if np.linalg.matrix_rank(normals, tol=DIRECTIONS) < 3:
+        return
+    row = provisional.iloc[0]
+    turn_deg = [float(row[f"rotation_{axis}_deg"]) for axis in "xyz"]
+    if not np.isfinite(turn_deg).all():
+        return
+    wanted = turned(given, turn_deg)
+
+    def off_deg(mount: Mount) -> float:
+        R = mount_of(mount).R_body_from_sensor
+        return float(np.degrees(np.linalg.norm(log_so3(wanted.R_body_from_sensor @ R.T))))
+
+    as_given = off_deg(given)
+    keys = [key for key in ANGLES if abs(getattr(given, key)) > SMALL_DEG]
+    some = [set_ for number in (1, 2, 3) for set_ in combinations(keys, number)]
+    reversed_ = [(off_deg(given.model_copy(update={key: -getattr(given, key) for key in one})), one) for one in some]
+    best, which = min(reversed_, default=(np.inf, ()))
+    if as_given < LEAST_DEG or best > HALF * as_given:
+        return
+    found = wanted.settings()
+    values = {key: getattr(given, key) for key in which}
+    changed = ", ".join(f"mbes.mount.{key} = {-value:g} in place of {value:g}" for key, value in values.items())
+    asked = ", ".join(f"{key} {found[key]:.1f}" for key in ANGLES)
+    yield Finding(
+        "sign",
+        f"mbes: the soundings fit better with {changed} (a sample of them asks for {asked}): reverse the sign; if you "
+        "have measured it so, enter those three values and check again",
+        "fault" if as_given > within_deg else "look",
+    )

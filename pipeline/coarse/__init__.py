@@ -1,0 +1,1 @@
+"""Coarse mounts from surveyed marks."""

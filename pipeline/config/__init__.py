@@ -1,0 +1,1 @@
+"""Settings: the YAML files of pool, session, target, plan and marks as strict models."""

@@ -1,0 +1,68 @@
+"""PLAN.yaml: passes that are to be sailed, and of the instruments what a session's settings do not tell."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from pipeline.config.quantities import Angle, Length, Lever, Model, TransmitSectors
+
+Rate = Annotated[float, Field(ge=0.1, le=1e7)]
+Swing = Annotated[float, Field(ge=0, le=45)]
+Sway = Annotated[float, Field(ge=0, le=5)]
+
+
+class LaserFigures(Model):
+    """Lines athwart, by an angle from the scanner's z axis towards its x axis."""
+
+    point_rate_hz: Rate = 20_000.0
+    line_rate_hz: Rate = 50.0
+    field_deg: tuple[Angle, Angle] = (30.0, 130.0)
+    max_range_m: Length = 40.0
+
+
+class MbesFigures(Model):
+    ping_rate_hz: Annotated[float, Field(ge=0.1, le=200)] = 20.0
+    beams: Annotated[int, Field(ge=2, le=2048)] = 256
+    sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
+    max_range_m: Length = 15.0
+    sectors: TransmitSectors = ()  # tilts of the transmit fan; none: no tilt
+
+
+class Unrest(Model):
+    """Amplitude and period of what the boat does about its track."""
+
+    roll_deg: Swing = 1.0
+    pitch_deg: Swing = 0.6
+    sway_m: Sway = 0.06
+    heave_m: Sway = 0.02
+    period_s: Annotated[float, Field(ge=0.5, le=1000)] = 4.5
+
+
+class Pass(Model):
+    """One pass along the wall."""
+
+    distance_m: Annotated[float, Field(ge=0.5, le=100)]  # of the INS from the wall
+    speed_m_s: Annotated[float, Field(ge=0.01, le=10)] = 0.4
+    heading_swing_deg: Annotated[float, Field(ge=0, le=45)] = 1.5  # amplitude
+    half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the blocks
+
+    def seconds(self, half_length_m: float) -> float:
+        return 2 * (self.half_length_m or half_length_m) / self.speed_m_s
+
+
+class Budget(Model):
+    """Time for all passes; between two passes the boat has to turn."""
+
+    seconds: Annotated[float, Field(gt=0, le=36_000)]
+    turn_s: Annotated[float, Field(ge=0, le=3600)] = 60.0
+
+
+class Plan(Model):
+    ins_height_m: Lever = 1.3  # of the INS above the water
+    ins_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
+    laser: LaserFigures = LaserFigures()
+    mbes: MbesFigures = MbesFigures()
+    unrest: Unrest = Unrest()
+    passes: Annotated[tuple[Pass, ...], Field(min_length=1, max_length=100)]
+    candidates: Annotated[tuple[Pass, ...], Field(max_length=30)] = ()  # to choose from within the budget
+    budget: Budget | None = None

@@ -1,0 +1,39 @@
+"""What a name in session.yaml stood for: run.yaml holds all of it."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.config.quantities import Model
+
+INSTRUMENT = "[a-z0-9_]{1,100}"
+InstrumentTitle = Annotated[str, Field(min_length=1, max_length=100)]
+
+
+class InstrumentUsed(Model):
+    """A preset as applied; session.yaml has its name alone (pipeline/config/instruments.py), run.yaml all of this."""
+
+    name: Annotated[str, Field(pattern=f"^{INSTRUMENT}$")]
+    title: InstrumentTitle
+    unverified: tuple[str, ...]  # keys of the preset that were taken from no document
+    origins: dict[str, Literal["session", "preset", "default"]]  # where the sensor's figures come from
+    rates: dict[str, int | float | tuple[float, float]]  # for poolcal plan
+
+
+class CastUsed(Model):
+    """A file's cast as it was used; session.yaml has the file's name alone (readers/casts.py), run.yaml all of this."""
+
+    file: Annotated[str, Field(max_length=1000)]  # in the session folder
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    kind: Annotated[str, Field(max_length=50)]
+    number: Annotated[int, Field(ge=1)]  # which of so many in the file
+    casts: Annotated[int, Field(ge=1)]
+    taken: Annotated[str, Field(max_length=50)] | None  # by the file, whose time zone is not known
+    place_deg: tuple[float, float] | None  # latitude, longitude
+    rows: int
+    left_out: dict[str, int]  # by reason
+    first_m: float
+    last_m: float
+    tolerance_m_s: float  # within which the depths that were kept have all rows, or their means
+    averaged_m: float  # over so much of depth rows that scatter were averaged first; 0: not
+    scatter_m_s: float  # of the rows about what was kept, RMS

@@ -1,0 +1,134 @@
+"""The target in a pool's config: the patent's, by its letters, or any other, by its faces."""
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+
+from pipeline.config.quantities import Angle, Length, Lever, Model
+
+
+def _name(text: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}", text):
+        raise ValueError("must be a name of at most 40 letters a to z, digits, and - _ . within it")
+    return text
+
+
+FaceName = Annotated[str, AfterValidator(_name)]
+FaceNames = Annotated[tuple[FaceName, ...], Field(min_length=2)]
+
+
+class Origin(Model):
+    """Of the target frame; of the patent's target the middle of the centre wall's front face."""
+
+    latitude_deg: Annotated[float, Field(ge=-90, le=90)]
+    longitude_deg: Annotated[float, Field(ge=-180, le=360)]
+    height_m: Annotated[float, Field(ge=-1000, le=10000, description="ellipsoidal")]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _not_interchanged(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        one, other = given.get("latitude_deg"), given.get("longitude_deg")
+        if not isinstance(one, (int, float)) or not isinstance(other, (int, float)):
+            return given
+        if abs(one) > 90 >= abs(other):
+            raise ValueError(
+                f"latitude_deg = {one:g} is no latitude: is it the longitude? Write latitude_deg: {other:g} and "
+                f"longitude_deg: {one:g}"
+            )
+        return given
+
+
+class Letters(Model):
+    """The patent's target by design: CONVENTIONS.md, "The target"."""
+
+    kind: Literal["letters"] = "letters"
+    a: Length
+    b: Length
+    c: Length
+    e: Length
+    low_side: Literal["south", "north"] = "south"
+    blocks_per_side: Annotated[int, Field(ge=1, le=200)] | None = None
+    first_base_m: Lever | None = None
+    stagger_m: Annotated[float, Field(ge=0, le=100)] | None = None
+    origin: Origin
+    azimuth_deg: Angle | None = None
+    water_level_m: Lever = 0.0
+
+    @model_validator(mode="after")
+    def _blocks_fit(self) -> "Letters":
+        if self.blocks_per_side is None and self.a < 2 * self.e:
+            raise ValueError(f"a = {self.a} leaves no room for one block and gap of e = {self.e}: a must be >= 2 e")
+        return self
+
+    @property
+    def shape(self) -> str:
+        """Which settings give the shape, for people."""
+        return "target.a, b, c, e and low_side"
+
+    @property
+    def sides(self) -> str:
+        """Which setting tells left from right."""
+        return "target.low_side"
+
+
+class FaceSettings(Model):
+    """A planar convex polygon: corners in the target frame, counter-clockwise as the sensors see it."""
+
+    corners: Annotated[tuple[tuple[Lever, Lever, Lever], ...], Field(min_length=3, max_length=60)]
+    seen: Literal["both", "dry", "wet"] = "both"  # by the laser alone: dry; by the sonar alone: wet
+    role: Literal["P1", "P2", "P3"] | None = None  # in the patent's steps
+
+
+class RelationSettings(Model):
+    """One of four things known of some faces; ``name``: of the family that they make."""
+
+    same_plane: FaceNames | None = None
+    distance: FaceNames | None = None  # parallel, as far apart as the corners say
+    height: FaceNames | None = None  # horizontal, as high above each other as the corners say
+    parallel: FaceNames | None = None  # at an unknown distance
+    name: FaceName | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> "RelationSettings":
+        if len(self.given) != 1:
+            raise ValueError("must have exactly one of same_plane, distance, height, parallel")
+        return self
+
+    @property
+    def given(self) -> dict[Literal["same_plane", "distance", "height", "parallel"], tuple[str, ...]]:
+        kinds = {
+            "same_plane": self.same_plane, "distance": self.distance, "height": self.height, "parallel": self.parallel,
+        }
+        return {kind: names for kind, names in kinds.items() if names is not None}  # type: ignore[misc]
+
+
+class Faces(Model):
+    """Any target of planar faces."""
+
+    kind: Literal["faces"]
+    faces: Annotated[dict[FaceName, FaceSettings], Field(min_length=1, max_length=500)]
+    relations: tuple[RelationSettings, ...] = ()
+    repeats_m: Length | None = None  # the height after which the shape repeats; null: it does not
+    origin: Origin
+    azimuth_deg: Angle | None = None
+    water_level_m: Lever = 0.0
+
+    @property
+    def shape(self) -> str:
+        return "target.faces"
+
+    @property
+    def sides(self) -> str:
+        return "the sign of y in target.faces"
+
+
+def _kind(value: Any) -> str:
+    return str(value.get("kind", "letters") if isinstance(value, dict) else getattr(value, "kind", "letters"))
+
+
+Target = Annotated[
+    Annotated[Letters, Tag("letters")] | Annotated[Faces, Tag("faces")], Discriminator(_kind)
+]

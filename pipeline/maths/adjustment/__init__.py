@@ -1,0 +1,1 @@
+"""The rigorous least-squares adjustment: observations, normal equations, solution, tests of residuals."""

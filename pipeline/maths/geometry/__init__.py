@@ -1,0 +1,1 @@
+"""Rotations, poses, planes, geodesy: what every part of the mathematics stands on."""

@@ -1,0 +1,57 @@
+"""Lifted second moments: one sum over the soundings from which the planes of *every* mount follow.
+
+A sounding lies in the target frame at
+
+    X = p + T · (E · m + l),    p, T: pose of the body (T = R_target_from_body),
+                                m = R_body_from_mbes(coarse) · x_mbes,  E = Exp(δ),  l = lever arm,
+
+which is linear in θ = (vec E, l, 1) with 9 + 3 + 1 = 13 elements: X_a = f_a · θ with
+
+    f_a = (T_a1 m1, T_a1 m2, T_a1 m3, T_a2 m1, …, T_a3 m3 | T_a1, T_a2, T_a3 | p_a),      vec E row by row.
+
+So Σ X_a X_b = θᵀ (Σ f_a f_bᵀ) θ, and with a constant 1 as fortieth feature also Σ X_a and the count: a 40 x 40 matrix
+per pass and face holds all. Iterating over mounts then costs microseconds, and no sounding is read twice.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.geometry.planes import Moments
+
+Array = NDArray[np.float64]
+FEATURES = 13
+SIZE = 3 * FEATURES + 1  # three axes, and the constant 1 for the sums
+
+
+def lift(R_target_from_body: Array, positions_m: Array, points_body_m: Array) -> Array:
+    """Features (n, 40) of soundings: poses (n, 3, 3), (n, 3) m; points m = R_body_from_mbes x_mbes, (n, 3) m."""
+    n = len(positions_m)
+    features = np.empty((n, SIZE))
+    for axis in range(3):
+        block = features[:, axis * FEATURES : (axis + 1) * FEATURES]
+        row = R_target_from_body[:, axis, :]
+        block[:, :9] = (row[:, :, None] * points_body_m[:, None, :]).reshape(n, 9)
+        block[:, 9:12] = row
+        block[:, 12] = positions_m[:, axis]
+    features[:, -1] = 1.0
+    return features
+
+
+def plane_moments(lifted: Array, correction: Array, lever_arm_m: Array) -> Moments:
+    """Moments of the soundings placed with mount Exp(δ) = ``correction`` (3, 3) times coarse, and this lever arm.
+
+    Their noise is Σ r rᵀ of the rays r = T E m: a beam that errs by δ meets a face at incidence i by r δ tan i too
+    early or too late, along the ray it is recorded on, which the range's own noise does as well.
+    """
+    place, rays = np.zeros((4, SIZE)), np.zeros((3, SIZE))
+    for axis in range(3):
+        place[axis, axis * FEATURES : (axis + 1) * FEATURES] = np.concatenate([correction.ravel(), lever_arm_m, [1.0]])
+        rays[axis, axis * FEATURES : axis * FEATURES + 9] = correction.ravel()
+    place[3, -1] = 1.0
+    sums = place @ lifted @ place.T
+    return Moments(round(float(sums[3, 3])), sums[:3, 3], sums[:3, :3], rays @ lifted @ rays.T)
+
+
+def attitude_sum(lifted: Array) -> Array:
+    """Σ R_target_from_body (3, 3) over the soundings: the features T_a multiplied by the constant."""
+    return np.array([lifted[axis * FEATURES + 9 : axis * FEATURES + 12, -1] for axis in range(3)])

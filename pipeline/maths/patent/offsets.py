@@ -1,0 +1,185 @@
+"""The patent's offsets [0126-0128], and angles and offsets in turn until both stand still.
+
+Corrections are laser minus MBES, displacements in the *target* frame; the lever arm lives in the *body* frame, so they
+are turned by the mean R_body_from_target of the soundings used: a pool that is not aligned with north would give
+nonsense otherwise.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import DegenerateGeometryError
+from pipeline.maths.geometry.planes import Plane, fit_plane
+from pipeline.maths.geometry.rotations import exp_so3, log_so3
+from pipeline.maths.patent.angles import PassPlanes, look, mean_attitude
+from pipeline.maths.patent.lifted_moments import plane_moments
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DryFace:
+    """A horizontal face as the laser sees it."""
+
+    name: str
+    mean_z_m: float
+    design_z_m: float
+    count: int
+
+
+@dataclass(frozen=True)
+class WetFace:
+    """A horizontal face as the sonar sees it: lifted moments."""
+
+    name: str
+    lifted: Array
+    design_z_m: float
+
+
+@dataclass(frozen=True)
+class PassOffsets:
+    """One pass: lifted moments by family, and the laser's planes P1 and P2."""
+
+    planes: PassPlanes
+    laser_wall: Plane
+    laser_p1: Plane
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """Displacement of the MBES's cloud onto the laser's: (3,) m in the target frame, in the body frame; pairs for Z."""
+
+    target_m: Array
+    body_m: Array
+    pairs: list[dict[str, float | str]]
+
+
+def offsets(
+    passes: Sequence[PassOffsets],
+    dry: Sequence[DryFace],
+    wet: Sequence[WetFace],
+    rotation: Array,
+    lever_arm_m: Array,
+    apply_x_first: bool,
+) -> Offsets:
+    """X, Y, Z with the mount Exp(δ) = ``rotation`` and this lever arm.
+
+    X [0126]: mean X of the laser's wall points minus that of the MBES's, pass by pass, weighted by n_L n_M / (n_L +
+    n_M). Z [0127]: (z_dry - z_wet) measured minus (z_dry - z_wet) by design, over every pair of horizontal faces.
+    Y [0128]: P1 planes projected onto the floor (their traces at their own mean height), cut with a line parallel to Y
+    through the faces' centroid, laser minus MBES. Moving the MBES's points by ΔX moves their cut by ΔX n_x / n_y, laser
+    minus MBES by the opposite: with ``apply_x_first`` that is added, and Y is what remains after X has been applied.
+    """
+    if not passes:
+        raise DegenerateGeometryError("no pass has laser points and soundings on both P1 and P2")
+    x_rows, y_rows = [], []
+    for one in passes:
+        wall = plane_moments(one.planes.lifted["P2"], rotation, lever_arm_m)
+        weight = one.laser_wall.count * wall.count / (one.laser_wall.count + wall.count)
+        x_rows.append((one.laser_wall.centroid_m[0] - wall.total[0] / wall.count, weight))
+    dx = _mean(x_rows)
+    for one in passes:
+        slanted = fit_plane(plane_moments(one.planes.lifted["P1"], rotation, lever_arm_m), one.laser_p1.normal)
+        cut_x = one.laser_p1.centroid_m[0]
+        dy = _cut(one.laser_p1, cut_x) - _cut(slanted, cut_x)
+        if apply_x_first:
+            dy -= dx * slanted.normal[0] / slanted.normal[1]
+        y_rows.append((dy, one.laser_p1.count * slanted.count / (one.laser_p1.count + slanted.count)))
+    pairs, dz = _height_pairs(dry, wet, rotation, lever_arm_m)
+    target = np.array([dx, _mean(y_rows), dz])
+    attitude = mean_attitude({f"{one.planes.number}-{k}": v for one in passes for k, v in one.planes.lifted.items()})
+    return Offsets(target, attitude @ target, pairs)
+
+
+def _mean(rows: Sequence[tuple[float, float]]) -> float:
+    return float(np.average([value for value, _ in rows], weights=[weight for _, weight in rows]))
+
+
+def _cut(plane: Plane, x_m: float) -> float:
+    """y where the plane's trace at its centroid's height meets x = x_m."""
+    n, c = plane.normal, plane.centroid_m
+    return float(c[1] - (x_m - c[0]) * n[0] / n[1])
+
+
+def _height_pairs(
+    dry: Sequence[DryFace], wet: Sequence[WetFace], rotation: Array, lever_arm_m: Array
+) -> tuple[list[dict[str, float | str]], float]:
+    if not dry or not wet:
+        seen_by = "laser" if not dry else "sonar"
+        raise DegenerateGeometryError(f"the {seen_by} sees no horizontal face well enough: Z cannot be told")
+    pairs: list[dict[str, float | str]] = []
+    rows = []
+    for below in wet:
+        moments = plane_moments(below.lifted, rotation, lever_arm_m)
+        for above in dry:
+            measured = above.mean_z_m - moments.total[2] / moments.count
+            design = above.design_z_m - below.design_z_m
+            rows.append((measured - design, above.count * moments.count / (above.count + moments.count)))
+            pairs.append(
+                {
+                    "dry_face": above.name,
+                    "wet_face": below.name,
+                    "measured_m": measured,
+                    "design_m": design,
+                    "dz_m": measured - design,
+                }
+            )
+    total = sum(weight for _, weight in rows)
+    for pair, (_, weight) in zip(pairs, rows, strict=True):
+        pair["weight"] = weight / total
+    return pairs, _mean(rows)
+
+
+@dataclass(frozen=True)
+class AlternationResult:
+    rotation_vector_rad: Array
+    lever_arm_correction_m: Array
+    converged: bool
+    iterations: int
+    rows: list[dict[str, float]]
+
+
+def alternate(
+    angle_passes: Sequence[PassPlanes],
+    offset_passes: Sequence[PassOffsets],
+    dry: Sequence[DryFace],
+    wet: Sequence[WetFace],
+    lever_arm_m: Array,
+    max_iterations: int,
+    step_tolerance_rad: float,
+    step_tolerance_m: float,
+) -> AlternationResult:
+    """One step of the angles, then one of the offsets, until both stand still.
+
+    The sequential recipe stops at angles found with a wrong lever arm (method: 0.08° on noise-free data); the fixed
+    point of the alternation has neither a deviation nor a displacement left, which only the truth has.
+    """
+    rotation, correction = np.eye(3), np.zeros(3)
+    rows: list[dict[str, float]] = []
+    converged = False
+    for iteration in range(1, max_iterations + 1):
+        turn = look(angle_passes, rotation, lever_arm_m + correction).correction_rad
+        rotation = exp_so3(turn) @ rotation
+        shift = offsets(offset_passes, dry, wet, rotation, lever_arm_m + correction, apply_x_first=True).body_m
+        correction = correction + shift
+        vector = np.degrees(log_so3(rotation))
+        step_rad, step_m = float(np.linalg.norm(turn)), float(np.linalg.norm(shift))
+        row: dict[str, float] = {"iteration": iteration, "step_deg": float(np.degrees(step_rad)), "step_m": step_m}
+        row |= {f"rotation_{axis}_deg": float(vector[k]) for k, axis in enumerate("xyz")}
+        rows.append(row | {f"lever_arm_{axis}_m": float(correction[k]) for k, axis in enumerate("xyz")})
+        converged = step_rad <= step_tolerance_rad and step_m <= step_tolerance_m
+        if converged or step_m > 100:
+            break
+    return AlternationResult(log_so3(rotation), correction, converged, len(rows), rows)
+
+
+def by_family(faces: Mapping[int, str], moments: Mapping[tuple[int, int], Array]) -> dict[tuple[int, str], Array]:
+    """Sum lifted moments of (pass, face) over the faces of each family: (pass, family) -> (40, 40)."""
+    total: dict[tuple[int, str], Array] = {}
+    for (number, face), lifted in moments.items():
+        key = (number, faces[face])
+        total[key] = total[key] + lifted if key in total else lifted
+    return total

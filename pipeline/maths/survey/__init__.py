@@ -1,0 +1,1 @@
+"""Marks surveyed by a total station: adjustment of rigid frames, data snooping."""

@@ -1,0 +1,64 @@
+"""The patent's target from its letters a, b, c, e: outlines of the faces, and what is known of their planes.
+
+Seen from above (the boat passes on the left, x < 0, y upward)::
+
+        pool wall x = c
+     .------------------.   y =  b/2 + c
+      \\   P3 blocks      |
+       \\                 |
+        |  P2            |   y in [-b/2, b/2], x = 0: the centre wall's front face
+       /                 |
+      /   P1 blocks      |
+     '------------------'   y = -b/2 - c
+"""
+
+import numpy as np
+
+from pipeline.maths.target.outlines import Outline, Relation
+
+Corner = tuple[float, float, float]
+LEVEL = "H"  # the family of all tops and bottoms
+
+
+def lettered(
+    a: float,
+    b: float,
+    c: float,
+    e: float,
+    low_side: str = "south",
+    blocks_per_side: int | None = None,
+    first_base_m: float | None = None,
+    stagger_m: float | None = None,
+) -> tuple[list[Outline], list[Relation], float]:
+    """Outlines, relations, and after what height they repeat (metres), in the target frame; CONVENTIONS.md, "The
+    target".
+
+    A block on side s = ±1 (+1 is north, +y) is the prism of height e over the triangle (0, s b/2), (c, s b/2),
+    (c, s (b/2 + c)). Its measured face runs at 45° from the wall's edge back to the pool's wall; its outward normal is
+    (-1, s, 0)/√2. P1 are the faces on -y, P3 those on +y, P2 the wall's front. The low side's first base stands at
+    ``first_base_m`` (default -a/2), the other side's ``stagger_m`` (default e) higher; then one block every 2 e.
+    """
+    count = int(np.floor(a / (2 * e) + 1e-9)) if blocks_per_side is None else blocks_per_side
+    first = -a / 2 if first_base_m is None else first_base_m
+    stagger = e if stagger_m is None else stagger_m
+    wall = [(0.0, b / 2, -a / 2), (0.0, -b / 2, -a / 2), (0.0, -b / 2, a / 2), (0.0, b / 2, a / 2)]
+    outlines, relations = [Outline("P2", wall, "P2")], []
+    level: list[str] = []
+    for role, side, word in (("P1", -1, "south"), ("P3", 1, "north")):
+        base = first + (0.0 if word == low_side else stagger)
+        near, inner, outer = (0.0, side * b / 2), (c, side * b / 2), (c, side * (b / 2 + c))
+        names = []
+        for k in range(count):
+            low, high = base + 2 * e * k, base + 2 * e * k + e
+            name = f"{role}-{k}"
+            ends = (near, outer) if side < 0 else (outer, near)
+            slanted = [(*ends[0], low), (*ends[1], low), (*ends[1], high), (*ends[0], high)]
+            outlines.append(Outline(name, slanted, role))
+            up = [near, inner, outer] if side > 0 else [near, outer, inner]
+            outlines.append(Outline(f"{name}-top", [(*corner, high) for corner in up]))
+            outlines.append(Outline(f"{name}-bottom", [(*corner, low) for corner in up[::-1]]))
+            names.append(name)
+            level += [f"{name}-top", f"{name}-bottom"]
+        if len(names) > 1:
+            relations.append(Relation("same_plane", tuple(names)))
+    return outlines, [*relations, Relation("height", tuple(level), LEVEL)], 2 * e

@@ -1,0 +1,1 @@
+"""What planned passes will give, and what passes lack."""

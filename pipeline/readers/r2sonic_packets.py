@@ -1,0 +1,115 @@
+"""Where R2Sonic's BTH0 packets lie in files: one after another, in HYPACK .R2S files, in XTF.
+
+Bare packets: each begins with its name and its size (u32, big-endian). HYPACK .R2S puts the size before it once more
+(u32, little-endian). Other packets of the sonar (snippets, water column, ...) have the same header and are skipped.
+
+XTF (Triton, "XTF File Format", rev. 40; little-endian): a file header of 1024 bytes (or a multiple), then records:
+u16 0xFACE, u8 type, u8, u16, 2 x u16, u32 length of the whole record. R2Sonic's packets are in records of type 65
+(QINSy) and 68 (Triton), behind a ping header whose length is not relied on: the packet is found by its name. The shell
+is so small that it is read here: a library that unpickles an index file it finds beside the data, and that never ends
+on a record of length 0, is not for files from elsewhere.
+
+Between packets that follow each other both readers search for the next mark where it is not at its place, and count.
+"""
+
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from typing import BinaryIO
+
+from pipeline.readers.raw_file import find, read_at, size_of
+
+BTH0 = b"BTH0"
+OTHERS = (b"SNI0", b"WCD0", b"AID0", b"TPX0", b"TPX1", b"STH0")
+MIN_PACKET, MAX_PACKET = 12, 65_535  # the sonar sends each as one UDP datagram
+SECTION = struct.Struct(">2sH")
+XTF_HEADER, XTF_MAGIC, XTF_RECORD = 1024, b"\xce\xfa", 14
+XTF_TYPES = (65, 68)
+XTF_MAX = 1 << 24
+Sections = dict[bytes, bytes]
+
+
+def packet_size(head: bytes) -> int | None:
+    """The size that a packet's first eight bytes promise; None where they are no packet's."""
+    size = int.from_bytes(head[4:8], "big")
+    return size if len(head) >= 8 and head[:4] in (BTH0, *OTHERS) and MIN_PACKET <= size <= MAX_PACKET else None
+
+
+def sections_of(packet: bytes) -> Sections | None:
+    """A packet's sections by name, their heads included; None where their sizes contradict the packet's."""
+    found: Sections = {}
+    offset = MIN_PACKET
+    while offset + SECTION.size <= len(packet):
+        name, size = SECTION.unpack_from(packet, offset)
+        if size < SECTION.size or offset + size > len(packet):
+            return None
+        found.setdefault(name, packet[offset : offset + size])
+        offset += size
+    return found
+
+
+def bare_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
+    """BTH0 packets that follow one another, with or without HYPACK's length before each."""
+    size, position = size_of(file), 0
+    while position < size:
+        head = read_at(file, position, 12)
+        prefix = 4 if _prefixed(head) else 0
+        start = position + prefix
+        length = packet_size(head[prefix : prefix + 8])
+        if length is not None and start + length <= size:
+            is_bathymetry = head[prefix : prefix + 4] == BTH0
+            sections = sections_of(read_at(file, start, length)) if is_bathymetry else {}
+            if sections is not None:
+                if sections:
+                    yield sections
+                position = start + length
+                continue
+            dropped["damaged packet"] += 1
+        else:
+            dropped["stray bytes" if length is None else "truncated packet"] += 1
+        following = find(file, BTH0, start + 1)
+        position = size if following < 0 else following
+
+
+def _prefixed(head: bytes) -> bool:
+    return len(head) == 12 and packet_size(head[4:]) == int.from_bytes(head[:4], "little")
+
+
+def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
+    """BTH0 packets out of the records of an XTF file; a file without any has its other records counted."""
+    size = size_of(file)
+    position = find(file, XTF_MAGIC, XTF_HEADER)
+    packets = others = 0
+    while 0 <= position < size:
+        head = read_at(file, position, XTF_RECORD)
+        length = int.from_bytes(head[10:14], "little")
+        sound = len(head) == XTF_RECORD and head[:2] == XTF_MAGIC and XTF_RECORD <= length <= XTF_MAX
+        following = position + length if sound and position + length <= size else find(file, XTF_MAGIC, position + 2)
+        broken = not sound or (following != position + length)
+        if broken:
+            dropped["truncated record" if following < 0 else "stray bytes"] += 1
+        if sound and head[2] not in XTF_TYPES:
+            others += 1
+        elif sound and (not broken or following < 0):
+            sections = _sections_in(read_at(file, position, length))
+            if sections is not None:
+                packets += 1
+                yield sections
+            elif not broken:
+                dropped["damaged packet"] += 1
+        position = following
+    if not packets:
+        dropped["XTF record other than R2Sonic bathymetry"] += others
+
+
+def _sections_in(record: bytes) -> Sections | None:
+    """The sections of the first sound BTH0 packet in a record."""
+    start = record.find(BTH0)
+    while start >= 0:
+        length = packet_size(record[start : start + 8])
+        if length is not None and start + length <= len(record):
+            sections = sections_of(record[start : start + length])
+            if sections is not None:
+                return sections
+        start = record.find(BTH0, start + 4)
+    return None

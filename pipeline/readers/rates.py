@@ -1,0 +1,25 @@
+"""How often a sensor tells something."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gps_time import NS
+
+ONE_PING_NS = 4_000_000  # sectors of one ping are sent within milliseconds, and have times of their own
+
+
+def rate_hz(sensor: str, epochs_ns: NDArray[np.int64], records: int) -> float:
+    """Records of an INS and pings of a sonar by their usual step, points of a laser by their number; NaN of too few.
+
+    >>> ping = np.array([0, 220_000, 440_000])
+    >>> rate_hz("mbes", np.concatenate([ping, ping + NS // 10, ping + NS // 5]), 900)
+    10.0
+    """
+    times = np.unique(epochs_ns)
+    if len(times) < 2:
+        return float("nan")
+    if sensor == "laser":
+        return float(records / ((times[-1] - times[0]) / NS))
+    if sensor == "mbes":
+        times = times[np.r_[True, np.diff(times) > ONE_PING_NS]]
+    return float(NS / np.median(np.diff(times))) if len(times) > 1 else float("nan")

@@ -1,0 +1,1 @@
+"""The answer: verdict, warnings, suspected causes, calibration.json."""

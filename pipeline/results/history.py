@@ -1,0 +1,184 @@
+"""All sessions of one boat on one page: has the mount moved, and when?
+
+Each accepted session is compared with the accepted one before it by the joint test of :mod:`pipeline.maths.comparison`.
+Rejected sessions are shown, never compared.
+"""
+
+import fnmatch
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date, datetime
+from pathlib import Path
+from re import fullmatch
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
+from pipeline.atomic_files import write_bytes, write_text, writing
+from pipeline.errors import ConfigError, PoolcalError
+from pipeline.maths.comparison import Estimate, compare
+from pipeline.mount import SETTINGS
+from pipeline.report.verdict import SIX
+from pipeline.results.compare import LEVEL, estimate_of
+from pipeline.results.screen import plural
+from pipeline.run.folder import RUN_YAML, calibration
+
+TEXTS = ("date_utc", "session", "run", "verdict", "moved")  # columns
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which sessions to show; dates are those of the first pass, UTC."""
+
+    name: str = "*"
+    since: date | None = None
+    until: date | None = None
+
+    def takes(self, session: str, day: str) -> bool:
+        inside = (self.since is None or day >= self.since.isoformat()) and (
+            self.until is None or day <= self.until.isoformat()
+        )
+        return inside and fnmatch.fnmatchcase(session.casefold(), self.name.casefold())
+
+    def words(self) -> str:
+        said = [f"name {self.name}"] if self.name != "*" else []
+        said += [f"since {self.since}"] if self.since else []
+        return ", ".join([*said, *([f"until {self.until}"] if self.until else [])])
+
+
+@dataclass(frozen=True)
+class History:
+    """One row a session in order of time; the runs that could not be read, with the reason; and those of a laser, which
+    has a mount of its own."""
+
+    table: pd.DataFrame
+    unreadable: list[str] = field(default_factory=list)
+    lasers: list[str] = field(default_factory=list)
+
+    @property
+    def without(self) -> str:
+        """What is not shown because it is of the laser, in words."""
+        many = len(self.lasers)
+        return f"{plural(many, 'laser run')} not shown: {', '.join(self.lasers)}" if many else ""
+
+
+def read_history(folder: Path, chosen: Filter) -> History:
+    """Every run in ``folder``, two levels deep."""
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: is no folder; RUNS_DIR is the folder that holds run folders")
+    found, unreadable, lasers = [], [], []
+    finished, begun = _runs_in(folder)
+    if not finished and not begun:
+        itself = (folder / RUN_YAML).is_file()
+        remedy = "it is one itself: name the folder that holds it" if itself else "name the folder that holds them"
+        raise ConfigError(f"{folder}: holds no run folder, nor do the folders in it; {remedy}")
+    for run in finished:
+        try:
+            result = calibration(run)
+            if result.get("calibrated") == "laser":
+                lasers.append(run.relative_to(folder).as_posix())
+                continue
+            row, estimate = _row(run.relative_to(folder).as_posix(), result), estimate_of(result)
+        except PoolcalError as error:
+            unreadable.append(str(error))
+            continue
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
+            unreadable.append(f"{run}: its calibration.json is not as poolcal writes it")
+            continue
+        if chosen.takes(row["session"], row["date_utc"][:10]):
+            found.append((row["date_utc"], row["run"], row, estimate))
+    unreadable += [_why_without(run) for run in begun]
+    found.sort(key=lambda one: one[:2])
+    rows = list(_with_jumps([(row, estimate) for *_, row, estimate in found]))
+    return History(pd.DataFrame(rows, columns=list(_columns())), unreadable, lasers)
+
+
+def _runs_in(folder: Path) -> tuple[list[Path], list[Path]]:
+    """Run folders up to two levels deep, with a result and without one that can be read."""
+    finished, begun = set(), set()
+    for depth in ("*", "*/*"):
+        finished |= {path.parent.parent for path in folder.glob(f"{depth}/report/{CALIBRATION_JSON.name}")}
+        begun |= {path.parent for path in folder.glob(f"{depth}/{RUN_YAML}")}
+    return sorted(finished), sorted(begun - finished)
+
+
+def _why_without(run: Path) -> str:
+    try:
+        (run / "report" / CALIBRATION_JSON.name).stat()
+    except PermissionError as error:
+        return f"{run}: its result cannot be read ({error.strerror}); correct its permissions"
+    except OSError:
+        pass
+    return f"{run}: has no result; run poolcal run again, and see what it says"
+
+
+def _columns() -> Iterator[str]:
+    yield from ("date_utc", "session", "run", "verdict")
+    for key in SETTINGS:
+        yield from (key, f"sigma_{key}")
+    yield from ("probability", "moved")
+
+
+def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
+    """The adjustment's values and sigmas, whichever method the session's result is; NaN where there are none."""
+    block = result["methods"]["adjustment"]
+    nothing = dict.fromkeys(SETTINGS, np.nan)
+    mount, sigma = (block[name] or nothing for name in ("mount", "sigma_mount"))
+    passes: Sequence[Mapping[str, Any]] = result["passes"]
+    row: dict[str, Any] = {
+        "date_utc": _moment(passes[0]["start_utc"]) if passes else "",
+        "session": str(result["session"]),
+        "run": run,
+        "verdict": str(result["verdict"]),
+    }
+    for key in SETTINGS:
+        row |= {key: float(mount[key]), f"sigma_{key}": float(sigma[key])}
+        if np.isinf(row[key]) or np.isinf(row[f"sigma_{key}"]):
+            raise ValueError(f"{key} is not finite")
+    return row | {"probability": np.nan, "moved": ""}
+
+
+def _moment(text: str) -> str:
+    """A date and time as poolcal writes them; a ValueError at anything else."""
+    if not fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z", text):
+        raise ValueError(f"{text!r} is no date and time")
+    datetime.fromisoformat(text)
+    return text
+
+
+def _with_jumps(found: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator[dict[str, Any]]:
+    before: Estimate | None = None
+    for row, now in found:
+        if row["verdict"] == "accepted" and now is not None:
+            if before is not None:
+                compared = compare(before, now)
+                moved = ", ".join(SIX[k] for k in compared.moved(LEVEL))
+                row = row | {"probability": compared.probability, "moved": moved}
+            before = now
+        yield row
+
+
+def _no_formula(text: str) -> str:
+    """A spreadsheet takes text that begins like this for a formula, and would run it.
+
+    >>> _no_formula("=1+1"), _no_formula("2026-05-12")
+    ("'=1+1", '2026-05-12')
+    """
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
+
+
+def write_history(history: History, out: Path, chosen: Filter) -> None:
+    """history.html, .csv and .parquet in ``out``."""
+    from pipeline.results.pages.history import page
+
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+    content = io.BytesIO()
+    history.table.to_parquet(content, index=False)
+    write_bytes(out / "history.parquet", content.getvalue())
+    plain = history.table.assign(**{name: history.table[name].map(_no_formula) for name in TEXTS})
+    write_text(out / "history.csv", plain.to_csv(index=False, lineterminator="\n"))
+    write_text(out / "history.html", page(history, chosen.words()))

@@ -1,0 +1,44 @@
+"""The page of a comparison of two runs: the same that ``poolcal diff`` prints."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from pipeline.mount import WITHIN_95
+from pipeline.results.compare import folded, shown
+from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
+
+
+def page(found: Mapping[str, Any]) -> str:
+    """``found``: from :func:`pipeline.results.compare.diff`."""
+    rows = found["parameters"]
+    return render(
+        "comparison.html",
+        found=found,
+        rows=rows,
+        config=list(folded(found["config"])),
+        shown=shown,
+        plain=lambda value: "–" if value is None else value if isinstance(value, str) else json.dumps(value),
+        chart=_chart(rows) if rows else None,
+    )
+
+
+def _chart(rows: list[dict[str, Any]]) -> Markup:
+    """Each difference in its own sigmas, with its 95 % interval; red: moved."""
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, 2.0))
+        axis = figure.add_axes((0.13, 0.24, 0.85, 0.72))
+        z = np.array([row["z"] for row in rows])
+        for place, row in enumerate(rows):
+            colour = ALARM if row["moved"] else INK
+            axis.errorbar([z[place]], [place], xerr=[WITHIN_95], fmt="o", color=colour, markersize=4, linewidth=1.2)
+        axis.axvline(0, color=QUIET, linewidth=0.8)
+        widest = max(4.0, 1.1 * (float(np.max(np.abs(z))) + WITHIN_95))
+        axis.set(xlim=(-widest, widest), xlabel="b - a, in sigmas of the difference, with 95 % intervals")
+        axis.set_yticks(range(len(rows)), [row["parameter"] for row in rows])
+        axis.invert_yaxis()
+        return picture(figure, "differences of the six values in sigmas")

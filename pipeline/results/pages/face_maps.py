@@ -1,0 +1,127 @@
+"""Pictures of the faces and of what passes them: maps of mean residuals, the passes' tracks."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, MaxNLocator
+from numpy.typing import NDArray
+
+from pipeline.adjustment.residual_tables import FEWEST
+from pipeline.artefacts.families import families_of, level_families
+from pipeline.maths.geometry.face_grid import face_axes
+from pipeline.maths.target.model import LEVEL
+from pipeline.results.pages.rendering import INK, QUIET, SONAR, WIDTH_IN, picture
+from pipeline.results.pages.target_plots import MOST_PANELS, XYZ
+
+Array = NDArray[np.float64]
+MAP_HEIGHT_IN = 2.9
+
+
+def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
+    """Mean residual over each family of faces as one sees it from the boat; level ones from above."""
+    figure = Figure(figsize=(WIDTH_IN, MAP_HEIGHT_IN))
+    where = {"left": 0.07, "right": 0.87, "bottom": 0.15, "top": 0.92, "wspace": 0.25}
+    level = level_families(faces)
+    family = dict(zip(faces["face"], faces["family"], strict=True))
+    normal = {
+        row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in faces.to_dict("records")
+    }
+    enough = (residual_map["count"] >= FEWEST) & np.isfinite(residual_map["mean_m"])
+    cells = residual_map[(residual_map["sensor"] == sensor) & enough]
+    of_family = np.array([family[face] for face in cells["face"]], dtype=object)
+    every = _from_the_boat(faces)
+    order = ([name for name in every if name in set(of_family)] or every)[:MOST_PANELS]
+    widths = [_panel_width(faces, name) for name in order]
+    panels = figure.subplots(1, len(order), width_ratios=widths, gridspec_kw=where, squeeze=False)[0]
+    span = max(1.0, 1000 * float(np.quantile(np.abs(cells["mean_m"]), 0.95))) if len(cells) else 1.0
+    z = cells.loc[[name not in level for name in of_family], "z_target_m"]
+    heights = (z.min() - 0.1, z.max() + 0.1) if len(z) else (0.0, 1.0)
+    image = None
+    for axis, name in zip(panels, order, strict=True):
+        inside = cells[of_family == name]
+        flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
+        size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
+        image = _grid(axis, flat[:, 0], flat[:, 1], 1000 * inside["mean_m"].to_numpy(), size, span) or image
+        axis.set(title=name, aspect="equal")
+        axis.set_xlabel("x, m (from above)" if name in level else "to the right, m")
+        if name not in level:
+            axis.set_ylim(*heights)
+        _few_ticks(axis)
+    panels[0].set_ylabel("z, height, m")
+    if image is not None:
+        bar = figure.add_axes((0.9, 0.15, 0.015, 0.7))
+        figure.colorbar(image, cax=bar, label="mean residual, mm", extend="both")
+    return picture(figure, f"maps of the {sensor}'s mean residuals over the faces")
+
+
+def _few_ticks(axis: Axes) -> None:
+    """Of a panel to scale, as many ticks as there is room for numbers beside each other."""
+    spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
+    box = axis.get_position(original=True)
+    room = box.width * WIDTH_IN, box.height * MAP_HEIGHT_IN
+    scale = min(inches / span for inches, span in zip(room, spans, strict=True))
+    for ticks, span, needed in zip((axis.xaxis, axis.yaxis), spans, (0.5, 0.25), strict=True):
+        number = int(span * scale / needed)
+        middle = round(float(np.mean(ticks.get_view_interval())), 1)
+        ticks.set_major_locator(MaxNLocator(min(number, 6)) if number else FixedLocator([middle]))
+
+
+def _from_the_boat(faces: pd.DataFrame) -> list[str]:
+    """Families as one sees them, y growing to the left; level ones last."""
+    middle = {
+        name: np.mean([np.reshape(one, (-1, 3))[:, 1].mean() for one in of_family["vertices_target_m"]])
+        for name, of_family in faces.groupby("family", sort=False)
+    }
+    level = level_families(faces)
+    return sorted(families_of(faces), key=lambda name: (name in level, -middle[name]))
+
+
+def _panel_width(faces: pd.DataFrame, name: str) -> float:
+    """Share of the picture, by how wide the family's faces are."""
+    outlines = faces.loc[faces["family"] == name, "vertices_target_m"]
+    x, y = np.ptp(np.concatenate([np.reshape(one, (-1, 3)) for one in outlines]), axis=0)[:2]
+    return float(np.clip((x if name in level_families(faces) else np.hypot(x, y)) / 1.5, 0.8, 2.0))
+
+
+def _grid(axis: Axes, x: Array, y: Array, values: Array, size: float, span: float) -> Any:
+    """Cells with these centres; where several lie over each other (block over block) their mean."""
+    if not len(x):
+        axis.text(0.5, 0.5, "no points", transform=axis.transAxes, ha="center", color=QUIET)
+        return None
+    column, row = (np.round((at - at.min()) / size).astype(int) for at in (x, y))
+    total, count = (np.zeros((row.max() + 1, column.max() + 1)) for _ in range(2))
+    np.add.at(total, (row, column), values)
+    np.add.at(count, (row, column), 1)
+    with np.errstate(invalid="ignore"):
+        mean = total / count
+    edges = (x.min() - size / 2, x.max() + size / 2, y.min() - size / 2, y.max() + size / 2)
+    return axis.imshow(mean, origin="lower", extent=edges, cmap="RdBu_r", vmin=-span, vmax=span, interpolation="none")
+
+
+def tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_deg: float) -> Markup:
+    """The passes' tracks before the target, north shown; ``positions_m``: of the INS in the target frame, by pass."""
+    figure = Figure(figsize=(WIDTH_IN, 3.6))
+    axis = figure.add_axes((0.08, 0.14, 0.78, 0.77))
+    for corners in faces.loc[faces["normal_z_target_1"].abs() <= LEVEL, "vertices_target_m"]:
+        points = np.reshape(corners, (-1, 3))
+        axis.plot(points[:, 1], points[:, 0], color=INK, linewidth=1.2)
+    for number, track in positions_m.items():
+        axis.plot(track[:, 1], track[:, 0], color=SONAR, linewidth=0.9)
+        axis.annotate(f"{number}", (track[-1, 1], track[-1, 0]), (4, 0), textcoords="offset points", va="center")
+        axis.plot(*track[0, [1, 0]], ".", color=SONAR, markersize=4)
+    rose = figure.add_axes((0.87, 0.4, 0.12, 0.24))
+    rose.axis("off")
+    rose.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
+    along, down = np.cos(np.radians(azimuth_deg)), -np.sin(np.radians(azimuth_deg))  # of north, along y and x
+    rose.arrow(-along, down, 1.6 * along, -1.6 * down, color=QUIET, width=0.02, head_width=0.25)
+    rose.annotate("N", (1.25 * along, -1.25 * down), ha="center", va="center")
+    axis.set(xlabel="y, along the target, m", ylabel="x, into it, m", aspect="equal")
+    axis.set_title("tracks of the passes (dot: start) and the target, from above")
+    axis.invert_yaxis()  # from above, with y to the right x runs down
+    axis.margins(0.08)
+    return picture(figure, "plan of the passes before the target")

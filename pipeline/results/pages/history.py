@@ -1,0 +1,108 @@
+"""The history's page: a control chart of each parameter, and the table behind it."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from pipeline.mount import PARAMETERS, WITHIN_95
+from pipeline.report.verdict import SIX
+from pipeline.results.history import History
+from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
+from pipeline.results.screen import plural
+
+UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
+
+
+def page(history: History, filters: str) -> str:
+    table = history.table
+    parameters = [{"name": name, "unit": "°" if unit == "deg" else unit} for name, *_, unit in PARAMETERS]
+    rows = [
+        {
+            "date": row["date_utc"][:16].replace("T", " "),
+            "session": row["session"],
+            "run": row["run"],
+            "verdict": row["verdict"],
+            "cells": {name: _number(row[key], 4) for name, _, key, _ in PARAMETERS},
+            "probability": "" if np.isnan(row["probability"]) else f"{row['probability']:.2g}",
+            "moved": row["moved"],
+        }
+        for row in table.to_dict("records")
+    ]
+    jumps = table[table["moved"] != ""]
+    each = "; ".join(f"{row['session']}: {row['moved']}" for row in jumps.to_dict("records"))
+    sentence = f"Significant movements: {each}." if each else "No movement of the mount is significant."
+    return render(
+        "history.html",
+        rows=rows,
+        parameters=parameters,
+        chart=_chart(table),
+        sentence=sentence,
+        filters=filters,
+        unreadable=history.unreadable,
+        without=history.without,
+        sessions=plural(len(rows), "session"),
+    )
+
+
+def _moments(dates: Sequence[str]) -> list[str]:
+    """The days of sessions in order of time; of a day with several, hour and minute as well; the chart takes them as
+    labels, which begin with the number in the table where even these are the same.
+
+    >>> _moments(["2026-05-12T08:00:00Z", "2026-05-12T14:30:00Z", "2026-05-13T08:00:00Z"])
+    ['2026-05-12 08:00', '2026-05-12 14:30', '2026-05-13']
+    >>> _moments(["2026-05-12T08:00:00Z", "2026-05-12T08:00:00Z"])
+    ['1: 2026-05-12 08:00', '2: 2026-05-12 08:00']
+    """
+    days, minutes = Counter(one[:10] for one in dates), Counter(one[:16] for one in dates)
+    found = []
+    for number, one in enumerate(dates, 1):
+        words = one[:16].replace("T", " ") if days[one[:10]] > 1 else one[:10]
+        found.append(f"{number}: {words}" if minutes[one[:16]] > 1 else words)
+    return found
+
+
+def _number(value: float, digits: int) -> str:
+    return "" if np.isnan(value) else f"{value:.{digits}f}"
+
+
+def _chart(table: pd.DataFrame) -> Markup:
+    """Six panels over the sessions in order of time."""
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
+        axes = figure.subplots(3, 2, sharex=True).T.ravel()
+        place = np.arange(len(table))
+        accepted = (table["verdict"] == "accepted").to_numpy()
+        for axis, (name, place_of_six, key, unit) in zip(axes, PARAMETERS, strict=True):
+            word, scale = UNITS[unit]
+            values = table[key].to_numpy(dtype=float)
+            sigma = table[f"sigma_{key}"].to_numpy(dtype=float) * scale
+            good = accepted & np.isfinite(values)
+            if good.any():
+                values = values - np.median(values[good])
+            if unit == "deg":
+                values = values - 360.0 * np.round(values / 360.0)  # a head turned round lies near ±180°
+            values = values * scale
+            axis.axhline(0.0, color=QUIET, linewidth=0.6)
+            for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
+                bars = WITHIN_95 * np.nan_to_num(sigma[use])
+                axis.errorbar(place[use], values[use], bars, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
+            word_of_six = SIX[place_of_six]
+            moved = np.array([word_of_six in words.split(", ") for words in table["moved"]], dtype=bool)
+            ring = {"color": ALARM, "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.4}
+            axis.plot(place[moved], values[moved], "o", **ring)
+            axis.set_title(f"{name}, {word}")
+            axis.margins(x=0.05, y=0.15)
+            if good.any():  # a rejected session far off must not hide the others: it goes to the edge
+                reach = 1.15 * float(np.max(np.abs(values[good]) + WITHIN_95 * np.nan_to_num(sigma[good]))) + 1e-9
+                axis.set_ylim(-reach, reach)
+                beyond = np.isfinite(values) & (np.abs(values) > reach)
+                for x, up in zip(place[beyond], values[beyond] > 0, strict=True):
+                    edge, mark = (0.96 * reach, "^") if up else (-0.96 * reach, "v")
+                    axis.plot([x], [edge], mark, color=QUIET, markersize=4)
+        for axis in (axes[2], axes[5]):
+            axis.set_xticks(place, _moments(table["date_utc"].tolist()), rotation=30, ha="right")
+        return picture(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")

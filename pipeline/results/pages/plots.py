@@ -1,0 +1,101 @@
+"""The report's pictures, each drawn by itself from a run's tables: they can be drawn side by side."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from pipeline.artefacts.catalogue.patent import ALTERNATION, ITERATIONS
+from pipeline.artefacts.catalogue.points import PASSES, POOL_FRAME, POSES
+from pipeline.artefacts.catalogue.results import CELLS, RESIDUAL_BINS, RESIDUAL_MAP, RESIDUALS
+from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
+from pipeline.artefacts.families import families_of
+from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.maths.geometry.passes import pass_of
+from pipeline.results.pages import face_maps, residual_plots, target_plots
+from pipeline.results.pages.rendering import style
+from pipeline.run.folder import calibration, read_settings
+from pipeline.run.results import Tables
+
+TRACK_POINTS = 300  # of a pass on the plan
+
+
+def draw(run: Path, name: str) -> Markup:
+    """One of :data:`PICTURES`."""
+    with style():
+        return PICTURES[name](Tables(run))
+
+
+def _residuals(tables: Tables) -> Markup:
+    passes = tables.table(PASSES)
+    families = families_of(tables.table(FACES))
+    return residual_plots.residuals(tables.table(RESIDUAL_BINS), tables.table(CELLS), passes, families)
+
+
+def _distances(tables: Tables) -> Markup:
+    residuals = tables.table(RESIDUALS, *target_plots.DISTANCES)
+    faces = tables.table(FACES)
+    return target_plots.distances(residuals, faces, _family(residuals, tables), _solved(tables))
+
+
+def _sections(tables: Tables) -> Markup:
+    residuals = tables.table(RESIDUALS, *target_plots.SECTIONS)
+    return target_plots.sections(residuals, tables.table(FACES), _solved(tables))
+
+
+def _map_laser(tables: Tables) -> Markup:
+    return face_maps.maps(tables.table(RESIDUAL_MAP), tables.table(FACES), "laser")
+
+
+def _map_mbes(tables: Tables) -> Markup:
+    return face_maps.maps(tables.table(RESIDUAL_MAP), tables.table(FACES), "mbes")
+
+
+def _convergence(tables: Tables) -> Markup:
+    return residual_plots.convergence(tables.table(ITERATIONS), tables.table(ALTERNATION))
+
+
+def _tracks(tables: Tables) -> Markup:
+    """The INS's track of each pass in the target frame."""
+    poses, passes, pose = (tables.table(one) for one in (POSES, PASSES, TARGET_POSE))
+    trajectory = trajectory_in_target(poses, pose)
+    number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
+    found = {}
+    for one in passes["pass"].tolist():
+        track = trajectory.positions_m[number == one]
+        if len(track):
+            found[int(one)] = track[:: max(1, len(track) // TRACK_POINTS)]
+    azimuth_deg = tables.table(POOL_FRAME)["azimuth_deg"].iloc[0] + pose["azimuth_correction_deg"].iloc[0]
+    return face_maps.tracks(found, tables.table(FACES), float(azimuth_deg))
+
+
+def _family(residuals: pd.DataFrame, tables: Tables) -> NDArray[Any]:
+    """The family of each residual's face."""
+    family = tables.table(FACES)["family"].to_numpy()
+    return np.asarray(family[residuals["face"].to_numpy().astype(int)])
+
+
+def _solved(tables: Tables) -> bool:
+    return calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
+
+
+def pictures_of(run: Path) -> list[str]:
+    """Names of those that the run's page has."""
+    laser = read_settings(run).session.calibrated == "laser"
+    iterated = not laser and len(Tables(run).table(ITERATIONS)) > 0
+    without = (("map_mbes",) if laser else ()) + (() if iterated else ("convergence",))
+    return [name for name in PICTURES if name not in without]
+
+
+PICTURES = {  # those that take longest first
+    "residuals": _residuals,
+    "distances": _distances,
+    "sections": _sections,
+    "map_mbes": _map_mbes,
+    "map_laser": _map_laser,
+    "convergence": _convergence,
+    "tracks": _tracks,
+}

@@ -1,0 +1,104 @@
+"""Pages for people: self-contained HTML, no script, printable. Every text is escaped by the template engine.
+
+Pictures are SVG made by matplotlib, each an image of its own in the page; they carry numbers and our own words alone,
+never a name from a file or a config.
+"""
+
+import base64
+import contextlib
+import io
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import jinja2
+import matplotlib
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+# Colours after Okabe and Ito, told apart by all eyes and in grey print.
+INK, QUIET, ALARM = "#1a1a1a", "#8a8f98", "#b00020"
+LASER, COARSE, SONAR = "#3aa0dc", "#b9bcc1", "#d55e00"
+FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a", "other": "#7a5c00", "more": "#1a1a1a"}
+AXIS = {"roll": "#0072b2", "pitch": "#e6a000", "yaw": "#009e73"}
+MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s", "other": "D", "more": "X"}
+WIDTH_IN = 7.2  # of every picture
+SMALLEST_PT = 7  # letters in a picture
+DPI = 200  # of what is drawn as dots in a vector picture
+HEAD_LETTERS = 70  # of the running head of a printed page
+MARGIN_TEXT = "font-size: 8pt; color: #50555d;"
+STYLE: dict[Any, Any] = {
+    "svg.fonttype": "path",
+    "svg.hashsalt": "poolcal",
+    "font.size": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": QUIET,
+    "axes.linewidth": 0.8,
+    "axes.titlesize": 9,
+    "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # where it stands anyway; looking for ticks in its way takes time
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Our style on matplotlib's own defaults, whatever file of settings lies about."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
+
+
+def prepare() -> None:
+    """Load what the first picture needs: fonts, drivers."""
+    with style():
+        figure = Figure()
+        axis = figure.subplots()
+        axis.plot(range(2), "o", rasterized=True, label="0")
+        axis.legend()
+        picture(figure, "")
+
+
+def render(template: str, **values: Any) -> str:
+    """A page from ``pipeline/results/pages/<template>``."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("pipeline.results", "pages"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["breakable"] = breakable
+    fixed = {"css": css_text, "picture_px": round(96 * WIDTH_IN), "margin_text": MARGIN_TEXT}
+    return environment.get_template(template).render(**fixed, **values)
+
+
+def css_text(text: str) -> Markup:
+    r"""Untrusted text within the quotes of a CSS string, at most a line of it: all but plain letters as numbers.
+
+    >>> css_text('a "} </style>')
+    Markup('a \\22 \\7d  \\3c \\2f style\\3e ')
+    """
+    short = text if len(text) <= HEAD_LETTERS else f"{text[:HEAD_LETTERS]}…"
+    plain = (one if one == " " or (one.isascii() and one.isalnum()) else f"\\{ord(one):x} " for one in short)
+    return Markup("".join(plain))
+
+
+def breakable(text: str) -> Markup:
+    """A name that may be broken into lines after _ and -, and not within a word.
+
+    >>> breakable("harbour_<b>")
+    Markup('harbour_<wbr>&lt;b&gt;')
+    """
+    return Markup("<wbr>").join(Markup.escape(part) for part in re.split(r"(?<=[_-])", text))
+
+
+def picture(figure: Figure, label: str) -> Markup:
+    """The figure as an element of the page, complete in itself, with words for those who cannot see it."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return Markup('<img class="picture" alt="{}" src="data:image/svg+xml;base64,{}">').format(label, data)

@@ -1,0 +1,122 @@
+"""What is out of date in a run folder, and why: decided by content, never by times."""
+
+import dataclasses
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.atomic_files import Digests
+from pipeline.console import Progress
+from pipeline.errors import ArtefactError, RawDataError
+from pipeline.readers import dispatch
+from pipeline.run import manifest, provenance
+from pipeline.run.folder import Settings
+from pipeline.run.stage_protocol import declared, name_of
+from pipeline.run.workers import SERIAL, Workers
+
+SENSORS = ("ins", "laser", "mbes")
+EMPTY = hashlib.sha256().hexdigest()  # empty files are all alike: the readers say what they think of them
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run folder, open and locked."""
+
+    path: Path
+    settings: Settings
+    digests: Digests
+    workers: Workers = SERIAL
+    progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
+    raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # by sensor, as they were first asked for
+
+    def folder(self, stage: str) -> Path:
+        return self.path / stage
+
+
+def out_of_date(this: Run, stage: ModuleType) -> list[str]:
+    """Why the stage has to be run; empty when its result is current."""
+    old = manifest.read(this.folder(name_of(stage)))
+    if old is None:
+        return ["has no result yet"]
+    return manifest.reasons(old, key_of(this, stage), present(this, this.folder(name_of(stage)), old))
+
+
+def present(this: Run, where: Path, old: manifest.Manifest) -> dict[str, str | None]:
+    """The stage's files as they are now."""
+    there = [name for name in old.outputs if (where / name).is_file()]
+    found = dict(zip(there, this.digests.of(where / name for name in there), strict=True))
+    return {name: found.get(name) for name in old.outputs}
+
+
+def key_of(this: Run, stage: ModuleType) -> manifest.Key:
+    settings = this.settings.resolved_plainly()
+    raw: dict[str, str] = {}
+    inputs: dict[str, str] = {}
+    for marker in declared(stage.Inputs).values():
+        if isinstance(marker, Raw):
+            raw |= raw_of(this, marker.sensor)
+        elif isinstance(marker, Provenance):
+            raw |= all_raw(this)
+        else:
+            inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
+    config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
+    if "mbes" in config:
+        raw |= cast_digest(this)
+    return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
+
+
+def raw_of(this: Run, sensor: str) -> dict[str, str]:
+    """Digests of one sensor's files as this run first found them: the later stages were made from these, and the report
+    tells these, whatever happens to the files meanwhile."""
+    if sensor not in this.raw:
+        this.raw[sensor] = raw_digests(this, sensor)
+    return this.raw[sensor]
+
+
+def all_raw(this: Run) -> dict[str, str]:
+    """Digests of all files that the session was read from."""
+    return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()} | cast_digest(this)
+
+
+def raw_digests(this: Run, sensor: str) -> dict[str, str]:
+    """Digest by file of one sensor, relative to the session folder, as the files are now."""
+    root, settings = this.settings.session_folder, getattr(this.settings.session, sensor)
+    if settings is None:
+        return {}
+    paths = dispatch.raw_files(settings, root)
+    names = [path.relative_to(root).as_posix() for path in paths]
+    for name in names:
+        if any("\udc80" <= letter <= "\udcff" for letter in name):  # Python's stand-ins for other bytes
+            raise RawDataError(f"{name!a}: the file's name is not UTF-8; rename it")
+    found = dict(zip(names, this.digests.of(paths), strict=True))
+    first: dict[str, str] = {}
+    for name, digest in found.items():
+        if first.setdefault(digest, name) != name and digest != EMPTY:
+            raise RawDataError(f"{name}: is the same as {first[digest]}; list one of the two under {sensor}.files")
+    return found
+
+
+def cast_digest(this: Run) -> dict[str, str]:
+    """Digest of the file that the cast of sound speed came from; its depths are in the settings."""
+    used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
+    if used is None:
+        return {}
+    (digest,) = this.digests.of([this.settings.session_folder / used.file])
+    if digest != used.sha256:
+        raise RawDataError(f"{used.file}: is not the cast that this run was made with; run poolcal run again")
+    return {used.file: digest}
+
+
+def _artefact_digest(this: Run, marker: Artefact | Document) -> str:
+    owner = manifest.read(this.folder(marker.owner))
+    found = manifest.artefact_digests(owner.outputs) if owner is not None else {}
+    name = file_name(marker)
+    if name not in found:
+        raise ArtefactError(f"{this.folder(marker.owner)}: has no complete {name}; run stage {marker.owner} first")
+    return found[name]
+
+
+def file_name(marker: Artefact | Document) -> str:
+    return f"{marker.name}.parquet" if isinstance(marker, Artefact) and marker.kind == "table" else marker.name

@@ -1,0 +1,59 @@
+"""An accepted calibration outlives what replaces it: its files stay in RUN/report.1, report.2 and so on."""
+
+from pathlib import Path
+
+from pipeline.artefacts.catalogue.results import CALIBRATION_JSON, CALIBRATION_YAML
+from pipeline.atomic_files import read_json, remove, settle, settle_names, write_bytes, writing
+from pipeline.results.pages.currency import PAGE
+from pipeline.run.folder import keeping, partial
+
+KEPT = (CALIBRATION_JSON.name, CALIBRATION_YAML.name, PAGE)
+
+
+def keep_accepted(stage: Path) -> Path | None:
+    """Where an accepted result that the finished partial folder is about to replace is kept from now on.
+
+    None: there is none, or the new one is the same, or it has been kept before. It is copied and renamed before
+    anything is replaced: killed at any step, the result is in its place, kept, or both.
+    """
+    if not _is_accepted(stage) or _result(stage) == _result(partial(stage)):
+        return None
+    numbers = [int(path.suffix[1:]) for path in stage.parent.glob(f"{stage.name}.*") if path.suffix[1:].isdecimal()]
+    for number in sorted(numbers):
+        before = stage.with_name(f"{stage.name}.{number}")
+        if _result(before) == _result(stage):
+            _copy(stage, before)
+            return None
+    remove(keeping(stage))
+    with writing(keeping(stage)):
+        keeping(stage).mkdir()
+    _copy(stage, keeping(stage))
+    settle(keeping(stage))
+    kept = stage.with_name(f"{stage.name}.{max(numbers, default=0) + 1}")
+    with writing(kept):
+        keeping(stage).rename(kept)
+    settle_names(stage.parent)
+    return kept
+
+
+def _copy(stage: Path, place: Path) -> None:
+    """Those of the files that are not there yet."""
+    for name in KEPT:
+        if (stage / name).is_file() and not (place / name).is_file():
+            with writing(place / name):
+                content = (stage / name).read_bytes()
+            write_bytes(place / name, content)
+
+
+def _is_accepted(stage: Path) -> bool:
+    try:
+        content = read_json(stage / CALIBRATION_JSON.name)
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and content.get("verdict") == "accepted"
+
+
+def _result(stage: Path) -> bytes | None:
+    path = stage / CALIBRATION_JSON.name
+    with writing(path):
+        return path.read_bytes() if path.is_file() else None

@@ -1,0 +1,133 @@
+"""Calls a stage: what it declares, how its parts are mapped, what it must return. Touches no run folder.
+
+A stage is a module with frozen dataclasses ``Config``, ``Inputs`` and ``Outputs``, each field annotated with its
+artefact, and either ``run(inputs, config) -> Outputs`` (all tables), or, over streams,
+
+    prepare(inputs, config) -> prepared                     once
+    run_batch(source, chunk, prepared, config) -> Piece     every chunk of every stream in SOURCES (default: all)
+    combine(prepared, partials, config) -> Outputs          once; its stream fields stay EMPTY
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any, get_type_hints
+
+from pipeline.artefacts.parquet import from_arrow, to_arrow
+from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.sinks import MemorySink, Sink, Written
+from pipeline.artefacts.streams import EMPTY, Mapper, Part, Stream, serial
+
+Marker = Artefact | Raw | Document | Provenance
+
+
+def name_of(stage: ModuleType) -> str:
+    """The stage's name: its module's last word."""
+    return stage.__name__.rpartition(".")[2]
+
+
+def declared(fields_of: type) -> dict[str, Marker]:
+    """What the fields of a stage's Inputs or Outputs are annotated with."""
+    found: dict[str, Marker] = {}
+    for name, hint in get_type_hints(fields_of, include_extras=True).items():
+        markers = [m() if m is Provenance else m for m in getattr(hint, "__metadata__", ())]
+        markers = [m for m in markers if isinstance(m, (Artefact, Raw, Document, Provenance))]
+        if len(markers) != 1:
+            raise TypeError(f"{fields_of.__module__}.{fields_of.__name__}.{name} must be annotated with one artefact")
+        found[name] = markers[0]
+    return found
+
+
+def is_stream(marker: Marker) -> bool:
+    return isinstance(marker, Raw) or (isinstance(marker, Artefact) and marker.kind == "stream")
+
+
+def sources(stage: ModuleType) -> tuple[str, ...]:
+    """The streams that are mapped, part by part; none for a stage of tables alone."""
+    if not hasattr(stage, "run_batch"):
+        return ()
+    streams = tuple(name for name, marker in declared(stage.Inputs).items() if is_stream(marker))
+    return tuple(getattr(stage, "SOURCES", streams))
+
+
+def evaluate(
+    stage: ModuleType,
+    inputs: Any,
+    config: Any,
+    sink: Sink,
+    mapper: Mapper = serial,
+    begin: Callable[[], None] = lambda: None,
+) -> Any:
+    """The stage's Outputs, checked against their artefacts; ``begin`` is called before parts are mapped."""
+    if not hasattr(stage, "run_batch"):
+        return _checked(stage, stage.run(inputs, config), {}, mapper)
+    prepared = stage.prepare(inputs, config)
+    outputs = {name: marker for name, marker in declared(stage.Outputs).items() if is_stream(marker)}
+    partials: dict[str, list[tuple[str, object]]] = {}
+    parts: dict[str, list[Part]] = {name: [] for name in outputs}
+    owner: dict[str, str] = {}
+    begin()
+    for source in sources(stage):
+        stream: Stream = getattr(inputs, source)
+        work = [
+            _Work(source, number, part, stage.run_batch, prepared, config, sink)
+            for number, part in enumerate(stream.parts)
+        ]
+        partials[source] = []
+        for part, (found, written) in zip(stream.parts, mapper(_run_part, work), strict=True):
+            partials[source] += [(part.name, partial) for partial in found]
+            for name, files in written.items():
+                if files and owner.setdefault(name, source) != source:
+                    raise TypeError(f"{stage.__name__}: {owner[name]} and {source} both write {name}")
+                parts[name] += files
+    result = stage.combine(prepared, partials, config)
+    streams = {name: Stream(tuple(found) or sink.empty(name), mapper) for name, found in parts.items()}
+    return _checked(stage, result, streams, mapper)
+
+
+@dataclass(frozen=True)
+class _Work:
+    source: str
+    number: int
+    part: Part
+    run_batch: Callable[..., Any]
+    prepared: Any
+    config: Any
+    sink: Sink
+
+
+def _run_part(work: _Work) -> tuple[list[object], Written]:
+    """One part from its first chunk to its last; a worker's whole task."""
+    partials = []
+    with work.sink.open(work.number) as sink:
+        for chunk in work.part.chunks():
+            piece = work.run_batch(work.source, chunk, work.prepared, work.config)
+            for name, batch in piece.streams.items():
+                sink.add(name, batch)
+            partials.append(piece.partial)
+    return partials, sink.written()
+
+
+def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], mapper: Mapper) -> Any:
+    """Tables in their artefacts' columns and types, exactly as they come back from a file; streams put in."""
+    if not isinstance(outputs, stage.Outputs):
+        raise TypeError(f"{stage.__name__} must return its Outputs, not {type(outputs).__name__}")
+    values: dict[str, Any] = dict(streams)
+    for name, marker in declared(stage.Outputs).items():
+        value = getattr(outputs, name)
+        if isinstance(marker, Document):
+            if not isinstance(value, str):
+                raise TypeError(f"{stage.__name__}: {name} must be text, not {type(value).__name__}")
+        elif isinstance(marker, Artefact) and marker.kind == "table":
+            values[name] = from_arrow(to_arrow(value, marker))
+        elif name not in streams or value != EMPTY:
+            raise TypeError(f"{stage.__name__}: stream {name} is filled from run_batch's pieces; leave it EMPTY")
+    return dataclasses.replace(outputs, **values)
+
+
+def run_in_memory(stage: ModuleType, inputs: Any, config: Any, mapper: Mapper = serial) -> Any:
+    """The stage without any file: for simulated campaigns and tests."""
+    outputs = declared(stage.Outputs)
+    streams = {name: marker for name, marker in outputs.items() if isinstance(marker, Artefact) and is_stream(marker)}
+    return evaluate(stage, inputs, config, MemorySink(streams), mapper)

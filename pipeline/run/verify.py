@@ -1,0 +1,42 @@
+"""Checks a run folder against its manifests: everything that was read and written is hashed again."""
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import ModuleType
+
+from pipeline.atomic_files import Digests
+from pipeline.errors import PoolcalError
+from pipeline.run import folder, manifest
+from pipeline.run.freshness import Run, key_of, present
+from pipeline.run.stage_protocol import name_of
+from pipeline.run.workers import SERIAL, Workers
+
+
+def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
+    """Read and hash again everything a run read and wrote; what is not as recorded."""
+    settings = folder.read_settings(run_folder)
+    with folder.reading(run_folder):
+        this = Run(run_folder, settings, Digests(None, workers.here), workers)
+        return [f"{name_of(stage)}: {problem}" for stage in stages for problem in _problems(this, stage)]
+
+
+def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
+    old = manifest.read(this.folder(name_of(stage)))
+    if old is None:
+        yield "has no complete result"
+        return
+    try:
+        now = key_of(this, stage)
+    except PoolcalError as error:
+        yield str(error)
+        return
+    recorded = dataclasses.replace(now, config=old.key.config, source=old.key.source, versions=old.key.versions)
+    yield from manifest.reasons(old, recorded, present(this, this.folder(name_of(stage)), old))
+    where = this.folder(name_of(stage))
+    for path in sorted(where.rglob("*.parquet")):
+        if path.relative_to(where).as_posix() not in old.outputs:
+            yield f"{path.relative_to(where).as_posix()} is not its own"
+    for name in sorted(now.config.keys() | old.key.config.keys()):
+        if now.config.get(name) != old.key.config.get(name):
+            yield f"{name} is not as in {folder.RUN_YAML}"

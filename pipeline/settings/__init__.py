@@ -1,1 +1,0 @@
-"""Blocks that the settings of several sensors have in common."""

@@ -1,0 +1,1 @@
+"""Where the target is in the points: its pose, the sensors' provisional mounts, its surface."""

@@ -1,0 +1,45 @@
+"""``poolcal check``: what a session's files are, and what is wrong with them, before it is calibrated."""
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from pipeline.artefacts.streams import EMPTY
+from pipeline.checking import rendering
+from pipeline.checking.check_session import examine
+from pipeline.checking.trial_calibration import Calibrated, Raw
+from pipeline.config.pool import PoolConfig, load_session
+from pipeline.config.session import SessionConfig
+from pipeline.errors import PoolcalError
+from pipeline.readers.casts import with_cast
+from pipeline.report.cast_checks import in_words
+from pipeline.run.folder import load_settings
+from stages.in_memory import calibrate_in_memory
+
+WITHOUT_CONFIG = "Target, mounts and soundings were not checked: give the pool's YAML file with --config."
+
+
+def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]:
+    """What the screen says, and whether something is wrong."""
+    settings = None if config is None else load_settings(session, config, None)
+    content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
+    found = examine(session, content, pool, _calibrated)
+    if as_json:
+        return rendering.as_json(found), found.faulty
+    used = None if content.mbes is None else content.mbes.svp_from
+    cast = "" if used is None else f"mbes.svp: {in_words(used)}\n\n"
+    unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"
+    return f"{cast}{rendering.text(found)}{unasked}", found.faulty
+
+
+def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrated:
+    found: dict[str, Any] = {}
+
+    def kept(key: str, value: Any) -> Any:
+        found[key] = value
+        return value
+
+    with suppress(PoolcalError):
+        calibrate_in_memory(session, pool, raw, "adjust", kept)
+    tables = (found.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
+    return Calibrated(found.get("segment/soundings_labelled", EMPTY), *tables)

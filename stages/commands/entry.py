@@ -1,0 +1,103 @@
+"""How the command line ends: from exceptions to exit status, interrupts, and streams that cannot be written."""
+
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from pipeline.console import say
+from pipeline.errors import PoolcalError
+
+INTERRUPTED = 130  # what typer makes of Ctrl-C
+STOPPED = "poolcal: interrupted; what was complete is kept"
+SPEAKERS = ("typer", "click", "rich")  # print the help by themselves
+interrupts: list[int] = []
+
+
+WANTED = {  # what an option that is left out must name
+    "--config": "--config FILE: the pool's YAML file, which says where the target is; begin with configs/defaults.yaml",
+    "--run": "--run RUN: the folder for the results, outside the session folder",
+    "--session": "--session SESSION: the folder with session.yaml",
+}
+
+
+def _usage(error: typer.TyperException) -> str:
+    """A command line that cannot be meant: what is wrong with it, and where its help is."""
+    command = getattr(getattr(error, "ctx", None), "command_path", "poolcal")
+    option = next(iter(getattr(getattr(error, "param", None), "opts", ())), "")
+    words = " ".join(error.format_message().split()).rstrip(".")
+    if words.startswith("Missing option") and option in WANTED:
+        words = f"missing: {WANTED[option]}"
+    return f"{words or 'nothing to do'}; see {command} --help"
+
+
+def status_of(command: Callable[[], Any], debug: bool) -> int:
+    """The exit status of a command; nothing is raised. ``debug``: show the traceback of bad input as well."""
+    try:
+        status = int(command() or 0)
+        if status == INTERRUPTED:
+            say(STOPPED, sys.stderr)
+        return status
+    except PoolcalError as error:
+        if debug:
+            say(traceback.format_exc().rstrip(), sys.stderr)
+        say(f"poolcal: {error}", sys.stderr)
+        return 2
+    except typer.TyperException as error:
+        say(f"poolcal: {_usage(error)}", sys.stderr)
+        return 2
+    except Exception as error:
+        if interrupts:  # a library that was being loaded has made another error of it
+            say(STOPPED, sys.stderr)
+            return INTERRUPTED
+        if isinstance(error, OSError) and _raised_in(error).startswith(SPEAKERS):
+            say(f"poolcal: {_refusal(error)}", sys.stderr)
+            return 2
+        say(traceback.format_exc().rstrip(), sys.stderr)
+        say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
+        return 3
+
+
+def _raised_in(error: BaseException) -> str:
+    """The name of the module that raised it."""
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    return str(frames[-1].f_globals.get("__name__", "")) if frames else ""
+
+
+def _refusal(error: OSError) -> str:
+    return f"standard output: cannot be written ({error.strerror}); make room, or send it elsewhere"
+
+
+def _interrupted(number: int, _: object) -> None:
+    interrupts.append(number)
+    raise KeyboardInterrupt
+
+
+def prepare() -> None:
+    """Before anything is said: Ctrl-C is noted, closed streams lead nowhere, and every letter can be written."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupted)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by the shell; open to the end
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure: Any = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="backslashreplace")
+
+
+def leave(status: int) -> None:
+    """End the process. What cannot be written any more is given up here, without Python's own complaint."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    if status == INTERRUPTED:
+        os._exit(status)  # a library left in the middle of its work would end with a status of its own
+    sys.exit(status)

@@ -1,0 +1,18 @@
+"""The laser's own calibration into session.yaml, with its covariance: the sonar's total sigmas are made from it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.coarse.session_edit import block_of, origin_of, read_session, written
+from pipeline.report.calibration_document import mounted_of
+from pipeline.run.folder import calibration
+
+
+def write(session: Path, run: Path) -> str:
+    """An accepted result into SESSION/session.yaml; what was done, in words."""
+    result = calibration(run)
+    block = result["laser"]
+    origin = origin_of("fine", run / "report" / "calibration.json", held=list(result["held"]))
+    blocks = {"laser": block_of(mounted_of(block), np.array(block["covariance_total"]), origin)}
+    return written(session, *read_session(session), blocks)

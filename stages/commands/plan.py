@@ -1,0 +1,113 @@
+"""``poolcal plan``: passes judged before they are sailed, on the screen, as YAML and as a recording."""
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from pipeline.atomic_files import write_text, writing
+from pipeline.config.plan import Pass
+from pipeline.config.pool import Verdict
+from pipeline.mount import PARAMETERS, mount_of
+from pipeline.planning import assessment
+from pipeline.planning.assessment import Answer, Outlook, shares_of_limits
+from pipeline.planning.prediction import Setting
+from pipeline.results.screen import plural
+from pipeline.run.folder import load_settings
+
+NARROWEST = 9  # columns of the table of passes
+WORSE = 1.05  # a sigma that grows by less is the same
+
+
+def plan(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path | None) -> tuple[str, bool]:
+    """What the screen says, and whether the passes will do."""
+    settings = load_settings(session, pool_file)
+    pool, wanted = settings.pool, assessment.load_plan(file, settings.session)
+    answer = assessment.judge(wanted, pool, settings.session)
+    said = table(answer, pool.verdict)
+    if rrd is not None:
+        from stages.views.plan import save_plan
+
+        with writing(rrd):
+            save_plan(answer, said, rrd)
+    if out is not None:
+        write_text(out, yaml.safe_dump(assessment.as_plain(answer), sort_keys=False))
+    return said, assessment.is_enough(answer, pool.verdict)
+
+
+def table(answer: Answer, limits: Verdict) -> str:
+    """For the screen."""
+    setting, plan = answer.setting, answer.setting.plan
+    rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
+    lines = ["As given:", *_passes(setting, rows), *_sigmas(setting, answer.given, limits)]
+    lines += [f"But: {gap}." for gap in answer.gaps]
+    if answer.weakest:
+        lines.append(f"Geometry: {answer.weakest}.")
+    if answer.remedy:
+        lines.append(f"Remedy: {answer.remedy}.")
+    if plan.budget is not None:
+        turns = (len(plan.passes) - 1) * plan.budget.turn_s
+        lines.append(f"Time: {answer.given.seconds:.0f} s and {turns:.0f} s of turns, of {plan.budget.seconds:g} s.")
+    if answer.better is not None:
+        lines += ["", *_chosen(answer, answer.better, limits)]
+    elif plan.candidates:
+        short = "no candidate helps within the budget" if plan.budget else "candidates want a budget to be chosen for"
+        lines += ["", f"Nothing better was looked for: {short}."]
+    return "\n".join(lines)
+
+
+def _chosen(answer: Answer, better: Outlook, limits: Verdict) -> list[str]:
+    """The list chosen, like passes together, and what it does to the sigmas: not all of them need get smaller."""
+    alike: dict[Pass, tuple[int, float, dict[str, assessment.Array]]] = {}
+    for one, seconds, points in better.each():
+        number, longest, sums = alike.get(one, (0, 0.0, dict.fromkeys(points, np.zeros(1))))
+        alike[one] = number + 1, max(longest, seconds), {name: sums[name] + points[name] for name in points}
+    rows = [(number, one, seconds, points) for one, (number, seconds, points) in alike.items()]
+    each = ", ".join(f"{number} x {one.distance_m:.1f} m" for number, one, *_ in rows)
+    lines = [f"Chosen from the candidates, in the time there is: {each}, in any order."]
+    lines += [*_passes(answer.setting, rows), *_sigmas(answer.setting, better, limits)]
+    if answer.given.solution.deficiency or better.solution.deficiency:
+        return lines
+    shares = [shares_of_limits(answer.setting, one, limits) for one in (answer.given, better)]
+    before, after = ((max(share.values()), max(share, key=share.__getitem__)) for share in shares)
+    lines.append(
+        f"The largest total sigma, as a share of its limit: {before[0]:.2f} ({before[1]}) as given, "
+        f"{after[0]:.2f} ({after[1]}) with these."
+    )
+    grown = [
+        f"{name} ({shares[0][name]:.2f} to {shares[1][name]:.2f} of its limit)"
+        for name in shares[0]
+        if shares[1][name] > WORSE * shares[0][name]
+    ]
+    return [*lines, f"Larger than as given: {', '.join(grown)}."] if grown else lines
+
+
+def _passes(setting: Setting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
+    """One line a kind of pass: how many, the time of one, and the points of all of them."""
+    families = list(dict.fromkeys(face.family for face in setting.model.faces))
+    widths = {family: max(NARROWEST, len(family) + 2) for family in families}
+    heads = "".join(f"{family:>{width}}" for family, width in widths.items())
+    lines = [f"  passes  distance     speed   swing    time   soundings on{heads}   laser points"]
+    for number, one, seconds, points in rows:
+        by_family = dict.fromkeys(families, 0.0)
+        for face, count in zip(setting.model.faces, points["mbes"], strict=True):
+            by_family[face.family] += float(count)
+        counts = "".join(f"{by_family[family]:>{width},.0f}" for family, width in widths.items())
+        sailed = f"  {number:>6}  {one.distance_m:>6.1f} m  {one.speed_m_s:>4.2f} m/s  {one.heading_swing_deg:>5.1f}°"
+        lines.append(f"{sailed}  {seconds:>4.0f} s               {counts}{points['laser'].sum():>15,.0f}")
+    return lines
+
+
+def _sigmas(setting: Setting, outlook: Outlook, limits: Verdict) -> list[str]:
+    lines = [f"  {'sigma':<8}{'random':>12}{'total':>12}{'limit':>12}"]
+    if outlook.solution.deficiency:
+        open_ones = plural(outlook.solution.deficiency, "direction")
+        return [*lines, f"  {open_ones} of the unknowns left open: no result"]
+    mounted = mount_of(setting.mbes.mount)
+    random, total = mounted.sigmas(outlook.random), mounted.sigmas(outlook.total)
+    for name, _, key, unit in PARAMETERS:
+        limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, "m")
+        over = "  above the limit" if not total[key] <= limit else ""
+        row = "".join(f"{value:>10.4f} {sign}" for value in (random[key], total[key], limit))
+        lines.append(f"  {name:<8}{row}{over}")
+    return lines

@@ -1,0 +1,116 @@
+"""A simulated session's result beside its truth: the demo's last word.
+
+The rotation's error is the vector ε in R_true = Exp(ε) · R_body_from_mbes, about the body's axes, which is also what
+the covariance speaks of. The answer is yes when the calibration was accepted and each of the six errors of the result
+is within LIMIT sigmas; a method without sigmas is held to LIMIT times the verdict's largest allowed ones.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pipeline.atomic_files import read_json
+from pipeline.config.mount import Mount
+from pipeline.config.pool import Verdict
+from pipeline.errors import ConfigError
+from pipeline.mount import PARAMETERS, SETTINGS
+from pipeline.run.folder import as_written, calibration, read_settings
+
+LIMIT = 4.0
+Array = NDArray[np.float64]
+
+
+def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
+    """The table for people, and whether the result stands up to the truth."""
+    result, settings = calibration(run), read_settings(run)
+    R_true, lever_arm_true_m = read_truth(truth_path)
+    chosen = settings.pool.result
+    with as_written(run):
+        _refuse_damaged(result, chosen)
+    values = result["methods"][chosen]
+    error, sigma = errors_of(values, R_true, lever_arm_true_m), _sigma_of(values)
+    lines = [f"session {result['session']}: {result['verdict']}", *(f"  {reason}" for reason in result["reasons"])]
+    lines += ["", f"{chosen} (the result)"]
+    lines += _table(settings.session.sonar.mount, values, R_true, lever_arm_true_m, sigma)
+    lines += ["", f"errors of all:       {''.join(f'{name:>10}' for name, *_ in PARAMETERS)}   (deg, m)"]
+    for method, other in result["methods"].items():
+        lines.append(f"  {method:19}{_error_row(errors_of(other, R_true, lever_arm_true_m))}")
+    limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
+    within = error is not None and bool(np.all(np.abs(error) <= limit))
+    accepted = result["verdict"] == "accepted"
+    what = "sigma" if sigma is not None else "the largest sigma allowed"
+    lines += ["", "error: what is still wrong; of angles the rotation from found to true about the body's axes"]
+    how = f"{'every error is' if within else 'an error is not'} within {LIMIT:g} {what}"
+    lines.append(f"{chosen}: {how if accepted else 'the calibration was rejected'}")
+    return "\n".join(lines), accepted and within
+
+
+def _refuse_damaged(result: dict[str, Any], chosen: str) -> None:
+    """Any of the errors that damaged values end in, before anything is computed from them."""
+    for values in (result["methods"][chosen], *result["methods"].values()):
+        if values["R_body_from_mbes"] is not None and values["lever_arm_m"] is not None:
+            R = np.array(values["R_body_from_mbes"], dtype=np.float64).reshape(3, 3)
+            if not np.allclose(R @ R.T, np.eye(3), atol=1e-6):
+                raise ValueError("no rotation")
+            np.array(values["lever_arm_m"], dtype=np.float64).reshape(3)
+            for key in SETTINGS:
+                float(values["mount"][key])
+        sigma = _sigma_of(values)
+        if sigma is not None:
+            sigma.reshape(6)
+    " ".join(result["reasons"])
+
+
+def _error_row(error: Array | None) -> str:
+    return "  no result" if error is None else "".join(f"{error[index]:10.5f}" for _, index, *_ in PARAMETERS)
+
+
+def read_truth(path: Path) -> tuple[Array, Array]:
+    """True rotation and lever arm of the sonar, from the simulator's file."""
+    try:
+        content: Any = read_json(path)
+        mbes = content["mbes"]
+        R_body_from_mbes = np.array(mbes["R_body_from_mbes"], dtype=np.float64).reshape(3, 3)
+        return R_body_from_mbes, np.array(mbes["lever_arm_m"], dtype=np.float64).reshape(3)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); name the OUT.truth.json meant") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise ConfigError(f"{path}: is no truth ({error!r}); name the OUT.truth.json meant") from error
+
+
+def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) -> Array | None:
+    """What is still wrong: rotation vector in degrees and lever arm in metres, true minus found; None: no result."""
+    if values["R_body_from_mbes"] is None or values["lever_arm_m"] is None:
+        return None
+    turn = Rotation.from_matrix(R_true @ np.array(values["R_body_from_mbes"]).T).as_rotvec()
+    return np.concatenate([np.degrees(turn), lever_arm_true_m - np.array(values["lever_arm_m"])])
+
+
+def _sigma_of(values: dict[str, Any]) -> Array | None:
+    sigma = values["sigma"]
+    if sigma is None or sigma["rotation_vector_deg"] is None or sigma["lever_arm_m"] is None:
+        return None
+    return np.array([*sigma["rotation_vector_deg"], *sigma["lever_arm_m"]], dtype=np.float64)
+
+
+def _largest(verdict: Verdict) -> Array:
+    return np.repeat([verdict.max_sigma_deg, verdict.max_sigma_m], 3)
+
+
+def _table(
+    coarse: Mount, values: dict[str, Any], R_true: Array, lever_arm_true_m: Array, sigma: Array | None
+) -> list[str]:
+    error = errors_of(values, R_true, lever_arm_true_m)
+    if error is None:
+        return ["  no result"]
+    yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
+    truth = (pitch, roll, yaw, *lever_arm_true_m)
+    lines = [f"  {'':6}{'coarse':>11}{'calibrated':>12}{'truth':>11}{'error':>11}{'sigma':>10}{'error/sigma':>13}"]
+    for name, k, key, unit in PARAMETERS:
+        spread = f"{'-':>10}{'-':>13}" if sigma is None else f"{sigma[k]:10.5f}{error[k] / sigma[k]:13.1f}"
+        numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[k]:11.5f}{error[k]:11.5f}"
+        lines.append(f"  {name:6}{numbers}{spread} {unit}")
+    return lines

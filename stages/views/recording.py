@@ -1,0 +1,113 @@
+"""Recordings for the Rerun viewer: RUN/<stage>/<stage>.rrd, drawn from Parquet alone, after the stage.
+
+A module a stage: ``log(recording, tables)``. All recordings of a run share the application's and the recording's id, so
+that opened together they are one scene. Entities (frame target unless said), * where one in so many points is shown
+(``one_in`` says how many):
+
+    /pool                              what is in the pool frame; a transform, known from stage segment on, places it
+    /pool/trajectory/pass_<n>          georeference: track of the INS
+    /pool/laser *, /pool/soundings *   georeference: points near the target, soundings with the coarse mount
+    /target/model/<family>             segment: outlines of the faces by design
+    /target/laser/<family> *           segment: labelled laser points
+    /planes/<sensor>/<family>          fit_planes: the planes found, cut out at the faces; arrows: their normals
+    /before/<family> *, /after/<family> *   adjust: soundings with the coarse and with the calibrated mount
+    /residuals/<sensor>/<family> *     adjust: points by distance from the adjusted surface
+    /maps/<sensor>/<family>            adjust: mean residual of each cell of the faces
+    /fans/<sensor>/pass_<n>            adjust: rays of one moment in the middle of the pass
+    /tables/<name>                     what is said in words and numbers
+
+over the steps of the timeline ``iteration``:
+
+    /iteration/soundings/<family> *, /iteration/planes/<family>, /iteration/normals/<sensor>   angle_iterate
+    /curves/deviation/<axis>, /curves/planes/<family>              angle_iterate: degrees
+    /curves/turns/<angles or offsets>                              offsets: change in each turn of the alternation
+
+over the moments of the timeline ``time`` (UTC):
+
+    /quality/attitude/<axis>                                       ingest: degrees
+    /quality/points/<sensor>, /quality/residual/<sensor>/<family>  adjust: points in a second, their mean residual, mm
+"""
+
+import re
+import uuid
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from pipeline.errors import ArtefactError
+from pipeline.mount import target_of
+from pipeline.results.pages.currency import agreeing, recording_path
+from pipeline.run.folder import read_settings
+from pipeline.run.results import Tables
+from stages import ORDER, names_in
+
+APPLICATION = "poolcal"
+DRAWN = ORDER  # stages that have a recording
+AT_MOST = 300_000  # points of a cloud: dense enough to see, few enough for any laptop
+COLOURS = {  # for all eyes
+    "P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167),
+    "other": (122, 92, 0), "more": (60, 60, 60),
+}
+GREY, SONAR, LASER = (150, 155, 165), (213, 94, 0), (0, 114, 178)
+DOT_M = 0.008  # radius of a point
+
+
+def record(run: Path, stage: str, tabs: Sequence[str]) -> bytes:
+    """A stage's recording, as its file's content; shown in these tabs of stages.views.blueprint."""
+    from stages.views.blueprint import tour
+
+    model = target_of(read_settings(run).pool.target)
+    return content(recording_id(run), tour(tabs, model), lambda recording: log(recording, stage, Tables(run)))
+
+
+def log(recording: Any, stage: str, tables: Tables) -> None:
+    import_module(f"stages.views.{stage}").log(recording, tables)
+
+
+def curve(recording: Any, path: str, style: Any, times: Callable[[], Any], values: Any) -> None:
+    """A curve over a timeline; ``times``: makes its rerun.TimeColumn.
+
+    Where there are no values, nothing is sent: of columns without rows the viewer makes a timeline from the beginning
+    to the end of time, and dies of it.
+    """
+    import rerun as rr
+
+    if len(values):
+        recording.log(path, style, static=True)
+        recording.send_columns(path, indexes=[times()], columns=rr.Scalars.columns(scalars=values))
+
+
+def words(text: str) -> Any:
+    """Text as it is, in letters of one width: a code block whose fence is longer than any run of ` inside."""
+    import rerun
+
+    longest = max((len(run) for run in re.findall("`+", text)), default=0)
+    fence = "`" * max(3, longest + 1)
+    return rerun.TextDocument(f"{fence}text\n{text}\n{fence}", media_type=rerun.MediaType.MARKDOWN)
+
+
+def content(identity: str, blueprint: Any, draw: Callable[[Any], None]) -> bytes:
+    """Of a recording's file. (The SDK's own writing hangs or leaves a stump when a disk is full.)"""
+    import rerun
+
+    recording = rerun.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
+    memory = recording.memory_recording()
+    recording.send_blueprint(blueprint, make_active=False, make_default=True)
+    draw(recording)
+    recording.flush()
+    return bytes(memory.drain_as_bytes())
+
+
+def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
+    """The recordings there are, in the stages' order, of stages that agree with each other."""
+    wanted = agreeing(run, names_in(run)) if stage is None else (stage,)
+    found = [path for name in wanted if (path := recording_path(run, name)).is_file()]
+    if not found:
+        raise ArtefactError(f"{run}: has no recording{'' if stage is None else f' of {stage}'}; run poolcal run first")
+    return found
+
+
+def recording_id(*runs: Path) -> str:
+    """One a run folder, and one for two together."""
+    return str(uuid.uuid5(uuid.NAMESPACE_URL, "\n".join(run.resolve().as_uri() for run in runs)))

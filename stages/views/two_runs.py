@@ -1,0 +1,68 @@
+"""Two runs in one recording: the first under /a, the second under /b, and both with the mount of the first."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.artefacts.catalogue.points import POSES
+from pipeline.artefacts.catalogue.target import SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.streams import xyz
+from pipeline.atomic_files import write_bytes
+from pipeline.results.compare import text
+from pipeline.run.folder import calibration
+from pipeline.run.results import Tables
+from stages.views.blueprint import side_by_side
+from stages.views.recording import DOT_M, LASER, SONAR, content, log, recording_id, words
+
+SOUNDINGS = 200_000  # of a run, on one target
+SHOWN = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # in the target's frame
+
+
+class Below:
+    """A recording in which every entity lies one level deeper."""
+
+    def __init__(self, recording: Any, name: str) -> None:
+        self._recording, self._name = recording, name
+
+    def log(self, path: str, *parts: Any, **options: Any) -> None:
+        self._recording.log(f"{self._name}/{path}", *parts, **options)
+
+    def send_columns(self, path: str, **columns: Any) -> None:
+        self._recording.send_columns(f"{self._name}/{path}", **columns)
+
+    def set_time(self, timeline: str, **at: Any) -> None:
+        self._recording.set_time(timeline, **at)
+
+
+def save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:
+    """``found``: the comparison of the two, from :func:`pipeline.results.compare.diff`."""
+
+    def draw(recording: Any) -> None:
+        for name, run in (("a", first), ("b", second)):
+            for stage in SHOWN:
+                log(Below(recording, name), stage, Tables(run))
+        _on_one_target(recording, Tables(first), Tables(second))
+        recording.log("tables/comparison", words(text(found)), static=True)
+
+    write_bytes(path, content(recording_id(first, second), side_by_side(), draw))
+
+
+def _on_one_target(recording: Any, first: Tables, second: Tables) -> None:
+    """Soundings of both runs with the mount of the first: a sonar that has moved hangs beside the faces."""
+    import rerun as rr
+
+    block = calibration(first.run)["mbes"]
+    if block["mount"] is None:
+        return
+    rotation, lever_arm = np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"])
+    for name, tables, colour in (("a", first, LASER), ("b", second, SONAR)):
+        axes = [f"{axis}_mbes_m" for axis in "xyz"]
+        columns, step = tables.sample(SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", *axes)
+        trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
+        positions, R_target_from_body = trajectory.poses_at(columns["t_ns"].astype(np.int64))
+        body = xyz(columns, "mbes_m") @ rotation.T + lever_arm
+        points = (positions + np.einsum("nij,nj->ni", R_target_from_body, body)).astype(np.float32)
+        cloud = rr.Points3D(points, radii=DOT_M, colors=colour)
+        recording.log(f"both/{name}", cloud, rr.AnyValues(one_in=step), static=True)
