@@ -2,29 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.mount import Mount
-from pipeline.config.target import Faces, Letters, Target
 from pipeline.maths.geometry.rotations import exp_so3, mount_from_rotation, mount_partials, rotation_from_mount
-from pipeline.maths.target.model import TargetModel
-from pipeline.maths.target.outlines import Outline, Relation, build_target
-from pipeline.maths.target.patent_target import lettered
+from pipeline.maths.mount_parameters import PARAMETERS
 
 Array = NDArray[np.float64]
-PARAMETERS = (  # as people list them: name, place among the six (rotation about body x, y, z, lever arm), setting, unit
-    ("roll", 1, "roll_deg", "deg"),
-    ("pitch", 0, "pitch_deg", "deg"),
-    ("yaw", 2, "yaw_deg", "deg"),
-    ("x", 3, "x_m", "m"),
-    ("y", 4, "y_m", "m"),
-    ("z", 5, "z_m", "m"),
-)
 
-SETTINGS = tuple(key for *_, key, _ in PARAMETERS)
 WITHIN_95 = 1.959964  # sigmas on either side
 
 
@@ -77,28 +64,3 @@ def change_of(total: Mapping[str, float], coarse: Mapping[str, float], key: str)
     return change - 360.0 * round(change / 360.0) if key.endswith("_deg") else change
 
 
-def target_of(target: Target) -> TargetModel:
-    """The target's faces; nobody changes them, for they are kept: many ask, and it takes a twentieth of a second."""
-    return _built(type(target), target.model_dump_json())
-
-
-@lru_cache(maxsize=16)
-def _built(kind: type[Letters] | type[Faces], text: str) -> TargetModel:
-    target = kind.model_validate_json(text)
-    if isinstance(target, Faces):
-        outlines = [Outline(name, one.corners, one.role or "", one.seen) for name, one in target.faces.items()]
-        relations = [
-            Relation(kind, faces, one.name or "") for one in target.relations for kind, faces in one.given.items()
-        ]
-        return build_target(outlines, relations, target.water_level_m, target.repeats_m)
-    outlines, relations, repeats_m = lettered(
-        target.a,
-        target.b,
-        target.c,
-        target.e,
-        target.low_side,
-        target.blocks_per_side,
-        target.first_base_m,
-        target.stagger_m,
-    )
-    return build_target(outlines, relations, target.water_level_m, repeats_m)

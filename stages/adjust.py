@@ -41,9 +41,10 @@ from pipeline.maths.adjustment.design_constraints import Known
 from pipeline.maths.adjustment.parallel_constraints import of_ties
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import mount_of, target_of
+from pipeline.mount import mount_of
 from pipeline.planning.observability import Seen, geometry_of
 from pipeline.planning.prediction import Setting
+from pipeline.target.design import target_of
 
 SHOWN = 100_000  # points of a sensor in the table residuals, at most
 LEAST_RAD = 1e-7  # nothing is known better

@@ -136,8 +136,9 @@ def stage(
 
     The stages before it must not be.
     """
-    from pipeline.console import Progress
-    from pipeline.run import folder, runner
+    from pipeline.run import runner
+    from pipeline.run.progress import Progress
+    from pipeline.run.settings import holds_run, load_settings
     from pipeline.run.workers import workers
     from stages.commands.draw import Painters
 
@@ -146,10 +147,10 @@ def stage(
         raise ConfigError(f"NAME {name!r}: is no stage; the stages are {', '.join(names)}")
     if (session is None) != (config is None):
         raise ConfigError("--session and --config: give both, or neither to use those in RUN/run.yaml")
-    calibrated = calibrated_in(run_folder) if folder.holds_run(run_folder) else "mbes"
+    calibrated = calibrated_in(run_folder) if holds_run(run_folder) else "mbes"
     settings = None
     if session is not None and config is not None:
-        settings = folder.load_settings(session, config, calibrated)
+        settings = load_settings(session, config, calibrated)
     with workers(jobs, executor) as pool:
         runner.run_stage(load(calibrated), name, run_folder, settings, pool, Progress())
     status = answer_of(run_folder) if name == names[-1] else 0
@@ -163,7 +164,7 @@ def verify(run_folder: RunFolder, jobs: Jobs = None) -> int:
 
     Hashes again everything that it read and wrote, and lists what is not as recorded.
     """
-    from pipeline.results.screen import plural
+    from pipeline.console import plural
     from pipeline.run.verify import verify as problems_of
     from pipeline.run.workers import workers
 
@@ -210,7 +211,8 @@ def diff(
 
     from pipeline.atomic_files import write_text
     from pipeline.results import compare as comparing
-    from pipeline.run.folder import refuse_output
+    from pipeline.results.compare_text import text
+    from pipeline.run.output_files import refuse_output
 
     found = comparison(first, second, tolerance_deg, tolerance_mm)
     for option, file in (("--html", html), ("--rrd", rrd)):
@@ -221,7 +223,7 @@ def diff(
         write_text(html, page(found))
     if rrd is not None:
         save_pair(first, second, found, rrd)
-    say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else comparing.text(found), sys.stdout)
+    say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else text(found), sys.stdout)
     return 1 if comparing.is_moved(found) else 0
 
 
@@ -237,8 +239,9 @@ def history(
 
     Writes history.html, history.csv and history.parquet.
     """
-    from pipeline.results.history import Filter, read_history, write_history
-    from pipeline.results.screen import plural
+    from pipeline.console import plural
+    from pipeline.results.history import Filter, read_history
+    from pipeline.results.pages.history import write_history
 
     chosen = Filter(name, since.date() if since else None, until.date() if until else None)
     found = read_history(folder, chosen)
@@ -275,7 +278,7 @@ def plan(
     rrd: Annotated[Path | None, typer.Option("--rrd", metavar="FILE", help="write a recording of it")] = None,
 ) -> int:
     """Predict what passes will give, before any data, and choose better ones. Status 1 if they will not do."""
-    from pipeline.run.folder import refuse_output
+    from pipeline.run.output_files import refuse_output
     from stages.commands.plan import plan as plan_of
 
     refuse_output("--yaml", out, session, begins=b"given:")
@@ -293,7 +296,7 @@ def coarse(
     write: Annotated[bool, typer.Option("--write/--no-write", help="put the mounts into session.yaml")] = True,
 ) -> int:
     """Coarse mounts from a survey of marks on bracket and instruments. Status 1 if the marks do not agree."""
-    from pipeline.run.folder import refuse_output
+    from pipeline.run.output_files import refuse_output
     from stages.commands.coarse import coarse as coarse_of
 
     refuse_output("--yaml", out, session, begins=b"agrees:")

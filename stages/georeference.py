@@ -31,7 +31,8 @@ from pipeline.maths.geometry.rotations import quaternion_from_rotation
 from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
 from pipeline.maths.sonar import soundings
 from pipeline.maths.sonar.ray_tracing import Cast
-from pipeline.mount import mount_of, target_of
+from pipeline.mount import mount_of
+from pipeline.target.design import target_of
 
 Array = NDArray[np.float64]
 

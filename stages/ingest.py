@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.ins_drift import thinned
 from pipeline.artefacts.catalogue.points import (
     FILES,
     GAPS,
@@ -27,7 +26,7 @@ from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, utc_text
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.geometry.passes import estimate_azimuth, find_passes, pass_of
-from pipeline.readers.file_summaries import Seen, counts_of, files_of, gaps_between, refuse_apart, refuse_empty
+from pipeline.readers.file_summaries import Seen, counts_of, files_of, gaps_between, refuse_apart, refuse_empty, thinned
 
 Columns = dict[str, NDArray[Any]]
 

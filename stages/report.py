@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.adjustment.pattern_tests import pattern_tests
 from pipeline.artefacts.catalogue.patent import CORRECTIONS
 from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES
 from pipeline.artefacts.catalogue.results import (
@@ -31,7 +32,7 @@ from pipeline.config.mount import Mount
 from pipeline.config.pool import Adjust, Method, Segment, Verdict
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.config.target import Target
-from pipeline.mount import Mounted, mount_of, target_of, turned
+from pipeline.mount import Mounted, mount_of, turned
 from pipeline.report.as_built import as_found, by_design, oddities
 from pipeline.report.calibration_document import (
     SCHEMA,
@@ -49,9 +50,9 @@ from pipeline.report.calibration_document import (
 )
 from pipeline.report.cast_checks import cast_doubts, in_words
 from pipeline.report.plane_agreement import closing_table
-from pipeline.report.residual_tests import pattern_tests
 from pipeline.report.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, one_eyed, reasons, warnings
 from pipeline.results.screen import verdict_in_words
+from pipeline.target.design import target_of
 
 Array = NDArray[np.float64]
 

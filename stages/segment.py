@@ -29,18 +29,11 @@ from pipeline.errors import RawDataError
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.labelling import Beams, Labels, hidden_in_part, label_points, near_planes
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import mount_of, target_of
-from pipeline.target.pose_search import (
-    VOXEL_M,
-    FoundMount,
-    FoundTarget,
-    LaserPoses,
-    LaserSample,
-    SoundingSample,
-    find_laser,
-    find_mount,
-    find_target,
-)
+from pipeline.mount import mount_of
+from pipeline.target.design import target_of
+from pipeline.target.laser_search import LaserPoses, find_laser
+from pipeline.target.mount_search import FoundMount, SoundingSample, find_mount
+from pipeline.target.pose_search import VOXEL_M, FoundTarget, LaserSample, find_target
 from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
 

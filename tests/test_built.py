@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from pipeline.config.target import Letters, Origin
-from pipeline.mount import target_of
 from pipeline.report.as_built import as_found, by_design, oddities
+from pipeline.target.design import target_of
 
 ROOT = np.sqrt(0.5)
 TARGET = Letters(a=8.0, b=3.0, c=1.0, e=0.5, origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0))

@@ -19,12 +19,14 @@ from pipeline.checking.findings import Finding
 from pipeline.checking.point_samples import Sample, put, sample
 from pipeline.checking.track import Track, frame_of, joined, track_of
 from pipeline.checking.trial_calibration import Calibrated
+from pipeline.config.load import load_pool, load_session
 from pipeline.config.mount import Mount
-from pipeline.config.pool import PoolConfig, load_pool, load_session
+from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.target import Letters, Origin
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import mount_of, target_of
+from pipeline.mount import mount_of
+from pipeline.target.design import target_of
 from pipeline.target.surface import ClosestSurface
 from tests.effort import often
 from tests.end_to_end.places import SCENARIOS, poolcal, simulate

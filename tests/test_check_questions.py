@@ -17,7 +17,7 @@ from pipeline.checking.track import Leg
 from pipeline.config.session import SessionConfig
 from pipeline.config.target import Letters, Origin
 from pipeline.gps_time import NS, WEEK_NS
-from pipeline.mount import target_of
+from pipeline.target.design import target_of
 
 START = 2418 * WEEK_NS + 200_000 * NS
 SIGMAS = {"north_m": 0.01, "east_m": 0.01, "up_m": 0.02, "roll_deg": 0.01, "pitch_deg": 0.01, "heading_deg": 0.04}

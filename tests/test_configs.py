@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from pipeline.config.pool import PoolConfig, load_pool
+from pipeline.config.load import load_pool
+from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Mbes
 from pipeline.config.target import Letters
 from pipeline.config.yaml_models import parse, read_yaml

@@ -20,7 +20,7 @@ def _imports(path: Path) -> Iterator[str]:
 
 
 def test_maths_is_pure() -> None:
-    for path in (ROOT / "pipeline" / "maths").glob("*.py"):
+    for path in (ROOT / "pipeline" / "maths").rglob("*.py"):
         for name in _imports(path):
             top = name.split(".")[0]
             ours = name.startswith(("pipeline.errors.", "pipeline.maths."))
@@ -37,7 +37,7 @@ def test_open3d_and_rerun_have_their_places() -> None:
 
 def test_modules_are_short() -> None:
     for path in [*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "stages").rglob("*.py")]:
-        assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= 310, path
 
 
 def _make(*words: str) -> str:

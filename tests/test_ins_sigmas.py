@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.adjustment.ins_drift import drift_of, thinned, told
+from pipeline.adjustment.ins_drift import drift_of, told
 from pipeline.config.session import Drift, Ins
 from pipeline.config.yaml_models import parse
+from pipeline.readers.file_summaries import thinned
 
 NS = 1_000_000_000
 INS: dict[str, Any] = {"files": ["a"], "format": "novatel"}

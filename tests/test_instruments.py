@@ -11,7 +11,8 @@ import yaml
 
 from pipeline.config import instruments
 from pipeline.config.instruments import PRESETS, applied, load_instrument
-from pipeline.config.pool import PoolConfig, load_session
+from pipeline.config.load import load_session
+from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Drift, SessionConfig, White
 from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.errors import ConfigError
@@ -19,7 +20,7 @@ from pipeline.planning import assessment
 from pipeline.report.calibration_document import instruments_block
 from pipeline.results.pages.instrument_table import figures_used
 from pipeline.results.pages.rendering import render
-from pipeline.run.folder import Settings, read_settings, write_settings
+from pipeline.run.settings import Settings, read_settings, write_settings
 from tests.end_to_end.pages import Page
 
 FILES = sorted(PRESETS.glob("*.yaml"))

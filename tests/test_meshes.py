@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.config.pool import load_pool
+from pipeline.config.load import load_pool
 from pipeline.config.target import Faces
 from pipeline.errors import ConfigError
-from pipeline.mount import target_of
 from pipeline.simulation.scenario import load_scenario
+from pipeline.target.design import target_of
 
 CORNERS = {
     "wall": [[0, 3, -4], [0, -3, -4], [0, -3, 2], [0, 3, 2]],

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from pipeline.config.pool import load_pool, load_session
+from pipeline.config.load import load_pool, load_session
 from pipeline.config.target import Letters
 from pipeline.errors import ConfigError
 from pipeline.report.verdict import Evidence, Settings, _ambiguities

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from pipeline.config.pool import PoolConfig
 from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import target_of
 from pipeline.results.pages import face_maps, target_plots
 from pipeline.results.pages.rendering import style
+from pipeline.target.design import target_of
 from tests.targets import by_letters
 
 ROOT = Path(__file__).parents[1]

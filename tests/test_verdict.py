@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.adjustment.pattern_tests import passes_test, pattern_tests
 from pipeline.config.pool import Verdict
 from pipeline.config.session import Drift, Mbes
 from pipeline.maths.adjustment.mean_tests import limit_of
 from pipeline.report.cast_checks import cast_doubts
-from pipeline.report.residual_tests import passes_test, pattern_tests
 from pipeline.report.verdict import Evidence, Settings, drift_doubt, one_eyed, reasons, warnings
 
 SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.observation_model import GROUPS, Scene, Weighting
+from pipeline.adjustment.observation_model import Scene
+from pipeline.adjustment.weighting import GROUPS, Weighting
 from pipeline.artefacts.streams import Batch, Stream
 from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
 from pipeline.maths.adjustment.parameters import State

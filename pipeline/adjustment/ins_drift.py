@@ -7,28 +7,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import Batch
 from pipeline.config.session import Drift, Ins
-from pipeline.gps_time import NS
 from pipeline.maths.geometry.passes import pass_of
 
-SPACING_NS = NS // 2  # of the rows that are kept
 AXES = {  # of the session's drift: the columns of which the root mean square counts
     "horizontal_m": ["north_m", "east_m"],
     "vertical_m": ["up_m"],
     "roll_pitch_deg": ["roll_deg", "pitch_deg"],
     "heading_deg": ["heading_deg"],
 }
-
-
-def thinned(sigmas: Batch) -> dict[str, NDArray[Any]]:
-    """In order of time, the first row of each half second."""
-    if not sigmas:
-        return {}
-    order = np.argsort(sigmas["t_ns"], kind="stable")
-    slot = sigmas["t_ns"][order] // SPACING_NS
-    kept = order[np.diff(slot, prepend=slot[:1] - 1) > 0]
-    return {name: values[kept] for name, values in sigmas.items()}
 
 
 def told(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Reading, read, refactored, scales_of
-from pipeline.adjustment.observation_model import Scene, Weighting
+from pipeline.adjustment.observation_model import Scene
+from pipeline.adjustment.weighting import Weighting
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
 from pipeline.config.session import Ins

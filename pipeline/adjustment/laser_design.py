@@ -11,8 +11,8 @@ from pipeline.config.session import Laser
 from pipeline.maths.adjustment.design_constraints import Design
 from pipeline.maths.adjustment.parameters import SIX
 from pipeline.maths.adjustment.solution import solve
+from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import PARAMETERS
 
 Array = NDArray[np.float64]
 VAGUE = 10.0  # rad or m: what is known of an unknown before any point, where nothing is

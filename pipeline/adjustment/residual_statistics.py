@@ -9,8 +9,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.iteration import Adjusted
-from pipeline.adjustment.observation_model import Observations, Scene, Weighting
+from pipeline.adjustment.observation_model import Scene
 from pipeline.adjustment.residual_tables import residuals_table, step_for
+from pipeline.adjustment.weighting import Observations, Weighting
 from pipeline.artefacts.catalogue.results import PATTERNS
 from pipeline.artefacts.streams import Batch, Stream, xyz
 from pipeline.config.pool import Adjust

@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import Block
 from pipeline.adjustment.iteration import Adjusted
+from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.residual_statistics import Cells
 from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.config.pool import Adjust
+from pipeline.console import plural
 from pipeline.maths.adjustment.parameters import NAMES, SIX
 from pipeline.maths.adjustment.solution import Freed, Solution, freed, weakest_direction
 from pipeline.maths.adjustment.variance_components import scatter
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.geometry.rotations import log_so3
 from pipeline.mount import Mounted
-from pipeline.report.residual_tests import passes_test
-from pipeline.results.screen import plural
 
 Array = NDArray[np.float64]
 COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common

@@ -20,7 +20,7 @@ from pipeline.config.pool import Ingest, PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.gps_time import NS
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import target_of
+from pipeline.target.design import target_of
 from pipeline.target.surface import ClosestSurface
 
 ROUGHLY, SAMPLED, FINELY = 4_000, 20_000, 60_000  # rows of a sensor: to hit the target, to calibrate, to count

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from pipeline.checking.file_survey import Seen
 from pipeline.checking.findings import Finding
+from pipeline.console import plural
 from pipeline.gps_time import NS, WEEK_NS, utc_text
 from pipeline.maths.geometry.passes import pass_of, split_at_gaps
 from pipeline.readers.whole_days import whole_days
-from pipeline.results.screen import plural
 
 Times = NDArray[np.int64]
 LEAPS = {  # s

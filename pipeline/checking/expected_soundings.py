@@ -18,12 +18,12 @@ from pipeline.checking.track import Track
 from pipeline.config.plan import MbesFigures, Pass, Plan
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
+from pipeline.console import plural
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.observations import SPEED_M_S
 from pipeline.maths.sonar.soundings import points_in_mbes
 from pipeline.maths.target.model import TargetModel
 from pipeline.planning.prediction import Setting, labelled, state_by_design
-from pipeline.results.screen import plural
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.ins_drift import thinned
 from pipeline.artefacts.sampling import every_nth
 from pipeline.artefacts.streams import Part
 from pipeline.atomic_files import temporary_folder
@@ -20,6 +19,7 @@ from pipeline.errors import ConfigError, RawDataError
 from pipeline.gps_time import NS
 from pipeline.readers import detect
 from pipeline.readers.dispatch import Sensor, Settings, raw_files, raw_parts
+from pipeline.readers.file_summaries import thinned
 from pipeline.readers.las import LasPart
 from pipeline.readers.rates import rate_hz
 from pipeline.readers.smrmsg import AccuracyPart

@@ -10,10 +10,10 @@ from pipeline.checking.findings import Finding
 from pipeline.checking.track import Track, askew_deg
 from pipeline.config.pool import PoolConfig, TargetPlace
 from pipeline.config.target import Origin
+from pipeline.console import plural
 from pipeline.gps_time import NS, utc_text
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.target.model import TargetModel
-from pipeline.results.screen import plural
 
 Times = NDArray[np.int64]
 ASTRAY_M = 1_000.0

@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from pipeline.coarse.frames import NEAR_DEG, Placed, examine, examine_flat, place
+from pipeline.coarse.drawing_errors import examine, examine_flat
+from pipeline.coarse.frames import NEAR_DEG, Placed, place
 from pipeline.coarse.session_edit import block_of
 from pipeline.config.marks import Marks
+from pipeline.console import signed
 from pipeline.errors import ConfigError, NotConvergedError
 from pipeline.maths.geometry.rotations import log_so3
+from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.maths.survey.data_snooping import LEVEL, SURVEY, MarkTest, Snooped, limit, snoop
 from pipeline.maths.survey.frame_adjustment import mounted_on
-from pipeline.mount import PARAMETERS, Mounted, change_of
-from pipeline.results.screen import signed
+from pipeline.mount import Mounted, change_of
 
 Array = NDArray[np.float64]
 FARTHEST_M = 100.0  # of a lever arm that session.yaml takes

@@ -23,7 +23,8 @@ from pipeline.config.instruments import applied
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import compose, content_of, parse, text_of
 from pipeline.errors import ConfigError
-from pipeline.mount import SETTINGS, Mounted
+from pipeline.maths.mount_parameters import SETTINGS
+from pipeline.mount import Mounted
 from pipeline.readers.casts import with_cast
 
 SENSORS = ("laser", "mbes")

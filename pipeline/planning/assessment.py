@@ -18,9 +18,11 @@ from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.errors import ConfigError
 from pipeline.maths.adjustment.parameters import SIX
 from pipeline.maths.adjustment.solution import Solution, solve, weakest_direction
-from pipeline.mount import PARAMETERS, mount_of, target_of
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.mount import mount_of
 from pipeline.planning.observability import VAGUE, Seen, geometry_of
 from pipeline.planning.prediction import Predicted, Setting, predict, state_by_design
+from pipeline.target.design import target_of
 
 Array = NDArray[np.float64]
 MOST_PASSES = 100

@@ -10,12 +10,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.artefacts.catalogue.points import GAPS
+from pipeline.artefacts.streams import Batch
+from pipeline.console import plural
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, WEEK_NS, utc_text
 from pipeline.maths.geometry.passes import split_at_gaps
 from pipeline.readers.rates import rate_hz
 from pipeline.readers.whole_days import DAY_NS, whole_days
-from pipeline.results.screen import plural
 
 Columns = dict[str, NDArray[Any]]
 
@@ -135,3 +136,16 @@ def counts_of(
             total["accuracy outside the INS's time"] = sigmas_outside
         rows += [{"source": source, "reason": reason, "count": number} for reason, number in sorted(total.items())]
     return pd.DataFrame(rows)
+
+
+def thinned(sigmas: Batch) -> dict[str, NDArray[Any]]:
+    """In order of time, the first row of each half second."""
+    if not sigmas:
+        return {}
+    order = np.argsort(sigmas["t_ns"], kind="stable")
+    slot = sigmas["t_ns"][order] // SPACING_NS
+    kept = order[np.diff(slot, prepend=slot[:1] - 1) > 0]
+    return {name: values[kept] for name, values in sigmas.items()}
+
+
+SPACING_NS = NS // 2  # of the rows that are kept

@@ -46,6 +46,7 @@ UNITS: dict[str, Mapping[str, float]] = {
 }  # fmt: skip
 COARSEST_DEG = 2e-7  # 2 cm: positions printed more coarsely are of no use
 
+
 @dataclass(frozen=True)
 class Layout:
     """Of one file. ``clock``: what, beside the time, tells its week: a column, or session.yaml (gps_week)."""

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from pipeline.console import plural
 from pipeline.gps_time import NS, WEEK_NS
-from pipeline.results.screen import plural
 
 DAY_NS = 86_400 * NS
 

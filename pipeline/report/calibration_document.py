@@ -13,7 +13,8 @@ from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.gps_time import utc_text
 from pipeline.maths.adjustment.parameters import NAMES, SIX
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.mount import PARAMETERS, SETTINGS, WITHIN_95, Mounted, change_of, six_of
+from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
+from pipeline.mount import WITHIN_95, Mounted, change_of, six_of
 from pipeline.report.suspected_causes import estimated
 
 Array = NDArray[np.float64]

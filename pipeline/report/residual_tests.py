@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.maths.adjustment.mean_tests import limit_of
+from pipeline.adjustment.pattern_tests import OF_PASSES, limit_for
 
-OF_PASSES = ("drift", "pass")
 CYCLE = "ping_"  # and the number of pings in turn
 ALONE = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # what may be off by itself
 CONCEDED = "{:.1f} times the drift that it is conceded"
@@ -44,29 +43,6 @@ class Tables:
     faces: list[str]
     shape: str
     tolerated_m: float
-
-
-def limit_for(patterns: pd.DataFrame, level: float) -> float:
-    """|normalised| that no row exceeds, but with a chance of ``level``."""
-    return limit_of(len(patterns), level)
-
-
-def pattern_tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
-    """By what the residuals were sorted: the largest |normalised|, of how many (dof), and the limit for all of them."""
-    limit, found = limit_for(patterns, level), []
-    for by, rows in patterns.groupby("by", sort=True):
-        statistic = float(rows["normalised"].abs().max())
-        found.append(
-            {"by": str(by), "statistic": statistic, "dof": len(rows), "limit": limit, "passed": statistic <= limit}
-        )
-    return found
-
-
-def passes_test(patterns: pd.DataFrame, level: float) -> dict[str, Any]:
-    """Whether the passes agree: the largest |normalised| by pass or drift, and the limit for all rows."""
-    rows, limit = patterns[patterns["by"].isin(OF_PASSES)], limit_for(patterns, level)
-    statistic = float(rows["normalised"].abs().max()) if len(rows) else 0.0
-    return {"statistic": statistic, "dof": len(rows), "limit": limit, "passed": statistic <= limit}
 
 
 def off(tables: Tables, level: float) -> list[Found]:

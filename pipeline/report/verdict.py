@@ -9,10 +9,10 @@ import pandas as pd
 
 from pipeline.config.pool import Method, Verdict
 from pipeline.config.session import Drift
-from pipeline.mount import PARAMETERS
+from pipeline.console import plural
+from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.residual_tests import Tables, off
 from pipeline.report.suspected_causes import causes, estimated
-from pipeline.results.screen import plural
 
 SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
 WORDS_OF_GROUP = {

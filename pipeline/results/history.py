@@ -5,7 +5,6 @@ Rejected sessions are shown, never compared.
 """
 
 import fnmatch
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime
@@ -17,14 +16,14 @@ import numpy as np
 import pandas as pd
 
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
-from pipeline.atomic_files import write_bytes, write_text, writing
+from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.maths.comparison import Estimate, compare
-from pipeline.mount import SETTINGS
+from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.report.verdict import SIX
 from pipeline.results.compare import LEVEL, estimate_of
-from pipeline.results.screen import plural
-from pipeline.run.folder import RUN_YAML, calibration
+from pipeline.run.results import calibration
+from pipeline.run.settings import RUN_YAML
 
 TEXTS = ("date_utc", "session", "run", "verdict", "moved")  # columns
 
@@ -161,24 +160,3 @@ def _with_jumps(found: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator
         yield row
 
 
-def _no_formula(text: str) -> str:
-    """A spreadsheet takes text that begins like this for a formula, and would run it.
-
-    >>> _no_formula("=1+1"), _no_formula("2026-05-12")
-    ("'=1+1", '2026-05-12')
-    """
-    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
-
-
-def write_history(history: History, out: Path, chosen: Filter) -> None:
-    """history.html, .csv and .parquet in ``out``."""
-    from pipeline.results.pages.history import page
-
-    with writing(out):
-        out.mkdir(parents=True, exist_ok=True)
-    content = io.BytesIO()
-    history.table.to_parquet(content, index=False)
-    write_bytes(out / "history.parquet", content.getvalue())
-    plain = history.table.assign(**{name: history.table[name].map(_no_formula) for name in TEXTS})
-    write_text(out / "history.csv", plain.to_csv(index=False, lineterminator="\n"))
-    write_text(out / "history.html", page(history, chosen.words()))

@@ -4,31 +4,9 @@ import textwrap
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from pipeline.mount import PARAMETERS, change_of
-
-
-def signed(value: float, digits: int) -> str:
-    """With its sign, and no minus before nothing.
-
-    >>> signed(-0.0004, 3), signed(-0.0006, 3)
-    ('+0.000', '-0.001')
-    """
-    return f"{round(value, digits) + 0.0:+.{digits}f}"
-
-
-def plural(number: int, noun: str) -> str:
-    """A count and what is counted, in whole words.
-
-    >>> plural(1, "file"), plural(2, "pass"), plural(3, "study"), plural(0, "day")
-    ('1 file', '2 passes', '3 studies', '0 days')
-    """
-    if number == 1:
-        return f"1 {noun}"
-    if noun.endswith(("s", "x", "ch", "sh")):
-        return f"{number} {noun}es"
-    if noun.endswith("y") and noun[-2] not in "aeiou":
-        return f"{number} {noun[:-1]}ies"
-    return f"{number} {noun}s"
+from pipeline.console import signed
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.mount import change_of
 
 
 def verdict_in_words(verdict: str, held: Collection[str] = ()) -> str:

@@ -6,151 +6,19 @@ import fcntl
 import os
 import stat
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
-import yaml
-from pydantic import BaseModel
-
-from pipeline.atomic_files import read_json, remove, settle, settle_names, write_text, writing
-from pipeline.config.pool import PoolConfig, load_pool, load_session
-from pipeline.config.session import Calibrated, Mbes, SessionConfig
-from pipeline.config.target import Target
-from pipeline.config.yaml_models import parse, read_yaml
-from pipeline.errors import ArtefactError, ConfigError
-from pipeline.mount import target_of
-from pipeline.readers.casts import with_cast
+from pipeline.atomic_files import remove, settle, settle_names, writing
+from pipeline.errors import ArtefactError
 from pipeline.run import manifest
+from pipeline.run.settings import RUN_YAML
 
-RUN_YAML = "run.yaml"
 LOCK = ".lock"
 DIGESTS = "digests.json"
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What a run is made from: both configs, checked, and where the raw files are."""
-
-    session_folder: Path
-    pool: PoolConfig
-    session: SessionConfig
-
-    def resolved(self) -> dict[str, Any]:
-        """Every setting by the name under which a stage's Config asks for it."""
-        blocks = (self.pool, self.session)
-        found = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
-        return found | {"target_place": self.pool.target_place, "recordings": self.session.recordings}
-
-    def resolved_plainly(self) -> dict[str, Any]:
-        """The same as plain values."""
-        return {
-            name: value.model_dump(mode="json") if isinstance(value, BaseModel) else value
-            for name, value in self.resolved().items()
-        }
-
-    def as_json(self) -> dict[str, Any]:
-        """The same as plain values, defaults filled in."""
-        return {**self.pool.model_dump(mode="json"), **self.session.model_dump(mode="json")}
-
-
-def load_settings(
-    session_folder: Path, config_path: Path, calibrated: Calibrated | None = "mbes"
-) -> Settings:
-    """Both YAML files, read and checked, for calibrating the sonar, or the laser by itself: of a session with both the
-    sonar is left out then. None: whatever the session can."""
-    pool = load_pool(config_path)
-    try:
-        target_of(pool.target)
-    except ConfigError as error:
-        raise ConfigError(f"{config_path}: {error}") from error
-    refuse_faces(pool, config_path)
-    session = load_session(session_folder, with_cast)
-    if calibrated == "laser":
-        session = session.model_copy(update={"mbes": None})
-    elif calibrated == "mbes" and session.mbes is None:
-        where = session_folder / "session.yaml"
-        raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
-    if session.mbes is not None:
-        refuse_cast(pool.target, session.mbes, session_folder / "session.yaml")
-    return Settings(session_folder.resolve(), pool, session)
-
-
-def refuse_faces(pool: PoolConfig, path: Path) -> None:
-    """Faces as built are faces of the target."""
-    names = [face.name for face in target_of(pool.target).faces]
-    for name in pool.as_built.faces:
-        if name not in names:
-            known = ", ".join(names)
-            raise ConfigError(f"{path}: as_built.faces: {name!r}: no face of this target; its faces are {known}")
-
-
-def refuse_cast(target: Target, mbes: Mbes, path: Path) -> None:
-    """A cast is of the water that the rays go through: at least of half the depth down to the target's lower end."""
-    if mbes.svp is None:
-        return
-    depth = target_of(target).depth_m
-    first, last = mbes.svp[0][0], mbes.svp[-1][0]
-    if min(last, depth) - first < depth / 2:
-        raise ConfigError(
-            f"{path}: mbes.svp: reaches from {first:g} to {last:g} m, the target down to {depth:g} m: less than half "
-            "of that; give a cast of the whole depth"
-        )
-
-
-def refuse_folders(run: Path, session_folder: Path) -> None:
-    """Raw data and results never share a folder: a run folder is swapped and cleared. And a name must be text."""
-    for path in (run, session_folder):
-        try:
-            str(path).encode()
-        except UnicodeEncodeError as error:
-            raise ConfigError(f"{str(path)!r}: the name is no UTF-8 text; rename the folder") from error
-    inner, outer = run.resolve(), session_folder.resolve()
-    if inner.is_relative_to(outer) or outer.is_relative_to(inner):
-        raise ConfigError(f"--run {run}: lies in the session folder {session_folder}, or round it; name a folder apart")
-
-
-def holds_run(run: Path) -> bool:
-    """Whether it is a run folder."""
-    return (run / RUN_YAML).is_file()
-
-
-def refuse_other(run: Path, calibrated: Calibrated) -> None:
-    """A run folder is the sonar's or the laser's, not both in turn. (Settings of an older program need not be read.)"""
-    try:
-        session = read_yaml(run / RUN_YAML)["session"] if holds_run(run) else None
-    except (ConfigError, KeyError):
-        return
-    if not isinstance(session, dict):
-        return
-    was = "laser" if session.get("mbes") is None else "mbes"
-    if was != calibrated:
-        what = {"mbes": "the sonar", "laser": "the laser"}[was]
-        raise ArtefactError(f"{run}: holds a calibration of {what}; name another run folder")
-
-
 # --- run.yaml --------------------------------------------------------------------------------------------------------
-def write_settings(run: Path, settings: Settings) -> None:
-    content = {
-        "session_folder": str(settings.session_folder),
-        "config": settings.pool.model_dump(mode="json"),
-        "session": settings.session.model_dump(mode="json"),
-    }
-    head = "# Written by poolcal: the config and the session of this run, as used, defaults filled in.\n"
-    write_text(run / RUN_YAML, head + yaml.safe_dump(content, sort_keys=False, width=120))
-
-
-def read_settings(run: Path) -> Settings:
-    """What the run in this folder was made from."""
-    path = run / RUN_YAML
-    if not path.is_file():
-        raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
-    content = read_yaml(path)
-    folder = content.get("session_folder")
-    if set(content) != {"session_folder", "config", "session"} or not isinstance(folder, str):
-        raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
-    pool = parse(PoolConfig, content["config"], f"{path}: config")
-    return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"))
 
 
 # --- the lock --------------------------------------------------------------------------------------------------------
@@ -254,44 +122,3 @@ def touch(stage: Path) -> None:
         (stage / manifest.NAME).touch()
 
 
-def calibration(run: Path) -> dict[str, Any]:
-    """RUN/report/calibration.json."""
-    path = run / "report" / "calibration.json"
-    if run.is_file():
-        raise ConfigError(f"{run}: is a file; RUN is a run folder, and stands first")
-    try:
-        content = read_json(path)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise ArtefactError(f"{path}: cannot be read ({reason}); run poolcal run again") from error
-    if not isinstance(content, dict) or content.get("verdict") not in ("accepted", "rejected"):
-        raise ArtefactError(f"{path}: holds no verdict; run poolcal run again")
-    return content
-
-
-@contextlib.contextmanager
-def as_written(run: Path) -> Iterator[None]:
-    """Where values are taken out of a run's calibration.json: one that somebody changed is an ArtefactError."""
-    try:
-        yield
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
-        raise ArtefactError(f"{run}: its calibration.json is not as poolcal writes it; run it again") from error
-
-
-def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b"") -> None:
-    """A file of its kind, never among a run's results or a session's files (``runs``). One that is there is replaced if
-    it ``begins`` as we write it: a plan or a config never."""
-    if file is None:
-        return
-    suffix = option.replace("--", ".")
-    if file.suffix != suffix:
-        raise ConfigError(f"{option} {file}: name a file that ends in {suffix}")
-    if file.exists() and not file.is_file():
-        raise ConfigError(f"{option} {file}: is no file; name another")
-    for run_folder in runs:
-        if file.resolve().is_relative_to(run_folder.resolve()):
-            raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")
-    if begins and file.is_file():
-        with writing(file), file.open("rb") as there:
-            if there.read(len(begins)) != begins:
-                raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")

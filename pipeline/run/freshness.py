@@ -7,12 +7,12 @@ from pathlib import Path
 from types import ModuleType
 
 from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
-from pipeline.atomic_files import Digests
-from pipeline.console import Progress
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
 from pipeline.run import manifest, provenance
-from pipeline.run.folder import Settings
+from pipeline.run.digests import Digests
+from pipeline.run.progress import Progress
+from pipeline.run.settings import Settings
 from pipeline.run.stage_protocol import declared, name_of
 from pipeline.run.workers import SERIAL, Workers
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON, CALIBRATION_YAML
 from pipeline.atomic_files import read_json, remove, settle, settle_names, write_bytes, writing
-from pipeline.results.pages.currency import PAGE
 from pipeline.run.folder import keeping, partial
+from pipeline.run.results import PAGE
 
 KEPT = (CALIBRATION_JSON.name, CALIBRATION_YAML.name, PAGE)
 

@@ -14,8 +14,8 @@ from pipeline.atomic_files import read_json
 from pipeline.config.yaml_models import read_yaml
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run import manifest
-from pipeline.run.folder import RUN_YAML
 from pipeline.run.freshness import EMPTY, Run, raw_of
+from pipeline.run.settings import RUN_YAML
 
 
 def refuse_another(this: Run, stages: Sequence[str]) -> None:

@@ -1,7 +1,9 @@
 """A finished run's tables and streams, read as they were written."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,6 +11,10 @@ import pandas as pd
 from pipeline.artefacts.parquet import read_table, rows_of
 from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import ParquetPart, Stream
+from pipeline.atomic_files import read_json
+from pipeline.errors import ArtefactError, ConfigError
+from pipeline.run import manifest
+from pipeline.run.settings import read_settings
 
 
 @dataclass(frozen=True)
@@ -39,3 +45,42 @@ class Tables:
         if not pieces:
             return {name: np.empty(0) for name in columns}, step
         return {name: np.concatenate([piece[name] for piece in pieces]) for name in columns}, step
+
+
+def calibration(run: Path) -> dict[str, Any]:
+    """RUN/report/calibration.json."""
+    path = run / "report" / "calibration.json"
+    if run.is_file():
+        raise ConfigError(f"{run}: is a file; RUN is a run folder, and stands first")
+    try:
+        content = read_json(path)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise ArtefactError(f"{path}: cannot be read ({reason}); run poolcal run again") from error
+    if not isinstance(content, dict) or content.get("verdict") not in ("accepted", "rejected"):
+        raise ArtefactError(f"{path}: holds no verdict; run poolcal run again")
+    return content
+
+
+def recording_path(run: Path, stage: str) -> Path:
+    """Where a stage's recording lies."""
+    return run / stage / f"{stage}.rrd"
+
+
+def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
+    """The finished stages that follow from each other and from run.yaml, in order."""
+    settings = read_settings(run).resolved_plainly()
+    found: dict[str, manifest.Manifest] = {}
+    for stage in stages:
+        one = manifest.read(run / stage)
+        if one is not None and manifest.consistent(found | {stage: one}) and _as_set(one, settings):
+            found[stage] = one
+    return found
+
+
+def _as_set(one: manifest.Manifest, settings: Mapping[str, Any]) -> bool:
+    """Whether the stage ran with the settings in run.yaml."""
+    return all(name in settings and settings[name] == value for name, value in one.key.config.items())
+
+
+PAGE = "report.html"

@@ -16,16 +16,17 @@ from pipeline.artefacts import parquet
 from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
 from pipeline.artefacts.sinks import FolderSink
 from pipeline.artefacts.streams import EMPTY, Chunk, ParquetPart, Part, Stream
-from pipeline.atomic_files import Digests, remove, write_text, writing
+from pipeline.atomic_files import remove, write_text, writing
 from pipeline.config.session import Calibrated
-from pipeline.console import Progress
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
 from pipeline.run import folder, manifest, provenance
-from pipeline.run.folder import Settings
+from pipeline.run.digests import Digests
 from pipeline.run.freshness import Run, all_raw, key_of, out_of_date, raw_digests, raw_of
 from pipeline.run.kept_results import keep_accepted
 from pipeline.run.other_session import refuse_another
+from pipeline.run.progress import Progress
+from pipeline.run.settings import Settings, load_settings, read_settings, refuse_folders, refuse_other, write_settings
 from pipeline.run.stage_protocol import declared, evaluate, is_stream, name_of, sources
 from pipeline.run.workers import SERIAL, Stopped, Workers
 
@@ -45,14 +46,14 @@ def run(
 
     A run folder with another session's results is refused, unless they may be replaced (``overwrite``).
     """
-    settings = folder.load_settings(session_folder, config_path, calibrated)
-    folder.refuse_folders(run_folder, session_folder)
+    settings = load_settings(session_folder, config_path, calibrated)
+    refuse_folders(run_folder, session_folder)
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
-        folder.refuse_other(run_folder, calibrated)
+        refuse_other(run_folder, calibrated)
         this = _open(run_folder, settings, workers, progress)
         if not overwrite:
             refuse_another(this, [name_of(stage) for stage in stages])
-        folder.write_settings(run_folder, settings)
+        write_settings(run_folder, settings)
         first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)
         had_to_run = []
         for stage in stages:
@@ -74,13 +75,13 @@ def run_stage(
     names = [name_of(stage) for stage in stages]
     new = settings is not None
     if settings is None:
-        settings = folder.read_settings(run_folder)
-    folder.refuse_folders(run_folder, settings.session_folder)
+        settings = read_settings(run_folder)
+    refuse_folders(run_folder, settings.session_folder)
     with folder.locked(run_folder, names):
         this = _open(run_folder, settings, workers, progress)
         if new:
             refuse_another(this, names)
-        folder.write_settings(run_folder, settings)
+        write_settings(run_folder, settings)
         for stage in stages[: names.index(name)]:
             if why := out_of_date(this, stage):
                 raise ArtefactError(f"{run_folder}: {name_of(stage)}: {why[0]}; run stage {name_of(stage)} first")

@@ -5,17 +5,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 
-from pipeline.atomic_files import Digests
 from pipeline.errors import PoolcalError
 from pipeline.run import folder, manifest
+from pipeline.run.digests import Digests
 from pipeline.run.freshness import Run, key_of, present
+from pipeline.run.settings import RUN_YAML, read_settings
 from pipeline.run.stage_protocol import name_of
 from pipeline.run.workers import SERIAL, Workers
 
 
 def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
     """Read and hash again everything a run read and wrote; what is not as recorded."""
-    settings = folder.read_settings(run_folder)
+    settings = read_settings(run_folder)
     with folder.reading(run_folder):
         this = Run(run_folder, settings, Digests(None, workers.here), workers)
         return [f"{name_of(stage)}: {problem}" for stage in stages for problem in _problems(this, stage)]
@@ -39,4 +40,4 @@ def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
             yield f"{path.relative_to(where).as_posix()} is not its own"
     for name in sorted(now.config.keys() | old.key.config.keys()):
         if now.config.get(name) != old.key.config.get(name):
-            yield f"{name} is not as in {folder.RUN_YAML}"
+            yield f"{name} is not as in {RUN_YAML}"

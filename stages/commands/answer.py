@@ -34,7 +34,7 @@ def say_failures(failed: "Sequence[Failure]", but: str = "") -> None:
 def answer_of(run_folder: Path) -> int:
     """Print the result; 1 if it was rejected."""
     from pipeline.results.screen import summary
-    from pipeline.run.folder import calibration
+    from pipeline.run.results import calibration
 
     result = calibration(run_folder)
     say(summary(result), sys.stdout)

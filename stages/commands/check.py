@@ -8,12 +8,13 @@ from pipeline.artefacts.streams import EMPTY
 from pipeline.checking import rendering
 from pipeline.checking.check_session import examine
 from pipeline.checking.trial_calibration import Calibrated, Raw
-from pipeline.config.pool import PoolConfig, load_session
+from pipeline.config.load import load_session
+from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.errors import PoolcalError
 from pipeline.readers.casts import with_cast
 from pipeline.report.cast_checks import in_words
-from pipeline.run.folder import load_settings
+from pipeline.run.settings import load_settings
 from stages.in_memory import calibrate_in_memory
 
 WITHOUT_CONFIG = "Target, mounts and soundings were not checked: give the pool's YAML file with --config."

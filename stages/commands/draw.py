@@ -22,8 +22,10 @@ from typing import Any
 from pipeline.artefacts.streams import Mapper, serial
 from pipeline.atomic_files import write_bytes
 from pipeline.errors import PoolcalError
-from pipeline.results.pages.currency import PAGE, agreeing, page_to_draw, recording_path
+from pipeline.results.pages.currency import page_to_draw
 from pipeline.run import folder, manifest
+from pipeline.run.results import PAGE, agreeing, recording_path
+from pipeline.run.settings import read_settings
 from stages import ORDER, names_in
 
 RECORDINGS = "recordings"
@@ -88,7 +90,7 @@ class Painters:
         if not self._wanted:
             return []
         try:
-            folder.read_settings(run)  # never lock, and so make, a folder that is no run's
+            read_settings(run)  # never lock, and so make, a folder that is no run's
             if not self._missing(run):
                 return []
             with folder.locked(run, ORDER):

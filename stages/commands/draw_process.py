@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from pipeline.artefacts.streams import Mapper, serial
-from pipeline.results.pages.currency import PAGE
+from pipeline.run.results import PAGE
 from stages import ORDER
 from stages.commands.draw import DRAW, RECORDINGS, Failure, Prepared, paint
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.coarse.session_edit import block_of, origin_of, read_session, written
 from pipeline.report.calibration_document import mounted_of
-from pipeline.run.folder import calibration
+from pipeline.run.results import calibration
 
 
 def write(session: Path, run: Path) -> str:

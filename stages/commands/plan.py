@@ -8,12 +8,13 @@ import yaml
 from pipeline.atomic_files import write_text, writing
 from pipeline.config.plan import Pass
 from pipeline.config.pool import Verdict
-from pipeline.mount import PARAMETERS, mount_of
+from pipeline.console import plural
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.mount import mount_of
 from pipeline.planning import assessment
 from pipeline.planning.assessment import Answer, Outlook, shares_of_limits
 from pipeline.planning.prediction import Setting
-from pipeline.results.screen import plural
-from pipeline.run.folder import load_settings
+from pipeline.run.settings import load_settings
 
 NARROWEST = 9  # columns of the table of passes
 WORSE = 1.05  # a sigma that grows by less is the same

@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 
 from pipeline.config.session import Calibrated
-from pipeline.console import Progress
 from pipeline.run import runner
+from pipeline.run.progress import Progress
 from pipeline.run.workers import workers
 from stages import load
 from stages.commands.answer import answer_of, say_failures, say_where

@@ -16,8 +16,10 @@ from pipeline.atomic_files import read_json
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Verdict
 from pipeline.errors import ConfigError
-from pipeline.mount import PARAMETERS, SETTINGS
-from pipeline.run.folder import as_written, calibration, read_settings
+from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
+from pipeline.run.output_files import as_written
+from pipeline.run.results import calibration
+from pipeline.run.settings import read_settings
 
 LIMIT = 4.0
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pipeline.atomic_files import temporary_folder
 from pipeline.errors import ConfigError
-from pipeline.run import folder
+from pipeline.run.settings import read_settings
 from stages import ORDER
 from stages.commands.answer import say_failures
 from stages.commands.diff import comparison, save_pair
@@ -18,7 +18,7 @@ def view(first: Path, second: Path | None, stage: str | None) -> int:
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
-        folder.read_settings(first)
+        read_settings(first)
         say_failures(Painters(report=False, recordings=True).draw(first))
         copy = f"copy {first}/*/*.rrd to a machine with one, or open {first}/report/report.html"
         return show(recordings_of(first, stage), copy)

@@ -24,7 +24,9 @@ from pipeline.config.session import Ins, Laser
 from pipeline.config.target import Target
 from pipeline.maths.adjustment.design_constraints import of_design
 from pipeline.maths.adjustment.parameters import SIX
-from pipeline.mount import PARAMETERS, mount_of, target_of
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.mount import mount_of
+from pipeline.target.design import target_of
 from stages.adjust import SHOWN, Outputs
 
 __all__ = ["Config", "Inputs", "Outputs", "run"]

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.adjustment.pattern_tests import pattern_tests
 from pipeline.artefacts.catalogue.points import INS_SIGMAS, PASSES
 from pipeline.artefacts.catalogue.results import (
     ADJUST_SUMMARY,
@@ -28,7 +29,8 @@ from pipeline.artefacts.schema import Provenance
 from pipeline.config.pool import Adjust, Segment, Verdict
 from pipeline.config.session import Ins, Laser
 from pipeline.config.target import Target
-from pipeline.mount import PARAMETERS, mount_of, target_of
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.mount import mount_of
 from pipeline.report.as_built import as_found, by_design, oddities
 from pipeline.report.calibration_document import (
     SCHEMA,
@@ -42,10 +44,10 @@ from pipeline.report.calibration_document import (
     plain,
     target_block,
 )
-from pipeline.report.residual_tests import pattern_tests
 from pipeline.report.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons, warnings
 from pipeline.results.screen import verdict_in_words
-from pipeline.target.pose_search import FARTHEST
+from pipeline.target.design import target_of
+from pipeline.target.laser_search import FARTHEST
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,10 @@ from pipeline.artefacts.poses import trajectory_in_target
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.face_grid import face_axes
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.mount import PARAMETERS, Mounted, mount_of
-from pipeline.run.folder import read_settings
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.mount import Mounted, mount_of
 from pipeline.run.results import Tables
+from pipeline.run.settings import read_settings
 from stages.views.ingest import moments_of
 from stages.views.recording import COLOURS, DOT_M, GREY, LASER, SONAR, curve, words
 

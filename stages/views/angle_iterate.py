@@ -17,8 +17,8 @@ from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.patent.lifted_moments import plane_moments
 from pipeline.mount import mount_of
 from pipeline.report.plane_agreement import families_of
-from pipeline.run.folder import read_settings
 from pipeline.run.results import Tables
+from pipeline.run.settings import read_settings
 from stages.views.fit_planes import cut_out
 from stages.views.recording import COLOURS, GREY, SONAR, curve, words
 

@@ -10,8 +10,8 @@ import numpy as np
 from pipeline.artefacts.catalogue.patent import ITERATIONS
 from pipeline.artefacts.parquet import rows_of
 from pipeline.maths.target.model import ROLES, TargetModel
-from pipeline.mount import target_of
-from pipeline.run.folder import read_settings
+from pipeline.run.settings import read_settings
+from pipeline.target.design import target_of
 
 PAPER = (255, 255, 255)
 FROM = (-1.0, -0.55, 0.45)  # the eye is in this direction from the target's middle

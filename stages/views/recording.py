@@ -36,10 +36,9 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import ArtefactError
-from pipeline.mount import target_of
-from pipeline.results.pages.currency import agreeing, recording_path
-from pipeline.run.folder import read_settings
-from pipeline.run.results import Tables
+from pipeline.run.results import Tables, agreeing, recording_path
+from pipeline.run.settings import read_settings
+from pipeline.target.design import target_of
 from stages import ORDER, names_in
 
 APPLICATION = "poolcal"

@@ -3,8 +3,7 @@
 from typing import Any
 
 from pipeline.results.screen import summary
-from pipeline.run.folder import calibration
-from pipeline.run.results import Tables
+from pipeline.run.results import Tables, calibration
 from stages.views.recording import words
 
 

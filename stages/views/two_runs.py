@@ -10,9 +10,8 @@ from pipeline.artefacts.catalogue.target import SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.poses import trajectory_in_target
 from pipeline.artefacts.streams import xyz
 from pipeline.atomic_files import write_bytes
-from pipeline.results.compare import text
-from pipeline.run.folder import calibration
-from pipeline.run.results import Tables
+from pipeline.results.compare_text import text
+from pipeline.run.results import Tables, calibration
 from stages.views.blueprint import side_by_side
 from stages.views.recording import DOT_M, LASER, SONAR, content, log, recording_id, words
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import ArtefactError, ConfigError
-from pipeline.run import folder
+from pipeline.run.settings import load_settings, write_settings
 from stages.commands.truth import compare, errors_of, read_truth
 from tests.runner.conftest import Pool
 
@@ -32,7 +32,7 @@ def _R_body_from_mbes(mount: dict[str, float]) -> np.ndarray:
 def found(pool: Pool) -> Path:
     """A run folder whose result is EPSILON and LEVER_ERROR away from the truth beside it."""
     (pool.run_folder / "report").mkdir(parents=True)
-    folder.write_settings(pool.run_folder, folder.load_settings(pool.session, pool.config))
+    write_settings(pool.run_folder, load_settings(pool.session, pool.config))
     block = {
         "R_body_from_mbes": _R_body_from_mbes(MOUNT).tolist(),
         "lever_arm_m": [0.3, 0.2, -2.0],
@@ -95,7 +95,7 @@ def test_a_rejected_calibration_is_a_no(found: Path) -> None:
 @pytest.mark.parametrize(("method", "good"), [("patent_alternating", True), ("patent_sequential", False)])
 def test_another_result_is_held_to_the_verdicts_limits(pool: Pool, found: Path, method: str, good: bool) -> None:
     pool.config.write_text(pool.config.read_text() + f"result: {method}\n")
-    folder.write_settings(found, folder.load_settings(pool.session, pool.config))
+    write_settings(found, load_settings(pool.session, pool.config))
     text, answer = compare(found, _truth(found))
     assert answer is good
     assert "largest sigma allowed" in text

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.config.pool import load_session
+from pipeline.config.load import load_session
 from tests.end_to_end.places import Told, poolcal
 from tests.maths.surveys import World
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.config.pool import load_session
+from pipeline.config.load import load_session
 from tests.coarse.conftest import KEYS, PLAIN, marks_of, mounts_in, run
 from tests.maths.surveys import ALONG, ON_BODY, ON_LASER, ON_MBES, World
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from pipeline.coarse.session_edit import edited, refuse_other
-from pipeline.config.pool import load_session
+from pipeline.config.load import load_session
 from pipeline.config.session import Laser
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError

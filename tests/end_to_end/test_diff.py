@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.results.compare import folded
+from pipeline.results.compare_text import folded
 from tests.end_to_end.places import Place, Told, poolcal, simulate
 
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from pipeline.coarse.session_edit import read_session
-from pipeline.config.pool import load_session
+from pipeline.config.load import load_session
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.maths.sonar.cast_profile import MOST, ascending, one_way, thinned
 from pipeline.readers.casts import read_cast, with_cast

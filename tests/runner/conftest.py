@@ -8,8 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.console import Progress
 from pipeline.run import runner
+from pipeline.run.progress import Progress
 from pipeline.run.workers import SERIAL, Workers
 from tests.runner import toys
 

@@ -10,7 +10,7 @@ import pytest
 from pipeline.atomic_files import remove
 from pipeline.errors import ArtefactError
 from pipeline.run import manifest
-from pipeline.run.folder import calibration
+from pipeline.run.results import calibration
 from pipeline.run.verify import verify
 from tests.limits import limited
 from tests.runner.conftest import Pool

@@ -13,7 +13,8 @@ import pytest
 
 from pipeline import atomic_files
 from pipeline.errors import ArtefactError
-from pipeline.run import folder, runner
+from pipeline.run import runner
+from pipeline.run.settings import load_settings
 from pipeline.run.verify import verify
 from tests.effort import often
 from tests.runner import toys
@@ -188,7 +189,7 @@ def test_another_session_is_refused_and_nothing_changed(judged: Pool) -> None:
         judged.run()
     for word in (str(judged.run_folder), "'toy'", str(first), str(judged.session), "--overwrite"):
         assert word in str(told.value)
-    settings = folder.load_settings(judged.session, judged.config)
+    settings = load_settings(judged.session, judged.config)
     with pytest.raises(ArtefactError, match="another session"):
         runner.run_stage(judged.stages, "take", judged.run_folder, settings)
     assert everything(judged.run_folder) == before

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from laspy.header import GpsTimeType
 
-from pipeline.config.pool import load_pool, load_session
+from pipeline.config.load import load_pool, load_session
 from pipeline.gps_time import NS, WEEK_NS, gps_ns_from_unix_utc
 from pipeline.simulation.novatel import crc32
 from pipeline.simulation.r2sonic_packets import packet_dtype, utc_from_gps_ns

@@ -9,7 +9,7 @@ import laspy
 import numpy as np
 import pytest
 
-from pipeline.config.pool import load_pool, load_session
+from pipeline.config.load import load_pool, load_session
 from pipeline.config.yaml_models import read_yaml
 from pipeline.errors import ConfigError
 from pipeline.simulation import session as session_module

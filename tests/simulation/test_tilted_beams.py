@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipeline.config.pool import load_session
+from pipeline.config.load import load_session
 from pipeline.errors import ConfigError
 from pipeline.simulation.beams import Beams, directions_in_mbes, swing_rad, transmit_tilts_rad
 from pipeline.simulation.mesh import build_mesh

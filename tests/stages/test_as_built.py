@@ -10,7 +10,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Mbes
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from pipeline.run.folder import load_settings, refuse_cast
+from pipeline.run.settings import load_settings, refuse_cast
 from tests.effort import often
 from tests.stages.conftest import QUIET, calibrated, made
 

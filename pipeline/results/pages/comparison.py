@@ -9,7 +9,8 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pipeline.mount import WITHIN_95
-from pipeline.results.compare import folded, shown
+from pipeline.results.compare import shown
+from pipeline.results.compare_text import folded
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
 
 

@@ -1,18 +1,22 @@
 """The history's page: a control chart of each parameter, and the table behind it."""
 
+import io
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from pipeline.mount import PARAMETERS, WITHIN_95
+from pipeline.atomic_files import write_bytes, write_text, writing
+from pipeline.console import plural
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.mount import WITHIN_95
 from pipeline.report.verdict import SIX
-from pipeline.results.history import History
+from pipeline.results.history import TEXTS, Filter, History
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
-from pipeline.results.screen import plural
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
 
@@ -106,3 +110,26 @@ def _chart(table: pd.DataFrame) -> Markup:
         for axis in (axes[2], axes[5]):
             axis.set_xticks(place, _moments(table["date_utc"].tolist()), rotation=30, ha="right")
         return picture(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")
+
+
+def _no_formula(text: str) -> str:
+    """A spreadsheet takes text that begins like this for a formula, and would run it.
+
+    >>> _no_formula("=1+1"), _no_formula("2026-05-12")
+    ("'=1+1", '2026-05-12')
+    """
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
+
+
+def write_history(history: History, out: Path, chosen: Filter) -> None:
+    """history.html, .csv and .parquet in ``out``."""
+    from pipeline.results.pages.history import page
+
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+    content = io.BytesIO()
+    history.table.to_parquet(content, index=False)
+    write_bytes(out / "history.parquet", content.getvalue())
+    plain = history.table.assign(**{name: history.table[name].map(_no_formula) for name in TEXTS})
+    write_text(out / "history.csv", plain.to_csv(index=False, lineterminator="\n"))
+    write_text(out / "history.html", page(history, chosen.words()))

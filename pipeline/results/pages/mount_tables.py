@@ -16,10 +16,9 @@ from pipeline.config.pool import Verdict
 from pipeline.config.session import SessionConfig
 from pipeline.maths.adjustment.parameters import NAMES
 from pipeline.maths.adjustment.solution import TOGETHER
-from pipeline.mount import PARAMETERS
+from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import reference, titled
-from pipeline.run.folder import calibration
-from pipeline.run.results import Tables
+from pipeline.run.results import Tables, calibration
 
 Row = Mapping[str, Any]
 SENSORS = ("laser", "mbes")

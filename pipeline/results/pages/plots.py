@@ -17,8 +17,8 @@ from pipeline.artefacts.poses import trajectory_in_target
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.results.pages import face_maps, residual_plots, target_plots
 from pipeline.results.pages.rendering import style
-from pipeline.run.folder import calibration, read_settings
-from pipeline.run.results import Tables
+from pipeline.run.results import Tables, calibration
+from pipeline.run.settings import read_settings
 
 TRACK_POINTS = 300  # of a pass on the plan
 

@@ -19,18 +19,19 @@ from pipeline.atomic_files import write_text
 from pipeline.config.target import Letters
 from pipeline.config.yaml_models import changes
 from pipeline.gps_time import utc_text
-from pipeline.mount import PARAMETERS, target_of
+from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import by_design
 from pipeline.results.pages import mount_tables
-from pipeline.results.pages.currency import PAGE, agreeing, drawn_from
+from pipeline.results.pages.currency import drawn_from
 from pipeline.results.pages.instrument_table import figures_used
 from pipeline.results.pages.mount_tables import METHODS
 from pipeline.results.pages.plots import pictures_of
 from pipeline.results.pages.rendering import render
 from pipeline.results.screen import verdict_in_words
 from pipeline.run import manifest
-from pipeline.run.folder import Settings, calibration, read_settings
-from pipeline.run.results import Tables
+from pipeline.run.results import PAGE, Tables, agreeing, calibration
+from pipeline.run.settings import Settings, read_settings
+from pipeline.target.design import target_of
 
 Row = Mapping[str, Any]
 MOST_GAPS = 12

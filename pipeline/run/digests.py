@@ -1,0 +1,48 @@
+"""Memory of the digests of large files: hashed again only where size or time of change differ."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from pipeline.artefacts.streams import Mapper, serial
+from pipeline.atomic_files import read_json, sha256, write_text
+from pipeline.errors import ArtefactError
+
+
+class Digests:
+    """SHA-256 by file, remembered by path, size and times of change, so that large raw files are read once."""
+
+    def __init__(self, memory: Path | None, mapper: Mapper = serial) -> None:
+        self._memory = memory
+        self.mapper = mapper
+        self._known: dict[str, list[object]] = _read_memory(memory) if memory is not None else {}
+
+    def of(self, paths: Iterable[Path]) -> list[str]:
+        """The digests of ``paths``, in their order; unknown files are hashed side by side."""
+        asked = [path.absolute() for path in paths]
+        marks = {path: _mark(path) for path in asked}
+        stale = [path for path, mark in marks.items() if self._known.get(str(path), [None])[1:] != mark]
+        for path, digest in zip(stale, self.mapper(sha256, stale), strict=True):
+            self._known[str(path)] = [digest, *marks[path]]
+        if stale and self._memory is not None:
+            write_text(self._memory, json.dumps(self._known, indent=0, sort_keys=True) + "\n")
+        return [str(self._known[str(path)][0]) for path in asked]
+
+
+def _mark(path: Path) -> list[object]:
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise ArtefactError(f"{path}: cannot be read ({error.strerror}); correct this and run again") from error
+    return [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
+
+
+def _read_memory(path: Path) -> dict[str, list[object]]:
+    """A damaged memory is forgotten: it only saves time."""
+    try:
+        content = read_json(path)
+    except (OSError, ValueError):
+        return {}
+    if not isinstance(content, dict):
+        return {}
+    return {name: entry for name, entry in content.items() if isinstance(entry, list) and len(entry) == 4}

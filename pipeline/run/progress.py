@@ -1,0 +1,78 @@
+"""What a run says while it works: a bar with rate and time left on a terminal, one plain line a stage elsewhere."""
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+from pipeline.console import say
+
+MAX_REASONS = 3
+
+
+@dataclass
+class Progress:
+    """Counts rows as workers take them up; safe to call from any of them."""
+
+    stream: TextIO = field(default_factory=lambda: sys.stderr)
+    quiet: bool = False
+    _rows: int = 0
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _bar: "Bar | None" = None
+
+    def note(self, text: str) -> None:
+        if not self.quiet:
+            say(text, self.stream)
+
+    def reasons(self, stage: str, reasons: Sequence[str]) -> None:
+        """Why a stage is run."""
+        for reason in reasons[:MAX_REASONS]:
+            self.note(f"{stage}: {reason}")
+        if len(reasons) > MAX_REASONS:
+            self.note(f"{stage}: and {len(reasons) - MAX_REASONS} more")
+
+    @contextlib.contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """One stage from its first row to its last; says at the end how long it took."""
+        self._rows, start = 0, time.perf_counter()
+        with self._shown(name):
+            yield
+        seconds = time.perf_counter() - start
+        rate = f", {self._rows:,} rows, {self._rows / max(seconds, 1e-9):,.0f} rows/s" if self._rows else ""
+        self.note(f"{name}: done in {seconds:.1f} s{rate}")
+
+    @contextlib.contextmanager
+    def _shown(self, name: str) -> Iterator[None]:
+        if self.quiet or not self.stream.isatty():
+            yield
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        columns: tuple[Any, ...] = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn())
+        columns += (TextColumn("{task.fields[rate]}"), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+        with Progress(*columns, console=Console(file=self.stream), transient=True) as self._bar:
+            self._bar.add_task(name, total=None, rate="")
+            try:
+                yield
+            finally:
+                self._bar = None
+
+    def begin(self, total: int | None) -> None:
+        """The streams are now mapped: count from here, towards ``total`` rows where that is known."""
+        self._rows = 0
+        if self._bar is not None:
+            self._bar.reset(self._bar.task_ids[0], total=total, rate="")
+
+    def advance(self, rows: int) -> None:
+        with self._lock:
+            self._rows += rows
+            if self._bar is not None:
+                task = self._bar.tasks[0]
+                rate = f"{self._rows / task.elapsed:,.0f} rows/s" if task.elapsed else ""
+                self._bar.update(task.id, completed=self._rows, rate=rate)
