@@ -3,7 +3,7 @@
 import pytest
 
 import pipeline  # noqa: F401
-from tests.effort import THOROUGH
+from tests.support.effort import THOROUGH
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -10,7 +10,7 @@ from pipeline.config.load import load_pool, load_session
 from pipeline.config.target import Letters
 from pipeline.errors import ConfigError
 from pipeline.report.verdict import Evidence, Settings, _ambiguities
-from tests.end_to_end.places import poolcal
+from tests.support.places import poolcal
 
 MOUNT = {"roll_deg": -48.0, "pitch_deg": 2.0, "yaw_deg": -2.8, "x_m": 0.38, "y_m": 0.12, "z_m": -2.09}
 ORIGIN = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}

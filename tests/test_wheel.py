@@ -13,9 +13,8 @@ import yaml
 
 from pipeline.errors import ConfigError
 from pipeline.simulation.scenario import SCENARIOS, load_scenario
-from tests.end_to_end.places import SMALL, result_of
-
-ROOT = Path(__file__).parents[1]
+from tests.support.places import SMALL, result_of
+from tests.support.roots import ROOT
 
 
 @pytest.fixture(scope="module")

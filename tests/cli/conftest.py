@@ -1,5 +1,5 @@
 """The same toy session as the runner's tests have."""
 
-from tests.runner.conftest import pool
+from tests.run.conftest import pool
 
 __all__ = ["pool"]

@@ -15,10 +15,11 @@ import pipeline
 from stages import ORDER
 from stages.cli import _go_on, call
 from stages.commands.draw import Painters
-from tests.runner.conftest import Pool
+from tests.support.roots import ROOT
+from tests.support.toy_run import Pool
 
 COMMANDS = ("simulate", "run", "stage", "verify", "view", "diff", "history", "plan", "coarse", "compare")
-TOY = [sys.executable, str(Path(__file__).with_name("toy_poolcal.py"))]
+TOY = [sys.executable, str(ROOT / "tests" / "support" / "toy_poolcal.py")]
 
 
 def _toy(*words: object, **options: object) -> "subprocess.CompletedProcess[str]":

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run.settings import load_settings, write_settings
 from stages.commands.truth import compare, errors_of, read_truth
-from tests.runner.conftest import Pool
+from tests.support.toy_run import Pool
 
 EPSILON_DEG, LEVER_ERROR_M = np.array([0.01, -0.02, 0.03]), np.array([0.001, -0.002, 0.003])
 SIGMA = {"rotation_vector_deg": [0.01] * 3, "lever_arm_m": [0.001] * 3}

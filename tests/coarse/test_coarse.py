@@ -10,10 +10,11 @@ import pytest
 import yaml
 
 from pipeline.config.load import load_session
-from tests.coarse.conftest import KEYS, PLAIN, marks_of, mounts_in, run
-from tests.maths.surveys import ALONG, ON_BODY, ON_LASER, ON_MBES, World
+from tests.support.marks import KEYS, PLAIN, marks_of, mounts_in, run
+from tests.support.roots import CONFIGS
+from tests.support.surveys import ALONG, ON_BODY, ON_LASER, ON_MBES, World
 
-EXAMPLE = Path(__file__).parents[2] / "configs" / "marks.yaml"
+EXAMPLE = CONFIGS / "marks.yaml"
 Change = Callable[[dict[str, Any]], object]
 
 

@@ -16,8 +16,8 @@ from pipeline.config.load import load_session
 from pipeline.config.session import Laser
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from tests.coarse.conftest import KEYS, PLAIN, marks_of, mounts_in, run
-from tests.maths.surveys import World
+from tests.support.marks import KEYS, PLAIN, marks_of, mounts_in, run
+from tests.support.surveys import World
 
 
 # --- session.yaml as text --------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import pytest
 
 from stages import ORDER
 from stages.commands.draw import Painters
-from tests.end_to_end.places import Place, Told, digests, poolcal, simulate
+from tests.support.places import Place, Told, digests, poolcal, simulate
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from tests.end_to_end.places import Place, edit, simulate
+from tests.support.places import Place, edit, simulate
 
 RMS = (0.02, 0.02, 0.03, 0.1, 0.1, 0.1, 0.9, 0.9, 2.4)  # north, east, down; velocities; roll, pitch, heading: 1/60 deg
 FROM_FILES = {"horizontal_m": 0.02, "vertical_m": 0.03, "roll_pitch_deg": 0.015, "heading_deg": 0.04}

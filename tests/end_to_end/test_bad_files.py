@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.gps_time import NS
 from pipeline.simulation.novatel import aligning_bodies, novatel_bytes
-from tests.end_to_end.places import Place, Told, poolcal, simulate
-from tests.end_to_end.refusals import Spoil, as_if_nothing_had_been, nothing_is_left, one_line
+from tests.support.places import Place, Told, poolcal, simulate
+from tests.support.refusals import Spoil, as_if_nothing_had_been, nothing_is_left, one_line
 
 
 # --- what can be wrong with files ------------------------------------------------------------------------------------

@@ -12,8 +12,8 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from tests.end_to_end.places import Place, Told, digests, poolcal
-from tests.end_to_end.refusals import one_line
+from tests.support.places import Place, Told, digests, poolcal
+from tests.support.refusals import one_line
 
 
 # --- run folders -----------------------------------------------------------------------------------------------------

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from tests.effort import often
-from tests.end_to_end.places import Place
-from tests.end_to_end.refusals import Spoil, as_if_nothing_had_been, nothing_is_left, one_line
+from tests.support.effort import often
+from tests.support.places import Place
+from tests.support.refusals import Spoil, as_if_nothing_had_been, nothing_is_left, one_line
 
 
 # --- what can be wrong with the two YAML files -----------------------------------------------------------------------

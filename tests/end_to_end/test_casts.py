@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from tests.end_to_end.places import Place, digests, poolcal, sigmas
+from tests.support.places import Place, digests, poolcal, sigmas
 
 DEPTHS = np.round(np.arange(0.1, 4.0, 0.02), 2)
 SPEEDS = np.round(1500.0 + 0.02 * DEPTHS**2, 3)

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import simulate as simulate_in_memory
-from tests.end_to_end.places import Place, Told, poolcal, result_of
-from tests.end_to_end.tables import place_soundings, write_tables
+from tests.support.places import Place, Told, poolcal, result_of
+from tests.support.tables import place_soundings, write_tables
 
 KEYS = {"schema", "session", "verdict", "reasons", "mbes", "methods", "inputs", "software"}
 BLOCK = {"R_body_from_mbes", "lever_arm_m", "mount", "correction", "sigma", "covariance"}

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from pipeline.results.compare_text import folded
-from tests.end_to_end.places import Place, Told, poolcal, simulate
+from tests.support.places import Place, Told, poolcal, simulate
 
 
 def compared(first: Path, second: Path, *more: object) -> tuple[int, dict[str, Any]]:

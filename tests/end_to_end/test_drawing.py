@@ -19,9 +19,9 @@ from pipeline.run.folder import locked
 from stages import ORDER
 from stages.commands.draw import Painters, Prepared, paint, painters
 from stages.views.blueprint import tabs_of
-from tests.effort import often
-from tests.end_to_end.places import Place, digests, poolcal
-from tests.end_to_end.recordings import points, read
+from tests.support.effort import often
+from tests.support.places import Place, digests, poolcal
+from tests.support.recordings import points, read
 
 MARK = f"STARTED_BY_TEST_{os.getpid()}"
 

@@ -3,8 +3,8 @@
 import yaml
 
 from stages import ORDER
-from tests.end_to_end.places import Place, digests
-from tests.targets import as_faces
+from tests.support.places import Place, digests
+from tests.support.targets import as_faces
 
 
 def test_faces_give_the_same_bytes_as_the_letters(place: Place, right: dict[str, str]) -> None:

@@ -9,10 +9,10 @@ import pytest
 from pipeline.gps_time import NS, WEEK_NS
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import simulate as simulate_in_memory
-from tests.effort import often
-from tests.end_to_end.places import Place, errors, poolcal, result_of, sigmas, simulate
-from tests.end_to_end.tables import write_tables
-from tests.readers import ie_files
+from tests.support.effort import often
+from tests.support.files import ie_files
+from tests.support.places import Place, errors, poolcal, result_of, sigmas, simulate
+from tests.support.tables import write_tables
 
 # Every format of each sensor; files of one sensor do not meet those of another before ingest has read them.
 FILES: dict[str, dict[str, Any]] = {

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.end_to_end.pages import Page
-from tests.end_to_end.places import Told, poolcal
+from tests.support.pages import Page
+from tests.support.places import Told, poolcal
 
 HOSTILE = '<script>alert("x")</script> & 水池 ' + "n" * 100
 

@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 from pipeline.config.load import load_session
-from tests.end_to_end.pages import Page
-from tests.end_to_end.places import Place, Told, poolcal, simulate
-from tests.end_to_end.recordings import read, text
+from tests.support.pages import Page
+from tests.support.places import Place, Told, poolcal, simulate
+from tests.support.recordings import read, text
 
 STAGES = ("ingest", "georeference", "segment", "fit_planes", "adjust", "report")
 BADGES = ("yes", "no", "part")

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.effort import often
-from tests.end_to_end.places import Place, digests, poolcal, poolcal_process
+from tests.support.effort import often
+from tests.support.places import Place, digests, poolcal, poolcal_process
 
 NAMES = [
     "水池 标定 2026 – ½",

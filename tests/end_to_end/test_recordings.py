@@ -18,8 +18,8 @@ import stages.views.recording
 from stages import ORDER
 from stages.commands.draw import Painters
 from stages.views.blueprint import tabs_of
-from tests.end_to_end.places import Told, poolcal
-from tests.end_to_end.recordings import Chunks, points, read, rows_in, text
+from tests.support.places import Told, poolcal
+from tests.support.recordings import Chunks, points, read, rows_in, text
 
 
 def curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:

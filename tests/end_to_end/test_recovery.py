@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.effort import often
-from tests.end_to_end.places import SCENARIOS, errors, poolcal, result_of, sigmas, simulate
+from tests.support.effort import often
+from tests.support.places import errors, poolcal, result_of, sigmas, simulate
+from tests.support.roots import SCENARIOS
 
 SEEDS = often((11,), (11, 13))  # many more in campaigns
 

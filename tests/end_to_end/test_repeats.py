@@ -6,9 +6,10 @@ import subprocess
 import pytest
 
 from stages import ORDER
-from tests.effort import often
-from tests.end_to_end.places import ROOT, Place, digests, poolcal, poolcal_process
-from tests.end_to_end.refusals import one_line
+from tests.support.effort import often
+from tests.support.places import Place, digests, poolcal, poolcal_process
+from tests.support.refusals import one_line
+from tests.support.roots import ROOT
 
 
 # --- the same bytes --------------------------------------------------------------------------------------------------

@@ -11,9 +11,9 @@ import pytest
 
 from stages import ORDER
 from stages.commands.draw import Painters
-from tests.effort import often
-from tests.end_to_end.pages import Page, assert_self_contained
-from tests.end_to_end.places import Place, Told, digests, poolcal, result_of
+from tests.support.effort import often
+from tests.support.pages import Page, assert_self_contained
+from tests.support.places import Place, Told, digests, poolcal, result_of
 
 HOSTILE = "<script>alert(1)</script> \"quotes\" '&amp;' 水池 ``` " + "x" * 240
 

@@ -9,7 +9,7 @@ import yaml
 from scipy.spatial.transform import Rotation, Slerp
 
 from pipeline.adjustment.residual_tables import step_for
-from tests.end_to_end.places import Told, result_of
+from tests.support.places import Told, result_of
 
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.end_to_end.places import ROOT, Place, digests, poolcal_process
+from tests.support.places import Place, digests, poolcal_process
+from tests.support.roots import ROOT
 
 
 @pytest.mark.thorough

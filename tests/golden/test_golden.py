@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.stages.conftest import calibrated, made
+from tests.support.simulated import calibrated, made
 
 FOLDER = Path(__file__).parent
 # Absolute tolerance of each column that is compared; the others must be equal. Far below the sigmas of the session.

@@ -10,8 +10,8 @@ from pyproj import CRS
 from pipeline.config.session import Laser
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.crs import Frame, placing_of
-from tests.readers.build import MOUNT, read, rows
-from tests.readers.e57_files import Scan, write
+from tests.support.files.build import MOUNT, read, rows
+from tests.support.files.e57_files import Scan, write
 
 AXES = ("x_m", "y_m", "z_m")
 A, F = 6_378_137.0, 1 / 298.257223563  # WGS 84

@@ -12,8 +12,8 @@ import pytest
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.maths.geometry.geodesy import ecef_from_geodetic
 from pipeline.readers.crs import Frame, placing_of
-from tests.readers.build import read, rows
 from tests.readers.test_crs import las, placed, table
+from tests.support.files.build import read, rows
 
 A = 6_378_137.0
 WGS84, GRS80 = 1 / 298.257223563, 1 / 298.257222101  # flattening; CGCS2000 has that of GRS 80 (GB 22021-2008)

@@ -11,8 +11,8 @@ from pipeline.config.session import Laser
 from pipeline.errors import RawDataError
 from pipeline.readers import e57
 from pipeline.readers.dispatch import raw_parts
-from tests.readers.build import MOUNT, read, rows
-from tests.readers.e57_files import Scan, edited, write
+from tests.support.files.build import MOUNT, read, rows
+from tests.support.files.e57_files import Scan, edited, write
 
 NS = 10**9
 START_S = 1_398_556_818.25  # GPS seconds: 2024-05-01

@@ -13,8 +13,8 @@ import pytest
 
 from pipeline.errors import RawDataError
 from pipeline.readers import e57
-from tests.readers.build import read, rows
-from tests.readers.e57_files import Scan, edited, write
+from tests.support.files.build import read, rows
+from tests.support.files.e57_files import Scan, edited, write
 
 POINTS = {"cartesianX": (1.0, 2.0), "cartesianY": (4.0, 5.0), "cartesianZ": (7.0, 8.0), "timeStamp": (0.0, 0.5)}
 DECLARATION = b'<?xml version="1.0" encoding="UTF-8"?>'

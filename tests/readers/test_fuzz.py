@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from pipeline.errors import PoolcalError
 from pipeline.readers.detect import HEAD, kind_of_bytes
-from tests.effort import often
-from tests.readers import build, e57_files, ie_files, sonar_files
+from tests.support.effort import often
+from tests.support.files import build, e57_files, ie_files, sonar_files
 
 WEEK_NS = 604_800 * 10**9
 OPTIONS = {"deadline": None, "suppress_health_check": list(HealthCheck), "derandomize": True, "database": None}

@@ -11,9 +11,18 @@ from pipeline.config.session import Mbes
 from pipeline.errors import RawDataError
 from pipeline.readers import gsf
 from pipeline.readers.dispatch import raw_parts
-from tests.readers.build import GPS_2024, MOUNT, read, rows
-from tests.readers.sonar_files import SCALES, gsf_header, gsf_ping, gsf_placed, profile, record, scale_factors, seabat
-from tests.readers.sonar_files import gsf as made
+from tests.support.files.build import GPS_2024, MOUNT, read, rows
+from tests.support.files.sonar_files import (
+    SCALES,
+    gsf_header,
+    gsf_ping,
+    gsf_placed,
+    profile,
+    record,
+    scale_factors,
+    seabat,
+)
+from tests.support.files.sonar_files import gsf as made
 
 NS = 10**9
 SOUND = SCALES + seabat(1480.0)

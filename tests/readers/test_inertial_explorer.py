@@ -11,9 +11,9 @@ import pytest
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.detect import INERTIAL_EXPLORER, kind_of_bytes
 from pipeline.readers.dispatch import raw_parts
-from tests.readers import build
-from tests.readers.build import rows
-from tests.readers.ie_files import HEADER, LAYOUTS, WEEK, Columns, Row, export, truth, whole
+from tests.support.files import build
+from tests.support.files.build import rows
+from tests.support.files.ie_files import HEADER, LAYOUTS, WEEK, Columns, Row, export, truth, whole
 
 NS = 1_000_000_000
 WEEK_NS = 604_800 * NS

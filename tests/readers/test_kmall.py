@@ -17,9 +17,9 @@ from pipeline.maths.sonar.soundings import points_in_mbes
 from pipeline.readers import kmall, kongsberg
 from pipeline.readers.dispatch import raw_parts
 from pipeline.readers.kmall_datagrams import datagrams
-from tests.readers.build import GPS_2024, MOUNT, UTC_2024, read, rows
-from tests.readers.sonar_files import ANGLES_DEG, datagram, iip, mrz, sounding
-from tests.readers.sonar_files import kmall as made
+from tests.support.files.build import GPS_2024, MOUNT, UTC_2024, read, rows
+from tests.support.files.sonar_files import ANGLES_DEG, datagram, iip, mrz, sounding
+from tests.support.files.sonar_files import kmall as made
 
 NS = 10**9
 FAN = [sounding(n, angle, 0.008) for n, angle in enumerate(ANGLES_DEG)]

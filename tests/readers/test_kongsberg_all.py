@@ -10,8 +10,8 @@ from pipeline.errors import RawDataError
 from pipeline.gps_time import GPS_EPOCH_UNIX_S
 from pipeline.readers import kongsberg
 from pipeline.readers.dispatch import raw_parts
-from tests.readers.build import MOUNT, read, rows
-from tests.readers.sonar_files import (
+from tests.support.files.build import MOUNT, read, rows
+from tests.support.files.sonar_files import (
     RECEIVER,
     TRANSMITTER,
     all_datagram,

@@ -12,8 +12,8 @@ from pipeline.config.session import Ins, Laser, SessionConfig
 from pipeline.errors import ConfigError, PoolcalError, RawDataError
 from pipeline.readers import las as reader
 from pipeline.readers.dispatch import raw_parts
-from tests.readers import build
-from tests.readers.build import WEEK, las, read, rows
+from tests.support.files import build
+from tests.support.files.build import WEEK, las, read, rows
 
 NS = 1_000_000_000
 WEEK_NS = 604_800 * NS

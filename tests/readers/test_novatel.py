@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.errors import PoolcalError, RawDataError
 from pipeline.readers.novatel import NovatelPart
-from tests.readers.build import (
+from tests.support.files.build import (
     ALIGNING,
     FREE,
     HIGH_VARIANCE,
@@ -100,7 +100,7 @@ BAD = {
 def test_impossible_values(name: str, value: float, file: Path) -> None:
     bad = inspvas(11.0, **{name: value}) if name != "week" else inspvas(11.0).replace(b"", b"")
     if name == "week":
-        from tests.readers.build import pva, short
+        from tests.support.files.build import pva, short
 
         bad = short(508, WEEK, 11.0, pva(11.0, week=int(value)))
     file.write_bytes(inspvas(10.0) + bad + inspvas(12.0))
@@ -111,7 +111,7 @@ def test_impossible_values(name: str, value: float, file: Path) -> None:
 
 @pytest.mark.parametrize("seconds", [float("nan"), -1.0, 2e6, 1e300])
 def test_impossible_seconds(seconds: float, file: Path) -> None:
-    from tests.readers.build import pva, short
+    from tests.support.files.build import pva, short
 
     file.write_bytes(inspvas(10.0) + short(508, WEEK, 11.0, pva(seconds)) + inspvas(12.0))
     columns, dropped = read("ins", file, "novatel")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import PoolcalError, RawDataError
-from tests.readers import build
-from tests.readers.build import (
+from tests.support.files import build
+from tests.support.files.build import (
     GPS_2024,
     a0,
     a2,

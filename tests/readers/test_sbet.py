@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError, RawDataError
-from tests.readers.build import WEEK, read, rows, sbet, sbet_row
+from tests.support.files.build import WEEK, read, rows, sbet, sbet_row
 
 NS = 1_000_000_000
 WEEK_NS = 604_800 * NS

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import PoolcalError
-from tests.readers import build, ie_files, sonar_files
-from tests.readers.build import read, rows
+from tests.support.files import build, ie_files, sonar_files
+from tests.support.files.build import read, rows
 
 MEGABYTE = 1 << 20
 

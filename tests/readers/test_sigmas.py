@@ -8,8 +8,8 @@ import pytest
 
 from pipeline.errors import PoolcalError, RawDataError
 from pipeline.readers.dispatch import raw_files, raw_parts
-from tests.readers import build
-from tests.readers.build import (
+from tests.support.files import build
+from tests.support.files.build import (
     ALIGNING,
     SIGMAS,
     WEEK,

@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.errors import PoolcalError, RawDataError
-from tests.readers.build import WEEK, read, rows
+from tests.support.files.build import WEEK, read, rows
 
 NS = 1_000_000_000
 WEEK_NS = 604_800 * NS

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.config.mount import Mount
-from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.readers.dispatch import Sensor, raw_parts
+from tests.support.real_files import DEFAULT, settings_of
 
-DEFAULT = Path(__file__).parents[3] / "shared" / "data"
-MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
 Columns = dict[str, np.ndarray]
 Read = Callable[..., tuple[Columns, dict[str, int]]]
 
@@ -28,12 +25,6 @@ def data() -> Path:
     return folder
 
 
-def settings_of(sensor: Sensor, name: str, kind: str, **more: Any) -> Ins | Laser | Mbes:
-    if sensor == "ins":
-        return Ins(files=[name], format=kind, **more)  # type: ignore[arg-type]
-    if sensor == "laser":
-        return Laser(files=[name], format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
-    return Mbes(files=[name], format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 from pipeline.checking.file_survey import survey
 from pipeline.checking.ins_quality import Quality, quality, told
 from pipeline.config.session import Ins, Laser, SessionConfig
-from tests.real.conftest import MOUNT
+from tests.support.real_files import MOUNT
 
 
 def _quality(data: Path, name: str, **more: object) -> Quality:

@@ -11,8 +11,7 @@ from pyproj import Transformer
 
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.session import SimulatedSession
-
-SCENARIOS = Path(__file__).parents[2] / "configs" / "scenarios"
+from tests.support.roots import SCENARIOS
 
 
 @pytest.fixture(scope="session")

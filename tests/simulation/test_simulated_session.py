@@ -17,9 +17,10 @@ from pipeline.simulation.ins import drift
 from pipeline.simulation.motion import Movement
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.session import simulate, simulate_to_folder, write_session
+from tests.support.roots import SCENARIOS
 
 Change = Callable[..., Scenario]
-NAMES = sorted(path.stem for path in (Path(__file__).parents[2] / "configs" / "scenarios").glob("*.yaml"))
+NAMES = sorted(path.stem for path in SCENARIOS.glob("*.yaml"))
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -156,7 +157,7 @@ def test_noise_is_what_was_put_in(changed: Change, noise_free: Scenario) -> None
 
 
 def test_drift_is_stationary_and_correlated(noisy: Scenario) -> None:
-    given = load_scenario(Path(__file__).parents[2] / "configs" / "scenarios" / "drift.yaml").ins.drift
+    given = load_scenario(SCENARIOS / "drift.yaml").ins.drift
     t_ns = np.concatenate([np.arange(0, 50_000), np.arange(56_000, 100_000)]) * 1_000_000_000  # 1 Hz with a gap
     errors = drift(given, t_ns, np.random.default_rng(0))
     sigmas = [0.015, 0.015, 0.02, *np.radians([0.01, 0.01, 0.03])]

@@ -1,76 +1,13 @@
 """Simulated sessions in memory, made once a worker."""
 
-import copy
-import functools
-import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pipeline.config.pool import PoolConfig
-from pipeline.config.session import SessionConfig
-from pipeline.config.yaml_models import parse
-from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.session import SimulatedSession, simulate
-from stages.in_memory import calibrate_in_memory
-
-THIN: dict[str, Any] = {"laser": {"point_rate_hz": 4000.0}, "mbes": {"ping_rate_hz": 10.0}}
-QUIET: dict[str, Any] = {
-    "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
-    "laser": {"outlier_share": 0.0, "water_return_share": 0.0, "range_sigma_m": 0.0, "angle_sigma_deg": 0.0},
-    "mbes": {
-        "point_beams": True,
-        "corner_share": 0.0,
-        "outlier_share": 0.0,
-        "surface_share": 0.0,
-        "range_sigma_m": 0.0,
-        "angle_sigma_deg": 0.0,
-    },
-}
-
-
-def merged(*parts: Mapping[str, Any]) -> dict[str, Any]:
-    """Scenario dictionaries laid over each other, two levels deep."""
-    total: dict[str, Any] = {}
-    for part in parts:
-        for key, value in part.items():
-            total[key] = {**total.get(key, {}), **value} if isinstance(value, dict) else value
-    return total
-
-
-def made(*parts: Mapping[str, Any], seed: int = 1) -> SimulatedSession:
-    """A thinned session; tests that ask for the same one get the same, and leave it as it is."""
-    return _made(json.dumps(merged({"name": "test"}, THIN, *parts)), seed)
-
-
-@functools.lru_cache(maxsize=4)
-def _made(scenario: str, seed: int) -> SimulatedSession:
-    return simulate(parse(Scenario, json.loads(scenario), "test"), seed)
-
-
-def calibrated(
-    session: SimulatedSession,
-    until: str = "report",
-    pool: Mapping[str, Any] | None = None,
-    mount: Mapping[str, float] | None = None,
-    raw: Mapping[str, Mapping[str, np.ndarray]] | None = None,
-    laser: Mapping[str, float] | None = None,
-    changed: Callable[[str, Any], Any] = lambda _, value: value,
-) -> dict[str, Any]:
-    """Every artefact; ``pool``, ``mount`` and ``laser`` change the pool's target, the coarse sonar mount, and by how
-    much the laser's mount is wrong."""
-    settings, design = copy.deepcopy(session.session), copy.deepcopy(session.pool)
-    settings["mbes"]["mount"].update(mount or {})
-    for key, value in (laser or {}).items():
-        settings["laser"]["mount"][key] += value
-    for key, value in (pool or {}).items():
-        design.setdefault(key, {}).update(value) if isinstance(value, dict) else design.update({key: value})
-    columns = {"ins": session.ins, "laser": session.laser, "mbes": session.mbes, **(raw or {})}
-    return calibrate_in_memory(
-        parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until, changed
-    )
+from pipeline.simulation.session import SimulatedSession
+from tests.support.simulated import QUIET, calibrated, made
 
 
 @pytest.fixture(scope="session")

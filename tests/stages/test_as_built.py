@@ -11,8 +11,8 @@ from pipeline.config.session import Mbes
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.run.settings import load_settings, refuse_cast
-from tests.effort import often
-from tests.stages.conftest import QUIET, calibrated, made
+from tests.support.effort import often
+from tests.support.simulated import QUIET, calibrated, made
 
 
 def result(found):

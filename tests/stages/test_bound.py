@@ -7,8 +7,8 @@ import pytest
 
 from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
-from tests.effort import often
-from tests.stages.conftest import THIN, calibrated, made, merged
+from tests.support.effort import often
+from tests.support.simulated import THIN, calibrated, made, merged
 from tools.bound import bound
 from tools.montecarlo import DRIFT, WHITE
 

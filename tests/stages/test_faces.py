@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,10 @@ from pipeline.artefacts.streams import Stream
 from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import simulate
-from tests.end_to_end.places import errors, sigmas
-from tests.stages.conftest import THIN, calibrated, made, merged
-from tests.targets import as_faces
-
-SCENARIOS = Path(__file__).parents[2] / "configs" / "scenarios"
+from tests.support.places import errors, sigmas
+from tests.support.roots import SCENARIOS
+from tests.support.simulated import THIN, calibrated, made, merged
+from tests.support.targets import as_faces
 
 
 def same(one: Any, other: Any) -> bool:

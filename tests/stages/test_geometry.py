@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.streams import MemoryPart, Stream
-from tests.effort import often
-from tests.stages.conftest import calibrated, made
+from tests.support.effort import often
+from tests.support.simulated import calibrated, made
 
 WAVES = ("surge", "sway", "heave", "roll", "pitch", "heading")
 STILL = {"motion": {name: {"amplitude": 0.0, "period_s": 5.0} for name in WAVES}}

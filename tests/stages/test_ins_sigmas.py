@@ -16,7 +16,7 @@ from pipeline.errors import RawDataError
 from pipeline.run.stage_protocol import run_in_memory
 from pipeline.simulation.session import SimulatedSession
 from stages import ingest
-from tests.stages.conftest import calibrated, made
+from tests.support.simulated import calibrated, made
 
 NS = 1_000_000_000
 FIGURES = {"north_m": 0.02, "east_m": 0.02, "up_m": 0.03, "roll_deg": 0.015, "pitch_deg": 0.015, "heading_deg": 0.04}

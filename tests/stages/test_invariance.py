@@ -10,7 +10,7 @@ from pipeline.config.session import Mbes
 from pipeline.config.yaml_models import parse
 from pipeline.run.stage_protocol import run_in_memory
 from stages import fit_planes
-from tests.stages.conftest import QUIET, calibrated, made
+from tests.support.simulated import QUIET, calibrated, made
 
 
 def estimate(found):

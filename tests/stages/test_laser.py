@@ -16,9 +16,9 @@ from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
 from stages.in_memory import calibrate_in_memory
-from tests.effort import often
-from tests.stages.conftest import THIN, made, merged
 from tests.stages.test_faces import SCENARIOS
+from tests.support.effort import often
+from tests.support.simulated import THIN, made, merged
 
 OFF = {"laser": {"coarse_angle_deg": 0.3, "coarse_lever_m": 0.03}, "mbes": {"ping_rate_hz": 0.5}}
 DRIFT = {

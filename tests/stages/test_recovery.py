@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from tests.effort import often
-from tests.stages.conftest import QUIET, calibrated, made
+from tests.support.effort import often
+from tests.support.simulated import QUIET, calibrated, made
 
 ORIGIN = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.simulation.session import SimulatedSession
-from tests.stages.conftest import calibrated, made
+from tests.support.simulated import calibrated, made
 from tools.montecarlo import DRIFT
 from tools.residual_tests import FAULTS, World
 

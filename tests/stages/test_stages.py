@@ -10,8 +10,8 @@ import pytest
 from pipeline.config.mount import Mount
 from pipeline.errors import RawDataError
 from pipeline.mount import change_of, mount_of
-from tests.effort import often
-from tests.stages.conftest import QUIET, calibrated, made
+from tests.support.effort import often
+from tests.support.simulated import QUIET, calibrated, made
 
 NS = 1_000_000_000
 

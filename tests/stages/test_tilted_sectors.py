@@ -11,8 +11,8 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
 from pipeline.planning import assessment
-from tests.effort import often
-from tests.stages.conftest import QUIET, THIN, calibrated, made
+from tests.support.effort import often
+from tests.support.simulated import QUIET, THIN, calibrated, made
 
 OUTER_DEG, CENTRE_DEG = -0.447, -0.701  # 0.254° apart
 COARSE = {"mbes": {"coarse_angle_deg": 0.1}}  # so near that the plan, which knows no other mount, can be compared

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.end_to_end.conftest import right, small, undisturbed
-from tests.end_to_end.places import Told
+from tests.support.places import Told
 from tools.pictures import missing
 
 __all__ = ["right", "small", "undisturbed"]

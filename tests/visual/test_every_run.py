@@ -7,7 +7,8 @@ import pytest
 
 from stages.views.blueprint import TABS, tabs_of
 from stages.views.recording import recordings_of
-from tests.end_to_end.places import SCENARIOS, poolcal, simulate
+from tests.support.places import poolcal, simulate
+from tests.support.roots import SCENARIOS
 from tests.visual.test_viewer import views_of
 from tools.pictures import show_tab, viewer
 

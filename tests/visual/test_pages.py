@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from pipeline.results.pages.rendering import SMALLEST_PT
-from tests.end_to_end.pages import Page
-from tests.end_to_end.places import poolcal
+from tests.support.pages import Page
+from tests.support.places import poolcal
 from tools.pictures import chromium
 
 WIDTHS = (390, 1280)

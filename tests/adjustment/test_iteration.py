@@ -1,0 +1,279 @@
+"""The adjustment on points made by a forward model of its own: signs, covariance, what is freed, what is considered."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation, Slerp
+from scipy.stats import chi2
+
+from pipeline.adjustment.consider import considered_of, correlated
+from pipeline.adjustment.iteration import Adjusted, Given, adjust, free_unknowns, noise_of
+from pipeline.adjustment.observation_model import Scene
+from pipeline.artefacts.streams import MemoryPart, Stream
+from pipeline.config.mount import Mount, MountSigma
+from pipeline.config.pool import Adjust, AsBuilt
+from pipeline.config.session import Drift, Ins, Laser, Mbes, White
+from pipeline.maths.adjustment.normal_equations import Body
+from pipeline.maths.adjustment.parameters import State, Surface
+from pipeline.maths.adjustment.solution import freed, solve
+from pipeline.maths.geometry.trajectory import Trajectory
+from tests.support.effort import often
+
+R_TRUE = Rotation.from_euler("ZXY", np.radians([-2.0, 1.2, -48.8])).as_matrix()
+LEVER_TRUE = np.array([0.3, 0.2, -2.0])
+R_LASER = Rotation.from_euler("ZXY", np.radians([0.4, -0.2, 0.3])).as_matrix()
+LASER_LEVER = np.array([0.2, 0.5, 1.1])
+ROOT = np.sqrt(0.5)
+FACES = (  # family, normal, a point on it, height above the family's plane
+    ("P1", (-ROOT, -ROOT, 0.0), (0.5, -2.0, 0.0), 0.0),
+    ("P2", (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0),
+    ("P3", (-ROOT, ROOT, 0.0), (0.5, 2.0, 0.0), 0.0),
+    ("H", (0.0, 0.0, 1.0), (0.5, 1.8, -1.5), -1.5),
+    ("H", (0.0, 0.0, 1.0), (0.5, -1.8, 1.0), 1.0),
+)
+MOUNT = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0}
+LASER = Laser(files=["x"], format="las", mount=Mount(**MOUNT), angle_sigma_deg=0.003)
+MBES = Mbes(files=["x"], format="r2sonic", mount=Mount(**MOUNT))
+QUIET = Ins(
+    files=["x"],
+    format="table",
+    drift=Drift(horizontal_m=0, vertical_m=0, roll_pitch_deg=0, heading_deg=0),
+    white=White(position_m=0, attitude_deg=0),
+)
+NOISY = Ins(files=["x"], format="table")
+RATE, SECONDS, GAP = 50, 8.0, 60.0
+NS = 1_000_000_000
+
+
+def motion(t: np.ndarray) -> tuple[np.ndarray, Rotation]:
+    """True poses: a pass at 4 m, and after a minute one at 8 m, rolling and swinging."""
+    second = t > SECONDS + GAP / 2
+    along = np.where(second, t - SECONDS - GAP, t) * 0.6 - 2.4
+    p = np.column_stack([np.where(second, -8.0, -4.0) + 0.1 * np.sin(t), along, 1.3 + 0.05 * np.cos(0.9 * t)])
+    angles = np.radians([2.0, 1.0, 1.5]) * np.sin(np.outer(t, [0.5, 1.1, 1.4]) + np.arange(3))
+    return p, Rotation.from_euler("ZXY", angles)
+
+
+def drift_of(rng: np.random.Generator, t: np.ndarray, drift: Drift) -> np.ndarray:
+    """Gauss-Markov, step by step; (n, 6)."""
+    angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
+    sigma = np.r_[drift.horizontal_m, drift.horizontal_m, drift.vertical_m, angles]
+    found = [sigma * rng.normal(size=6)]
+    for step in np.diff(t):
+        phi = np.exp(-step / drift.time_constant_s)
+        found.append(phi * found[-1] + np.sqrt(1 - phi**2) * sigma * rng.normal(size=6))
+    return np.array(found)
+
+
+def made(
+    seed: int, ins: Ins = QUIET, sensors: float = 1.0, latency_s: float = 0.0, faster: float = 0.0
+) -> tuple[dict[str, Stream], Scene]:
+    """Points of both sensors; the sonar's clock late by ``latency_s``, the sound faster than recorded by a share."""
+    rng = np.random.default_rng(seed)
+    t = np.r_[np.arange(0, SECONDS, 1 / RATE), SECONDS + GAP + np.arange(0, SECONDS, 1 / RATE)]
+    p, T = motion(t)
+    error = drift_of(rng, t, ins.drift)
+    error[:, :3] += ins.white.position_m * rng.normal(size=(len(t), 3))
+    error[:, 3:] += np.radians(ins.white.attitude_deg) * rng.normal(size=(len(t), 3))
+    recorded = Rotation.from_rotvec(-error[:, 3:]) * T
+    trajectory = Trajectory.build((t * NS).round().astype(np.int64), p - error[:, :3], recorded.as_matrix())
+    place = Slerp(t, T)
+
+    def moments(each: int, epochs: int) -> np.ndarray:
+        moment = rng.uniform(0, SECONDS - 2 / RATE, epochs) + rng.integers(0, 2, epochs) * (SECONDS + GAP)
+        return np.repeat(np.sort(moment), each)
+
+    def met(moment: np.ndarray, face: np.ndarray, rays: np.ndarray, lever: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Where rays (unit, sensor frame) meet these faces' planes, in the sensor's frame; NaN: beyond, or grazed."""
+        T = place(moment)
+        origin = np.array([np.interp(moment, t, column) for column in p.T]).T + T.apply(lever)
+        normal = np.array([one[1] for one in FACES])[face]
+        distance = np.sum(normal * (np.array([one[2] for one in FACES])[face] - origin), axis=1)
+        slant = np.sum(normal * T.apply(rays @ R.T), axis=1)
+        ranges = distance / slant
+        return rays * np.where((ranges > 1.5) & (ranges < 14) & (np.abs(slant) > 0.09), ranges, np.nan)[:, None]
+
+    moment = moments(40, 250)
+    face = np.repeat(rng.choice([0, 1, 2, 4], 250, p=[0.2, 0.5, 0.2, 0.1]), 40)
+    away, up = np.radians([rng.uniform(-25, 25, len(moment)), rng.uniform(-25, 25, len(moment))])
+    x = met(moment, face, Rotation.from_euler("ZY", np.column_stack([away, up])).apply([1, 0, 0]), LASER_LEVER, R_LASER)
+    moment, face, x = (values[np.isfinite(x[:, 0])] for values in (moment, face, x))
+    ray = x / np.linalg.norm(x, axis=1, keepdims=True)
+    x = x + sensors * 0.005 * ray * rng.normal(size=(len(x), 1))
+    length = np.linalg.norm(x, axis=1, keepdims=True)
+    x = x + sensors * np.radians(0.003) * length * np.cross(ray, rng.normal(size=x.shape))
+    t_ns = (moment * NS).round().astype(np.int64)
+    target = trajectory.place(t_ns, x @ R_LASER.T + LASER_LEVER)
+    laser = columns(t_ns, face, x, "laser_m") | {f"{axis}_target_m": target[:, k] for k, axis in enumerate("xyz")}
+
+    moment = moments(30, 160)
+    face = np.repeat(rng.choice([0, 1, 2, 3], 160, p=[0.2, 0.5, 0.2, 0.1]), 30)
+    angle = rng.uniform(np.radians(-45), np.radians(40), len(moment))
+    rays = np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
+    strayed = angle + sensors * np.radians(0.06) * rng.normal(size=len(angle))
+    x = met(moment, face, np.column_stack([np.sin(strayed), 0 * angle, -np.cos(strayed)]), LEVER_TRUE, R_TRUE)
+    x = rays * np.linalg.norm(x, axis=1, keepdims=True)  # recorded at the angle that was meant
+    moment, face, x = (values[np.isfinite(x[:, 0])] for values in (moment, face, x))
+    x = x + sensors * 0.008 * x / np.linalg.norm(x, axis=1, keepdims=True) * rng.normal(size=(len(x), 1))
+    down = -x[:, 2]
+    x = x - faster * np.column_stack([2 * x[:, 0], 0 * down, -down + x[:, 0] ** 2 / down])
+    mbes = columns(((moment + latency_s) * NS).round().astype(np.int64), face, x, "mbes_m")
+
+    numbers = {"P1": 0, "P2": 1, "P3": 2, "H": 3}
+    surfaces = [Surface.at(FACES[k][0], np.array(FACES[k][1]), np.array(FACES[k][2]), 0.0) for k in range(3)]
+    surfaces.append(Surface.at("H", np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.0]), 0.0))
+    coarse = Rotation.from_rotvec(np.radians([2.5, -2.0, 2.2])).as_matrix()
+    scene = Scene(
+        Body.of(trajectory, LASER_LEVER),
+        np.array([numbers[family] for family, *_ in FACES]),
+        np.array([height for *_, height in FACES]),
+        State.at(coarse @ R_TRUE, LEVER_TRUE + np.array([0.2, -0.25, 0.22]), surfaces),
+        ins.white.position_m,
+        LASER,
+        MBES,
+    )
+    return {"laser": Stream((MemoryPart("l", laser),)), "mbes": Stream((MemoryPart("m", mbes),))}, scene
+
+
+def columns(t_ns: np.ndarray, face: np.ndarray, x: np.ndarray, suffix: str) -> dict[str, np.ndarray]:
+    return {"t_ns": t_ns, "face": face.astype(np.int16)} | {f"{axis}_{suffix}": x[:, k] for k, axis in enumerate("xyz")}
+
+
+def error_of(found: Adjusted) -> np.ndarray:
+    """ε of R_true = Exp(ε) R, and of the lever arm."""
+    rotation = Rotation.from_matrix(R_TRUE @ found.state.R_body_from_sensor.T).as_rotvec()
+    return np.concatenate([rotation, LEVER_TRUE - found.state.lever_arm_m])
+
+
+def solved(seed: int, ins: Ins = QUIET, settings: Any = None, **options: Any) -> Adjusted:
+    streams, scene = made(seed, ins, **options)
+    return adjust(streams, scene, Given(noise_of(ins)), settings or Adjust(), 5.0)
+
+
+def test_without_noise_the_truth_comes_back() -> None:
+    found = solved(1, sensors=1e-7)
+    assert found.converged
+    assert np.abs(error_of(found)[:3]).max() < 1e-7
+    assert np.abs(error_of(found)[3:]).max() < 1e-7
+    assert found.weighting.factors["laser"] < 0.01  # the factor knows
+
+
+@pytest.mark.parametrize("ins", [QUIET, NOISY], ids=["sensors alone", "INS white noise and drift"])
+def test_errors_are_as_large_as_the_covariance_says(ins: Ins) -> None:
+    """Mean normalised squared error of the six over repeats within its 99.9 % band, and each factor near one."""
+    repeats = often(16, 40)
+    squared, factors, left = [], [], []
+    for seed in range(100, 100 + repeats):
+        found = solved(seed, ins)
+        assert found.converged
+        e = error_of(found)
+        squared.append(e @ np.linalg.solve(found.solution.covariance[:6, :6], e))
+        factors.append(list(found.weighting.factors.values()))
+        left.append(found.equations.squares / found.redundancy)
+    low, high = chi2.ppf([0.0005, 0.9995], 6 * repeats) / repeats
+    assert low < np.mean(squared) < high
+    np.testing.assert_allclose(np.mean(factors, axis=0), 1.0, atol=often(0.05, 0.03))
+    # the whole model, poses and all, explains what is there
+    assert np.mean(left) == pytest.approx(1.0, abs=often(0.016, 0.01))
+
+
+def test_drift_taken_for_granted_would_be_seen() -> None:
+    """The same data with an INS said to be perfect: errors of many sigmas, and a sum of squares that is too large."""
+    streams, scene = made(7, NOISY)
+    trusting = adjust(streams, scene, Given(noise_of(QUIET)), Adjust(), 5.0)
+    e = error_of(trusting)
+    assert e @ np.linalg.solve(trusting.solution.covariance[:6, :6], e) > 100
+    assert trusting.equations.squares / trusting.redundancy > 1.2
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "value"),
+    [("mbes_latency", {"latency_s": 0.02}, 0.02), ("sound_speed", {"faster": 0.003}, 0.003)],
+)
+def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str, float], value: float) -> None:
+    """Tested while held, far beyond its sigma; estimated when the config frees it, and the six are right again."""
+    held = solved(3, NOISY, **options)
+    equations, names = held.equations, held.state.names
+    tests = {names[one.unknown]: one for one in freed(equations.normal, equations.right, held.solution)}
+    assert abs(tests[name].value) > 10 * tests[name].sigma
+    found = solved(3, NOISY, Adjust(free=(name,)), **options)
+    values = dict(zip(found.state.names, found.state.values_of_other(), strict=True))
+    place = found.solution.free.tolist().index(found.state.names.index(name))
+    assert abs(values[name] - value) < 4 * np.sqrt(found.solution.covariance[place, place])
+    e = error_of(found)
+    assert e @ np.linalg.solve(found.solution.covariance[:6, :6], e) < chi2.ppf(0.999, 6)
+    wrong = error_of(held)
+    assert wrong @ np.linalg.solve(held.solution.covariance[:6, :6], wrong) > 100
+
+
+def test_what_is_considered_adds_what_it_would_move() -> None:
+    """The sensitivity is the change of the answer when a held value is moved; the total adds its square."""
+    found = solved(5, NOISY)
+    normal, right, names = found.equations.normal, found.equations.right, found.state.names
+    free = free_unknowns(found.state)
+    for name in ("laser_rotation_y", "sound_speed_gradient", "wet_P2_shift"):
+        number = names.index(name)
+        place = found.solution.held.tolist().index(number)
+        moved = solve(normal, right + 1e-3 * normal[:, number], free)
+        change = (moved.step - solve(normal, right, free).step)[free] / 1e-3
+        np.testing.assert_allclose(found.solution.sensitivity[:, place], change, rtol=1e-6, atol=1e-9)
+        sigmas = np.zeros(found.state.size)
+        sigmas[number] = 0.002
+        extra = found.solution.total(sigmas) - found.solution.covariance
+        np.testing.assert_allclose(extra, 0.002**2 * np.outer(change, change), rtol=1e-6, atol=1e-14)
+    together = np.array([[1e-6, 4e-7], [4e-7, 1e-6]])
+    pair = np.array([names.index("laser_range"), names.index("mbes_range")])
+    S = found.solution.sensitivity[:, [found.solution.held.tolist().index(k) for k in pair]]
+    total = found.solution.total(np.zeros(found.state.size), (pair, together))
+    np.testing.assert_allclose(total - found.solution.covariance, S @ together @ S.T, rtol=1e-6, atol=1e-14)
+
+
+def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None:
+    """C + S Q Sᵀ, Q the six by six of session.yaml, in its order: rotation x, y, z, lever arm x, y, z."""
+    found = solved(5, NOISY)
+    names, held = found.state.names, found.solution.held.tolist()
+    root = np.tril(np.random.default_rng(1).normal(size=(6, 6))) * np.repeat([1e-4, 2e-3], 3)[:, None]
+    Q = root @ root.T
+    block = tuple(map(tuple, Q.tolist()))
+    laser = LASER.model_copy(update={"mount_covariance": block, "mount_sigma": MountSigma(angle_deg=40.0)})
+    sigmas = considered_of(names, laser, MBES, AsBuilt())
+    six = [names.index(f"laser_{kind}_{axis}") for kind in ("rotation", "lever_arm") for axis in "xyz"]
+    np.testing.assert_allclose(sigmas[six], np.sqrt(np.diag(Q)), rtol=1e-12)
+    others = sigmas.copy()
+    others[six] = 0.0
+    S = found.solution.sensitivity[:, [held.index(k) for k in six]]
+    extra = found.solution.total(sigmas, *correlated(names, laser)) - found.solution.total(others)
+    np.testing.assert_allclose(extra, S @ Q @ S.T, rtol=1e-6, atol=1e-14)
+    assert correlated(names, LASER) == ()
+
+
+def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:
+    """Where the INS's own attitude tells nothing, both sensors turn as one body: rotation and lever arm."""
+    loose = Ins(
+        files=["x"],
+        format="table",
+        drift=Drift(horizontal_m=0.5, vertical_m=0.5, roll_pitch_deg=3.0, heading_deg=3.0),
+    )
+    found = solved(6, loose)
+    names, held = found.state.names, found.solution.held.tolist()
+    for axis in range(3):
+        turn = np.eye(3)[axis]
+        mine = [f"laser_rotation_{'xyz'[axis]}", *(f"laser_lever_arm_{one}" for one in "xyz")]
+        S = found.solution.sensitivity[:6, [held.index(names.index(name)) for name in mine]]
+        effect = S @ np.concatenate([[1.0], np.cross(turn, LASER_LEVER)])
+        np.testing.assert_allclose(effect[:3], turn, atol=2e-3)
+        np.testing.assert_allclose(effect[3:], np.cross(turn, LEVER_TRUE), atol=0.1)  # y is weak: the INS pulls
+
+
+def test_the_wall_alone_leaves_directions_open() -> None:
+    streams, scene = made(8)
+    (laser,), (mbes,) = (stream.parts for stream in streams.values())
+    walls = [
+        Stream((MemoryPart(part.name, {k: v[part.columns["face"] == 1] for k, v in part.columns.items()}),))
+        for part in (laser, mbes)
+    ]
+    found = adjust(dict(zip(streams, walls, strict=True)), scene, Given(noise_of(QUIET)), Adjust(), 5.0)
+    assert found.solution.deficiency > 0
+    assert not found.converged
+    assert np.all(np.isfinite(found.solution.step))

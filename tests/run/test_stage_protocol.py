@@ -1,0 +1,102 @@
+"""A stage called without files, and what a stage must not do."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.artefacts.parquet import read_table
+from pipeline.artefacts.streams import EMPTY, Chunk, MemoryPart, Piece, Stream
+from pipeline.config.pool import Segment
+from pipeline.run.stage_protocol import declared, run_in_memory
+from tests.support import toys
+from tests.support.toy_run import Pool
+
+SETTINGS = toys.SiftConfig(Segment())
+
+
+def _points(*sizes: int) -> Stream:
+    rng = np.random.default_rng(3)
+    return Stream(tuple(MemoryPart(str(n), {"t_ns": np.arange(n), "x_m": rng.normal(size=n)}) for n in sizes))
+
+
+def test_memory_gives_what_files_give(pool: Pool) -> None:
+    pool.run()
+    parts = tuple(
+        MemoryPart(path.name, {"t_ns": np.arange(5000), "x_m": np.fromfile(path)})
+        for path in sorted((pool.session / "laser").iterdir())
+    )
+    outputs = run_in_memory(pool.stages[1], toys.SiftInputs(Stream(parts)), SETTINGS)
+    pd.testing.assert_frame_equal(outputs.means, read_table(pool.run_folder / "sift" / "means.parquet", toys.MEANS))
+    assert outputs.means["face"].dtype == np.int16
+    (batch, _) = outputs.near.batches()
+    assert batch["face"].dtype == np.int16
+
+
+def test_a_part_without_rows_is_left_out() -> None:
+    outputs = run_in_memory(toys.stages()[1], toys.SiftInputs(_points(10, 0, 10)), SETTINGS)
+    assert [part.name for part in outputs.near.parts] == ["part-00000-000", "part-00002-000"]
+
+
+def test_a_stream_without_any_row(pool: Pool) -> None:
+    pool.margin(1e6)
+    pool.run()
+    assert [p.name for p in (pool.run_folder / "sift" / "near").iterdir()] == ["part-00000-000.parquet"]
+    assert run_in_memory(toys.stages()[1], toys.SiftInputs(_points(0)), SETTINGS).near.parts == ()
+
+
+def test_only_named_sources_are_mapped() -> None:
+    stage = toys.stages()[1]
+    stage.SOURCES = ()  # type: ignore[attr-defined]
+    stage.combine = lambda prepared, partials, config: toys.SiftOutputs(  # type: ignore[attr-defined]
+        pd.DataFrame({"face": [0], "mean_m": [float(len(partials))]})
+    )
+    assert run_in_memory(stage, toys.SiftInputs(_points(10)), SETTINGS).means["mean_m"][0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("run_batch", lambda source, chunk, prepared, config: Piece({"far": chunk.columns}, 0), "far"),
+        ("run_batch", lambda source, chunk, prepared, config: Piece({"near": chunk.columns}, 0), "missing columns"),
+        ("combine", lambda prepared, partials, config: None, "must return its Outputs"),
+        ("combine", lambda prepared, partials, config: toys.SiftOutputs(pd.DataFrame({"a": [1]})), "missing columns"),
+        (
+            "combine",
+            lambda prepared, partials, config: toys.SiftOutputs(pd.DataFrame(), _points(1)),
+            "leave it EMPTY",
+        ),
+    ],
+)
+def test_a_stage_that_breaks_the_protocol_is_a_bug(name: str, value: object, message: str) -> None:
+    stage = toys.stages()[1]
+    setattr(stage, name, value)
+    with pytest.raises((TypeError, KeyError), match=message):
+        run_in_memory(stage, toys.SiftInputs(_points(10)), SETTINGS)
+
+
+def test_every_field_names_its_artefact() -> None:
+    assert declared(toys.SiftOutputs) == {"means": toys.MEANS, "near": toys.NEAR}
+
+    class Outputs:
+        means: pd.DataFrame
+
+    with pytest.raises(TypeError, match="means must be annotated"):
+        declared(Outputs)
+
+
+def test_dropped_records_reach_the_stage() -> None:
+    seen: list[int] = []
+    stage = toys.stages()[0]
+
+    def keep(source: str, chunk: Chunk, prepared: None, config: object) -> Piece:
+        seen.append(chunk.dropped["bad"])
+        return Piece({}, 0)
+
+    stage.run_batch = keep  # type: ignore[attr-defined]
+    path = Path(toys.__file__).with_name("nothing.bin")
+    with pytest.raises(FileNotFoundError):
+        run_in_memory(stage, toys.TakeInputs(Stream((toys.RawPart(path),))), None)
+    assert run_in_memory(stage, toys.TakeInputs(EMPTY), None).points.parts == ()
+    assert seen == []

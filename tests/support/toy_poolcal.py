@@ -1,0 +1,84 @@
+"""poolcal with toy stages: python toy_poolcal.py ARGUMENTS. What the toy report does is told by verdict.max_sigma_m:
+1: accepted, 2: rejected, 3: a bug, 4: Ctrl-C, 5: hangs.
+"""
+
+import os
+import signal
+import sys
+import time
+import types
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import pandas as pd
+
+import pipeline.readers.dispatch
+import pipeline.results.screen
+import stages
+import stages.commands.draw
+from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
+from pipeline.artefacts.schema import Provenance
+from pipeline.config.pool import Verdict
+from tests.support import toys
+
+
+@dataclass(frozen=True)
+class Config:
+    verdict: Verdict
+    name: str
+
+
+@dataclass(frozen=True)
+class Inputs:
+    means: Annotated[pd.DataFrame, toys.MEANS]
+    provenance: Annotated[dict[str, Any], Provenance]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    calibration_json: Annotated[str, CALIBRATION_JSON]
+
+
+def _run(inputs: Inputs, config: Config) -> Outputs:
+    import json
+
+    code = round(config.verdict.max_sigma_m)
+    if code == 3:
+        raise ZeroDivisionError("a toy bug")
+    if code == 4:
+        os.kill(os.getpid(), signal.SIGINT)
+    if code in (4, 5):
+        time.sleep(30)
+    result = {
+        "schema": 1, "session": config.name, "verdict": "rejected" if code == 2 else "accepted",
+        "reasons": ["toy"] if code == 2 else [], "inputs": inputs.provenance["inputs"],
+        "software": inputs.provenance["software"],
+    }  # fmt: skip
+    return Outputs(json.dumps(result) + "\n")
+
+
+def install() -> None:
+    report = types.ModuleType("stages.report")
+    report.__file__ = __file__
+    vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
+    stages.commands.draw.Painters.begin = lambda *_: None  # type: ignore[method-assign]  # toys have nothing to show
+    stages.commands.draw.Painters.draw = lambda *_: []  # type: ignore[method-assign]
+    pipeline.results.screen.summary = lambda result: f"{result['session']}: {result['verdict']}"
+    take, sift, _ = toys.stages()
+    take.__name__, sift.__name__ = "stages.take", "stages.sift"
+    for module in (take, sift, report):
+        sys.modules[module.__name__] = module
+    stages.ORDER = ("take", "sift", "report")  # type: ignore[assignment]
+    pipeline.readers.dispatch.raw_files = toys.raw_files  # type: ignore[attr-defined,assignment]
+    pipeline.readers.dispatch.raw_parts = toys.raw_parts  # type: ignore[attr-defined,assignment]
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal: a job in the background ignores it
+    install()
+    from stages.cli import main
+
+    main()
