@@ -11,7 +11,7 @@ from pipeline.artefacts.schema import Artefact, Document, Raw
 from pipeline.artefacts.streams import EMPTY, MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
-from pipeline.run.stage_protocol import declared, name_of, run_in_memory
+from pipeline.run.stage_protocol import declared, inputs_in, name_of, run_in_memory
 from stages import load
 
 
@@ -34,11 +34,13 @@ def calibrate_in_memory(
             return found[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}
 
-    for stage in load("mbes" if session.mbes is not None else "laser"):
-        inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
+    stages = load(session.calibrated)
+    names = [name_of(stage) for stage in stages]
+    for stage in stages:
+        inputs = stage.Inputs(**{name: given(marker) for name, marker in inputs_in(names, stage).items()})
         outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
         for name, marker in declared(stage.Outputs).items():
-            if isinstance(marker, (Artefact, Document)):
+            if isinstance(marker, (Artefact, Document)) and getattr(outputs, name) is not None:
                 key = f"{marker.owner}/{marker.name}"
                 found[key] = changed(key, getattr(outputs, name))
         if name_of(stage) == until:

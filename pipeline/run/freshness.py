@@ -13,7 +13,7 @@ from pipeline.run import manifest, provenance
 from pipeline.run.digests import Digests
 from pipeline.run.progress import Progress
 from pipeline.run.settings import Settings
-from pipeline.run.stage_protocol import declared, name_of
+from pipeline.run.stage_protocol import inputs_in, name_of
 from pipeline.run.workers import SERIAL, Workers
 
 SENSORS = ("ins", "laser", "mbes")
@@ -27,6 +27,7 @@ class Run:
     path: Path
     settings: Settings
     digests: Digests
+    stages: tuple[str, ...]  # names, in the order in which they run
     workers: Workers = SERIAL
     progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
     raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # by sensor, as they were first asked for
@@ -54,7 +55,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     settings = this.settings.resolved_plainly()
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
-    for marker in declared(stage.Inputs).values():
+    for marker in inputs_in(this.stages, stage).values():
         if isinstance(marker, Raw):
             raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):

@@ -27,7 +27,7 @@ from pipeline.run.kept_results import keep_accepted
 from pipeline.run.other_session import refuse_another
 from pipeline.run.progress import Progress
 from pipeline.run.settings import Settings, load_settings, read_settings, refuse_folders, refuse_other, write_settings
-from pipeline.run.stage_protocol import declared, evaluate, is_stream, name_of, sources
+from pipeline.run.stage_protocol import declared, evaluate, inputs_in, is_stream, name_of, sources
 from pipeline.run.workers import SERIAL, Stopped, Workers
 
 
@@ -48,13 +48,14 @@ def run(
     """
     settings = load_settings(session_folder, config_path, calibrated)
     refuse_folders(run_folder, session_folder)
-    with folder.locked(run_folder, [name_of(stage) for stage in stages]):
+    names = [name_of(stage) for stage in stages]
+    with folder.locked(run_folder, names):
         refuse_other(run_folder, calibrated)
-        this = _open(run_folder, settings, workers, progress)
+        this = _open(run_folder, settings, names, workers, progress)
         if not overwrite:
-            refuse_another(this, [name_of(stage) for stage in stages])
+            refuse_another(this, names)
         write_settings(run_folder, settings)
-        first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)
+        first = not any(manifest.read(this.folder(name)) for name in names)
         had_to_run = []
         for stage in stages:
             if _bring_up_to_date(this, stage, first):
@@ -78,7 +79,7 @@ def run_stage(
         settings = read_settings(run_folder)
     refuse_folders(run_folder, settings.session_folder)
     with folder.locked(run_folder, names):
-        this = _open(run_folder, settings, workers, progress)
+        this = _open(run_folder, settings, names, workers, progress)
         if new:
             refuse_another(this, names)
         write_settings(run_folder, settings)
@@ -88,10 +89,12 @@ def run_stage(
         return _bring_up_to_date(this, stages[names.index(name)])
 
 
-def _open(path: Path, settings: Settings, workers: Workers, progress: Progress | None) -> Run:
+def _open(
+    path: Path, settings: Settings, stages: Sequence[str], workers: Workers, progress: Progress | None
+) -> Run:
     path = path.absolute()  # workers elsewhere have another working directory
     digests = Digests(path / folder.DIGESTS, workers.here)
-    return Run(path, settings, digests, workers, progress or Progress(quiet=True))
+    return Run(path, settings, digests, tuple(stages), workers, progress or Progress(quiet=True))
 
 
 # --- reading, running, writing ---------------------------------------------------------------------------------------
@@ -136,7 +139,7 @@ def _execute(this: Run, stage: ModuleType) -> None:
     key = key_of(this, stage)
     settings = this.settings.resolved()
     config = stage.Config(**{field.name: settings[field.name] for field in dataclasses.fields(stage.Config)})
-    inputs = stage.Inputs(**{name: _read(this, marker) for name, marker in declared(stage.Inputs).items()})
+    inputs = stage.Inputs(**{name: _read(this, marker) for name, marker in inputs_in(this.stages, stage).items()})
     remove(partial)
     try:
         streams = _make_folders(partial, stage)
@@ -251,6 +254,8 @@ def _write(partial: Path, stage: ModuleType, outputs: Any) -> dict[str, int]:
         value = getattr(outputs, name)
         if isinstance(marker, Document):
             write_text(partial / marker.name, value)
+        elif value is None:
+            continue
         elif isinstance(marker, Artefact) and marker.kind == "table":
             parquet.write_table(partial / f"{marker.name}.parquet", parquet.to_arrow(value, marker))
             rows[marker.name] = len(value)

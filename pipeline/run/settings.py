@@ -32,7 +32,11 @@ class Settings:
         """Every setting by the name under which a stage's Config asks for it."""
         blocks = (self.pool, self.session)
         found = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
-        return found | {"target_place": self.pool.target_place, "recordings": self.session.recordings}
+        return found | {
+            "target_place": self.pool.target_place,
+            "recordings": self.session.recordings,
+            "calibrated": self.session.calibrated,
+        }
 
     def resolved_plainly(self) -> dict[str, Any]:
         """The same as plain values."""

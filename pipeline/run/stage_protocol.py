@@ -6,10 +6,13 @@ artefact, and either ``run(inputs, config) -> Outputs`` (all tables), or, over s
     prepare(inputs, config) -> prepared                     once
     run_batch(source, chunk, prepared, config) -> Piece     every chunk of every stream in SOURCES (default: all)
     combine(prepared, partials, config) -> Outputs          once; its stream fields stay EMPTY
+
+A field of a table with the default None is optional. An optional input is None where no stage of the run makes it, and
+an optional output that is None is not written.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, get_type_hints
@@ -37,6 +40,18 @@ def declared(fields_of: type) -> dict[str, Marker]:
             raise TypeError(f"{fields_of.__module__}.{fields_of.__name__}.{name} must be annotated with one artefact")
         found[name] = markers[0]
     return found
+
+
+def inputs_in(stages: Collection[str], stage: ModuleType) -> dict[str, Marker]:
+    """Return what a stage takes in a run of ``stages`` (names), by field: all but optional tables that none of them
+    makes.
+    """
+    optional = {field.name for field in dataclasses.fields(stage.Inputs) if field.default is None}
+    return {
+        name: marker
+        for name, marker in declared(stage.Inputs).items()
+        if not (name in optional and isinstance(marker, Artefact) and marker.owner not in stages)
+    }
 
 
 def is_stream(marker: Marker) -> bool:
@@ -114,8 +129,11 @@ def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], map
     if not isinstance(outputs, stage.Outputs):
         raise TypeError(f"{stage.__name__} must return its Outputs, not {type(outputs).__name__}")
     values: dict[str, Any] = dict(streams)
+    optional = {field.name for field in dataclasses.fields(stage.Outputs) if field.default is None}
     for name, marker in declared(stage.Outputs).items():
         value = getattr(outputs, name)
+        if value is None and name in optional:
+            continue
         if isinstance(marker, Document):
             if not isinstance(value, str):
                 raise TypeError(f"{stage.__name__}: {name} must be text, not {type(value).__name__}")

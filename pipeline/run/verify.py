@@ -18,7 +18,8 @@ def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SE
     """Read and hash again everything a run read and wrote; what is not as recorded."""
     settings = read_settings(run_folder)
     with folder.reading(run_folder):
-        this = Run(run_folder, settings, Digests(None, workers.here), workers)
+        names = tuple(name_of(stage) for stage in stages)
+        this = Run(run_folder, settings, Digests(None, workers.here), names, workers)
         return [f"{name_of(stage)}: {problem}" for stage in stages for problem in _problems(this, stage)]
 
 

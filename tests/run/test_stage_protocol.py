@@ -1,15 +1,20 @@
 """A stage called without files, and what a stage must not do."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from pipeline.artefacts.parquet import read_table
+from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import EMPTY, Chunk, MemoryPart, Piece, Stream
 from pipeline.config.pool import Segment
-from pipeline.run.stage_protocol import declared, run_in_memory
+from pipeline.run.manifest import read
+from pipeline.run.stage_protocol import declared, inputs_in, run_in_memory
+from pipeline.run.verify import verify
 from tests.support import toys
 from tests.support.toy_run import Pool
 
@@ -84,6 +89,66 @@ def test_every_field_names_its_artefact() -> None:
 
     with pytest.raises(TypeError, match="means must be annotated"):
         declared(Outputs)
+
+
+@dataclass(frozen=True)
+class OptionalInputs:
+    near: Annotated[Stream, toys.NEAR]
+    means: Annotated[pd.DataFrame | None, toys.MEANS] = None
+    points: Annotated[Stream, toys.POINTS] = EMPTY
+
+
+@dataclass(frozen=True)
+class OptionalOutputs:
+    calibration_json: Annotated[str, toys.TEXT_OUT]
+    counts: Annotated[pd.DataFrame | None, toys.TAKE_COUNTS] = None
+
+
+def _stage_of_options(pool: Pool) -> None:
+    """Let the last stage take the means only if there are any, and write counts only then."""
+
+    def tell(inputs: OptionalInputs, config: toys.TellConfig) -> OptionalOutputs:
+        counts = None if inputs.means is None else pd.DataFrame({"source": ["a"], "reason": ["b"], "count": [1]})
+        return OptionalOutputs(f"{inputs.means is not None}\n", counts)
+
+    last = pool.stages[2]
+    last.Inputs, last.Outputs, last.run = OptionalInputs, OptionalOutputs, tell  # type: ignore[attr-defined]
+
+
+def test_an_optional_table_is_left_out_where_no_stage_makes_it(pool: Pool) -> None:
+    _stage_of_options(pool)
+    stage = pool.stages[2]
+    assert list(inputs_in(("take", "sift"), stage)) == ["near", "means", "points"]
+    assert list(inputs_in(("take",), stage)) == ["near", "points"]  # what is not optional is missed later
+    outputs = stage.run(OptionalInputs(EMPTY), None)
+    assert run_in_memory(stage, OptionalInputs(EMPTY), None) == outputs
+    assert outputs.counts is None
+
+
+def test_an_optional_table_is_read_and_written_where_there_is_one(pool: Pool) -> None:
+    _stage_of_options(pool)
+    pool.run()
+    assert (pool.run_folder / "tell" / "calibration.json").read_text() == "True\n"
+    assert (pool.run_folder / "tell" / "counts.parquet").is_file()
+    assert "sift/means" in read(pool.run_folder / "tell").key.inputs
+
+
+def test_without_it_nothing_is_written_and_the_stage_is_current(pool: Pool) -> None:
+    elsewhere = Artefact("another", "means", "table", "means", toys.MEANS.columns)
+
+    @dataclass(frozen=True)
+    class Inputs:
+        near: Annotated[Stream, toys.NEAR]
+        means: Annotated[pd.DataFrame | None, elsewhere] = None
+
+    _stage_of_options(pool)
+    pool.stages[2].Inputs = Inputs  # type: ignore[attr-defined]
+    pool.run()
+    assert (pool.run_folder / "tell" / "calibration.json").read_text() == "False\n"
+    assert not (pool.run_folder / "tell" / "counts.parquet").exists()
+    assert list(read(pool.run_folder / "tell").key.inputs) == ["sift/near"]
+    assert pool.run() == []
+    assert verify(pool.stages, pool.run_folder) == []
 
 
 def test_dropped_records_reach_the_stage() -> None:
