@@ -1,209 +1,148 @@
-"""The answer: calibration.json for programs, calibration.yaml for people, a summary for the screen, and the verdict."""
+"""The answer: the verdict, calibration.json for programs and calibration.yaml for people."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from pipeline.adjustment.ins_drift import drift_of, told
-from pipeline.adjustment.pattern_tests import pattern_tests
-from pipeline.artefacts.catalogue.patent import CORRECTIONS
-from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES
-from pipeline.artefacts.catalogue.results import (
-    ADJUST_SUMMARY,
-    CALIBRATION,
-    CALIBRATION_JSON,
-    CALIBRATION_YAML,
-    CELLS,
-    CLOSING,
-    COVARIANCE,
-    DRIFT,
-    ESTIMATE,
-    FREED,
-    GEOMETRY,
-    GROUPS,
-    PATTERNS,
-)
-from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT, SOUNDING_MOMENTS, TARGET_POSE
+from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.mount import Mount
 from pipeline.config.pool import Adjust, Method, Segment, Verdict
-from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.config.session import Calibrated, Ins, Laser, Mbes
 from pipeline.config.target import Target
-from pipeline.mount import Mounted, mount_of, turned
-from pipeline.report.as_built import as_found, by_design, oddities
+from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
 from pipeline.report.calibration_document import (
     SCHEMA,
-    adjustment_block,
-    calibration_table,
     documents,
     free_block,
+    geometry_block,
     instruments_block,
-    matrix,
-    method_block,
-    mounted_of,
     pass_rows,
-    plain,
     target_block,
 )
-from pipeline.report.cast_checks import cast_doubts, in_words
-from pipeline.report.plane_agreement import closing_table
-from pipeline.report.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, one_eyed, reasons, warnings
+from pipeline.report.drift_check import NO_DRIFT, check_ins_drift
+from pipeline.report.evidence import Evidence
+from pipeline.report.laser_report import laser_report
+from pipeline.report.method_blocks import calibration_table
+from pipeline.report.sensor_report import SensorReport
+from pipeline.report.sonar_report import SonarSettings, sonar_report
+from pipeline.report.verdict import Criteria, rejections
+from pipeline.report.warnings import geometry_gaps, target_off_origin, unexpected_noise
 from pipeline.results.screen import verdict_in_words
 from pipeline.target.design import target_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Config:
+    """Settings: ``calibrated`` says whether the report is the sonar's or the laser's."""
+
     name: str
     target: Target
     ins: Ins
     laser: Laser
-    mbes: Mbes
+    mbes: Mbes | None
+    calibrated: Calibrated
     segment: Segment
     adjust: Adjust
     verdict: Verdict
     result: Method
 
+    @property
+    def sensor(self) -> Mbes | Laser:
+        """Settings of the calibrated sensor."""
+        return self.mbes if self.calibrated == "mbes" and self.mbes is not None else self.laser
 
-@dataclass(frozen=True)
-class Inputs:
-    files: Annotated[pd.DataFrame, FILES]
-    passes: Annotated[pd.DataFrame, PASSES]
-    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
-    faces: Annotated[pd.DataFrame, FACES]
-    planes: Annotated[pd.DataFrame, PLANES]
-    sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
-    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
-    provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
-    corrections: Annotated[pd.DataFrame, CORRECTIONS]
-    estimate: Annotated[pd.DataFrame, ESTIMATE]
-    covariance: Annotated[pd.DataFrame, COVARIANCE]
-    geometry: Annotated[pd.DataFrame, GEOMETRY]
-    drift: Annotated[pd.DataFrame, DRIFT]
-    freed: Annotated[pd.DataFrame, FREED]
-    patterns: Annotated[pd.DataFrame, PATTERNS]
-    cells: Annotated[pd.DataFrame, CELLS]
-    groups: Annotated[pd.DataFrame, GROUPS]
-    summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+
+@dataclass(frozen=True, kw_only=True)
+class Inputs(Evidence):
+    """Tables of the earlier stages, and what the run is made from."""
+
     provenance: Annotated[dict[str, Any], Provenance]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outputs:
+    """The documents and tables; ``closing`` compares two sensors, so a calibration of the laser has none."""
+
     calibration: Annotated[pd.DataFrame, CALIBRATION]
-    closing: Annotated[pd.DataFrame, CLOSING]
     calibration_json: Annotated[str, CALIBRATION_JSON]
     calibration_yaml: Annotated[str, CALIBRATION_YAML]
+    closing: Annotated[pd.DataFrame | None, CLOSING] = None
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    coarse = mount_of(config.mbes.mount)
-    methods = _patent_methods(inputs.corrections, coarse)
-    methods["adjustment"] = adjustment_block(
-        inputs.estimate, inputs.covariance, inputs.summary.to_dict("records")[0], coarse
-    )
+    """Judge a calibration, and write it down for programs and people."""
     passes = pass_rows(inputs.passes, inputs.cells)
-    evidence = Evidence(
-        inputs.faces,
-        inputs.target_pose,
-        inputs.provisional_mount,
-        inputs.corrections,
-        inputs.summary,
-        inputs.cells,
-        inputs.geometry,
-        inputs.freed,
-        inputs.patterns,
-    )
-    from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
-    drift = drift_of(config.ins, inputs.ins_sigmas, inputs.passes)
-    doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
-    farthest, level = config.segment.farthest_mount, config.adjust.test_level
-    tolerated = config.adjust.test_tolerance_m
-    settings = Settings(
-        config.verdict, level, tolerated, config.result, farthest, doubt, config.target.shape,
-        sides=config.target.sides, asked=_asked(config.mbes.mount, inputs.provisional_mount),
-    )
-    found = reasons(evidence, methods, settings)
+    report = _sensor_report(inputs, config, passes)
     model = target_of(config.target)
-    built = as_found(inputs.planes, inputs.patterns, model)
-    summary, target = inputs.summary.iloc[0], target_block(inputs.target_pose.iloc[0]) | {"as_found": built}
-    verdict = "rejected" if found else "accepted"
+    shape = measured_shape(inputs.planes, inputs.patterns, model)
+    target = target_block(inputs.target_pose.iloc[0]) | {"as_found": shape}
+    drift_figures = told(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift = drift_of(config.ins, inputs.ins_sigmas, inputs.passes)
+    source = "the INS's files say" if drift_figures else "ins.drift says"
+    drift_check = check_ins_drift(inputs.drift, drift, source)
+
+    reasons = rejections(inputs, report.methods, _criteria(config, report), drift_check)
+    warnings = [
+        *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
+        *unexpected_noise(inputs.groups),
+        *target_off_origin(target),
+        *(check for check in [drift_check] if check is not None and check not in (NO_DRIFT, *reasons)),
+        *report.pass_warnings,
+        *deviations_from_design(shape, design_shape(model)),
+        *report.cast_warnings,
+    ]
+    verdict = "rejected" if reasons else "accepted"
     result = {
         "schema": SCHEMA,
         "session": config.name,
         "verdict": verdict,
-        "verdict_in_words": verdict_in_words(verdict),
-        "reasons": found,
-        "warnings": warnings(
-            inputs.groups, target, inputs.geometry, methods["adjustment"]["sigma_mount_total"]
-        )
-        + ([doubt] if doubt not in ("", NO_DRIFT, *found) else [])
-        + one_eyed(passes)
-        + oddities(built, by_design(model))
-        + cast_doubts(config.mbes, inputs.files, methods["adjustment"]["correction"]),
-        "result": config.result,
-        "mbes": methods[config.result],
-        "methods": methods,
-        "coarse": {"mount": coarse.settings()},
-        "geometry": {
-            "correlation": matrix(inputs.covariance, "correlation"),
-            "weakest": str(summary["weakest"]),
-            "advice": "; ".join(inputs.geometry["words"]),
-            "test": {name: plain(summary[f"test_{name}"]) for name in ("statistic", "limit", "dof", "passed")},
-            "patterns": pattern_tests(inputs.patterns, config.adjust.test_level),
-        },
+        "verdict_in_words": verdict_in_words(verdict, inputs.fixed),
+        "reasons": [statement.words for statement in reasons],
+        "warnings": [statement.words for statement in warnings],
+        "result": report.method,
+        **report.result_keys,
+        "coarse": {"mount": report.coarse.settings()},
+        "geometry": geometry_block(inputs, report.advice, config.adjust.test_level),
         "free": free_block(inputs.freed),
         "target": target,
         "passes": passes,
-        "ranges": _range_note(config.mbes),
-        **_cast_block(config.mbes),
-        "ins_drift": drift.model_dump() | {"from_files": list(from_files)},
+        **report.data_keys,
+        "ins_drift": drift.model_dump() | {"from_files": list(drift_figures)},
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
-    } | instruments_block({"ins": config.ins, "laser": config.laser, "mbes": config.mbes})
-    mounts = {"coarse": coarse} | {name: mounted_of(block) for name, block in methods.items() if block["mount"]}
+        **instruments_block({"ins": config.ins, "laser": config.laser, **report.instruments}),
+    }
+    json_text, yaml_text = documents(result)
     return Outputs(
-        calibration_table(methods, coarse),
-        closing_table(inputs.faces, inputs.planes, inputs.sounding_moments, coarse, mounts),
-        *documents(result),
+        calibration=calibration_table(report.methods, report.coarse),
+        calibration_json=json_text,
+        calibration_yaml=yaml_text,
+        closing=report.closing,
     )
 
 
-def _asked(coarse: Mount, provisional: pd.DataFrame) -> str:
-    """What to enter where the coarse angles have been checked, and the soundings yet ask for others."""
-    found = provisional.iloc[0]
-    settings = turned(coarse, [float(found[f"rotation_{axis}_deg"]) for axis in "xyz"]).settings()
-    values = ", ".join(f"{key} {settings[key]:.1f}" for key in ("roll_deg", "pitch_deg", "yaw_deg"))
-    return f"; if you have checked the signs, enter {values} as mbes.mount and run again"
+def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str, Any]]) -> SensorReport:
+    """Return the parts of the report that depend on which sensor is calibrated; ``passes``: of calibration.json."""
+    sensor = config.sensor
+    if isinstance(sensor, Laser):
+        return laser_report(sensor, evidence, config.segment)
+    settings = SonarSettings(
+        mbes=sensor, segment=config.segment, method=config.result, sides=config.target.sides
+    )
+    return sonar_report(settings, evidence, passes)
 
 
-def _range_note(mbes: Mbes) -> str:
-    said = "sonar ranges taken as recorded: half the two-way path"
-    if mbes.projector_offset_m is not None:
-        said = f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
-    if mbes.svp is None:
-        return said
-    said = f"{said}; rays traced through a cast of {len(mbes.svp)} depths"
-    return said if mbes.svp_from is None else f"{said} (mbes.svp {in_words(mbes.svp_from)})"
-
-
-def _cast_block(mbes: Mbes) -> dict[str, Any]:
-    """What of calibration.json tells of the cast; nothing without one."""
-    if mbes.svp is None:
-        return {}
-    used = {} if mbes.svp_from is None else mbes.svp_from.model_dump(mode="json")
-    return {"cast": {"depths": len(mbes.svp), "sigma_m_s": mbes.svp_sigma_m_s} | used}
-
-
-def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dict[str, Any]]:
-    methods = {}
-    for row in corrections.to_dict("records"):
-        vector = np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"])
-        lever = np.array([row[f"lever_arm_{axis}_m"] for axis in "xyz"])
-        methods[str(row["method"])] = method_block(vector, lever, coarse, row)
-    return methods
+def _criteria(config: Config, report: SensorReport) -> Criteria:
+    """Return what the calibration is judged by."""
+    return Criteria(
+        limits=config.verdict,
+        test_level=config.adjust.test_level,
+        tolerance_m=config.adjust.test_tolerance_m,
+        method=report.method,
+        search=report.search,
+        shape=config.target.shape,
+        sides=report.sides,
+    )

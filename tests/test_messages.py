@@ -9,7 +9,7 @@ import yaml
 from pipeline.config.load import load_pool, load_session
 from pipeline.config.target import Letters
 from pipeline.errors import ConfigError
-from pipeline.report.verdict import Evidence, Settings, _ambiguities
+from pipeline.report.ambiguities import MountSearch, ambiguities
 from tests.support.places import poolcal
 
 MOUNT = {"roll_deg": -48.0, "pitch_deg": 2.0, "yaw_deg": -2.8, "x_m": 0.38, "y_m": 0.12, "z_m": -2.09}
@@ -125,17 +125,14 @@ def test_exchanged_sides_are_looked_for_first_where_they_fit() -> None:
     import pandas as pd
 
     pose = {"ambiguous": True, "within": True, "rival": "left and right exchanged", "agreement_m2": 36.7}
-    mount = {"within": True, "ambiguous": False, "rival_score": 0.0, "score": 1.0}
+    mount = pd.Series({"within": True, "ambiguous": False, "rival_score": 0.0, "score": 1.0})
     target = Letters.model_validate(TARGET, strict=False)
+    search = MountSearch(sensor="mbes", max_angle_deg=4.5, max_lever_arm_m=0.45)
 
     def said(rival: str, agreement: float) -> str:
-        tables = {
-            "target_pose": pd.DataFrame([pose | {"rival": rival, "rival_agreement_m2": agreement}]),
-            "provisional_mount": pd.DataFrame([mount]),
-        }
-        evidence = Evidence(**{name: tables.get(name, pd.DataFrame()) for name in Evidence.__dataclass_fields__})
-        settings = Settings(*[None] * 4, (4.5, 0.45), "", target.shape, sides=target.sides)  # type: ignore[arg-type]
-        return _ambiguities(evidence, settings)[0]
+        rival_pose = pd.Series(pose | {"rival": rival, "rival_agreement_m2": agreement})
+        (reason,) = ambiguities(rival_pose, mount, search, target.shape, target.sides)
+        return reason.words
 
     assert "check target.low_side first, then target.origin" in said("left and right exchanged", 43.2)
     assert "first" not in said("one period higher", 43.2)

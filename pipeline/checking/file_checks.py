@@ -11,7 +11,7 @@ from pipeline.checking.findings import Finding
 from pipeline.config.session import SessionConfig
 from pipeline.gps_time import utc_text
 from pipeline.maths.geometry.geodesy import ecef_from_geodetic
-from pipeline.report.cast_checks import doubts
+from pipeline.report.cast_checks import cast_origin_warnings
 
 SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock
 TWICE = 0.5  # of a file's time in another one: recorded twice
@@ -190,8 +190,8 @@ def cast(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
     span = (min(first for first, _ in times), max(last for _, last in times)) if times else None
     ins = next((seen.columns for seen in files if seen.sensor == "ins" and seen.columns), None)
     place = None if ins is None else (_degrees(ins["latitude_rad"]), _degrees(ins["longitude_rad"]))
-    for words in doubts(session.mbes.svp_from, span, place):
-        yield Finding("sound speed", words, "look")
+    for warning in cast_origin_warnings(session.mbes.svp_from, span, place):
+        yield Finding("sound speed", warning.words, "look")
 
 
 def _degrees(angles_rad: NDArray[np.float64]) -> float:

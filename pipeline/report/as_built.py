@@ -1,4 +1,4 @@
-"""The target as the laser finds it, against its design in the pool's config.
+"""The target's shape as the laser measures it, against its design in the pool's config.
 
 In the target frame (x into the wall, z up). With the laser's own planes n · X = d of the upright families over all
 passes (the adjusted ones are the sonar's as well: what is wrong there would turn them):
@@ -9,10 +9,10 @@ passes (the adjusted ones are the sonar's as well: what is wrong there would tur
 * e, where the target repeats: the laser's mean residuals on the horizontal faces, v_k ± s_k at design heights h_k, fall
   on v = v0 + q h if the target is higher by the share q; weighted least squares give e (1 + q), e half the period.
 
-Of the patent's target c has no plane that shows it: the back wall is not the target's.
+No plane shows the c of the patent's target: the back wall is not the target's.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,100 +21,121 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.from_tables import ALL_PASSES, laser_planes
 from pipeline.maths.target.model import TargetModel
+from pipeline.report.reason_codes import ReasonCode, Statement
 
 Plane = tuple[NDArray[np.float64], float]  # normal, distance
 FLANKS = ("P1", "P3")
 WALL = "P2"
-ODD_LENGTH_M, ODD_HEIGHT_M, ODD_ANGLE_DEG = 0.01, 0.002, 0.2  # worth a look: more than drift between faces makes
-FEWEST_FACES = 3
-TINY_M = 1e-5  # no mean is known better
+MAX_DEVIATION = {"b": 0.01, "e": 0.002}  # m; more than drift between faces makes
+MAX_DEVIATION_DEG = 0.2  # of a corner, likewise
+MIN_FACES = 3  # horizontal ones, for e
+MIN_SIGMA_M = 1e-5  # no mean is known better
 
 
-def as_found(planes: pd.DataFrame, patterns: pd.DataFrame, model: TargetModel) -> dict[str, Any]:
-    """b_m, e_m, corner_deg and lean_deg by family; None, or left out, where the laser did not see it."""
+def measured_shape(planes: pd.DataFrame, patterns: pd.DataFrame, model: TargetModel) -> dict[str, Any]:
+    """Return the shape as measured: b_m, e_m, corner_deg and lean_deg by family.
+
+    What the laser did not see is None, or left out of the angles.
+
+    Parameters
+    ----------
+    planes : table with the laser's planes
+    patterns : table with the laser's mean residuals by face
+    model : the target's design
+    """
     laser = laser_planes(planes)
-    found = {name: laser.get((ALL_PASSES, name)) for name in _upright(model)}
-    seen = {name: (plane.normal, plane.distance_m) for name, plane in found.items() if plane is not None}
+    of_family = {name: laser.get((ALL_PASSES, name)) for name in _upright(model)}
+    measured = {name: (plane.normal, plane.distance_m) for name, plane in of_family.items() if plane is not None}
     return {
-        "b_m": _width(seen),
-        "e_m": _e(patterns, model),
-        "corner_deg": _corners(seen, reference(found)),
-        "lean_deg": {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in seen.items()},
+        "b_m": _width(measured),
+        "e_m": _half_period(patterns, model),
+        "corner_deg": _corners(measured, reference_family(of_family)),
+        "lean_deg": _leans(measured),
     }
 
 
-def by_design(model: TargetModel) -> dict[str, Any]:
-    """The same as the config has it."""
+def design_shape(model: TargetModel) -> dict[str, Any]:
+    """Return the same as ``measured_shape``, by design."""
     planes = _upright(model)
     return {
         "b_m": _width(planes),
         "e_m": None if model.repeats_m is None else model.half_period_m,
-        "corner_deg": _corners(planes, reference(planes)),
-        "lean_deg": {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in planes.items()},
+        "corner_deg": _corners(planes, reference_family(planes)),
+        "lean_deg": _leans(planes),
     }
 
 
 def _upright(model: TargetModel) -> dict[str, Plane]:
-    """Families in one plane that is not level, by design."""
-    return {one.name: (one.normal, one.distance_m) for one in model.families if one.one_plane and not one.level}
+    """Return the planes of families that lie in one plane and are not level, by design."""
+    families = [family for family in model.families if family.one_plane and not family.level]
+    return {family.name: (family.normal, family.distance_m) for family in families}
 
 
 def _width(planes: Mapping[str, Plane]) -> float | None:
+    """Return b: the distance at z = 0 between the lines in which the flanks meet the wall."""
     if WALL not in planes or not all(flank in planes for flank in FLANKS):
         return None
-    wall, at = planes[WALL]
+    n2, d2 = planes[WALL]
     (n1, d1), (n3, d3) = (planes[flank] for flank in FLANKS)
-    one, other = (np.linalg.solve(np.array([n[:2], wall[:2]]), np.array([d, at])) for n, d in ((n1, d1), (n3, d3)))
-    return float(np.linalg.norm(other - one))
+    south, north = (np.linalg.solve(np.array([n[:2], n2[:2]]), np.array([d, d2])) for n, d in ((n1, d1), (n3, d3)))
+    return float(np.linalg.norm(north - south))
 
 
-def _corners(planes: Mapping[str, Plane], against: str) -> dict[str, float]:
-    """Between each family and ``against``; nothing where that was not seen."""
-    if against not in planes:
+def _corners(planes: Mapping[str, Plane], reference: str) -> dict[str, float]:
+    """Return the angle between each family and the ``reference``; empty if that was not seen."""
+    if reference not in planes:
         return {}
     return {
-        family: float(np.degrees(np.arccos(np.clip(n @ planes[against][0], -1, 1))))
+        family: float(np.degrees(np.arccos(np.clip(n @ planes[reference][0], -1, 1))))
         for family, (n, _) in planes.items()
-        if family != against
+        if family != reference
     }
 
 
-def reference(families: Iterable[str]) -> str:
-    """The family that the angles of ``corner_deg`` are counted from: the wall, or the first."""
+def _leans(planes: Mapping[str, Plane]) -> dict[str, float]:
+    """Return by family how far its faces lean, positive where they look up."""
+    return {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in planes.items()}
+
+
+def reference_family(families: Iterable[str]) -> str:
+    """Return the family from which ``corner_deg`` is counted: the wall, or the first."""
     names = list(families)
     return WALL if WALL in names else next(iter(names), "")
 
 
-def titled(family: str) -> str:
-    """As the screen and the report name it."""
+def family_title(family: str) -> str:
+    """Return a family's name on the screen and in the report."""
     return "wall" if family == WALL else family
 
 
-def _e(patterns: pd.DataFrame, model: TargetModel) -> float | None:
+def _half_period(patterns: pd.DataFrame, model: TargetModel) -> float | None:
+    """Return e: the design's, stretched by the slope of the laser's residuals over the height."""
     level = [family for family in model.families if family.level]
     if model.repeats_m is None or not level:
         return None
     rows = patterns[(patterns["by"] == "face") & (patterns["sensor"] == "laser")]
     rows = rows[rows["family"] == max(level, key=lambda family: len(family.faces)).name]
-    if len(rows) < FEWEST_FACES:
+    if len(rows) < MIN_FACES:
         return None
     height = np.array([model.faces[int(face)].offset_m for face in rows["low"]])
-    sigma = np.hypot(rows["sigma_mean_m"].to_numpy(), TINY_M)
+    sigma = np.hypot(rows["sigma_mean_m"].to_numpy(), MIN_SIGMA_M)
     share = np.polyfit(height, rows["mean_m"].to_numpy(), 1, w=1 / sigma)[0]
     return float(model.half_period_m * (1 + share))
 
 
-def oddities(found: Mapping[str, Any], design: Mapping[str, Any]) -> list[str]:
-    """What differs from the config by more than a target is usually built to; nothing that rejects by itself. (Where
-    it stands, and how far out of plumb, the verdict's warnings have from the target's pose.)"""
-    words = []
-    for letter, least in (("b", ODD_LENGTH_M), ("e", ODD_HEIGHT_M)):
-        value, given = found[f"{letter}_m"], design[f"{letter}_m"]
-        if value is not None and abs(value - given) > least:
-            words.append(f"the laser finds {letter} = {value:.4f} m where the config has {given:g} m: measure it")
-    for family, angle in found["corner_deg"].items():
-        if abs(angle - design["corner_deg"][family]) > ODD_ANGLE_DEG:
-            given = design["corner_deg"][family]
-            other = reference(design["lean_deg"])
-            words.append(f"the laser finds {angle:.2f}° between {titled(other)} and {family}, by design {given:g}°")
-    return words
+def deviations_from_design(measured: Mapping[str, Any], design: Mapping[str, Any]) -> Iterator[Statement]:
+    """Yield a warning for each length and angle that differs from the design by more than a target is usually built to.
+
+    Where the target stands, and how far it is out of plumb, is a warning of its own.
+    """
+    for letter, limit_m in MAX_DEVIATION.items():
+        value, designed = measured[f"{letter}_m"], design[f"{letter}_m"]
+        if value is not None and abs(value - designed) > limit_m:
+            words = f"the laser finds {letter} = {value:.4f} m where the config has {designed:g} m: measure it"
+            yield Statement(ReasonCode.LENGTH_OFF_DESIGN, words)
+    reference = family_title(reference_family(design["lean_deg"]))
+    for family, angle in measured["corner_deg"].items():
+        designed = design["corner_deg"][family]
+        if abs(angle - designed) > MAX_DEVIATION_DEG:
+            words = f"the laser finds {angle:.2f}° between {reference} and {family}, by design {designed:g}°"
+            yield Statement(ReasonCode.ANGLE_OFF_DESIGN, words)

@@ -1,4 +1,4 @@
-"""A cast of sound speed: what was made of its file, and whether it is of this session's time, place and water."""
+"""A cast of sound speed: how its file was used, and whether it belongs to this session's time, place and water."""
 
 from collections.abc import Iterator, Mapping
 from datetime import datetime
@@ -10,16 +10,17 @@ import pandas as pd
 from pipeline.config.resolved import CastUsed
 from pipeline.config.session import Mbes
 from pipeline.gps_time import NS, unix_ns_from_gps, utc_text
+from pipeline.report.reason_codes import ReasonCode, Statement
 
-LONGEST_H = 36.0  # between the cast and the soundings, whatever time zone its file has
-FARTHEST_KM = 5.0
-ODD_SPEED_M_S = 3.0  # the head's sound speed, so far beyond the cast's, is of other water
-RETRACE_DEG = 2.0  # a coarse mount farther off than this wants its rays traced again
+MAX_APART_H = 36.0  # between the cast and the soundings, whatever time zone its file has
+MAX_APART_KM = 5.0  # between the cast and the session
+MAX_SPEED_GAP_M_S = 3.0  # a head's sound speed so far beyond the cast's is of other water
+MAX_MOUNT_ERROR_DEG = 2.0  # with a coarse mount farther off than this, rays are to be traced again
 EARTH_KM = 6371.0
 
 
-def in_words(used: CastUsed) -> str:
-    """What was made of it, in words."""
+def describe_cast(used: CastUsed) -> str:
+    """Describe which cast of which file was used, and how it was thinned."""
     which = f", cast {used.number} of {used.casts}" if used.casts > 1 else ""
     taken = f"taken {used.taken}" if used.taken else "without a time"
     left_out = "".join(f", left out {count} {reason}" for reason, count in used.left_out.items())
@@ -30,66 +31,84 @@ def in_words(used: CastUsed) -> str:
     )
 
 
-def doubts(
+def cast_origin_warnings(
     used: CastUsed | None, span_ns: tuple[int, int] | None, place_deg: tuple[float, float] | None
-) -> Iterator[str]:
-    """``span_ns``: first and last sounding, GPS time; ``place_deg``: latitude, longitude of the session; None: not
-    known."""
+) -> Iterator[Statement]:
+    """Yield a warning if the cast is of another time or another place than the session.
+
+    Parameters
+    ----------
+    used : the cast, with its time and place where the file gives them; None if there is none
+    span_ns : GPS times of the first and the last sounding; None if not known
+    place_deg : latitude and longitude of the session; None if not known
+    """
     if used is None:
         return
     if used.taken is not None and span_ns is not None:
         cast_s = (datetime.fromisoformat(used.taken) - datetime(1970, 1, 1)).total_seconds()
-        first_s, last_s = (float(one) / NS for one in unix_ns_from_gps(np.array(span_ns)))
+        first_s, last_s = (float(time) / NS for time in unix_ns_from_gps(np.array(span_ns)))
         apart_h = max(first_s - cast_s, cast_s - last_s) / 3600
-        if apart_h > LONGEST_H:
-            yield (
+        if apart_h > MAX_APART_H:
+            yield Statement(
+                ReasonCode.CAST_OF_ANOTHER_TIME,
                 f"mbes.svp: {used.file} was taken at {used.taken}, {apart_h / 24:.1f} days away from the soundings "
-                f"({utc_text(span_ns[0])}): the cast is taken for true; take one at the session"
+                f"({utc_text(span_ns[0])}): the cast is taken for true; take one at the session",
             )
     if used.place_deg is not None and place_deg is not None:
-        away_km = _apart_km(used.place_deg, place_deg)
-        if away_km > FARTHEST_KM:
-            yield (
-                f"mbes.svp: {used.file} was taken {away_km:.0f} km from here: the cast is taken for true; take one in "
-                "the water of the session"
+        apart_km = _apart_km(used.place_deg, place_deg)
+        if apart_km > MAX_APART_KM:
+            yield Statement(
+                ReasonCode.CAST_OF_ANOTHER_PLACE,
+                f"mbes.svp: {used.file} was taken {apart_km:.0f} km from here: the cast is taken for true; take one in "
+                "the water of the session",
             )
 
 
-def cast_doubts(mbes: Mbes, files: pd.DataFrame, correction: Mapping[str, Any]) -> list[str]:
-    """A cast that cannot be of this water by what the head recorded; and rays traced through it with a coarse mount far
-    off: a ray at θ from straight down bends by g t sin θ, of which a share of δ / tan θ is wrong where θ is wrong by δ
-    (a sixtieth for a degree at 45°)."""
+def cast_warnings(mbes: Mbes, files: pd.DataFrame, correction: Mapping[str, Any]) -> Iterator[Statement]:
+    """Yield a warning if the cast disagrees with the head's sound speed, or if rays were traced with a wrong mount.
+
+    A ray at θ from straight down bends by g t sin θ. Where the coarse mount makes θ wrong by δ, a share of δ / tan θ
+    of that is wrong (a sixtieth for a degree at 45°).
+
+    Parameters
+    ----------
+    mbes : settings of the sonar; without a cast there is no warning
+    files : the table, with the sound speeds that the head recorded
+    correction : of the adjustment, block of calibration.json
+    """
     if mbes.svp is None:
-        return []
-    found = [] if mbes.svp_from is None else list(doubts(mbes.svp_from, _span(files), None))
+        return
+    if mbes.svp_from is not None:
+        yield from cast_origin_warnings(mbes.svp_from, _span_ns(files), None)
     speeds = [speed for _, speed in mbes.svp]
     low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
-    if max(low - max(speeds), min(speeds) - high) > ODD_SPEED_M_S:
-        found.append(
+    if max(low - max(speeds), min(speeds) - high) > MAX_SPEED_GAP_M_S:
+        yield Statement(
+            ReasonCode.CAST_OFF_HEAD_SPEED,
             f"mbes.svp lies between {min(speeds):.1f} and {max(speeds):.1f} m/s, the head recorded {low:.1f} to "
-            f"{high:.1f}: the cast is taken for true; was it taken here and now?"
+            f"{high:.1f}: the cast is taken for true; was it taken here and now?",
         )
-    turn = correction["rotation_vector_deg"]
-    if turn is not None and np.linalg.norm(turn) > RETRACE_DEG:
-        found.append(
-            f"rays were traced through mbes.svp with a coarse mount that is {np.linalg.norm(turn):.1f}° off: enter the "
-            "values found as mbes.mount and run again"
+    rotation_deg = correction["rotation_vector_deg"]
+    if rotation_deg is not None and np.linalg.norm(rotation_deg) > MAX_MOUNT_ERROR_DEG:
+        yield Statement(
+            ReasonCode.RAYS_TRACED_WITH_WRONG_MOUNT,
+            f"rays were traced through mbes.svp with a coarse mount that is {np.linalg.norm(rotation_deg):.1f}° off: "
+            "enter the values found as mbes.mount and run again",
         )
-    return found
 
 
-def _span(files: pd.DataFrame) -> tuple[int, int]:
-    """First and last sounding, GPS time."""
+def _span_ns(files: pd.DataFrame) -> tuple[int, int]:
+    """Return GPS times of the first and the last sounding, from the table ``files``."""
     own = files[(files["sensor"] == "mbes") & (files["first_ns"] >= 0)]
     return int(own["first_ns"].min()), int(own["last_ns"].max())
 
 
-def _apart_km(one_deg: tuple[float, float], other_deg: tuple[float, float]) -> float:
-    """Great circle between two places (latitude, longitude) on a sphere, by haversines.
+def _apart_km(first_deg: tuple[float, float], second_deg: tuple[float, float]) -> float:
+    """Return the great circle between two places (latitude, longitude) on a sphere, by haversines.
 
     >>> round(_apart_km((0.0, 179.5), (0.0, -179.5)), 1), round(_apart_km((90.0, 0.0), (0.0, 77.0))), EARTH_KM
     (111.2, 10008, 6371.0)
     """
-    (lat, lon), (lat_other, lon_other) = np.radians(one_deg), np.radians(other_deg)
-    across = np.cos(lat) * np.cos(lat_other) * np.sin((lon_other - lon) / 2) ** 2
-    return float(2 * EARTH_KM * np.arcsin(np.sqrt(np.sin((lat_other - lat) / 2) ** 2 + across)))
+    (lat_1, lon_1), (lat_2, lon_2) = np.radians(first_deg), np.radians(second_deg)
+    across = np.cos(lat_1) * np.cos(lat_2) * np.sin((lon_2 - lon_1) / 2) ** 2
+    return float(2 * EARTH_KM * np.arcsin(np.sqrt(np.sin((lat_2 - lat_1) / 2) ** 2 + across)))

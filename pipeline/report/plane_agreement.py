@@ -1,4 +1,4 @@
-"""How the sonar's planes close with the laser's: before the calibration and after it, by each method."""
+"""Misclosure of the sonar's and the laser's planes: with the coarse mount, and with each method's."""
 
 from collections.abc import Mapping
 
@@ -17,29 +17,33 @@ from pipeline.mount import Mounted
 Array = NDArray[np.float64]
 
 
-def closing_table(
-    faces: pd.DataFrame,
-    planes: pd.DataFrame,
-    sounding_moments: pd.DataFrame,
-    coarse: Mounted,
-    mounts: Mapping[str, Mounted],
+def plane_agreement_table(
+    planes: pd.DataFrame, moments: Mapping[str, Array], coarse: Mounted, mounts: Mapping[str, Mounted]
 ) -> pd.DataFrame:
-    """One row a mount and a family in one plane that both sensors see; ``mounts``: totals by name."""
+    """Return the table ``closing``: one row per mount and family in one plane that both sensors see.
+
+    Parameters
+    ----------
+    planes : table with the laser's planes
+    moments : lifted moments of the soundings by family, over all passes
+    coarse : the mount with which the moments were made
+    mounts : the mounts to compare, by name
+    """
     laser = laser_planes(planes)
     rows = []
-    for mount, placed in mounts.items():
-        correction = placed.R_body_from_sensor @ coarse.R_body_from_sensor.T
-        for family, lifted in families_of(faces, sounding_moments).items():
+    for name, mount in mounts.items():
+        correction = mount.R_body_from_sensor @ coarse.R_body_from_sensor.T
+        for family, lifted in moments.items():
             plane = laser.get((ALL_PASSES, family))
             if plane is None:
                 continue
             try:
-                sonar = fit_plane(plane_moments(lifted, correction, placed.lever_arm_body_m), plane.normal)
+                sonar = fit_plane(plane_moments(lifted, correction, mount.lever_arm_body_m), plane.normal)
             except DegenerateGeometryError:
                 continue
             rows.append(
                 {
-                    "mount": mount,
+                    "mount": name,
                     "plane": family,
                     "angle_deg": np.degrees(angle_between(plane.normal, sonar.normal)),
                     "distance_m": float(plane.normal @ sonar.centroid_m - plane.distance_m),
@@ -51,10 +55,10 @@ def closing_table(
     return pd.DataFrame(rows, columns=[column.name for column in CLOSING.columns])
 
 
-def families_of(faces: pd.DataFrame, sounding_moments: pd.DataFrame) -> dict[str, Array]:
-    """Lifted moments of each family over all passes."""
-    family = dict(zip(faces["face"].tolist(), faces["family"].tolist(), strict=True))
-    total: dict[str, Array] = {}
-    for (_, name), moments in sorted(by_family(family, lifted_moments(sounding_moments)).items()):
-        total[name] = total[name] + moments if name in total else moments
-    return total
+def lifted_moments_by_family(faces: pd.DataFrame, sounding_moments: pd.DataFrame) -> dict[str, Array]:
+    """Return the lifted moments of each family over all passes, from the tables of these names."""
+    family_of_face = dict(zip(faces["face"].tolist(), faces["family"].tolist(), strict=True))
+    totals: dict[str, Array] = {}
+    for (_, family), moments in sorted(by_family(family_of_face, lifted_moments(sounding_moments)).items()):
+        totals[family] = totals[family] + moments if family in totals else moments
+    return totals

@@ -1,8 +1,8 @@
-"""What is held and yet asks to be something else: the likely cause of residuals, in words.
+"""Fixed parameters that the residuals suggest are wrong, and additionally estimated ones, described for the report.
 
-Each held parameter has been freed by itself (table ``freed``). One that comes out farther from zero than noise and its
-own considered sigma explain is a cause; of several, which one error makes move together, the one that explains most
-(largest value / sigma) is named.
+Each fixed parameter has been estimated by itself (table ``freed``). One whose estimate is farther from zero than noise
+and its own a-priori sigma explain is a suspected cause. One error often moves several of them; the cause named is the
+one that explains most (largest value over sigma).
 """
 
 from collections.abc import Mapping
@@ -12,55 +12,77 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-FAR = 4.0  # sigmas: one in 16 000, of some forty parameters one in 400 sessions
+SIGNIFICANT = 4.0  # sigmas: one in 16 000, of some forty parameters one in 400 sessions
 UNITS = {"mbes_latency": "s", "laser_latency": "s", "sound_speed": "1"}
 AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
-FACES = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
-
-
-def causes(freed: pd.DataFrame) -> list[tuple[str, float]]:
-    """Parameters that stand out, with how many sigmas they lie from zero by themselves; the most telling first."""
-    found = []
-    for row in freed[~freed["estimated"]].to_dict("records"):
-        if _far(row):
-            found.append((_words(row), abs(row["value"]) / row["sigma"]))
-    return sorted(found, key=lambda one: -one[1])
+FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
 
 
 @dataclass(frozen=True)
-class Estimated:
-    """What ``adjust.free`` names, as the adjustment found it: total sigma, unit, in words, and whether it lies farther
-    from zero than its sigma and what the settings concede."""
+class SuspectedCause:
+    """A fixed parameter that would explain the residuals: words, and its value over the sigma from noise."""
+
+    words: str
+    normalised: float
+
+
+@dataclass(frozen=True)
+class EstimatedParameter:
+    """A parameter that ``adjust.free`` names.
+
+    Attributes
+    ----------
+    unknown : its name
+    value, sigma_total : estimate and total sigma in ``unit``
+    words : the estimate, and what to look at
+    is_significant : whether the value is farther from zero than its sigma and the settings explain
+    """
 
     unknown: str
     value: float
     sigma_total: float
     unit: str
     words: str
-    far: bool
+    is_significant: bool
 
 
-def estimated(freed: pd.DataFrame) -> list[Estimated]:
-    """What is free beside the mount and the surfaces; nothing, where the data leave no result."""
+def suspected_causes(freed: pd.DataFrame) -> list[SuspectedCause]:
+    """Return the fixed parameters (table ``freed``) that differ significantly from zero, the most telling first."""
+    causes = [
+        SuspectedCause(_words(row), abs(row["value"]) / row["sigma"])
+        for row in freed[~freed["estimated"]].to_dict("records")
+        if _is_significant(row)
+    ]
+    return sorted(causes, key=lambda cause: -cause.normalised)
+
+
+def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:
+    """Return what is estimated beside mount and surfaces (table ``freed``); empty if the data leave no result."""
     return [
-        Estimated(row["unknown"], row["value"], row["sigma"], UNITS[row["unknown"]], _words(row), _far(row))
+        EstimatedParameter(
+            unknown=row["unknown"],
+            value=row["value"],
+            sigma_total=row["sigma"],
+            unit=UNITS[row["unknown"]],
+            words=_words(row),
+            is_significant=_is_significant(row),
+        )
         for row in freed[freed["estimated"] & np.isfinite(freed["sigma"])].to_dict("records")
     ]
 
 
-def _far(row: Mapping[Any, Any]) -> bool:
-    return bool(abs(row["value"]) > FAR * np.hypot(row["sigma"], row["considered"]))
+def _is_significant(row: Mapping[Any, Any]) -> bool:
+    return bool(abs(row["value"]) > SIGNIFICANT * np.hypot(row["sigma"], row["considered"]))
 
 
 def _words(row: Mapping[Any, Any]) -> str:
-    """One parameter as freed by itself: where it stands, and what to look at."""
+    """Describe the estimate of one parameter, and what to look at."""
     name, value, sigma = str(row["unknown"]), float(row["value"]), float(row["sigma"])
     sensor = "laser" if name.startswith("laser") else "mbes"
-    whose = {"laser": "the laser's", "mbes": "the sonar's"}[sensor]
+    owner = {"laser": "the laser's", "mbes": "the sonar's"}[sensor]
     if name.endswith("_latency"):
-        return (
-            f"{whose} clock: its latency is {_size(1e3 * value, 1e3 * sigma, 'ms')} more than {sensor}.latency_s says"
-        )
+        size = _size(1e3 * value, 1e3 * sigma, "ms")
+        return f"{owner} clock: its latency is {size} more than {sensor}.latency_s says"
     if name == "sound_speed":
         return (
             f"the sound speed: it is {_size(100 * value, 100 * sigma, '%')} above that recorded, or given as "
@@ -69,24 +91,29 @@ def _words(row: Mapping[Any, Any]) -> str:
     if name == "sound_speed_gradient":
         return f"a sound speed that changes with depth, by {_size(value, sigma, 'm/s')} per metre: take a (better) cast"
     if name.endswith("_range"):
-        return f"{whose} ranges: they should be {_size(1e3 * value, 1e3 * sigma, 'mm')} longer"
+        return f"{owner} ranges: they should be {_size(1e3 * value, 1e3 * sigma, 'mm')} longer"
     if name.startswith("laser_rotation"):
         angle = _size(np.degrees(value), np.degrees(sigma), "°")
         return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
     if name.startswith("laser_lever_arm"):
         return f"laser.mount: {name[-1]}_m should be {_size(1e3 * value, 1e3 * sigma, 'mm')} more"
-    family, _, what = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
-    faces = FACES.get(family, f"of {family}")
-    if what.startswith("turn"):
+    return _words_of_wet_faces(name, value, sigma)
+
+
+def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
+    """Describe a turn (rad) or shift (m) of a family's wet faces against its dry ones."""
+    family, _, kind = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
+    faces = FACES_OF_FAMILY.get(family, f"of {family}")
+    if kind.startswith("turn"):
         angle = _size(np.degrees(value), np.degrees(sigma), "°")
         return f"the target: its wet faces {faces} are turned by {angle} against the dry ones"
-    off = _size(1e3 * value, 1e3 * sigma, "mm")
-    how = "lie higher" if family == "H" else "stand off"
-    return f"the target: its wet faces {faces} {how} by {off}; check its shape in the config, and its survey"
+    shift = _size(1e3 * value, 1e3 * sigma, "mm")
+    verb = "lie higher" if family == "H" else "stand off"
+    return f"the target: its wet faces {faces} {verb} by {shift}; check its shape in the config, and its survey"
 
 
 def _size(value: float, sigma: float, unit: str) -> str:
-    """A value with its sigma, to the sigma's first digit."""
+    """Format a value with its sigma, to the sigma's first digit."""
     digits = max(0, -int(np.floor(np.log10(max(sigma, 1e-9)))))
     gap = "" if unit == "°" else " "
     return f"{value:+.{digits}f} ± {sigma:.{digits}f}{gap}{unit}"

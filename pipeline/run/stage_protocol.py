@@ -43,8 +43,9 @@ def declared(fields_of: type) -> dict[str, Marker]:
 
 
 def inputs_in(stages: Collection[str], stage: ModuleType) -> dict[str, Marker]:
-    """Return what a stage takes in a run of ``stages`` (names), by field: all but optional tables that none of them
-    makes.
+    """Return what a stage takes in a run of these ``stages``, by field.
+
+    Optional tables that none of the stages makes are left out; the stage is then given None.
     """
     optional = {field.name for field in dataclasses.fields(stage.Inputs) if field.default is None}
     return {

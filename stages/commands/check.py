@@ -13,7 +13,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.errors import PoolcalError
 from pipeline.readers.casts import with_cast
-from pipeline.report.cast_checks import in_words
+from pipeline.report.cast_checks import describe_cast
 from pipeline.run.settings import load_settings
 from stages.in_memory import calibrate_in_memory
 
@@ -28,7 +28,7 @@ def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]
     if as_json:
         return rendering.as_json(found), found.faulty
     used = None if content.mbes is None else content.mbes.svp_from
-    cast = "" if used is None else f"mbes.svp: {in_words(used)}\n\n"
+    cast = "" if used is None else f"mbes.svp: {describe_cast(used)}\n\n"
     unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"
     return f"{cast}{rendering.text(found)}{unasked}", found.faulty
 

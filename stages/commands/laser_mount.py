@@ -1,16 +1,16 @@
-"""The laser's own calibration into session.yaml, with its covariance: the sonar's total sigmas are made from it."""
+"""Writes the laser's own calibration into session.yaml, with the covariance that the sonar's total sigmas need."""
 
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.coarse.session_edit import block_of, origin_of, read_session, written
-from pipeline.report.calibration_document import mounted_of
+from pipeline.report.method_blocks import mounted_of
 from pipeline.run.results import calibration
 
 
 def write(session: Path, run: Path) -> str:
-    """An accepted result into SESSION/session.yaml; what was done, in words."""
+    """Write an accepted result into SESSION/session.yaml, and return what was done, in words."""
     result = calibration(run)
     block = result["laser"]
     origin = origin_of("fine", run / "report" / "calibration.json", held=list(result["held"]))

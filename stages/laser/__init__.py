@@ -1,1 +1,1 @@
-"""The two stages of a run that calibrates the laser itself in which it differs from one that calibrates the sonar."""
+"""The stage of a run that calibrates the laser itself in which it differs from one that calibrates the sonar."""

@@ -16,7 +16,7 @@ from pipeline.maths.geometry.planes import fit_plane
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.patent.lifted_moments import plane_moments
 from pipeline.mount import mount_of
-from pipeline.report.plane_agreement import families_of
+from pipeline.report.plane_agreement import lifted_moments_by_family
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
 from stages.views.fit_planes import cut_out
@@ -41,7 +41,7 @@ def log(recording: Any, tables: Tables) -> None:
     body = xyz(columns, "mbes_m") @ mount.R_body_from_sensor.T
     family = faces["family"].to_numpy()[columns["face"].astype(int)]
     laser = laser_planes(tables.table(PLANES))
-    lifted = families_of(faces, tables.table(SOUNDING_MOMENTS))
+    lifted = lifted_moments_by_family(faces, tables.table(SOUNDING_MOMENTS))
     _curves(recording, iterations)
     say_why(recording, "angles", tables.table(ANGLES))
     for row in iterations.iloc[:: max(1, -(-len(iterations) // STEPS))].to_dict("records"):

@@ -5,13 +5,13 @@ import pandas as pd
 import pytest
 
 from pipeline.config.target import Letters, Origin
-from pipeline.report.as_built import as_found, by_design, oddities
+from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
 from pipeline.target.design import target_of
 
 ROOT = np.sqrt(0.5)
 TARGET = Letters(a=8.0, b=3.0, c=1.0, e=0.5, origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0))
 MODEL = target_of(TARGET)
-DESIGN = by_design(MODEL)
+DESIGN = design_shape(MODEL)
 
 
 def planes(half_width: float, corner_deg: float = 45.0) -> pd.DataFrame:
@@ -39,11 +39,11 @@ def heights(share: float) -> pd.DataFrame:
 
 
 def test_as_designed_nothing_is_said() -> None:
-    found = as_found(planes(1.5), heights(0.0), MODEL)
+    found = measured_shape(planes(1.5), heights(0.0), MODEL)
     assert found["b_m"] == pytest.approx(3.0)
     assert found["e_m"] == pytest.approx(0.5)
     assert found["corner_deg"] == pytest.approx({"P1": 45.0, "P3": 45.0})
-    assert not oddities(found, DESIGN)
+    assert not [*deviations_from_design(found, DESIGN)]
 
 
 @pytest.mark.parametrize(
@@ -56,25 +56,24 @@ def test_as_designed_nothing_is_said() -> None:
     ],
 )
 def test_what_differs_is_said_alone(half_width: float, corner_deg: float, share: float, words: str) -> None:
-    said = oddities(as_found(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)
-    assert len(said) == 1
-    assert words in said[0]
+    (warning,) = deviations_from_design(measured_shape(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)
+    assert words in warning.words
 
 
 @pytest.mark.parametrize("differs", [(1.504, 45.0, 0.0), (1.5, 45.19, 0.0), (1.5, 45.0, 0.003)])
 def test_what_a_target_is_built_to_is_not_said(differs: tuple[float, float, float]) -> None:
     half_width, corner_deg, share = differs
-    assert not oddities(as_found(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)
+    assert not [*deviations_from_design(measured_shape(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)]
 
 
 def test_without_a_flank_there_is_no_width() -> None:
-    found = as_found(planes(1.5).query("plane != 'P3'"), heights(0.0), MODEL)
+    found = measured_shape(planes(1.5).query("plane != 'P3'"), heights(0.0), MODEL)
     assert found["b_m"] is None
     assert set(found["corner_deg"]) == {"P1"}
-    assert not oddities(found, DESIGN)
+    assert not [*deviations_from_design(found, DESIGN)]
 
 
 def test_without_the_wall_no_angle_is_compared_with_the_walls() -> None:
-    found = as_found(planes(1.5).query("plane != 'P2'"), heights(0.0), MODEL)
+    found = measured_shape(planes(1.5).query("plane != 'P2'"), heights(0.0), MODEL)
     assert found["corner_deg"] == {}
-    assert not oddities(found, DESIGN)
+    assert not [*deviations_from_design(found, DESIGN)]

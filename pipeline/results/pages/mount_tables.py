@@ -17,7 +17,7 @@ from pipeline.config.session import SessionConfig
 from pipeline.maths.adjustment.parameters import NAMES
 from pipeline.maths.adjustment.solution import TOGETHER
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.report.as_built import reference, titled
+from pipeline.report.as_built import family_title, reference_family
 from pipeline.run.results import Tables, calibration
 
 Row = Mapping[str, Any]
@@ -154,7 +154,7 @@ def shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) 
 def built(found: Row, design: Row) -> list[Row]:
     """What the laser sees of the target, beside its design."""
     rows = [(letter, design[f"{letter}_m"], found[f"{letter}_m"], "m") for letter in ("b", "e")]
-    angle_between = f"angle between {titled(reference(design['lean_deg']))} and"
+    angle_between = f"angle between {family_title(reference_family(design['lean_deg']))} and"
     for words, kind in ((angle_between, "corner_deg"), ("leaning of", "lean_deg")):
         rows += [(f"{words} {family}", design[kind][family], angle, "deg") for family, angle in found[kind].items()]
     return [

@@ -20,7 +20,7 @@ from pipeline.config.target import Letters
 from pipeline.config.yaml_models import changes
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.report.as_built import by_design
+from pipeline.report.as_built import design_shape
 from pipeline.results.pages import mount_tables
 from pipeline.results.pages.currency import drawn_from
 from pipeline.results.pages.instrument_table import figures_used
@@ -88,7 +88,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         closing=closing,
         spread=list(dict.fromkeys(row["plane"] for row in closing if np.isnan(row["angle_deg"]))),
         shares=list(mount_tables.shares(tables.table(FREED), estimate, settings.session)),
-        built=mount_tables.built(result["target"]["as_found"], by_design(target_of(settings.pool.target))),
+        built=mount_tables.built(result["target"]["as_found"], design_shape(target_of(settings.pool.target))),
         names=[name for name, *_ in PARAMETERS],
         correlations=mount_tables.correlations(result),
         groups=tables.table(GROUPS).to_dict("records"),

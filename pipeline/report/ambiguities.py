@@ -1,0 +1,108 @@
+"""Doubts about where the target stands or how the sensor is mounted: the labels depend on both."""
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from pipeline.config.session import Calibrated
+from pipeline.maths.adjustment.solution import WORDS
+from pipeline.report.reason_codes import ReasonCode, Statement
+
+
+@dataclass(frozen=True, kw_only=True)
+class MountSearch:
+    """How the provisional mount was searched, and what a reason about it advises.
+
+    Attributes
+    ----------
+    sensor : the sensor that is calibrated
+    max_angle_deg, max_lever_arm_m : farther from the coarse mount than this no mount is taken for labelling
+    angles_advice : what to enter where the coarse angles have been checked; said where nothing else is in doubt
+    """
+
+    sensor: Calibrated
+    max_angle_deg: float
+    max_lever_arm_m: float
+    angles_advice: str = ""
+
+
+def ambiguities(pose: pd.Series, mount: pd.Series, search: MountSearch, shape: str, sides: str) -> list[Statement]:
+    """Return what makes the labels doubtful; empty if nothing does.
+
+    Parameters
+    ----------
+    pose : row of the table ``target_pose``
+    mount : row of the table ``provisional_mount``
+    search : limits of the mount's search
+    shape : the settings that give the target's shape, for people
+    sides : the setting that tells the target's left from its right, for people
+    """
+    statements = []
+    if pose["ambiguous"]:
+        statements.append(_ambiguous_pose(pose, shape, sides))
+    if not pose["within"]:
+        words = (
+            "no pose of the target within the search limits fits the laser points: target.origin or target.azimuth_deg "
+            "is farther off than segment.search_... allow; poolcal check tells by how much"
+        )
+        statements.append(Statement(ReasonCode.TARGET_BEYOND_SEARCH, words))
+    if not mount["within"]:
+        if search.sensor == "laser":
+            words = _no_laser_mount(mount, search, shape)
+        else:
+            words = _no_sonar_mount(mount, search, shape, alone=not statements and not mount["ambiguous"])
+        statements.append(Statement(ReasonCode.MOUNT_BEYOND_SEARCH, words))
+    if mount["ambiguous"]:
+        words = (
+            f"the soundings fit two ways (score {mount['rival_score']:.3f} against {mount['score']:.3f}): the coarse "
+            "mount may be a block off; measure the coarse lever arm again"
+        )
+        statements.append(Statement(ReasonCode.AMBIGUOUS_MOUNT, words))
+    return statements
+
+
+def _ambiguous_pose(pose: pd.Series, shape: str, sides: str) -> Statement:
+    """Name the rival pose, how well it fits, and which settings to check first."""
+    rival_is_better = pose["rival_agreement_m2"] > pose["agreement_m2"]
+    fit = "better" if rival_is_better else "nearly as well"
+    remedy = "check" if rival_is_better else "let the laser see the wall's top edge; check"
+    if rival_is_better and str(pose["rival"]).startswith("left and right exchanged"):
+        remedy += f" {sides} first, then"
+    return Statement(
+        ReasonCode.AMBIGUOUS_TARGET_POSE,
+        f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {fit} "
+        f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} target.origin (a "
+        f"height wrong by e or 2 e, half a period or a whole one, does this), azimuth_deg, and {shape}; poolcal "
+        "check tells which",
+    )
+
+
+def _no_laser_mount(mount: pd.Series, search: MountSearch, shape: str) -> str:
+    """Say that the laser's mount lies outside of the search, and where."""
+    excess = _best_fit(mount, search)
+    return (
+        f"no mount of the laser within {search.max_angle_deg:g}° of the coarse one brings its points onto the "
+        f"target{excess}: laser.mount is farther off than segment.search_laser_deg allows, or {shape} are wrong"
+    )
+
+
+def _no_sonar_mount(mount: pd.Series, search: MountSearch, shape: str, alone: bool) -> str:
+    """Say that the sonar's mount lies outside of the search, and where; ``alone``: nothing else is in doubt."""
+    excess = _best_fit(mount, search)
+    angles_alone = "°" in excess and " m" not in excess
+    advice = search.angles_advice if angles_alone and alone else ""
+    return (
+        f"no mount within {search.max_angle_deg:g}° and {search.max_lever_arm_m:g} m of the coarse one brings the "
+        f"soundings onto the target{excess}: mbes.mount is farther off than segment.search_mount_deg and "
+        f"search_mount_m allow (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
+        f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{advice}"
+    )
+
+
+def _best_fit(mount: pd.Series, search: MountSearch) -> str:
+    """List the components of the best mount that lie beyond the limits; empty if none does."""
+    angles = [(float(mount[f"rotation_{axis}_deg"]), "°", search.max_angle_deg) for axis in "xyz"]
+    arms = [(float(mount[f"lever_arm_{axis}_m"]), " m", search.max_lever_arm_m) for axis in "xyz"]
+    components = zip(WORDS, angles + arms, strict=True)
+    excess = [f"{value:+.2f}{unit} in {name}" for name, (value, unit, limit) in components if abs(value) > limit]
+    return f"; best fits {', '.join(excess)}" if excess else ""

@@ -1,0 +1,51 @@
+"""The tables that a report is made from."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import pandas as pd
+
+from pipeline.artefacts.catalogue.patent import CORRECTIONS
+from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES
+from pipeline.artefacts.catalogue.results import (
+    ADJUST_SUMMARY,
+    CELLS,
+    COVARIANCE,
+    DRIFT,
+    ESTIMATE,
+    FREED,
+    GEOMETRY,
+    GROUPS,
+    PATTERNS,
+)
+from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT, SOUNDING_MOMENTS, TARGET_POSE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Tables of the earlier stages; a calibration of the laser has no ``corrections``."""
+
+    files: Annotated[pd.DataFrame, FILES]
+    passes: Annotated[pd.DataFrame, PASSES]
+    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
+    faces: Annotated[pd.DataFrame, FACES]
+    planes: Annotated[pd.DataFrame, PLANES]
+    sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
+    target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
+    estimate: Annotated[pd.DataFrame, ESTIMATE]
+    covariance: Annotated[pd.DataFrame, COVARIANCE]
+    geometry: Annotated[pd.DataFrame, GEOMETRY]
+    drift: Annotated[pd.DataFrame, DRIFT]
+    freed: Annotated[pd.DataFrame, FREED]
+    patterns: Annotated[pd.DataFrame, PATTERNS]
+    cells: Annotated[pd.DataFrame, CELLS]
+    groups: Annotated[pd.DataFrame, GROUPS]
+    summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+    corrections: Annotated[pd.DataFrame | None, CORRECTIONS] = None
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """Mount parameters that the adjustment fixed, with the sigma that each would have had (degrees or m)."""
+        rows = self.geometry[self.geometry["kind"] == "held"]
+        return dict(zip(rows["words"].tolist(), rows["sigma"].tolist(), strict=True))

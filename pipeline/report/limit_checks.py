@@ -1,0 +1,66 @@
+"""Reasons to reject from the limits of the total sigmas: the adjustment's own, and what a patent's form may differ."""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+from pipeline.config.pool import Verdict
+from pipeline.maths.adjustment.solution import WORDS
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.report.reason_codes import ReasonCode, Statement
+
+
+def sigmas_above_limit(
+    sigmas: Mapping[str, float] | None, limits: Verdict, fixed: Collection[str]
+) -> list[Statement]:
+    """Return a reason for each estimated mount parameter whose total sigma is above its limit.
+
+    Parameters
+    ----------
+    sigmas : total sigmas by setting, degrees and m; None if the adjustment has none
+    limits : their limits
+    fixed : names of the parameters that were fixed
+    """
+    if sigmas is None:
+        return [Statement(ReasonCode.NO_COVARIANCE, "the adjustment has no covariance")]
+    bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
+    return [
+        Statement(
+            ReasonCode.SIGMA_ABOVE_LIMIT,
+            f"total sigma of {WORDS[place]} is {sigmas[key]:.4g}{bounds[unit][1]}, above the limit of "
+            f"{bounds[unit][0]:g}{bounds[unit][1]}",
+        )
+        for name, place, key, unit in PARAMETERS
+        if name not in fixed and not sigmas[key] <= bounds[unit][0]
+    ]
+
+
+def patent_reasons(
+    method: str, row: Any, methods: Mapping[str, Mapping[str, Any]], limits: Verdict
+) -> Iterator[Statement]:
+    """Yield each reason why a form of the patent cannot be the result.
+
+    It has no sigma: it must have converged, and agree with the adjustment within the limits of the sigmas.
+
+    Parameters
+    ----------
+    method : the patent's form
+    row : its row of the table ``corrections``
+    methods : blocks of calibration.json by method
+    limits : limits of the total sigmas
+    """
+    if row["reason"]:
+        yield Statement(ReasonCode.PATENT_NO_RESULT, f"{method} has no result: {row['reason']}")
+        return
+    if not row["converged"]:
+        yield Statement(ReasonCode.PATENT_NOT_CONVERGED, f"{method} did not converge in {row['iterations']} turns")
+        return
+    patent, adjusted = methods[method]["correction"], methods["adjustment"]["correction"]
+    bounds = {"rotation_vector_deg": (limits.max_sigma_deg, "°", 0), "lever_arm_m": (limits.max_sigma_m, " m", 3)}
+    for part, (limit, unit, first) in bounds.items():
+        for place, (value, reference) in enumerate(zip(patent[part], adjusted[part], strict=True), start=first):
+            if abs(value - reference) > limit:
+                yield Statement(
+                    ReasonCode.PATENT_OFF_ADJUSTMENT,
+                    f"{method} differs from the adjustment by {value - reference:+.4f}{unit} in {WORDS[place]}, more "
+                    f"than {limit:g}{unit}",
+                )

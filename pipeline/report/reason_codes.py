@@ -1,0 +1,79 @@
+"""Stable codes of everything that a verdict says: why a calibration is rejected, and what it warns of.
+
+The words beside a code are for people and may be mended; a code is for programs and stays.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Self
+
+
+class ReasonCode(StrEnum):
+    """A code of calibration.json with its meaning."""
+
+    meaning: str
+
+    def __new__(cls, code: str, meaning: str) -> Self:
+        """Make a member whose value is the code alone."""
+        member = str.__new__(cls, code)
+        member._value_, member.meaning = code, meaning
+        return member
+
+    # The target or the mount is not found for certain: these reject, and nothing else is judged.
+    AMBIGUOUS_TARGET_POSE = "ambiguous_target_pose", "another pose of the target fits the laser points as well"
+    TARGET_BEYOND_SEARCH = "target_beyond_search", "no pose of the target within the search limits fits"
+    MOUNT_BEYOND_SEARCH = "mount_beyond_search", "no mount within the search limits brings the points onto the target"
+    AMBIGUOUS_MOUNT = "ambiguous_mount", "another mount fits the soundings nearly as well"
+
+    # The adjustment: these reject.
+    NO_RESULT = "no_result", "the adjustment has no result"
+    NOT_CONVERGED = "not_converged", "the adjustment did not converge"
+    TOO_FEW_SOUNDINGS = "too_few_soundings", "a family of faces has too few soundings for its labels to be trusted"
+    NO_PARAMETER_ESTIMABLE = "no_parameter_estimable", "all six mount parameters had to be fixed"
+    NO_COVARIANCE = "no_covariance", "the adjustment has no covariance"
+    SIGMA_ABOVE_LIMIT = "sigma_above_limit", "the total sigma of a mount parameter is above verdict's limit"
+    ESTIMATE_OFF_SETTINGS = "estimate_off_settings", "a parameter of adjust.free is significantly not as configured"
+
+    # Mean residuals beyond the tolerance: these reject.
+    PASSES_DISAGREE = "passes_disagree", "one pass lies off the others"
+    INS_DRIFT_BETWEEN_PASSES = "ins_drift_between_passes", "the INS would have to drift too far in one pass"
+    RESIDUALS_BY_FACE = "residuals_by_face", "mean residuals differ from face to face"
+    RESIDUALS_BY_ANGLE = "residuals_by_angle", "mean residuals depend on the beam's angle or elevation"
+    RESIDUALS_STEP = "residuals_step", "mean residuals step at a receive angle"
+    RESIDUALS_BY_PING = "residuals_by_ping", "mean residuals alternate from ping to ping"
+    RESIDUALS_BY_DISTANCE = "residuals_by_distance", "mean residuals depend on the distance"
+    RESIDUALS_BY_TIME = "residuals_by_time", "mean residuals lie off for some seconds"
+    SUSPECTED_CAUSE = "suspected_cause", "a fixed parameter that would explain the residuals"
+
+    # A form of the patent as the result: these reject.
+    PATENT_NO_RESULT = "patent_no_result", "the patent's form has no result"
+    PATENT_NOT_CONVERGED = "patent_not_converged", "the patent's form did not converge"
+    PATENT_OFF_ADJUSTMENT = "patent_off_adjustment", "the patent's form differs from the adjustment beyond the limits"
+
+    # Drift of the INS: beside other reasons they reject, otherwise they warn.
+    INS_DRIFT_NOT_GIVEN = "ins_drift_not_given", "ins.drift allows the INS no drift at all"
+    INS_DRIFT_ABOVE_SETTINGS = "ins_drift_above_settings", "the INS drifts farther than its figures say"
+
+    # These only warn.
+    GEOMETRY_GAP = "geometry_gap", "the passes leave a gap in the geometry"
+    NOISE_OFF_SIGMAS = "noise_off_sigmas", "observations scatter more, or less, than their sigmas say"
+    INS_NOISE_ABOVE_SETTINGS = "ins_noise_above_settings", "INS poses scatter more than ins.white says"
+    PING_NOISE_ABOVE_SETTINGS = "ping_noise_above_settings", "whole pings scatter more than ins.white says"
+    MANY_OUTLIERS = "many_outliers", "an unusual share of the observations was cut as outliers"
+    TARGET_OFF_ORIGIN = "target_off_origin", "the target stands far from target.origin, or out of plumb"
+    PASS_WITHOUT_SOUNDINGS = "pass_without_soundings", "in some passes the laser alone saw the target"
+    PASS_WITHOUT_LASER = "pass_without_laser", "in some passes the sonar alone saw the target"
+    LENGTH_OFF_DESIGN = "length_off_design", "b or e of the target is measured otherwise than designed"
+    ANGLE_OFF_DESIGN = "angle_off_design", "an angle between faces is measured otherwise than designed"
+    CAST_OF_ANOTHER_TIME = "cast_of_another_time", "the cast was taken long before or after the soundings"
+    CAST_OF_ANOTHER_PLACE = "cast_of_another_place", "the cast was taken far away"
+    CAST_OFF_HEAD_SPEED = "cast_off_head_speed", "the cast disagrees with the sound speed recorded at the head"
+    RAYS_TRACED_WITH_WRONG_MOUNT = "rays_traced_with_wrong_mount", "rays were traced with a mount that is far off"
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One reason or warning: a stable code for programs, and words for people."""
+
+    code: ReasonCode
+    words: str

@@ -1,0 +1,156 @@
+"""What deviating residuals look like, and what their cause may be, in words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report.reason_codes import ReasonCode, Statement
+
+CYCLE = "ping_"  # and the length of the cycle in pings
+SENSORS = {"laser": "the laser", "mbes": "the sonar"}
+MAX_DRIFT_M = 0.05  # a mean residual beyond this is no drift: the model is wrong
+SAME_STEP_DEG = 3.0  # steps nearer to each other than this are one
+TURNS = {"turn_x": "pitch", "turn_y": "roll", "turn_z": "heading"}  # y of the target is the track
+Row = Mapping[Any, Any]  # of the table patterns
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResidualTests:
+    """Tested means, and what their description needs.
+
+    Attributes
+    ----------
+    patterns : the table
+    face_names : names of the faces by number
+    shape : the settings that give the target's shape, for people
+    tolerance_m : the tolerance of the tests
+    """
+
+    patterns: pd.DataFrame
+    face_names: list[str]
+    shape: str
+    tolerance_m: float
+
+
+@dataclass(frozen=True)
+class ExceededTests:
+    """Rows that exceed the ``limit``, with what they were tested against."""
+
+    tests: ResidualTests
+    rows: pd.DataFrame
+    limit: float
+
+    def outcome(self, row: Row) -> str:
+        """Describe the outcome of a row's test."""
+        excess = abs(float(row["normalised"]))
+        beyond = f"{excess:.1f} sigma beyond {1000 * self.tests.tolerance_m:g} mm"
+        if row["by"] == "drift":
+            beyond = f"{excess:.1f} times the drift that it is conceded"
+        return f"{beyond}, limit {self.limit:.1f}"
+
+
+# --- passes ------------------------------------------------------------------------------------------------------
+def describe_pass(row: Row, exceeded: ExceededTests) -> Statement:
+    """Describe the pass that deviates most, and whether the other sensor deviates there as well."""
+    if row["by"] == "drift":
+        return _drift(row, exceeded)
+    patterns = exceeded.tests.patterns
+    means, number = patterns[patterns["by"] == "pass"], int(row["low"])
+    of_other = (means["family"] == row["family"]) & (means["low"] == row["low"]) & (means["sensor"] != row["sensor"])
+    other_m = means[of_other]["mean_m"]
+    is_of_both = bool(len(other_m)) and float(other_m.iloc[0]) * row["mean_m"] > row["mean_m"] ** 2 / 4
+    other_sensor = SENSORS["mbes" if row["sensor"] == "laser" else "laser"]
+    also = f" and {other_sensor} {1000 * other_m.iloc[0]:+.1f} mm" if is_of_both else ""
+    if abs(row["mean_m"]) > MAX_DRIFT_M:
+        cause = f"wrong {exceeded.tests.shape}, or a coarse mount farther off than segment searches"
+    elif is_of_both:
+        cause = "drift of the INS in that pass, or its clock: sail again, in shorter time"
+    elif row["sensor"] == "mbes":
+        cause = "the sonar's clock, the sound speed, or a bracket that moved"
+    else:
+        cause = "a wrong laser.mount, the laser's clock, or INS drift between the passes"
+    return Statement(
+        ReasonCode.PASSES_DISAGREE,
+        f"the passes do not agree: in pass {number} {SENSORS[row['sensor']]} lies {1000 * row['mean_m']:+.1f} mm{also} "
+        f"off {row['family']} against the other passes ({exceeded.outcome(row)}); likely {cause}",
+    )
+
+
+def _drift(row: Row, exceeded: ExceededTests) -> Statement:
+    """Describe a pass in which the INS would have to drift too far."""
+    turn = f"{abs(np.degrees(row['mean_m'])):.3f}° in {TURNS[str(row['family'])]}"
+    return Statement(
+        ReasonCode.INS_DRIFT_BETWEEN_PASSES,
+        f"the passes do not agree: for both sensors to fit in pass {int(row['low'])}, the INS must be wrong there by "
+        f"{turn} more than in the other passes ({exceeded.outcome(row)}); likely a bracket that moved in that pass, a "
+        "sensor's clock, or ins.drift is too small",
+    )
+
+
+# --- everything else ---------------------------------------------------------------------------------------------
+def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
+    """Describe a deviation by face, angle, ping, distance or time."""
+    variable, low, high = row["by"], row["low"], row["low"] + row["width"]
+    if variable == "step":
+        return _step(row, exceeded)
+    if variable.startswith(CYCLE):
+        return _cycle(row, exceeded)
+    lies = f"{SENSORS[row['sensor']]} lies {1000 * row['mean_m']:+.1f} mm off {row['family']} ({exceeded.outcome(row)})"
+    if variable == "face":
+        return Statement(
+            ReasonCode.RESIDUALS_BY_FACE,
+            f"residuals go with face: on face {exceeded.tests.face_names[int(low)]} {lies}; likely that face is not "
+            "where the config has it: survey it (as_built.faces), and see what stands before it",
+        )
+    if variable == "angle":
+        angles = "receive angles" if row["sensor"] == "mbes" else "elevations"
+        words = f"residuals go with angle: between {angles} {low:.0f}° and {high:.0f}° {lies}"
+        return Statement(ReasonCode.RESIDUALS_BY_ANGLE, words)
+    if variable == "distance":
+        words = f"residuals go with distance: from {low:.0f} to {high:.0f} m {lies}"
+        return Statement(ReasonCode.RESIDUALS_BY_DISTANCE, words)
+    words = f"residuals go with time: for ten seconds (GPS {low:.0f}) {lies}"
+    return Statement(ReasonCode.RESIDUALS_BY_TIME, words)
+
+
+def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
+    """Describe pings that deviate in turn.
+
+    Modes that a sonar takes in turn, whose fans are tilted differently, displace whole pings along the track.
+    """
+    pings = int(row["by"].removeprefix(CYCLE))
+    which = f"one ping of {pings} (those whose number divided by {pings} leaves {row['low']:.0f})"
+    return Statement(
+        ReasonCode.RESIDUALS_BY_PING,
+        f"residuals go with pings: in {which} the sonar lies {1000 * row['mean_m']:+.1f} mm off {row['family']} "
+        f"against the other pings ({exceeded.outcome(row)}); likely modes taken in turn (frequencies, swaths) whose "
+        "transmit fans have different tilts: give each sounding its tilt (column transmit_tilt_deg of a table), or "
+        "record in a single mode",
+    )
+
+
+def _step(row: Row, exceeded: ExceededTests) -> Statement:
+    """Describe a step of the sonar's distances at one receive angle.
+
+    If the steps of two families have different signs at one angle, soundings are displaced along the track: a face
+    turned to one side then lies too near, and one turned to the other side too far.
+    """
+    rows = exceeded.rows
+    steps = rows[(rows["by"] == "step") & ((rows["low"] - row["low"]).abs() <= SAME_STEP_DEG)]
+    opposite = steps[(steps["family"] != row["family"]) & (steps["mean_m"] * row["mean_m"] < 0)]
+    also, cause = "", "a sector of the fan, or a detection, whose ranges or angles differ from the rest"
+    if len(opposite):
+        other = opposite.loc[opposite["normalised"].abs().idxmax()]
+        also = f", and from {other['family']} by {1000 * other['mean_m']:+.1f} mm"
+        cause = (
+            "transmit sectors of different tilt: the soundings on one side of it lie farther forward than those on the "
+            "other; give each its tilt (column transmit_tilt_deg of a table), or record with a single sector"
+        )
+    return Statement(
+        ReasonCode.RESIDUALS_STEP,
+        f"residuals go with angle: at a receive angle of {row['low']:.0f}° the sonar's distance from {row['family']} "
+        f"steps by {1000 * row['mean_m']:+.1f} mm{also} ({exceeded.outcome(row)}); likely {cause}",
+    )

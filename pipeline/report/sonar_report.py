@@ -1,0 +1,105 @@
+"""What the report says of a calibration of the sonar against the laser."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from pipeline.config.mount import Mount
+from pipeline.config.pool import Method, Segment
+from pipeline.config.session import Mbes
+from pipeline.mount import Mounted, mount_of, turned
+from pipeline.report.ambiguities import MountSearch
+from pipeline.report.cast_checks import cast_warnings, describe_cast
+from pipeline.report.evidence import Evidence
+from pipeline.report.method_blocks import Block, adjustment_block, mounted_of, patent_blocks
+from pipeline.report.plane_agreement import lifted_moments_by_family, plane_agreement_table
+from pipeline.report.sensor_report import SensorReport
+from pipeline.report.warnings import passes_with_one_sensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class SonarSettings:
+    """Settings of a sonar's report.
+
+    Attributes
+    ----------
+    mbes : the sonar
+    segment : limits of the search for its provisional mount
+    method : the method that is to be the result
+    sides : the setting that tells the target's left from its right, for people
+    """
+
+    mbes: Mbes
+    segment: Segment
+    method: Method
+    sides: str
+
+
+def sonar_report(settings: SonarSettings, evidence: Evidence, passes: Sequence[Mapping[str, Any]]) -> SensorReport:
+    """Return the sonar's parts of a report.
+
+    Parameters
+    ----------
+    settings : of the sonar and its search
+    evidence : tables of the run
+    passes : rows of calibration.json
+    """
+    mbes, method = settings.mbes, settings.method
+    coarse = mount_of(mbes.mount)
+    methods = {} if evidence.corrections is None else patent_blocks(evidence.corrections, coarse)
+    methods["adjustment"] = adjustment_block(evidence.estimate, evidence.covariance, evidence.summary, coarse)
+    max_angle_deg, max_lever_arm_m = settings.segment.farthest_mount
+    return SensorReport(
+        coarse=coarse,
+        methods=methods,
+        method=method,
+        search=MountSearch(
+            sensor="mbes",
+            max_angle_deg=max_angle_deg,
+            max_lever_arm_m=max_lever_arm_m,
+            angles_advice=_angles_advice(mbes.mount, evidence.provisional_mount.iloc[0]),
+        ),
+        sides=settings.sides,
+        advice="; ".join(evidence.geometry["words"]),
+        result_keys={"mbes": methods[method], "methods": methods},
+        data_keys={"ranges": _range_note(mbes)} | _cast_block(mbes),
+        instruments={"mbes": mbes},
+        pass_warnings=tuple(passes_with_one_sensor(passes)),
+        cast_warnings=tuple(cast_warnings(mbes, evidence.files, methods["adjustment"]["correction"])),
+        closing=_closing(evidence, coarse, methods),
+    )
+
+
+def _angles_advice(coarse: Mount, provisional: pd.Series) -> str:
+    """Say which angles to enter, where the coarse ones have been checked and the soundings still ask for others."""
+    settings = turned(coarse, [float(provisional[f"rotation_{axis}_deg"]) for axis in "xyz"]).settings()
+    values = ", ".join(f"{key} {settings[key]:.1f}" for key in ("roll_deg", "pitch_deg", "yaw_deg"))
+    return f"; if you have checked the signs, enter {values} as mbes.mount and run again"
+
+
+def _range_note(mbes: Mbes) -> str:
+    """Say how ranges were reduced, and whether rays were traced."""
+    note = "sonar ranges taken as recorded: half the two-way path"
+    if mbes.projector_offset_m is not None:
+        note = f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
+    if mbes.svp is None:
+        return note
+    note = f"{note}; rays traced through a cast of {len(mbes.svp)} depths"
+    return note if mbes.svp_from is None else f"{note} (mbes.svp {describe_cast(mbes.svp_from)})"
+
+
+def _cast_block(mbes: Mbes) -> dict[str, Any]:
+    """Return the key ``cast`` of calibration.json; empty without a cast."""
+    if mbes.svp is None:
+        return {}
+    source = {} if mbes.svp_from is None else mbes.svp_from.model_dump(mode="json")
+    return {"cast": {"depths": len(mbes.svp), "sigma_m_s": mbes.svp_sigma_m_s} | source}
+
+
+def _closing(evidence: Evidence, coarse: Mounted, methods: Mapping[str, Block]) -> pd.DataFrame:
+    """Return the agreement of the planes with the coarse mount and with that of every method that has a result."""
+    mounts = {"coarse": coarse} | {name: mounted_of(block) for name, block in methods.items() if block["mount"]}
+    moments = lifted_moments_by_family(evidence.faces, evidence.sounding_moments)
+    return plane_agreement_table(evidence.planes, moments, coarse, mounts)

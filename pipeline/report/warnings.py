@@ -1,0 +1,103 @@
+"""What does not reject a calibration, and still is to be looked at before anyone leaves."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.console import plural
+from pipeline.maths.adjustment.solution import WORDS
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.report.reason_codes import ReasonCode, Statement
+
+MAX_VARIANCE_FACTOR = 2.0  # of a group of observations: above this, or below its inverse, its sigmas are wrong
+MAX_COMMON_VARIANCE_FACTOR = 4.0  # of what an epoch's points share; a small one is a good INS
+MAX_OUTLIER_SHARE = 0.01  # of a group of observations
+MAX_TARGET_OFFSET_M = 0.1  # from target.origin, along each axis
+MAX_TARGET_TILT_DEG = 0.1  # out of plumb
+
+GROUP_WORDS = {
+    "laser": "laser points",
+    "mbes_vertical": "soundings on vertical faces",
+    "mbes_horizontal": "soundings on horizontal faces",
+}
+COMMON_NOISE = {  # groups of what an epoch's points share: code, and words for the root of the variance factor
+    "ins_white": (
+        ReasonCode.INS_NOISE_ABOVE_SETTINGS,
+        "the INS's poses scatter from record to record {:.1f} times as much as ins.white says: its filter, or the "
+        "laser's clock",
+    ),
+    "ping": (
+        ReasonCode.PING_NOISE_ABOVE_SETTINGS,
+        "whole pings scatter {:.1f} times as much as ins.white says: the sonar's clock, or stabilised beams",
+    ),
+}
+
+
+def geometry_gaps(geometry: pd.DataFrame, sigmas: Mapping[str, float] | None) -> list[Statement]:
+    """Return a warning for each gap in the geometry, with the largest total sigmas that come of it.
+
+    ``geometry``: the table; ``sigmas``: total sigmas of the mount by setting, degrees and m, where there are any.
+    """
+    suffix = "" if sigmas is None else _sigma_suffix(sigmas)
+    gaps = geometry.loc[geometry["kind"] == "gap", "words"]
+    return [Statement(ReasonCode.GEOMETRY_GAP, f"{words}{suffix}") for words in gaps]
+
+
+def _sigma_suffix(sigmas: Mapping[str, float]) -> str:
+    """Name the largest sigma of the angles and of the lever arm."""
+    angle, arm = (
+        max((sigmas[key], WORDS[place]) for _, place, key, unit in PARAMETERS if unit == kind) for kind in ("deg", "m")
+    )
+    return f"; total sigmas are up to {angle[0]:.3f}° ({angle[1]}) and {1000 * arm[0]:.1f} mm ({arm[1]})"
+
+
+def unexpected_noise(groups: pd.DataFrame) -> Iterator[Statement]:
+    """Yield a warning for each group of observations (table ``groups``) with unexpected noise or many outliers."""
+    for row in groups.to_dict("records"):
+        factor, cut_share = row["variance_factor"], row["cut"] / max(row["count"], 1)
+        if row["group"] in COMMON_NOISE:
+            if factor > MAX_COMMON_VARIANCE_FACTOR:
+                code, words = COMMON_NOISE[row["group"]]
+                yield Statement(code, words.format(np.sqrt(factor)))
+            continue
+        name = GROUP_WORDS[row["group"]]
+        if factor > MAX_VARIANCE_FACTOR or factor < 1 / MAX_VARIANCE_FACTOR:
+            yield Statement(
+                ReasonCode.NOISE_OFF_SIGMAS,
+                f"{name} scatter {np.sqrt(factor):.1f} times as much as the session's sigmas say: "
+                f"{'more' if factor > 1 else 'less'} noise, or a target that is not as configured",
+            )
+        if cut_share > MAX_OUTLIER_SHARE:
+            yield Statement(
+                ReasonCode.MANY_OUTLIERS,
+                f"{100 * cut_share:.1f} % of {name} were cut as outliers: look at the residuals of the faces",
+            )
+
+
+def target_off_origin(target: Mapping[str, Any]) -> list[Statement]:
+    """Return a warning if the target (block of calibration.json) stands far from where it was surveyed, or leans."""
+    x, y, z = target["offset_m"]
+    tilts = target["tilt_deg"]
+    if not (max(abs(x), abs(y), abs(z)) > MAX_TARGET_OFFSET_M or max(map(abs, tilts)) > MAX_TARGET_TILT_DEG):
+        return []
+    words = (
+        f"the target was found {x:+.2f}, {y:+.2f}, {z:+.2f} m (x, y, z) from target.origin, out of plumb by "
+        f"{tilts[0]:+.2f}° and {tilts[1]:+.2f}°: if it was set up and surveyed better than this, check laser.mount"
+    )
+    return [Statement(ReasonCode.TARGET_OFF_ORIGIN, words)]
+
+
+def passes_with_one_sensor(passes: Sequence[Mapping[str, Any]]) -> Iterator[Statement]:
+    """Yield a warning for each sensor that missed the target where the other saw it; ``passes``: as reported."""
+    laser_alone = "the laser saw the target, and there are no soundings on it"
+    sonar_alone = "the sonar saw the target, and there are no laser points on it"
+    for present, missing, code, words in (
+        ("laser_points", "soundings", ReasonCode.PASS_WITHOUT_SOUNDINGS, laser_alone),
+        ("soundings", "laser_points", ReasonCode.PASS_WITHOUT_LASER, sonar_alone),
+    ):
+        numbers = [str(row["pass"]) for row in passes if row[present] and not row[missing]]
+        if numbers:
+            noun = plural(len(numbers), "pass").partition(" ")[2]
+            yield Statement(code, f"{noun} {', '.join(numbers)}: {words}; was it recording?")

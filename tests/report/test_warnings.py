@@ -1,0 +1,85 @@
+"""Each warning, on both sides of its limit. What the warnings say is in test_wording.py."""
+
+import pandas as pd
+import pytest
+
+from pipeline.config.session import Drift, Mbes
+from pipeline.report.cast_checks import cast_warnings
+from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.reason_codes import ReasonCode
+from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
+from tests.support.evidence import FIGURES, FOUND, SIGMA, codes, drift, gaps, groups
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({}, []),
+        ({"variance_factor": 1.99}, []),
+        ({"variance_factor": 2.01}, [ReasonCode.NOISE_OFF_SIGMAS]),
+        ({"variance_factor": 0.51}, []),
+        ({"variance_factor": 0.49}, [ReasonCode.NOISE_OFF_SIGMAS]),
+        ({"group": "ins_white", "variance_factor": 0.01}, []),
+        ({"group": "ins_white", "variance_factor": 4.1}, [ReasonCode.INS_NOISE_ABOVE_SETTINGS]),
+        ({"group": "ping", "variance_factor": 3.9}, []),
+        ({"group": "ping", "variance_factor": 9.0}, [ReasonCode.PING_NOISE_ABOVE_SETTINGS]),
+        ({"cut": 10}, []),
+        ({"cut": 11}, [ReasonCode.MANY_OUTLIERS]),
+        ({"cut": 11, "variance_factor": 9.0}, [ReasonCode.NOISE_OFF_SIGMAS, ReasonCode.MANY_OUTLIERS]),
+    ],
+)
+def test_noise_that_is_not_as_configured(change, expected):
+    assert codes([*unexpected_noise(groups(**change))]) == expected
+
+
+@pytest.mark.parametrize(
+    ("change", "warned"),
+    [({}, False), ({"offset_m": [0.0, -0.11, 0.0]}, True), ({"tilt_deg": [0.0, 0.11]}, True)],
+)
+def test_a_target_far_from_where_it_was_surveyed(change, warned):
+    assert codes(target_off_origin(FOUND | change)) == [ReasonCode.TARGET_OFF_ORIGIN] * warned
+
+
+def test_each_gap_in_the_geometry_is_a_warning():
+    assert geometry_gaps(gaps(), SIGMA) == []
+    assert codes(geometry_gaps(gaps("one pass alone", "no wall"), SIGMA)) == [ReasonCode.GEOMETRY_GAP] * 2
+    assert [gap.words for gap in geometry_gaps(gaps("one pass alone"), None)] == ["one pass alone"]
+
+
+def test_a_pass_that_one_sensor_missed_is_said():
+    rows = [(0, 9000, 400), (1, 0, 0), (2, 8000, 0), (5, 8000, 0), (6, 0, 300)]
+    passes = [{"pass": k, "laser_points": laser, "soundings": sonar} for k, laser, sonar in rows]
+    both = [ReasonCode.PASS_WITHOUT_SOUNDINGS, ReasonCode.PASS_WITHOUT_LASER]
+    assert codes([*passes_with_one_sensor(passes)]) == both
+    assert [*passes_with_one_sensor(passes[:2])] == []
+
+
+@pytest.mark.parametrize(("sigmas", "far"), [(1.19, False), (1.21, True)])
+def test_an_ins_that_drifts_farther_than_its_figures(sigmas, far):
+    vertical = Drift(**dict.fromkeys(FIGURES, 0.0) | {"vertical_m": 0.02})
+    for figures in (Drift(), vertical):
+        check = check_ins_drift(drift(sigmas), figures)
+        assert (check is not None and check.code == ReasonCode.INS_DRIFT_ABOVE_SETTINGS) == far
+    assert check_ins_drift(drift(sigmas).iloc[:0], Drift()) is None
+
+
+CAST = ((0.0, 1500.0), (5.0, 1501.0))
+
+
+@pytest.mark.parametrize(
+    ("cast", "recorded_m_s", "turn_deg", "expected"),
+    [
+        (CAST, 1500.0, [0.0, 1.9, 1.0], [ReasonCode.RAYS_TRACED_WITH_WRONG_MOUNT]),
+        (CAST, 1500.0, [0.0, 1.9, 0.5], []),
+        (CAST, 1500.0, None, []),
+        (CAST, 1504.1, None, [ReasonCode.CAST_OFF_HEAD_SPEED]),
+        (CAST, 1503.9, None, []),
+        (CAST, 1496.9, None, [ReasonCode.CAST_OFF_HEAD_SPEED]),
+        (CAST, float("nan"), None, []),
+        (None, 1470.0, [0.0, 3.0, 0.7], []),
+    ],
+)
+def test_a_cast_of_other_water_and_rays_bent_with_a_wrong_mount(cast, recorded_m_s, turn_deg, expected):
+    files = pd.DataFrame({"sound_speed_low_m_s": [recorded_m_s], "sound_speed_high_m_s": [recorded_m_s]})
+    warnings = cast_warnings(Mbes.model_construct(svp=cast), files, {"rotation_vector_deg": turn_deg})
+    assert codes([*warnings]) == expected

@@ -1,0 +1,316 @@
+"""The words of every reason and warning: the one place that holds sentences."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from pipeline.config.pool import Verdict
+from pipeline.config.resolved import CastUsed
+from pipeline.config.session import Drift, Mbes
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.report.as_built import deviations_from_design
+from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
+from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.report.verdict import rejections
+from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
+from tests.support.evidence import (
+    ADJUSTED,
+    FIGURES,
+    FOUND,
+    OFF,
+    PASS_3,
+    SEARCH,
+    SIGMA,
+    drift,
+    evidence,
+    gaps,
+    groups,
+    judged,
+    methods,
+)
+
+IN_TURN = replace(ADJUSTED, method="patent_alternating")
+OF_LASER = replace(ADJUSTED, search=replace(SEARCH, sensor="laser", max_angle_deg=1.5, max_lever_arm_m=float("inf")))
+SHAPE = {"b_m": 3.0, "e_m": 0.5, "corner_deg": {"P1": 45.0, "P3": 45.0}, "lean_deg": {"P1": 0.0, "P2": 0.0, "P3": 0.0}}
+FILES = pd.DataFrame({"sound_speed_low_m_s": [1504.1], "sound_speed_high_m_s": [1504.1]})
+CAST = ((0.0, 1500.0), (5.0, 1501.0))
+USED = CastUsed(
+    file="1.svp", sha256="0" * 64, kind="text", number=1, casts=1, taken="2026-05-09 05:00:00", place_deg=(36.0, 120.0),
+    rows=2, left_out={}, first_m=0.0, last_m=5.0, tolerance_m_s=0.1, averaged_m=0.0, scatter_m_s=0.0,
+)  # fmt: skip
+
+REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, words
+    (
+        {"pose": {"ambiguous": True}},
+        ReasonCode.AMBIGUOUS_TARGET_POSE,
+        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m²); let the laser see the wall's",
+    ),
+    (
+        {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0}},
+        ReasonCode.AMBIGUOUS_TARGET_POSE,
+        "better (11.00 against 10.00 m²); check target.origin",
+    ),
+    (
+        {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0, "rival": "left and right exchanged"}},
+        ReasonCode.AMBIGUOUS_TARGET_POSE,
+        "; check the target's left and right first, then target.origin",
+    ),
+    (
+        {"pose": {"within": False}},
+        ReasonCode.TARGET_BEYOND_SEARCH,
+        "no pose of the target within the search limits fits the laser points: target.origin or target.azimuth_deg is "
+        "farther off",
+    ),
+    (
+        {"mount": {"within": False}},
+        ReasonCode.MOUNT_BEYOND_SEARCH,
+        "no mount within 4.5° and 0.45 m of the coarse one brings the soundings onto the target: mbes.mount is farther",
+    ),
+    (
+        {"mount": {"within": False, "rotation_z_deg": -4.6, "lever_arm_z_m": 0.6}},
+        ReasonCode.MOUNT_BEYOND_SEARCH,
+        "onto the target; best fits -4.60° in yaw, +0.60 m in lever arm z: mbes.mount is farther off",
+    ),
+    ({"mount": {"ambiguous": True}}, ReasonCode.AMBIGUOUS_MOUNT, "the soundings fit two ways (score 0.100 against 0."),
+    (
+        {"summary": {"reason": "the data leave 2 directions open"}},
+        ReasonCode.NO_RESULT,
+        "the adjustment has no result: the data leave 2 directions open; two more passes at 3 m would do",
+    ),
+    ({"summary": {"converged": False}}, ReasonCode.NOT_CONVERGED, "the adjustment did not converge in 6 steps"),
+    ({"count": -371}, ReasonCode.TOO_FEW_SOUNDINGS, "only 29 soundings lie on P2: too few to trust; sail so that"),
+    (
+        {"fixed": [name for name, *_ in PARAMETERS]},
+        ReasonCode.NO_PARAMETER_ESTIMABLE,
+        "none of the six can be found: this target and these passes cannot give any within its limit",
+    ),
+    (
+        {"freed": {"unknown": "mbes_latency", "estimated": True, "value": 2.01e-3, "sigma": 3e-4, "considered": 4e-4}},
+        ReasonCode.ESTIMATE_OFF_SETTINGS,
+        "adjust.free found the sonar's clock: its latency is +2.0 ± 0.3 ms more than mbes.latency_s says: the mount "
+        "holds with that alone; correct it, there and in the survey, and run again",
+    ),
+    (
+        {"patterns": [PASS_3]},
+        ReasonCode.PASSES_DISAGREE,
+        "the passes do not agree: in pass 3 the sonar lies -12.0 mm off P2 against the other passes (4.0 sigma beyond "
+        "3 mm, limit 3.3); likely the sonar's clock, the sound speed, or a bracket that moved",
+    ),
+    (
+        {"patterns": [OFF | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "low": 1.0}]},
+        ReasonCode.INS_DRIFT_BETWEEN_PASSES,
+        "for both sensors to fit in pass 1, the INS must be wrong there by 0.115° in heading more than in the other "
+        "passes (3.5 times the drift that it is conceded, limit 3.3)",
+    ),
+    (
+        {"patterns": [OFF | {"by": "face", "low": 1.0}]},
+        ReasonCode.RESIDUALS_BY_FACE,
+        "residuals go with face: on face P2 the sonar lies +1.0 mm off P2 (3.5 sigma",
+    ),
+    (
+        {"patterns": [OFF]},
+        ReasonCode.RESIDUALS_BY_ANGLE,
+        "residuals go with angle: between receive angles 20° and 22° the sonar lies +1.0 mm off P2",
+    ),
+    (
+        {"patterns": [OFF | {"sensor": "laser"}]},
+        ReasonCode.RESIDUALS_BY_ANGLE,
+        "residuals go with angle: between elevations 20° and 22° the laser lies",
+    ),
+    (
+        {"patterns": [OFF | {"by": "step"}]},
+        ReasonCode.RESIDUALS_STEP,
+        "residuals go with angle: at a receive angle of 20° the sonar's distance from P2 steps by +1.0 mm",
+    ),
+    (
+        {"patterns": [OFF | {"by": "ping_2", "low": 1.0}]},
+        ReasonCode.RESIDUALS_BY_PING,
+        "residuals go with pings: in one ping of 2 (those whose number divided by 2 leaves 1) the sonar lies +1.0 mm",
+    ),
+    (
+        {"patterns": [OFF | {"by": "distance", "normalised": -3.5}]},
+        ReasonCode.RESIDUALS_BY_DISTANCE,
+        "residuals go with distance: from 20 to 22 m the sonar lies",
+    ),
+    (
+        {"patterns": [OFF | {"by": "time"}]},
+        ReasonCode.RESIDUALS_BY_TIME,
+        "residuals go with time: for ten seconds (GPS 20) the sonar lies",
+    ),
+    (
+        {"freed": {"value": 6e-4}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "likely cause of residuals (6 sigma): the sound speed: it is +0.06 ± 0.01 % above that recorded",
+    ),
+    (
+        {"freed": {"unknown": "mbes_latency", "value": 0.02}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the sonar's clock: its latency is +20.0 ± 0.1 ms more",
+    ),
+    (
+        {"freed": {"unknown": "laser_rotation_y", "value": -0.01}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "laser.mount: it should be turned by -0.573 ± 0.006° about body y (roll of the boat)",
+    ),
+    (
+        {"freed": {"unknown": "wet_H_shift", "value": 0.02}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the target: its wet faces that are horizontal lie higher by +20.0 ± 0.1 mm; check its shape",
+    ),
+]
+OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
+    (
+        lambda: judged(evidence(mount={"within": False, "rotation_z_deg": -1.6}), OF_LASER),
+        ReasonCode.MOUNT_BEYOND_SEARCH,
+        "no mount of the laser within 1.5° of the coarse one brings its points onto the target; best fits +4.40° in "
+        "pitch, +4.40° in roll, -1.60° in yaw: laser.mount is farther off than segment.search_laser_deg allows, or",
+    ),
+    (
+        lambda: rejections(
+            evidence(), {"adjustment": {"sigma_mount_total": None, "correction": None}}, ADJUSTED
+        ),
+        ReasonCode.NO_COVARIANCE,
+        "the adjustment has no covariance",
+    ),
+    (
+        lambda: judged(evidence(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=0.0059, max_sigma_m=1.0))),
+        ReasonCode.SIGMA_ABOVE_LIMIT,
+        "total sigma of yaw is 0.006°, above the limit of 0.0059°",
+    ),
+    (
+        lambda: judged(evidence(alternating={"reason": "the sonar sees no horizontal face"}), IN_TURN),
+        ReasonCode.PATENT_NO_RESULT,
+        "patent_alternating has no result: the sonar sees no horizontal face",
+    ),
+    (
+        lambda: judged(evidence(alternating={"converged": False}), IN_TURN),
+        ReasonCode.PATENT_NOT_CONVERGED,
+        "patent_alternating did not converge in 9 turns",
+    ),
+    (
+        lambda: rejections(evidence(), methods(lever_arm_m=[0.1, 0.094, 0.1]), IN_TURN),
+        ReasonCode.PATENT_OFF_ADJUSTMENT,
+        "patent_alternating differs from the adjustment by -0.0060 m in lever arm y, more than",
+    ),
+    (
+        lambda: rejections(evidence(), methods(rotation_vector_deg=[0.8, -0.8, 0.86]), IN_TURN),
+        ReasonCode.PATENT_OFF_ADJUSTMENT,
+        "differs from the adjustment by +0.0600° in yaw, more than",
+    ),
+    (
+        lambda: _one(check_ins_drift(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0)))),
+        ReasonCode.INS_DRIFT_NOT_GIVEN,
+        "ins.drift concedes the INS no drift at all: give its figures before anything else is looked for",
+    ),
+    (
+        lambda: _one(check_ins_drift(drift(1.21), Drift())),
+        ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
+        "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before anything else is looked",
+    ),
+    (
+        lambda: geometry_gaps(gaps("one pass alone"), SIGMA),
+        ReasonCode.GEOMETRY_GAP,
+        "one pass alone; total sigmas are up to 0.006° (yaw) and 0.6 mm (lever arm y)",
+    ),
+    (
+        lambda: unexpected_noise(groups(variance_factor=2.01)),
+        ReasonCode.NOISE_OFF_SIGMAS,
+        "soundings on horizontal faces scatter 1.4 times as much as the session's sigmas say: more noise, or",
+    ),
+    (lambda: unexpected_noise(groups(variance_factor=0.49)), ReasonCode.NOISE_OFF_SIGMAS, "sigmas say: less noise"),
+    (
+        lambda: unexpected_noise(groups(group="ins_white", variance_factor=4.1)),
+        ReasonCode.INS_NOISE_ABOVE_SETTINGS,
+        "the INS's poses scatter from record to record 2.0 times as much as ins.white says",
+    ),
+    (
+        lambda: unexpected_noise(groups(group="ping", variance_factor=9.0)),
+        ReasonCode.PING_NOISE_ABOVE_SETTINGS,
+        "whole pings scatter 3.0 times as much as ins.white says",
+    ),
+    (
+        lambda: unexpected_noise(groups(cut=11)),
+        ReasonCode.MANY_OUTLIERS,
+        "1.1 % of soundings on horizontal faces were cut as outliers",
+    ),
+    (
+        lambda: target_off_origin(FOUND | {"tilt_deg": [0.0, 0.11]}),
+        ReasonCode.TARGET_OFF_ORIGIN,
+        "the target was found +0.00, +0.05, -0.09 m (x, y, z) from target.origin, out of plumb by +0.00° and +0.11°: "
+        "if it was set up and surveyed better than this, check laser.mount",
+    ),
+    (
+        lambda: passes_with_one_sensor([{"pass": k, "laser_points": 9, "soundings": 0} for k in (2, 5)]),
+        ReasonCode.PASS_WITHOUT_SOUNDINGS,
+        "passes 2, 5: the laser saw the target, and there are no soundings on it; was it recording?",
+    ),
+    (
+        lambda: passes_with_one_sensor([{"pass": 6, "laser_points": 0, "soundings": 9}]),
+        ReasonCode.PASS_WITHOUT_LASER,
+        "pass 6: the sonar saw the target, and there are no laser points on it; was it recording?",
+    ),
+    (
+        lambda: deviations_from_design(SHAPE | {"b_m": 3.012}, SHAPE),
+        ReasonCode.LENGTH_OFF_DESIGN,
+        "the laser finds b = 3.0120 m where the config has 3 m: measure it",
+    ),
+    (
+        lambda: deviations_from_design(SHAPE | {"corner_deg": {"P1": 45.0, "P3": 45.3}}, SHAPE),
+        ReasonCode.ANGLE_OFF_DESIGN,
+        "the laser finds 45.30° between wall and P3, by design 45°",
+    ),
+    (
+        lambda: cast_origin_warnings(USED, (1_462_500_000_000_000_000,) * 2, None),
+        ReasonCode.CAST_OF_ANOTHER_TIME,
+        "mbes.svp: 1.svp was taken at 2026-05-09 05:00:00, ",
+    ),
+    (
+        lambda: cast_origin_warnings(USED, None, (37.0, 120.0)),
+        ReasonCode.CAST_OF_ANOTHER_PLACE,
+        "mbes.svp: 1.svp was taken 111 km from here: the cast is taken for true",
+    ),
+    (
+        lambda: cast_warnings(Mbes.model_construct(svp=CAST), FILES, {"rotation_vector_deg": None}),
+        ReasonCode.CAST_OFF_HEAD_SPEED,
+        "mbes.svp lies between 1500.0 and 1501.0 m/s, the head recorded 1504.1 to 1504.1",
+    ),
+    (
+        lambda: cast_warnings(
+            Mbes.model_construct(svp=CAST), FILES.replace(1504.1, 1500.0), {"rotation_vector_deg": [0.0, 1.9, 1.0]}
+        ),
+        ReasonCode.RAYS_TRACED_WITH_WRONG_MOUNT,
+        "rays were traced through mbes.svp with a coarse mount that is 2.1° off: enter the values found as mbes.mount",
+    ),
+]
+
+
+def _one(check: Statement | None) -> list[Statement]:
+    return [] if check is None else [check]
+
+
+@pytest.mark.parametrize(("change", "code", "words"), REASONS)
+def test_each_evidence_is_one_reason(change: dict[str, Any], code: ReasonCode, words: str) -> None:
+    (reason,) = judged(evidence(**change))
+    assert reason.code == code
+    assert words in reason.words
+
+
+@pytest.mark.parametrize(("statements", "code", "words"), OTHERS)
+def test_each_statement_has_its_words(
+    statements: Callable[[], Iterable[Statement]], code: ReasonCode, words: str
+) -> None:
+    (statement,) = statements()
+    assert statement.code == code
+    assert words in statement.words
+
+
+def test_no_code_is_without_words_and_a_meaning() -> None:
+    assert {code for _, code, _ in [*REASONS, *OTHERS]} == set(ReasonCode)
+    for code in ReasonCode:
+        assert code.value == code.name.lower() == str(code)
+        assert code.meaning
+        assert "\n" not in code.meaning

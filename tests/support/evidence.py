@@ -1,0 +1,110 @@
+"""Evidence of a good session for the report, and what can be changed in it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import pandas as pd
+
+from pipeline.config.pool import Verdict
+from pipeline.report.ambiguities import MountSearch
+from pipeline.report.evidence import Evidence
+from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.report.verdict import Criteria, rejections
+
+SIGMA = {"roll_deg": 0.002, "pitch_deg": 0.005, "yaw_deg": 0.006, "x_m": 1e-4, "y_m": 6e-4, "z_m": 3e-4}
+ZERO = {"rotation_vector_deg": [0.8, -0.8, 0.8], "lever_arm_m": [0.1, 0.1, 0.1]}
+FOUND = {"offset_m": [0.0, 0.05, -0.09], "tilt_deg": [0.05, -0.05]}  # of a target that is where it should be
+FIGURES = ("horizontal_m", "vertical_m", "roll_pitch_deg", "heading_deg")
+OFF = {"normalised": 3.5}  # beyond the limit of one row, 3.29
+PASS_3 = {"by": "pass", "low": 3.0, "mean_m": -0.012, "normalised": -4.0}
+SEARCH = MountSearch(sensor="mbes", max_angle_deg=4.5, max_lever_arm_m=0.45)
+ADJUSTED = Criteria(
+    limits=Verdict(), test_level=0.001, tolerance_m=0.003, method="adjustment", search=SEARCH,
+    shape="target.a, b, c, e and low_side",
+)  # fmt: skip
+
+
+def methods(**patent: Any) -> dict[str, Any]:
+    """Blocks of the adjustment and of a patent's form, the latter with another correction."""
+    adjustment = {"sigma_mount_total": SIGMA, "correction": ZERO}
+    return {"adjustment": adjustment, "patent_alternating": {"sigma_mount": None, "correction": ZERO | patent}}
+
+
+def evidence(
+    *,
+    pose: Mapping[str, Any] | None = None,
+    mount: Mapping[str, Any] | None = None,
+    summary: Mapping[str, Any] | None = None,
+    alternating: Mapping[str, Any] | None = None,
+    freed: Mapping[str, Any] | None = None,
+    patterns: Sequence[Mapping[str, Any]] = ({},),
+    fixed: Sequence[str] = (),
+    count: int = 500,
+) -> Evidence:
+    """Tables of a session that is accepted, with changes to their rows."""
+    pose_row = {
+        "ambiguous": False,
+        "rival": "one block higher",
+        "rival_agreement_m2": 9.0,
+        "agreement_m2": 10.0,
+        "within": True,
+    }
+    mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4, "within": True}
+    mount_row |= {f"rotation_{axis}_deg": 4.4 for axis in "xyz"} | {f"lever_arm_{axis}_m": 0.44 for axis in "xyz"}
+    summary_row = {"reason": "", "converged": True, "iterations": 6}
+    row = {"method": "patent_alternating", "reason": "", "converged": True, "iterations": 9}
+    cells = pd.DataFrame(
+        {
+            "sensor": ["laser", "mbes", "mbes"],
+            "family": ["P1", "P2", "P2"],
+            "pass": [0, 3, 4],
+            "count": [5000, 400, count],
+        }
+    )
+    nothing = {"unknown": "sound_speed", "estimated": False, "considered": 1e-4, "value": 2e-4, "sigma": 1e-4}
+    pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
+    geometry = [("remedy", "two more passes at 3 m would do", 0.0)] + [("held", name, 0.1) for name in fixed]
+    tables: dict[str, pd.DataFrame | None] = {field.name: pd.DataFrame() for field in fields(Evidence)}
+    tables |= {
+        "faces": pd.DataFrame({"name": ["P1-0", "P2"]}),
+        "target_pose": pd.DataFrame([pose_row | dict(pose or {})]),
+        "provisional_mount": pd.DataFrame([mount_row | dict(mount or {})]),
+        "corrections": pd.DataFrame([row | dict(alternating or {})]),
+        "summary": pd.DataFrame([summary_row | dict(summary or {})]),
+        "cells": cells,
+        "geometry": pd.DataFrame(geometry, columns=["kind", "words", "sigma"]),
+        "freed": pd.DataFrame([nothing | dict(freed or {})]),
+        "patterns": pd.DataFrame([pattern | {"normalised": 0.3} | dict(changes) for changes in patterns]),
+    }
+    return Evidence(**tables)  # type: ignore[arg-type]
+
+
+def judged(tables: Evidence, criteria: Criteria = ADJUSTED) -> list[Statement]:
+    """The reasons to reject."""
+    return rejections(tables, methods(), criteria)
+
+
+def codes(statements: Sequence[Statement]) -> list[ReasonCode]:
+    """What they say, without the words."""
+    return [statement.code for statement in statements]
+
+
+def groups(**changes: Any) -> pd.DataFrame:
+    """The table of variance factors, with one group."""
+    row = {"group": "mbes_horizontal", "count": 1000, "variance_factor": 1.0, "cut": 0}
+    return pd.DataFrame([row | changes])
+
+
+def gaps(*words: str) -> pd.DataFrame:
+    """The table geometry, with gaps and a remedy."""
+    rows = [("gap", gap) for gap in words] + [("remedy", "two more")]
+    return pd.DataFrame(rows, columns=["kind", "words"])
+
+
+def drift(sigmas: float) -> pd.DataFrame:
+    """The table drift with values of so many sigmas in every component, at three knots."""
+    values = {"x": 0.015, "y": 0.015, "z": 0.02}, {"x": 0.01, "y": 0.01, "z": 0.03}
+    columns = {f"{axis}_target_m": value for axis, value in values[0].items()}
+    columns |= {f"turn_{axis}_target_deg": value for axis, value in values[1].items()}
+    return pd.DataFrame([{name: sign * sigmas * value for name, value in columns.items()} for sign in (1, -1, -1)])
