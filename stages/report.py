@@ -20,6 +20,7 @@ from pipeline.report.calibration_document import (
     geometry_block,
     instruments_block,
     pass_rows,
+    statement_lists,
     target_block,
 )
 from pipeline.report.drift_check import NO_DRIFT, check_ins_drift
@@ -100,8 +101,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "session": config.name,
         "verdict": verdict,
         "verdict_in_words": verdict_in_words(verdict, inputs.fixed),
-        "reasons": [statement.words for statement in reasons],
-        "warnings": [statement.words for statement in warnings],
+        **statement_lists("reason", reasons),
+        **statement_lists("warning", warnings),
         "result": report.method,
         **report.result_keys,
         "coarse": {"mount": report.coarse.settings()},

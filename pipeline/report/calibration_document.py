@@ -1,8 +1,8 @@
 """Blocks of calibration.json that every calibration has, and its documents."""
 
 import json
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,7 @@ from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.gps_time import utc_text
 from pipeline.maths.adjustment.parameters import SIX
 from pipeline.report.evidence import Evidence
+from pipeline.report.reason_codes import Statement
 from pipeline.report.suspected_causes import estimated_parameters
 
 SCHEMA = 1
@@ -24,6 +25,14 @@ def json_number(value: Any) -> bool | int | float | None:
         return bool(value)
     number = float(value)
     return None if not np.isfinite(number) else int(number) if number.is_integer() and abs(number) < 1e9 else number
+
+
+def statement_lists(kind: Literal["reason", "warning"], statements: Sequence[Statement]) -> dict[str, list[str]]:
+    """Return the words of reasons or warnings, and in the same order their codes."""
+    return {
+        f"{kind}s": [statement.words for statement in statements],
+        f"{kind}_codes": [statement.code.value for statement in statements],
+    }
 
 
 def instruments_block(sensors: Mapping[str, Ins | Laser | Mbes]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pipeline.simulation.session import simulate as simulate_in_memory
 from tests.support.places import Place, Told, poolcal, result_of
 from tests.support.tables import place_soundings, write_tables
 
-KEYS = {"schema", "session", "verdict", "reasons", "mbes", "methods", "inputs", "software"}
+KEYS = {"schema", "session", "verdict", "reasons", "reason_codes", "mbes", "methods", "inputs", "software"}
 BLOCK = {"R_body_from_mbes", "lever_arm_m", "mount", "correction", "sigma", "covariance"}
 METHODS = ("patent_sequential", "patent_alternating", "adjustment")
 MOUNT = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
@@ -41,7 +41,8 @@ def test_keys(result: dict[str, Any]) -> None:
     assert result["schema"] == 1
     assert result["session"] == "2026-05-12_small"
     assert result["verdict"] == "accepted"
-    assert result["reasons"] == []
+    assert result["reasons"] == result["reason_codes"] == []
+    assert len(result["warnings"]) == len(result["warning_codes"])
     assert tuple(result["methods"]) == METHODS
     assert result["mbes"] == result["methods"]["adjustment"]
     assert set(result["inputs"]) == {
@@ -121,7 +122,7 @@ def test_rejected_by_the_limits(done: Place, result: dict[str, Any]) -> None:
     assert told.status == 1
     rejected = done.result()
     assert rejected["verdict"] == "rejected"
-    assert len(rejected["reasons"]) == 3
+    assert rejected["reason_codes"] == ["sigma_above_limit"] * 3
     for reason, axis in zip(rejected["reasons"], ("roll", "pitch", "yaw"), strict=True):
         assert axis in reason
         assert f"  because {reason}\n" in told.out

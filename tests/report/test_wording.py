@@ -12,6 +12,7 @@ from pipeline.config.resolved import CastUsed
 from pipeline.config.session import Drift, Mbes
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import deviations_from_design
+from pipeline.report.calibration_document import statement_lists
 from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.reason_codes import ReasonCode, Statement
@@ -306,6 +307,17 @@ def test_each_statement_has_its_words(
     (statement,) = statements()
     assert statement.code == code
     assert words in statement.words
+
+
+def test_words_and_codes_are_parallel_lists() -> None:
+    reasons = judged(evidence(count=-371, patterns=[OFF]))
+    lists = statement_lists("reason", reasons)
+    assert lists == {
+        "reasons": [reason.words for reason in reasons],
+        "reason_codes": ["too_few_soundings", "residuals_by_angle"],
+    }
+    assert all(type(code) is str for code in lists["reason_codes"])  # as YAML writes it
+    assert statement_lists("warning", []) == {"warnings": [], "warning_codes": []}
 
 
 def test_no_code_is_without_words_and_a_meaning() -> None:
