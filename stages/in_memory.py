@@ -34,7 +34,7 @@ def calibrate_in_memory(
         return {"inputs": {}, "software": {}}
 
     settings = settings_by_name(pool, session)
-    for stage in load("mbes" if session.mbes is not None else "laser"):
+    for stage in load(session.calibrated):
         inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
         outputs = run_in_memory(stage, inputs, stage_config(stage.Config, settings))
         for name, marker in declared(stage.Outputs).items():

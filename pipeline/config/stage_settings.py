@@ -77,7 +77,7 @@ def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:
     return config(**{name: _as_annotated(annotations[name], settings[name]) for name in names})
 
 
-def plain(settings: Mapping[str, Any]) -> dict[str, Any]:
+def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings as JSON has them."""
     return {
         name: value.model_dump(mode="json") if isinstance(value, BaseModel) else value

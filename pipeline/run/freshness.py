@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
-from pipeline.config.stage_settings import plain, stage_config
+from pipeline.config.stage_settings import plain_settings, stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
 from pipeline.run import manifest, provenance
@@ -61,7 +61,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
             raw |= all_raw(this)
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
-    config = plain(vars(stage_config(stage.Config, this.settings.resolved())))
+    config = plain_settings(vars(stage_config(stage.Config, this.settings.resolved())))
     if "svp" in (config.get("mbes") or {}):
         raw |= cast_digest(this)
     return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())

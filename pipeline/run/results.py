@@ -12,7 +12,7 @@ from pipeline.artefacts.parquet import read_table, rows_of
 from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import ParquetPart, Stream
 from pipeline.atomic_files import read_json
-from pipeline.config.stage_settings import plain
+from pipeline.config.stage_settings import plain_settings
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run import manifest
 from pipeline.run.settings import read_settings
@@ -70,7 +70,7 @@ def recording_path(run: Path, stage: str) -> Path:
 
 def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
     """The finished stages that follow from each other and from run.yaml, in order."""
-    settings = plain(read_settings(run).resolved())
+    settings = plain_settings(read_settings(run).resolved())
     found: dict[str, manifest.Manifest] = {}
     for stage in stages:
         one = manifest.read(run / stage)
