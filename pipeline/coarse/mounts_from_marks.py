@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from pipeline.coarse.drawing_errors import examine, examine_flat
 from pipeline.coarse.frames import NEAR_DEG, Placed, place
-from pipeline.coarse.session_edit import block_of
+from pipeline.coarse.session_file import mount_block
 from pipeline.config.marks import Marks
 from pipeline.console import signed
 from pipeline.errors import ConfigError, NotConvergedError
@@ -67,7 +67,7 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
 
 def blocks_of(answer: Answer, origin: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """By sensor, what session.yaml is to say."""
-    return {name: block_of(mounted, covariance, origin) for name, (mounted, covariance) in answer.mounts.items()}
+    return {name: mount_block(mounted, covariance, origin) for name, (mounted, covariance) in answer.mounts.items()}
 
 
 # --- in words --------------------------------------------------------------------------------------------------------

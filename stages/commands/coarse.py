@@ -6,7 +6,7 @@ import yaml
 
 from pipeline.atomic_files import write_text
 from pipeline.coarse import mounts_from_marks as calibrating
-from pipeline.coarse.session_edit import SENSORS, origin_of, read_session, written
+from pipeline.coarse.session_file import SENSORS, mount_origin, read_session, write_mounts
 from pipeline.config.marks import load_marks
 from pipeline.config.mount import Mount
 from pipeline.config.yaml_models import parse
@@ -25,8 +25,8 @@ def coarse(file: Path, session: Path, out: Path | None, write: bool) -> tuple[st
     if out is not None:
         write_text(out, yaml.safe_dump(calibrating.as_plain(answer, present), sort_keys=False, allow_unicode=True))
     if answer.agrees:
-        blocks = calibrating.blocks_of(answer, origin_of("coarse", file))
-        said.append(written(session, text, content, blocks) if write else f"{path}: not written (--no-write)")
+        blocks = calibrating.blocks_of(answer, mount_origin("coarse", file))
+        said.append(write_mounts(session, text, content, blocks) if write else f"{path}: not written (--no-write)")
         missing = [name for name in SENSORS if name not in present and name not in blocks]
         said += [f"But {name} still has no mount there." for name in missing]
     return "\n".join(said), answer.agrees
