@@ -6,6 +6,7 @@ from typing import Any
 
 from pipeline.console import plural
 from pipeline.results.compare import FACE_KEYS, Row, shown
+from pipeline.text_table import text_table
 
 
 def text(found: Mapping[str, Any]) -> str:
@@ -22,17 +23,28 @@ def text(found: Mapping[str, Any]) -> str:
         lines += ["", "counts:"]
         lines += [f"  {r['stage']}, {r['source']}, {r['reason']}: {r['a']:,} -> {r['b']:,}" for r in found["counts"]]
     if found["planes"]:
-        lines += ["", f"{'planes, b - a':<16}{'turned':>12}{'distance':>14}{'rms':>14}"]
-        for r in found["planes"]:
-            name = f"  {r['sensor']} {r['plane']}"
-            cells = (shown(r["angle_deg"], "deg", ""), shown(r["distance_m"], "m"), shown(r["rms_m"], "m"))
-            lines.append(f"{name:<16}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}")
+        planes = [
+            (
+                f"  {row['sensor']} {row['plane']}",
+                shown(row["angle_deg"], "deg", ""),
+                shown(row["distance_m"], "m"),
+                shown(row["rms_m"], "m"),
+            )
+            for row in found["planes"]
+        ]
+        lines += ["", *text_table("<16>12>14>14", ("planes, b - a", "turned", "distance", "rms"), planes)]
     if any(row["difference"] for row in found["parameters"]):
-        lines += [""]
-        lines.append(f"{'mount, b - a':<16}{'difference':>14}{'sigma':>14}{'in sigmas':>12}")
-        for r in found["parameters"]:
-            size = f"{shown(r['difference'], r['unit']):>14}{shown(r['sigma'], r['unit'], ''):>14}{r['z']:>12.1f}"
-            lines.append(f"  {r['parameter']:<14}{size}{'  moved' if r['moved'] else ''}")
+        parameters = [
+            (
+                f"  {row['parameter']}",
+                shown(row["difference"], row["unit"]),
+                shown(row["sigma"], row["unit"], ""),
+                f"{row['z']:.1f}",
+                "moved" if row["moved"] else "",
+            )
+            for row in found["parameters"]
+        ]
+        lines += ["", *text_table("<16>14>14>12  <1", ("mount, b - a", "difference", "sigma", "in sigmas"), parameters)]
     lines += [f"not compared: {why}" for why in found["not_compared"]]
     return "\n".join([*lines, "", found["sentence"] + "."])
 
