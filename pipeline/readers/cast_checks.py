@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.config.yaml_models import FOOT_M
 from pipeline.errors import RawDataError
 from pipeline.maths.sonar.cast_profile import ascending, largest_difference, one_way
 
 Array = NDArray[np.float64]
 DEEPEST_M = 200.0
 MIN_WATER_SPEED_M_S, MAX_WATER_SPEED_M_S = 1300.0, 1700.0
-FOOT_M = 0.3048
 MAX_DIFFERENCE_M_S = 2.0  # between the ways down and up
 JUMP_M_S, WITHIN_M = 10.0, 0.5  # from row to row: more is a bubble, or air
 

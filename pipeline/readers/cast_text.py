@@ -15,7 +15,7 @@ from pipeline.errors import RawDataError
 from pipeline.readers.cast_columns import cast_of_columns
 from pipeline.readers.cast_values import RecordedCast, first_two_numbers, place_of, time_of_day_of_year, time_of_digits
 
-WIDE = str.maketrans("（），；：", "(),;:")  # as Chinese and Japanese keyboards have them
+_WIDE = str.maketrans("（），；：", "(),;:")  # as Chinese and Japanese keyboards have them
 
 
 def casts_of(text: str, name: str) -> tuple[str, list[RecordedCast]]:
@@ -26,7 +26,7 @@ def casts_of(text: str, name: str) -> tuple[str, list[RecordedCast]]:
     RawDataError
         It is none of the kinds, or not depth in metres and sound speed in m/s.
     """
-    lines = text.translate(WIDE).splitlines()
+    lines = text.translate(_WIDE).splitlines()
     first = next((line.strip() for line in lines if line.strip()), "")
     if first.upper().startswith("[SVP_VERSION"):
         if not first.upper().startswith("[SVP_VERSION_2]"):

@@ -28,11 +28,11 @@ from pipeline.readers.file_kind import (
     XTF,
     FileKind,
 )
+from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.inertial_explorer_layout import names_line
 from pipeline.readers.kongsberg_all_datagrams import is_datagram_header
 from pipeline.readers.r2sonic_packets import BTH0, OTHER_PACKETS, packet_size
 from pipeline.readers.raw_file import opened, size_of
-from pipeline.readers.row_checks import through_float32
 from pipeline.readers.table_columns import column_names
 
 HEAD_BYTES = 65_536  # of a file, by which its kind is known

@@ -86,7 +86,7 @@ def raw_parts(sensor: Sensor, settings: SensorSettings, folder: Path) -> tuple[P
         Something is missing or wrong in session.yaml: ``gps_week``, ``laser.frame``, ``laser.heights``.
     """
     if isinstance(settings, Laser):
-        placing_of(openers.frame_of(settings))
+        placing_of(openers.laser_frame(settings))
     files = files_matching(folder, settings.files, f"{sensor}.files")
     for file in files:
         _refuse_other_format(file, sensor, settings)

@@ -41,9 +41,14 @@ from pipeline.readers.gsf_records import HEADER, PING, PROFILE, gsf_records
 from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import RepeatedPings
 from pipeline.readers.row_checks import Sieve
-from pipeline.readers.sounding_chunks import beam_numbers, checked_chunk, chunks_of_pings, per_sounding
-
-NO_TILT_DEG = 0.005
+from pipeline.readers.sounding_chunks import (
+    NO_TILT_DEG,
+    beam_numbers,
+    checked_chunk,
+    chunks_of_pings,
+    per_sounding,
+    single_beam_error,
+)
 
 
 @dataclass(frozen=True)
@@ -117,10 +122,7 @@ class GsfPart:
                 "which way the transmitter looks; give the sonar's own .kmall or .all"
             )
         if not number and len(ping.angle_deg) == 1:
-            raise RawDataError(
-                f"{self.name}: its pings are of one beam (a single-beam echo sounder), which sees no planes; give the "
-                "files of a multibeam sonar"
-            )
+            raise single_beam_error(self.name)
         if ping.receiver_and_swath != first.receiver_and_swath:
             raise RawDataError(
                 f"{self.name}: has soundings of several receivers or swaths, each with a mount of its own; log one "

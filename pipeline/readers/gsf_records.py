@@ -1,6 +1,6 @@
-"""Where headers, pings and profiles lie in GSF files (big-endian).
+"""Find the headers, pings and profiles of GSF files (big-endian).
 
-A record: u32 size, u32 of checksum flag (bit 31) and kind (bits 0 to 21), with the flag the u32 sum of the bytes, then
+A record: u32 size, u32 of checksum flag (bit 31) and kind (bits 0 to 21); with the flag, the u32 sum of the bytes; then
 the bytes. Where no record begins, the next ping or profile is searched for, and the gap is counted.
 """
 
@@ -14,8 +14,8 @@ from pipeline.readers.raw_file import read_at, size_of
 RECORD_HEAD = struct.Struct(">2I")
 CHECKED, KIND = 1 << 31, (1 << 22) - 1
 HEADER, PING, PROFILE, KINDS = 1, 2, 3, 12
-MAX_RECORD = 524_288
-SEARCH_BLOCK = 1 << 16
+_MAX_RECORD = 524_288
+_SEARCH_BLOCK = 1 << 16
 
 
 def gsf_records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, bytes]]:
@@ -46,19 +46,19 @@ def _span(head: bytes) -> tuple[int, int] | None:
         return None
     size, word = RECORD_HEAD.unpack_from(head)
     start = RECORD_HEAD.size + (4 if word & CHECKED else 0)
-    return (start, start + size) if 0 < size <= MAX_RECORD and 0 < word & KIND <= KINDS else None
+    return (start, start + size) if 0 < size <= _MAX_RECORD and 0 < word & KIND <= KINDS else None
 
 
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
     """Return the start of the next ping or profile that a record or the end of the file follows, or the file's end."""
     marks = [struct.pack(">I", flag | kind) for kind in (PING, PROFILE) for flag in (0, CHECKED)]
     while start < size:
-        block = read_at(file, start, SEARCH_BLOCK + 8)
-        candidates = {at for mark in marks for at in _positions_of(mark, block) if 4 <= at < SEARCH_BLOCK + 4}
+        block = read_at(file, start, _SEARCH_BLOCK + 8)
+        candidates = {at for mark in marks for at in _positions_of(mark, block) if 4 <= at < _SEARCH_BLOCK + 4}
         for at in sorted(candidates):
             if _is_record(file, start + at - 4, size):
                 return start + at - 4
-        start += SEARCH_BLOCK
+        start += _SEARCH_BLOCK
     return size
 
 

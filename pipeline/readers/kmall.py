@@ -5,7 +5,7 @@ hold all of the file's index, end with any exception at the first damaged datagr
 makes a dictionary of each sounding, and ignores the size that the datagram gives for one. So
 :mod:`pipeline.readers.kmall_datagrams` finds the datagrams, and all soundings of a datagram are read at once.
 
-Of a sounding, offsets in bytes: 2 u8 transmit sector, 3 u8 type (0 normal, 1 extra, 2 rejected), 72 f32 angle to the
+Offsets in bytes within a sounding: 2 u8 transmit sector, 3 u8 type (0 normal, 1 extra, 2 rejected), 72 f32 angle to the
 array [degrees], 80 f32 two-way travel time [s]; corrections at 76 and 84 are applied in them already. Time is the
 datagram's, that of the first sector, and the delay of the sounding's own sector. Angles are positive to port, as is the
 sign of the sectors' edges (port +, starboard -); here starboard +. The sound speed is that at the transducer's depth.
@@ -15,8 +15,8 @@ The frame ``mbes`` is that of the receiver's array, to which the beam angles ref
 way round is near 180 degrees. Each sector is tilted along track by itself (txSectorInfo, tiltAngleReTx: the steering of
 the main lobe as sent, in the transmitter's own frame), and sends from its own part of the transmitter. The installation
 turns both into the frame ``mbes`` (:mod:`pipeline.readers.kongsberg_arrays`). The tilt includes all that steered the
-sector: stabilisation of pitch or yaw, the swath of a dual swath, the mode of a ping. Of two receivers only one can be
-calibrated; pings of a single beam are no fan.
+sector: stabilisation of pitch or yaw, the swath of a dual swath, the mode of a ping. Only one of two
+receivers can be calibrated; pings of a single beam are no fan.
 """
 
 import io
@@ -29,8 +29,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from pipeline.gps_time import NS, gps_ns_from_unix_utc
-from pipeline.readers.kmall_datagrams import DATAGRAM_HEAD, DATAGRAM_LENGTH, IIP, kmall_datagrams
-from pipeline.readers.kongsberg import KongsbergPart, KongsbergPing, TransmitSectors, are_possible
+from pipeline.readers.kmall_datagrams import IIP, KMALL_HEAD, KMALL_LENGTH, kmall_datagrams
+from pipeline.readers.kongsberg import KongsbergPart, KongsbergPing, PingSectors, are_possible
 from pipeline.readers.kongsberg_arrays import Transmitter
 from pipeline.readers.kongsberg_installation import SINGLE_HEAD, transmitters_of_kmall
 from pipeline.readers.repeated_pings import RepeatedPings
@@ -69,7 +69,7 @@ def decode_mrz(datagram: bytes, installation: Installation) -> KongsbergPing | N
     reader: Any = kmall()
     reader.FID = io.BytesIO(datagram)
     try:
-        _, _, _, _, _, seconds, nanoseconds = DATAGRAM_HEAD.unpack_from(datagram)
+        _, _, _, _, _, seconds, nanoseconds = KMALL_HEAD.unpack_from(datagram)
         reader.read_EMdgmHeader()
         partition = reader.read_EMdgmMpartition()
         common = reader.read_EMdgmMbody()
@@ -83,7 +83,7 @@ def decode_mrz(datagram: bytes, installation: Installation) -> KongsbergPing | N
     start = reader.FID.tell() + receiver["numExtraDetectionClasses"] * receiver["numBytesPerClass"]
     if partition["numOfDgms"] != 1 or nanoseconds >= NS or step < MIN_SOUNDING_BYTES or count > MAX_BEAMS:
         return None
-    if start + count * step > len(datagram) - DATAGRAM_LENGTH.size:
+    if start + count * step > len(datagram) - KMALL_LENGTH.size:
         return None
     soundings = np.frombuffer(datagram, _sounding_layout(step), count, start)
     sectors = _transmit_sectors(sector_infos, common["rxTransducerInd"], installation)
@@ -126,10 +126,10 @@ def _sector_infos(reader: Any, info: dict[str, Any]) -> list[dict[str, Any]]:
     return sector_infos
 
 
-def _transmit_sectors(sector_infos: list[dict[str, Any]], receiver: int, installation: Installation) -> TransmitSectors:
+def _transmit_sectors(sector_infos: list[dict[str, Any]], receiver: int, installation: Installation) -> PingSectors:
     """Return the sectors, each with its transmitter; a head of both arrays has one number for them."""
     names = ("sectorTransmitDelay_sec", "tiltAngleReTx_deg", "txSubArray")
     delay_s, tilt_deg, array_part = (np.array([sector[name] for sector in sector_infos]) for name in names)
     head = installation.get((SINGLE_HEAD, receiver))
     transmitters = [installation.get((sector["txArrNumber"], receiver), head) for sector in sector_infos]
-    return TransmitSectors(delay_s, tilt_deg, array_part, transmitters)
+    return PingSectors(delay_s, tilt_deg, array_part, transmitters)

@@ -1,4 +1,4 @@
-"""Where #MRZ and #IIP datagrams lie in Kongsberg's .kmall files (little-endian).
+"""Find the #MRZ and #IIP datagrams of Kongsberg's .kmall files (little-endian).
 
 A datagram: u32 length, '#' and three letters, u8 version, u8 system, u16 sonar, u32 Unix seconds (UTC), u32
 nanoseconds, its body, u32 length again. Where the two lengths differ, or no datagram begins, the next whole one is
@@ -12,10 +12,10 @@ from typing import BinaryIO
 
 from pipeline.readers.raw_file import read_at, size_of
 
-DATAGRAM_HEAD = struct.Struct("<I4s2BH2I")
-DATAGRAM_LENGTH = struct.Struct("<I")
-MIN_DATAGRAM, MAX_DATAGRAM = DATAGRAM_HEAD.size + DATAGRAM_LENGTH.size, 1 << 24
-SEARCH_BLOCK = 1 << 16
+KMALL_HEAD = struct.Struct("<I4s2BH2I")
+KMALL_LENGTH = struct.Struct("<I")
+_MIN_DATAGRAM, _MAX_DATAGRAM = KMALL_HEAD.size + KMALL_LENGTH.size, 1 << 24
+_SEARCH_BLOCK = 1 << 16
 MRZ, IIP = b"#MRZ", b"#IIP"  # soundings; the installation
 
 
@@ -45,7 +45,7 @@ def _length_at(file: BinaryIO, position: int, size: int) -> int | None:
 def _is_head(head: bytes) -> bool:
     letters = head[5:8]
     plausible = len(head) == 8 and head[4:5] == b"#" and letters.isalnum() and letters.isupper()
-    return plausible and MIN_DATAGRAM <= int.from_bytes(head[:4], "little") <= MAX_DATAGRAM
+    return plausible and _MIN_DATAGRAM <= int.from_bytes(head[:4], "little") <= _MAX_DATAGRAM
 
 
 def _cut_off(file: BinaryIO, position: int, size: int) -> bool:
@@ -56,11 +56,11 @@ def _cut_off(file: BinaryIO, position: int, size: int) -> bool:
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
     """Return the start of the next whole datagram, or the file's end."""
     while start < size:
-        block = read_at(file, start, SEARCH_BLOCK + 8)
+        block = read_at(file, start, _SEARCH_BLOCK + 8)
         mark = block.find(b"#", 4)
-        while 0 <= mark < SEARCH_BLOCK + 4:
+        while 0 <= mark < _SEARCH_BLOCK + 4:
             if _length_at(file, start + mark - 4, size) is not None:
                 return start + mark - 4
             mark = block.find(b"#", mark + 1)
-        start += SEARCH_BLOCK
+        start += _SEARCH_BLOCK
     return size

@@ -16,15 +16,21 @@ from pipeline.gps_time import NS
 from pipeline.readers.kongsberg_arrays import COINCIDENT_TRANSMITTER, SectorSoundings, Transmitter
 from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import Sieve
-from pipeline.readers.sounding_chunks import beam_numbers, checked_chunk, chunks_of_pings, per_sounding
+from pipeline.readers.sounding_chunks import (
+    NO_TILT_DEG,
+    beam_numbers,
+    checked_chunk,
+    chunks_of_pings,
+    per_sounding,
+    single_beam_error,
+)
 
 MAX_TILT_DEG = 45.0
-NO_TILT_DEG = 0.005
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class TransmitSectors:
+class PingSectors:
     """A ping's transmit sectors (n,).
 
     Parameters
@@ -53,7 +59,7 @@ class KongsbergPing:
     number: int
     receiver: str
     sound_speed_m_s: float
-    sectors: TransmitSectors
+    sectors: PingSectors
     sector: NDArray[np.integer[Any]]
     extra: NDArray[np.bool_]
     rejected: NDArray[np.bool_]
@@ -61,7 +67,7 @@ class KongsbergPing:
     two_way_time_s: Array
 
 
-def are_possible(sectors: TransmitSectors, sector: NDArray[np.integer[Any]]) -> bool:
+def are_possible(sectors: PingSectors, sector: NDArray[np.integer[Any]]) -> bool:
     """Return whether delays and tilts are possible, and each sounding's ``sector`` (n,) is one of the ``sectors``."""
     delays, tilts = np.abs(sectors.delay_s), np.abs(sectors.tilt_deg)
     all_exist = not len(sector) or int(sector.max()) < len(sectors.transmitters)
@@ -107,10 +113,7 @@ class KongsbergPart(ABC):
                 "log one head alone"
             )
         if ping is first and len(ping.sector) == 1:
-            raise RawDataError(
-                f"{self.name}: its pings are of one beam (a single-beam echo sounder), which sees no planes; give the "
-                "files of a multibeam sonar"
-            )
+            raise single_beam_error(self.name)
         for tilt, transmitter in zip(ping.sectors.tilt_deg, ping.sectors.transmitters, strict=True):
             if transmitter is None and abs(tilt) > NO_TILT_DEG:
                 raise RawDataError(

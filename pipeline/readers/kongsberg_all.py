@@ -23,7 +23,7 @@ import numpy as np
 
 from pipeline.errors import RawDataError
 from pipeline.gps_time import gps_ns_from_unix_utc
-from pipeline.readers.kongsberg import KongsbergPart, KongsbergPing, TransmitSectors, are_possible
+from pipeline.readers.kongsberg import KongsbergPart, KongsbergPing, PingSectors, are_possible
 from pipeline.readers.kongsberg_all_datagrams import HEAD_WITHOUT_LENGTH, TAIL, kongsberg_all_datagrams
 from pipeline.readers.kongsberg_installation import transmitter_of_all
 from pipeline.readers.repeated_pings import RepeatedPings
@@ -83,7 +83,7 @@ def decode_raw_ranges(datagram: bytes, installation: str) -> KongsbergPing | Non
         return None
     sector_rows = np.frombuffer(datagram, SECTOR, n_sectors, start)
     beam_rows = np.frombuffer(datagram, BEAM, n_beams, start + sector_rows.nbytes)
-    sectors = TransmitSectors(
+    sectors = PingSectors(
         delay_s=sector_rows["delay"].astype(float),
         tilt_deg=sector_rows["tilt"] / 100,
         array_part=sector_rows["part"].astype(int),

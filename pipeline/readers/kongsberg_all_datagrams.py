@@ -1,8 +1,8 @@
 """Find the datagrams of Kongsberg's .all files (little-endian; some old files are big-endian, and are not read).
 
 A datagram: u32 length of what follows, 2, u8 type, u16 model, u32 date (year month day), u32 milliseconds of the day,
-u16 number, u16 serial number, its body, 3, u16 sum of the bytes between 2 and 3. Where no datagram
-begins, the next whole one is searched for, and the gap is counted.
+u16 number, u16 serial number, its body, 3, u16 sum of the bytes between 2 and 3. Where no datagram begins,
+the next whole one is searched for, and the gap is counted.
 """
 
 import struct
@@ -12,12 +12,12 @@ from typing import BinaryIO
 
 from pipeline.readers.raw_file import read_at, size_of
 
-DATAGRAM_HEAD = struct.Struct("<IBBHIIHH")  # with the length
+ALL_HEAD = struct.Struct("<IBBHIIHH")  # with the length
 HEAD_WITHOUT_LENGTH = struct.Struct("<BBHIIHH")
 STX, ETX = 2, 3
-TAIL = 3  # bytes of the end and the sum
-MAX_DATAGRAM = 1 << 20
-SEARCH_BLOCK = 1 << 16
+TAIL = 3  # bytes of ETX and the sum
+_MAX_DATAGRAM = 1 << 20
+_SEARCH_BLOCK = 1 << 16
 DATAGRAM_TYPES = frozenset(b"0123ACDEFGHIJKLMNOPQRSTUVWXYabcdfhijklmnprsv")  # of the datagrams of all models
 
 
@@ -25,7 +25,7 @@ def kongsberg_all_datagrams(file: BinaryIO, types: bytes, dropped: Counter[str])
     """Yield the whole datagrams of the ``types``, one after another, without their length."""
     size, position = size_of(file), 0
     while position < size:
-        head = read_at(file, position, DATAGRAM_HEAD.size)
+        head = read_at(file, position, ALL_HEAD.size)
         length = _whole_length(file, position, head, size)
         if length is None:
             cut = is_datagram_header(head) and position + 4 + int.from_bytes(head[:4], "little") > size
@@ -43,13 +43,11 @@ def kongsberg_all_datagrams(file: BinaryIO, types: bytes, dropped: Counter[str])
 
 def is_datagram_header(head: bytes, order: str = "<") -> bool:
     """Return whether a datagram begins here; ``order`` is that of the bytes, as in :mod:`struct`."""
-    if len(head) < DATAGRAM_HEAD.size:
+    if len(head) < ALL_HEAD.size:
         return False
-    length, begin, kind, _, date, milliseconds, _, _ = struct.unpack(
-        order + DATAGRAM_HEAD.format[1:], head[: DATAGRAM_HEAD.size]
-    )
+    length, begin, kind, _, date, milliseconds, _, _ = struct.unpack(order + ALL_HEAD.format[1:], head[: ALL_HEAD.size])
     dated = 19_900_000 < date < 21_000_000 and milliseconds < 86_400_000
-    return begin == STX and kind in DATAGRAM_TYPES and DATAGRAM_HEAD.size <= length <= MAX_DATAGRAM and dated
+    return begin == STX and kind in DATAGRAM_TYPES and ALL_HEAD.size <= length <= _MAX_DATAGRAM and dated
 
 
 def _whole_length(file: BinaryIO, position: int, head: bytes, size: int) -> int | None:
@@ -63,12 +61,12 @@ def _whole_length(file: BinaryIO, position: int, head: bytes, size: int) -> int 
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
     """Return the start of the next whole datagram, or the file's end."""
     while start < size:
-        block = read_at(file, start, SEARCH_BLOCK + DATAGRAM_HEAD.size)
+        block = read_at(file, start, _SEARCH_BLOCK + ALL_HEAD.size)
         mark = block.find(STX, 4)
-        while 0 <= mark < SEARCH_BLOCK + 4:
-            head = block[mark - 4 : mark - 4 + DATAGRAM_HEAD.size]
+        while 0 <= mark < _SEARCH_BLOCK + 4:
+            head = block[mark - 4 : mark - 4 + ALL_HEAD.size]
             if _whole_length(file, start + mark - 4, head, size) is not None:
                 return start + mark - 4
             mark = block.find(STX, mark + 1)
-        start += SEARCH_BLOCK
+        start += _SEARCH_BLOCK
     return size

@@ -15,7 +15,7 @@ from pipeline.maths.sonar.crossed_arrays import tilt_in_mbes
 
 Array = NDArray[np.float64]
 MIN_PATH_RATIO = 3.0  # of the path to the transmitter's distance: no shorter path is possible
-ITERATIONS = 4  # the error falls by (distance of the arrays / range)² with each
+_ITERATIONS = 4  # the error falls by (distance of the arrays / range)² with each
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class SectorSoundings:
         side = np.where(np.abs(self.angle_rad) > np.pi / 2, 1.0, -1.0)
         r, s = path / 2, np.sin(self.angle_rad)
         p = np.sin(tilt_in_mbes(self.angle_rad, self.tilt_rad, self.axis))
-        for _ in range(ITERATIONS):
+        for _ in range(_ITERATIONS):
             x = r[:, None] * np.column_stack([s, p, side * np.sqrt(np.maximum(1 - s**2 - p**2, 0.0))])
             from_part, to_receiver = np.linalg.norm(x - t, axis=1), np.linalg.norm(x - q, axis=1)
             angle = _on_side(np.arcsin((x - t)[:, 0] / from_part), side)

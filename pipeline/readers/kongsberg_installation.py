@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.maths.geometry.rotations import rotation_x, rotation_y, rotation_z
 from pipeline.readers.kongsberg_arrays import Array, Transmitter
 
-R_MBES_FROM_ARRAY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # of the receiver itself
+R_MBES_FROM_ARRAY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # starboard, forward, up
 SINGLE_HEAD = -1  # in place of a transmitter's number
 PARTS = ("P", "C", "S")  # of a transmitter, in the order of their numbers
 # models with both arrays in one head; S2 is another head's

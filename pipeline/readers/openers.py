@@ -40,7 +40,7 @@ class SensorFiles(Generic[BlockOfSensor]):
     accuracy_files: list[SessionFile]  # SMRMSG files, of an INS alone
 
 
-def frame_of(settings: Laser) -> Frame:
+def laser_frame(settings: Laser) -> Frame:
     """Return the frame, or the coordinate reference system, in which the laser's points are stored."""
     return Frame(settings.frame, settings.heights)
 
@@ -78,7 +78,7 @@ def gps_weeks(first_s: Mapping[str, float], gps_week: int | None, sensor: Sensor
 def open_tables(request: SensorFiles[Any]) -> Parts:
     """Return one part for each Parquet or CSV table."""
     settings = request.settings
-    frame = frame_of(settings) if isinstance(settings, Laser) else Frame()
+    frame = laser_frame(settings) if isinstance(settings, Laser) else Frame()
     return tuple(
         TablePart(
             path=file.path,
@@ -148,7 +148,7 @@ def open_las(request: SensorFiles[Laser]) -> Parts:
             name=file.name,
             header=header,
             gps_week=weeks.get(file.name),
-            frame=frame_of(settings),
+            frame=laser_frame(settings),
             latency_s=settings.latency_s,
         )
     )
@@ -160,7 +160,7 @@ def open_e57(request: SensorFiles[Laser]) -> Parts:
     return tuple(
         part
         for file in request.files
-        for part in e57.parts(file.path, file.name, frame_of(settings), settings.latency_s, settings.max_records)
+        for part in e57.parts(file.path, file.name, laser_frame(settings), settings.latency_s, settings.max_records)
     )
 
 

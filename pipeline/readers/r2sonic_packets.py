@@ -79,7 +79,7 @@ def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
     """Yield the sections of BTH0 packets in an XTF file; in a file without any, count the other records."""
     size = size_of(file)
     position = find(file, XTF_MAGIC, XTF_HEADER)
-    packets = others = 0
+    packets = other_records = 0
     while 0 <= position < size:
         head = read_at(file, position, XTF_RECORD)
         length = int.from_bytes(head[10:14], "little")
@@ -89,7 +89,7 @@ def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
         if broken:
             dropped["truncated record" if following < 0 else "stray bytes"] += 1
         if whole and head[2] not in XTF_TYPES:
-            others += 1
+            other_records += 1
         elif whole and (not broken or following < 0):
             sections = _sections_in(read_at(file, position, length))
             if sections is not None:
@@ -99,7 +99,7 @@ def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
                 dropped["damaged packet"] += 1
         position = following
     if not packets:
-        dropped["XTF record other than R2Sonic bathymetry"] += others
+        dropped["XTF record other than R2Sonic bathymetry"] += other_records
 
 
 def _sections_in(record: bytes) -> Sections | None:

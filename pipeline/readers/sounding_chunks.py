@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Chunk
+from pipeline.errors import RawDataError
 from pipeline.readers.row_checks import (
     MBES_COLUMNS,
     Sieve,
@@ -21,6 +22,7 @@ from pipeline.readers.row_checks import (
 CHUNK_SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 CHUNK_PINGS = 8_192
 MAX_BEAMS = np.iinfo(np.int16).max  # of a ping: the type of the column beam
+NO_TILT_DEG = 0.005  # a sector is not tilted if its tilt is no larger
 PingT = TypeVar("PingT")
 
 
@@ -55,6 +57,14 @@ def chunks_of_pings(
         yield chunk_of(group)
     if dropped:
         yield no_rows(MBES_COLUMNS, dropped)
+
+
+def single_beam_error(name: str) -> RawDataError:
+    """Return the refusal of a file whose pings are of one beam."""
+    return RawDataError(
+        f"{name}: its pings are of one beam (a single-beam echo sounder), which sees no planes; give the "
+        "files of a multibeam sonar"
+    )
 
 
 def per_sounding(values: Sequence[Any] | NDArray[Any], counts: NDArray[np.int64], dtype: Any) -> NDArray[Any]:

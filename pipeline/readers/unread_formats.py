@@ -70,7 +70,7 @@ POF = FileKind("a trajectory of RIEGL (.pof)", advice=f"{EXPORT_SOLUTION}: it wa
 POQ = FileKind("a trajectory's accuracies of RIEGL (.poq)", advice=f"{EXPORT_SOLUTION}: it was made from one of these")
 PTX = FileKind("a PTX file", advice=f"its points have no times: {EXPORT_LAS}")
 
-MARKS: tuple[tuple[int, bytes, FileKind], ...] = (
+_MARKS: tuple[tuple[int, bytes, FileKind], ...] = (
     (8, b"RieglLMS", FileKind("a RIEGL .rxp file", advice=f"{EXPORT_LAS} (RiSCAN PRO, RiPROCESS, or RiVLib)")),
     (0, b"ply\n", FileKind("a PLY file", advice=EXPORT_LAS)),
     (0, b"ply\r\n", FileKind("a PLY file", advice=EXPORT_LAS)),
@@ -101,12 +101,12 @@ MARKS: tuple[tuple[int, bytes, FileKind], ...] = (
 
 def kind_by_mark(head: bytes) -> FileKind | None:
     """Return the kind whose mark the file has; no other file begins with one of these marks."""
-    return next((kind for at, magic, kind in MARKS if head[at : at + len(magic)] == magic), None)
+    return next((kind for at, magic, kind in _MARKS if head[at : at + len(magic)] == magic), None)
 
 
 def kind_by_first_record(head: bytes, size: int) -> FileKind | None:
     """Return the kind that the first record of a binary file of ``size`` bytes has the shape of."""
-    return next((kind for has_shape, kind in SHAPES if has_shape(head, size)), None)
+    return next((kind for has_shape, kind in _SHAPES if has_shape(head, size)), None)
 
 
 def kind_of_text(head: str) -> FileKind | None:
@@ -134,7 +134,7 @@ def _is_sentence(line: str) -> bool:
     return int(np.bitwise_xor.reduce(np.frombuffer(sentence[1].encode(), np.uint8))) == int(sentence[2], 16)
 
 
-SHAPES: tuple[tuple[Callable[[bytes, int], bool], FileKind], ...] = (
+_SHAPES: tuple[tuple[Callable[[bytes, int], bool], FileKind], ...] = (
     (unread_records.is_big_endian_all, BIG_ENDIAN_ALL),
     (unread_records.is_s7k, S7K),
     (unread_records.is_jsf, JSF),
