@@ -15,8 +15,8 @@ The frame ``mbes`` is that of the receiver's array, to which the beam angles ref
 way round is near 180 degrees. Each sector is tilted along track by itself (txSectorInfo, tiltAngleReTx: the steering of
 the main lobe as sent, in the transmitter's own frame), and sends from its own part of the transmitter. The installation
 turns both into the frame ``mbes`` (:mod:`pipeline.readers.kongsberg_arrays`). The tilt includes all that steered the
-sector: stabilisation of pitch or yaw, the swath of a dual swath, the mode of a ping. Only one of two
-receivers can be calibrated; pings of a single beam are no fan.
+sector: stabilisation of pitch or yaw, the swath of a dual swath, the mode of a ping. Only one of two receivers can
+be calibrated; pings of a single beam are no fan.
 """
 
 import io
