@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from pipeline.config.pool import Verdict
-from pipeline.config.resolved import CastUsed
+from pipeline.config.references import CastUsed
 from pipeline.config.session import Drift, Mbes
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import deviations_from_design
