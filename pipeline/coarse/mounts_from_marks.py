@@ -18,7 +18,7 @@ from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.maths.survey.data_snooping import LEVEL, SURVEY, MarkTest, Snooped, limit, snoop
 from pipeline.maths.survey.frame_adjustment import mounted_on
-from pipeline.mount import Mounted, change_of
+from pipeline.mount import Mounted, setting_change
 
 Array = NDArray[np.float64]
 FARTHEST_M = 100.0  # of a lever arm that session.yaml takes
@@ -125,7 +125,7 @@ def table(answer: Answer, present: Mapping[str, Mounted]) -> str:
         for parameter, _, key, of_setting in PARAMETERS:
             unit = "°" if of_setting == "deg" else of_setting
             before = "-" if was is None else f"{was[key]:.4f} {unit}"
-            change = "-" if was is None else f"{signed(change_of(settings, was, key), 4)} {unit}"
+            change = "-" if was is None else f"{signed(setting_change(settings, was, key), 4)} {unit}"
             found = f"{settings[key]:.4f} {unit}"
             lines.append(f"{parameter:<12}{before:>12}{found:>14}{change:>14}{sigma[key]:>10.4f} {unit}")
         lines.append("")
@@ -173,7 +173,7 @@ def as_plain(answer: Answer, present: Mapping[str, Mounted]) -> dict[str, Any]:
             "mount": settings,
             "sigma_mount": mounted.sigmas(covariance),
             "session": was,
-            "change": None if was is None else {key: change_of(settings, was, key) for key in settings},
+            "change": None if was is None else {key: setting_change(settings, was, key) for key in settings},
             "R_body_from_sensor": mounted.R_body_from_sensor.tolist(),
             "covariance": covariance.tolist(),
         }

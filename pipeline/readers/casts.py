@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.session import inside
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.maths.sonar.cast_profile import TOLERANCE_M_S, ascending, largest_difference, one_way, thinned
+from pipeline.maths.sonar.cast_profile import TOLERANCE_M_S, ascending, largest_difference, one_way, thinned_profile
 from pipeline.readers.cast_text import Cast, casts_of
 from pipeline.readers.dispatch import found
 from pipeline.readers.raw_file import opened
@@ -79,7 +79,7 @@ def read_cast(path: Path, name: str, number: Any = None) -> tuple[list[list[floa
     kind, casts = casts_of(_text(content, name), name)
     cast, chosen = _chosen(casts, number, name)
     depth, speed, left_out = _cleaned(np.array(cast.rows, dtype=np.float64).reshape(-1, 2), name)
-    profile = thinned(depth, speed)
+    profile = thinned_profile(depth, speed)
     if profile.scatter_m_s > MOST_SCATTER_M_S:
         raise RawDataError(
             f"{name}: its sound speeds scatter by {profile.scatter_m_s:.1f} m/s about their mean at a depth; check the "

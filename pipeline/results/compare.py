@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.artefacts.catalogue.target import FACES, PLANES
-from pipeline.artefacts.families import families_of, level_families
+from pipeline.artefacts.from_tables import family_names, horizontal_families, normal_of
 from pipeline.errors import ArtefactError
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.geometry.planes import angle_between
@@ -171,7 +171,7 @@ def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row
         return
     tables = []
     faces = Tables(first.path).table(FACES)
-    upright = [name for name in families_of(faces.loc[faces["one_plane"]]) if name not in level_families(faces)]
+    upright = [name for name in family_names(faces.loc[faces["one_plane"]]) if name not in horizontal_families(faces)]
     for run in (first, second):
         rows = Tables(run.path).table(PLANES).query("`pass` == -1").to_dict("records")
         tables.append({(row["sensor"], row["plane"]): row for row in rows})
@@ -185,7 +185,7 @@ def _planes(first: RunRead, second: RunRead, missing: list[str]) -> Iterator[Row
                 missing.append(f"planes: {family} of {sensor} is not in both")
                 continue
             a, b = (table[key] for table in tables)
-            one_n, other_n = (np.array([float(row[f"normal_{axis}_target_1"]) for axis in "xyz"]) for row in (a, b))
+            one_n, other_n = (normal_of(row) for row in (a, b))
             angle = float(np.degrees(angle_between(one_n, other_n)))
             shift, rms = float(b["distance_m"] - a["distance_m"]), float(b["rms_m"] - a["rms_m"])
             if angle or shift or rms:

@@ -6,7 +6,7 @@ from typing import Any
 
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.mount import change_of
+from pipeline.mount import setting_change
 
 
 def verdict_in_words(verdict: str, held: Collection[str] = ()) -> str:
@@ -37,7 +37,7 @@ def summary(calibration: Mapping[str, Any]) -> str:
     for parameter, _, key, of_setting in PARAMETERS:
         unit = "°" if of_setting == "deg" else of_setting
         total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
-        change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
+        change = f"{setting_change(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
         names = ("sigma_mount", "sigma_mount_total")
         sigmas = [f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in names]
         if parameter in held:

@@ -104,7 +104,7 @@ def made(
     length = np.linalg.norm(x, axis=1, keepdims=True)
     x = x + sensors * np.radians(0.003) * length * np.cross(ray, rng.normal(size=x.shape))
     t_ns = (moment * NS).round().astype(np.int64)
-    target = trajectory.place(t_ns, x @ R_LASER.T + LASER_LEVER)
+    target = trajectory.points_from_body(t_ns, x @ R_LASER.T + LASER_LEVER)
     laser = columns(t_ns, face, x, "laser_m") | {f"{axis}_target_m": target[:, k] for k, axis in enumerate("xyz")}
 
     moment = moments(30, 160)
