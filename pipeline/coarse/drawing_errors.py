@@ -11,8 +11,8 @@ from pipeline.coarse.frames import AXES, FAR_DEG, NEAR_DEG, NEAR_ONE, NEAR_UNIT,
 from pipeline.console import plural
 from pipeline.errors import ConfigError, DegenerateGeometryError
 from pipeline.maths.geometry.rotations import log_so3
-from pipeline.maths.survey.data_snooping import LEVEL, LINE_RAD, fits, limit, sigma_about_line
-from pipeline.maths.survey.frame_adjustment import Frame, Survey, adjust, closed_form
+from pipeline.maths.survey.data_snooping import LINE_RAD, SIGNIFICANCE, fit_of_frame, global_limit, sigma_about_line
+from pipeline.maths.survey.frame_adjustment import Frame, Survey, adjust_frames, closed_form
 
 UNITS = {"mm": 1000.0, "cm": 100.0, "inches": 1 / 0.0254, "feet": 1 / 0.3048}  # how many of them are a metre
 
@@ -90,25 +90,25 @@ def _refuse_units(survey: Survey, frame: Frame, key: str) -> None:
 
 def _refuse_misfit(placed: Placed, name: str, key: str, present: Mapping[str, Array]) -> None:
     """Where a frame does not fit, but its mirror image or with two names interchanged it clearly does: quotient of the
-    two Ω beyond F at LEVEL. Of several such explanations those are said that fit as well as the best. Where leaving out
-    one mark explains it too, names must explain it in full."""
+    two Ω beyond F at SIGNIFICANCE. Of several such explanations those are said that fit as well as the best. Where
+    leaving out one mark explains it too, names must explain it in full."""
     frame, survey = placed.frames[name], placed.survey
-    squares, redundancy = fits(survey, frame)
-    if squares <= limit(redundancy):
+    squares, redundancy = fit_of_frame(survey, frame)
+    if squares <= global_limit(redundancy):
         return
-    far = float(fdtri(redundancy, redundancy, 1 - LEVEL))
-    enough = squares / far if np.isfinite(squares) else limit(redundancy)
-    tried = {pair: fits(survey, swap(frame, *pair))[0] for pair in _likely_pairs(survey, frame)}
+    far = float(fdtri(redundancy, redundancy, 1 - SIGNIFICANCE))
+    enough = squares / far if np.isfinite(squares) else global_limit(redundancy)
+    tried = {pair: fit_of_frame(survey, swap(frame, *pair))[0] for pair in _likely_pairs(survey, frame)}
     better = {pair: left for pair, left in tried.items() if left < enough}
-    if any(left > limit(redundancy) for left in better.values()) and _one_explains_it(survey, frame):
-        better = {pair: left for pair, left in better.items() if left <= limit(redundancy)}
-    mirrored = np.inf if is_flat(survey, frame) else fits(survey, mirror(frame, 0))[0]
+    if any(left > global_limit(redundancy) for left in better.values()) and _one_explains_it(survey, frame):
+        better = {pair: left for pair, left in better.items() if left <= global_limit(redundancy)}
+    mirrored = np.inf if is_flat(survey, frame) else fit_of_frame(survey, mirror(frame, 0))[0]
     if mirrored < enough:
         better[()] = mirrored
     if not better:
         return
     best = min(better.values())
-    said = [pair for pair, left in better.items() if left <= max(limit(redundancy), best)]
+    said = [pair for pair, left in better.items() if left <= max(global_limit(redundancy), best)]
     pairs = ", or ".join(" and ".join(placed.names[frame.marks[k]] for k in pair) for pair in said if pair)
     words = []
     if () in said:
@@ -121,7 +121,8 @@ def _refuse_misfit(placed: Placed, name: str, key: str, present: Mapping[str, Ar
 def _one_explains_it(survey: Survey, frame: Frame) -> bool:
     """Whether all but some one mark fit."""
     count = len(frame.marks)
-    return count > 3 and any(fits(survey, frame.without(k))[0] <= limit(3 * count - 9) for k in range(count))
+    limit = global_limit(3 * count - 9)
+    return count > 3 and any(fit_of_frame(survey, frame.without(k))[0] <= limit for k in range(count))
 
 
 def _likely_pairs(survey: Survey, frame: Frame) -> Sequence[tuple[int, ...]]:
@@ -153,7 +154,7 @@ def is_flat(survey: Survey, frame: Frame) -> bool:
     that plane changed in sign, which raises Ω by no more than 4 Σ h² / σ²."""
     variance = float(np.trace(survey.covariance[frame.marks] + frame.covariance, axis1=1, axis2=2).mean()) / 3
     thickness = np.linalg.svd(frame.drawing_m - frame.drawing_m.mean(axis=0), compute_uv=False)[-1]
-    return bool(4 * thickness**2 / variance <= limit(3 * len(frame.marks) - 6))
+    return bool(4 * thickness**2 / variance <= global_limit(3 * len(frame.marks) - 6))
 
 
 @dataclass(frozen=True)
@@ -176,7 +177,7 @@ def flips(placed: Placed, name: str, present: Mapping[str, Array]) -> Flips | No
         return None
 
     def turned(frame: Frame) -> Array:
-        return adjust(placed.survey, [frame]).poses[0].R_survey_from_frame
+        return adjust_frames(placed.survey, [frame]).poses[0].R_survey_from_frame
 
     as_drawn = {one: turned(placed.frames[one]) for one in ("body", *sensors)}
 

@@ -16,8 +16,8 @@ from pipeline.console import signed
 from pipeline.errors import ConfigError, NotConvergedError
 from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.maths.survey.data_snooping import LEVEL, SURVEY, MarkTest, Snooped, limit, snoop
-from pipeline.maths.survey.frame_adjustment import mounted_on
+from pipeline.maths.survey.data_snooping import SIGNIFICANCE, SURVEY, MarkTest, SnoopingResult, global_limit, snoop
+from pipeline.maths.survey.frame_adjustment import relative_mount
 from pipeline.mount import Mounted, setting_change
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Answer:
     """The marks in use, their adjustment, by sensor its mount with covariance (6, 6), and words of warning."""
 
     placed: Placed
-    snooped: Snooped
+    snooped: SnoopingResult
     mounts: Mapping[str, tuple[Mounted, Array]]
     warnings: tuple[str, ...]
 
@@ -54,7 +54,7 @@ def judge(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Answer:
     mounts = {}
     for number, name in enumerate(placed.frames):
         if name != "body":
-            R, lever_arm_m, covariance = mounted_on(snooped.last, 0, number)
+            R, lever_arm_m, covariance = relative_mount(snooped.last, 0, number)
             if np.abs(lever_arm_m).max() > FARTHEST_M:
                 length = float(np.linalg.norm(lever_arm_m))
                 raise ConfigError(f"{where}: {name}: lies {length:.0f} m from the INS; give all coordinates in m")
@@ -146,8 +146,8 @@ def table(answer: Answer, present: Mapping[str, Mounted]) -> str:
 
 def _global_line(answer: Answer) -> str:
     first = answer.snooped.first
-    free, passed = first.redundancy, first.squares <= limit(first.redundancy)
-    line = f"Global test: {first.squares:.1f}, limit {limit(free):.1f}, {free} degrees of freedom: "
+    free, passed = first.redundancy, first.squares <= global_limit(first.redundancy)
+    line = f"Global test: {first.squares:.1f}, limit {global_limit(free):.1f}, {free} degrees of freedom: "
     line += f"{'passed' if passed else 'failed'}. Variance factor {first.squares / free:.2f}"
     if free < CAUTIOUS:
         low, high = (float(chdtri(free, share)) / free for share in (0.975, 0.025))
@@ -159,11 +159,11 @@ def as_plain(answer: Answer, present: Mapping[str, Mounted]) -> dict[str, Any]:
     """All of it as plain values, for YAML."""
     first = answer.snooped.first
     tests = {
-        "level": LEVEL,
+        "level": SIGNIFICANCE,
         "statistic": first.squares,
         "degrees_of_freedom": first.redundancy,
-        "limit": limit(first.redundancy),
-        "passed": first.squares <= limit(first.redundancy),
+        "limit": global_limit(first.redundancy),
+        "passed": first.squares <= global_limit(first.redundancy),
         "variance_factor": first.squares / first.redundancy,
     }
     mounts = {}

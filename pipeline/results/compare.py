@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.artefacts.catalogue.target import FACES, PLANES
 from pipeline.artefacts.from_tables import family_names, horizontal_families, normal_of
 from pipeline.errors import ArtefactError
-from pipeline.maths.comparison import Estimate, compare
+from pipeline.maths.comparison import MountEstimate, mount_difference
 from pipeline.maths.geometry.planes import angle_between
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.verdict import SIX
@@ -61,13 +61,13 @@ class RunRead:
         return cls(path, read_settings(path), result, found)
 
 
-def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
+def estimate_of(result: Mapping[str, Any]) -> MountEstimate | None:
     """The adjustment's, from calibration.json: the patent's forms have no covariance to test with."""
     block = result["methods"]["adjustment"]
     if block["covariance"] is None or block["mount"] is None:
         return None
     shapes = {"R_body_from_mbes": (3, 3), "lever_arm_m": (3,), "covariance": (6, 6)}
-    found = Estimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
+    found = MountEstimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
     if not np.linalg.eigvalsh(found.covariance).min() > 0:
         raise ValueError("the covariance is not positive")
     return found
@@ -128,8 +128,8 @@ def _mount(
         which = [run.result["session"] for run, e in ((first, one), (second, other)) if e is None]
         missing.append(f"mount: {' and '.join(which)} has no result with a covariance")
         return {"comparable": False, "parameters": [], "joint": None, "beyond_tolerance": []}
-    found = compare(one, other)
-    moved = found.moved(LEVEL)
+    found = mount_difference(one, other)
+    moved = found.significant(LEVEL)
     scale = [np.degrees(1.0)] * 3 + [1.0] * 3
     limits = [tolerance_deg] * 3 + [None if tolerance_mm is None else tolerance_mm / 1000] * 3
     rows: list[Row] = []

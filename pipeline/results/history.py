@@ -18,7 +18,7 @@ import pandas as pd
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
-from pipeline.maths.comparison import Estimate, compare
+from pipeline.maths.comparison import MountEstimate, mount_difference
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.report.verdict import SIX
 from pipeline.results.compare import LEVEL, estimate_of
@@ -148,13 +148,13 @@ def _moment(text: str) -> str:
     return text
 
 
-def _with_jumps(found: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator[dict[str, Any]]:
-    before: Estimate | None = None
+def _with_jumps(found: list[tuple[dict[str, Any], MountEstimate | None]]) -> Iterator[dict[str, Any]]:
+    before: MountEstimate | None = None
     for row, now in found:
         if row["verdict"] == "accepted" and now is not None:
             if before is not None:
-                compared = compare(before, now)
-                moved = ", ".join(SIX[k] for k in compared.moved(LEVEL))
+                compared = mount_difference(before, now)
+                moved = ", ".join(SIX[k] for k in compared.significant(LEVEL))
                 row = row | {"probability": compared.probability, "moved": moved}
             before = now
         yield row

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from pipeline.atomic_files import read_json
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Verdict
 from pipeline.errors import ConfigError
+from pipeline.maths.comparison import mount_error
 from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
+from pipeline.mount import Mounted
 from pipeline.run.output_files import as_written
 from pipeline.run.results import calibration
 from pipeline.run.settings import read_settings
@@ -87,8 +88,8 @@ def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) ->
     """What is still wrong: rotation vector in degrees and lever arm in metres, true minus found; None: no result."""
     if values["R_body_from_mbes"] is None or values["lever_arm_m"] is None:
         return None
-    turn = Rotation.from_matrix(R_true @ np.array(values["R_body_from_mbes"]).T).as_rotvec()
-    return np.concatenate([np.degrees(turn), lever_arm_true_m - np.array(values["lever_arm_m"])])
+    error = mount_error(R_true, lever_arm_true_m, np.array(values["R_body_from_mbes"]), np.array(values["lever_arm_m"]))
+    return np.asarray(error * np.repeat([np.degrees(1.0), 1.0], 3))
 
 
 def _sigma_of(values: dict[str, Any]) -> Array | None:
@@ -108,11 +109,10 @@ def _table(
     error = errors_of(values, R_true, lever_arm_true_m)
     if error is None:
         return ["  no result"]
-    yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
-    truth = (pitch, roll, yaw, *lever_arm_true_m)
+    truth = Mounted(R_true, lever_arm_true_m).settings()
     lines = [f"  {'':6}{'coarse':>11}{'calibrated':>12}{'truth':>11}{'error':>11}{'sigma':>10}{'error/sigma':>13}"]
     for name, k, key, unit in PARAMETERS:
         spread = f"{'-':>10}{'-':>13}" if sigma is None else f"{sigma[k]:10.5f}{error[k] / sigma[k]:13.1f}"
-        numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[k]:11.5f}{error[k]:11.5f}"
+        numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[key]:11.5f}{error[k]:11.5f}"
         lines.append(f"  {name:6}{numbers}{spread} {unit}")
     return lines
