@@ -11,7 +11,7 @@ from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
 from pipeline.artefacts.patent_tables import angle_passes
 from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.pool import AngleIterate, FitPlanes
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.patent.angles import AngleResult, AngleTolerances, iterate_angles
 from pipeline.mount import mount_of
@@ -21,7 +21,7 @@ from pipeline.mount import mount_of
 class Config:
     fit_planes: FitPlanes
     angle_iterate: AngleIterate
-    mbes: Mbes
+    mbes: SensorMount
 
 
 @dataclass(frozen=True)

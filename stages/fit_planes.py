@@ -22,7 +22,7 @@ from pipeline.artefacts.from_tables import normals_of, trajectory_in_target
 from pipeline.artefacts.streams import Batch, Stream, xyz
 from pipeline.artefacts.to_tables import direction_row, moments_table, plane_row
 from pipeline.config.pool import FitPlanes
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.planes import Plane, PlaneMoments, fit_plane
 from pipeline.maths.geometry.trajectory import Trajectory
@@ -38,7 +38,7 @@ NamedKey = tuple[int, str]  # pass, name of a face or a family
 @dataclass(frozen=True)
 class Config:
     fit_planes: FitPlanes
-    mbes: Mbes | None
+    mbes: SensorMount | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)

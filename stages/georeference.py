@@ -22,7 +22,7 @@ from pipeline.artefacts.counts import by_reason, counts_table, why_none_used
 from pipeline.artefacts.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
 from pipeline.artefacts.to_tables import poses_table, xyz_columns
 from pipeline.config.pool import Georeference
-from pipeline.config.session import Laser, Mbes
+from pipeline.config.stage_settings import LaserPlacement, SonarPlacement
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS
@@ -41,8 +41,8 @@ Array = NDArray[np.float64]
 class Config:
     target: Target
     georeference: Georeference
-    laser: Laser
-    mbes: Mbes | None
+    laser: LaserPlacement
+    mbes: SonarPlacement | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: C
 
 
 def _soundings(
-    columns: Batch, prepared: Prepared, mbes: Mbes, water_level_m: float
+    columns: Batch, prepared: Prepared, mbes: SonarPlacement, water_level_m: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return soundings in the mbes frame and in the pool frame, and which of them are possible."""
     t_ns, recorded_m_s = columns["t_ns"], columns["sound_speed_m_s"]

@@ -12,7 +12,7 @@ from pipeline.artefacts.from_tables import rotation_vector_deg
 from pipeline.artefacts.patent_tables import angle_passes, offset_observations
 from pipeline.artefacts.to_tables import mount_correction_columns
 from pipeline.config.pool import FitPlanes, Offsets
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.patent.angles import PassPlanes
@@ -33,7 +33,7 @@ SEQUENTIAL, ALTERNATING = "patent_sequential", "patent_alternating"
 class Config:
     fit_planes: FitPlanes
     offsets: Offsets
-    mbes: Mbes
+    mbes: SensorMount
 
 
 @dataclass(frozen=True)

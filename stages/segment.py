@@ -19,7 +19,7 @@ from pipeline.artefacts.from_tables import trajectory_in_pool
 from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream
 from pipeline.artefacts.to_tables import faces_table
 from pipeline.config.pool import Segment
-from pipeline.config.session import Laser, Mbes
+from pipeline.config.stage_settings import SensorMount, SonarBeams
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
 from pipeline.mount import mount_of
@@ -39,8 +39,8 @@ FEWEST_VOXELS = 50  # of dry laser points
 class Config:
     target: Target
     segment: Segment
-    laser: Laser
-    mbes: Mbes | None  # none: the laser is calibrated
+    laser: SensorMount
+    mbes: SonarBeams | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)

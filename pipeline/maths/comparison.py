@@ -72,11 +72,11 @@ class MountDifference:
         return beyond or [int(np.argmax(size))]
 
 
-def mount_difference(first: MountEstimate, second: MountEstimate) -> MountDifference:
+def compare_estimates(first: MountEstimate, second: MountEstimate) -> MountDifference:
     """Compute the second estimate minus the first, and test it.
 
     >>> estimate = MountEstimate(np.eye(3), np.zeros(3), np.eye(6) * 1e-6)
-    >>> mount_difference(estimate, estimate).probability
+    >>> compare_estimates(estimate, estimate).probability
     1.0
     """
     rotation = rotation_error(second.R_body_from_sensor, first.R_body_from_sensor)

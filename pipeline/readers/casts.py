@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.session import inside
+from pipeline.config.recording import inside_session
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.maths.sonar.cast_profile import TOLERANCE_M_S, ascending, largest_difference, one_way, thinned_profile
 from pipeline.readers.cast_text import Cast, casts_of
@@ -57,7 +57,7 @@ def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
             )
         return dict(content)
     try:
-        inside(given)
+        inside_session(given)
     except ValueError as error:
         raise ConfigError(f"{where}.svp = {given!r}: {error}") from error
     paths = found(folder, [given], "mbes.svp")

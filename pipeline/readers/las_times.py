@@ -8,7 +8,7 @@ standard time, September 2011: so times tell beyond doubt where flag or key cont
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.session import LasTime
+from pipeline.config.recording import LasTime
 from pipeline.errors import RawDataError
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS
 from pipeline.readers.row_checks import FIRST_WEEK, LAST_WEEK, through_float32

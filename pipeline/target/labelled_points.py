@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.streams import Batch, Piece, xyz
 from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.pool import Segment
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.beams import Beams
 from pipeline.maths.target.labelling import Labels, LabelSettings, hidden_in_part, label_points
@@ -96,7 +96,7 @@ def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: Label
     return Piece({"laser_labelled": columns}, counts)
 
 
-def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mbes: Mbes) -> Piece:
+def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mbes: SonarBeams) -> Piece:
     """Place soundings with the provisional mount, and label them.
 
     Parameters

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.pool import Segment
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.target.labelling import LabelSettings, label_points
 from pipeline.maths.target.model import TargetModel
@@ -22,7 +22,7 @@ BEHIND_M = 0.15  # farther behind a face than this is no noise
 
 
 def search_mount(
-    sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: Mbes, settings: Segment
+    sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: SonarBeams, settings: Segment
 ) -> ProvisionalMount:
     """Return the correction of the coarse mount with which the soundings fall onto the wet faces.
 
@@ -105,7 +105,7 @@ def _criteria(
 
 
 def _wet_labeller(
-    sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: Mbes, settings: Segment
+    sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: SonarBeams, settings: Segment
 ) -> Labeller:
     """Return the function that labels the soundings below the water, with their beams turned by the correction."""
     limits = LabelSettings(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.comparison import MountEstimate, mount_difference
+from pipeline.maths.comparison import MountEstimate, compare_estimates
 
 MOUNT = Rotation.from_euler("ZXY", [-2.0, 1.2, -48.8], degrees=True)
 LEVER = np.array([0.3, 0.2, -2.0])
@@ -32,7 +32,7 @@ def test_the_second_minus_the_first():
     C = np.eye(6) * 1e-8
     turned = Rotation.from_rotvec([0.0, 0.0, np.radians(0.1)]) * MOUNT
     shifted = LEVER + np.array([0.0, 0.002, 0.0])
-    found = mount_difference(MountEstimate(MOUNT.as_matrix(), LEVER, C), MountEstimate(turned.as_matrix(), shifted, C))
+    found = compare_estimates(MountEstimate(MOUNT.as_matrix(), LEVER, C), MountEstimate(turned.as_matrix(), shifted, C))
     np.testing.assert_allclose(found.difference, [0, 0, np.radians(0.1), 0, 0.002, 0], atol=1e-12)
     np.testing.assert_allclose(found.sigma, np.sqrt(2e-8), rtol=2e-3)  # the angles' axes are not quite at right angles
     assert found.significant(0.01) == [2, 4]
@@ -48,7 +48,8 @@ def test_what_moved_is_named_as_it_is_set(yaw, place, angle):
         Rotation.from_euler("ZXY", [s["yaw"], s["pitch"], s["roll"]], degrees=True).as_matrix()
         for s in (settings, moved)
     )
-    found = mount_difference(MountEstimate(one, LEVER, np.eye(6) * 1e-8), MountEstimate(other, LEVER, np.eye(6) * 1e-8))
+    C = np.eye(6) * 1e-8
+    found = compare_estimates(MountEstimate(one, LEVER, C), MountEstimate(other, LEVER, C))
     expected = np.zeros(6)
     expected[place] = np.radians(0.3)
     np.testing.assert_allclose(found.difference, expected, atol=1e-12)
@@ -60,7 +61,7 @@ def test_false_alarms_are_as_many_as_the_level_says():
     alarms = 0
     for _ in range(1000):
         first, second = covariance(rng), covariance(rng, rng.uniform(0.5, 3.0))
-        found = mount_difference(drawn(rng, first), drawn(rng, second))
+        found = compare_estimates(drawn(rng, first), drawn(rng, second))
         alarms += found.probability < 0.01
         assert bool(found.significant(0.01)) == (found.probability < 0.01)
     assert 3 <= alarms <= 20
@@ -70,7 +71,7 @@ def test_false_alarms_are_as_many_as_the_level_says():
 def test_a_moved_bracket_is_found_and_named(seed):
     rng = np.random.default_rng(seed)
     moved = np.array([0, 0, np.radians(0.05), 0, 0, 0.002])
-    found = mount_difference(drawn(rng, covariance(rng, 0.5)), drawn(rng, covariance(rng, 0.5), moved))
+    found = compare_estimates(drawn(rng, covariance(rng, 0.5)), drawn(rng, covariance(rng, 0.5), moved))
     assert found.probability < 1e-4
     assert {2, 5} <= set(found.significant(0.01))
 
@@ -78,6 +79,6 @@ def test_a_moved_bracket_is_found_and_named(seed):
 def test_a_movement_that_only_all_six_show_together_names_the_largest():
     C = np.eye(6) * 1e-8
     moved = MountEstimate(np.eye(3), np.full(3, 2.45 * np.sqrt(2e-8)), C)
-    found = mount_difference(MountEstimate(np.eye(3), np.zeros(3), C), moved)
+    found = compare_estimates(MountEstimate(np.eye(3), np.zeros(3), C), moved)
     assert found.probability < 0.01
     assert len(found.significant(0.01)) == 1

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 def rotation_error(R_true: Any, R_found: Any) -> np.ndarray:
     """ε (3,) rad of R_true = Exp(ε) R_found."""
-    return (Rotation.from_matrix(R_true) * Rotation.from_matrix(R_found).inv()).as_rotvec()
+    return np.asarray((Rotation.from_matrix(R_true) * Rotation.from_matrix(R_found).inv()).as_rotvec())
 
 
 def mount_error(block: Mapping[str, Any], truth: Mapping[str, Any], sensor: str = "mbes") -> np.ndarray:

@@ -156,7 +156,7 @@ def digests(run: Path) -> dict[str, str]:
 
 def errors(block: dict[str, Any], truth: dict[str, Any]) -> np.ndarray:
     """True minus found: rotation vector in degrees about the body's axes, lever arm in metres."""
-    return mount_error(block, truth) * np.repeat([np.degrees(1.0), 1.0], 3)
+    return np.asarray(mount_error(block, truth) * np.repeat([np.degrees(1.0), 1.0], 3))
 
 
 def sigmas(block: dict[str, Any]) -> np.ndarray:

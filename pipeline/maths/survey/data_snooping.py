@@ -23,7 +23,7 @@ from pipeline.errors import NotConvergedError
 from pipeline.maths.survey.frame_adjustment import Frame, FrameAdjustment, Survey, adjust_frames
 
 Array = NDArray[np.float64]
-SIGNIFICANCE = 0.001  # level of the global test; and of all the marks' tests together
+SNOOPING_LEVEL = 0.001  # level of the global test; and of all the marks' tests together
 LEAST_SHARE = 1e-6  # share of an error that reaches the residuals, below which they do not show it
 LINE_RAD = float(np.radians(5.0))  # a turn less certain than this is not determined
 UNEXPLAINED_RATIO = 3.0  # critical values: if a frame's worst is beyond that, what went from it did not explain it
@@ -79,14 +79,14 @@ class SnoopingResult:
 
 
 def global_limit(redundancy: int) -> float:
-    """Return the limit of the global test: Ω lies above it with probability SIGNIFICANCE."""
-    return float(chdtri(max(redundancy, 1), SIGNIFICANCE))
+    """Return the limit of the global test: Ω lies above it with probability SNOOPING_LEVEL."""
+    return float(chdtri(max(redundancy, 1), SNOOPING_LEVEL))
 
 
 def mark_tests(adjusted: FrameAdjustment, frames: Sequence[Frame]) -> tuple[MarkTest, ...]:
     """Return the test of every mark whose error would show, the worst first.
 
-    All limits together have the level SIGNIFICANCE (Bonferroni).
+    All limits together have the level SNOOPING_LEVEL (Bonferroni).
     """
     W, J = adjusted.weight, adjusted.design
     WJ = W @ J
@@ -102,7 +102,7 @@ def mark_tests(adjusted: FrameAdjustment, frames: Sequence[Frame]) -> tuple[Mark
     marks = [mark for _, mark, *_ in testable]
     shared = sorted({mark for mark in marks if marks.count(mark) > 1})
     testable += [(SURVEY, mark, *_statistic(adjusted.by_survey[:, mark], W, P, weighted)) for mark in shared]
-    limits = {rank: float(chdtri(rank, SIGNIFICANCE / len(testable))) for rank in (1, 2, 3)} if testable else {}
+    limits = {rank: float(chdtri(rank, SNOOPING_LEVEL / len(testable))) for rank in (1, 2, 3)} if testable else {}
     tests = [
         MarkTest(frame=frame, mark=mark, statistic=statistic, rank=rank, limit=limits[rank])
         for frame, mark, statistic, rank in testable

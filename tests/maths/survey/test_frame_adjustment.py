@@ -249,7 +249,7 @@ def test_false_alarms_are_as_rare_as_the_level() -> None:
         found = frame_adjustment.adjust_frames(survey, frames)
         worst = data_snooping.mark_tests(found, frames)[0]
         alarms += found.squares > data_snooping.global_limit(found.redundancy) or worst.ratio > 1
-    assert alarms <= binom.ppf(0.999, DRAWS, 2 * data_snooping.SIGNIFICANCE)
+    assert alarms <= binom.ppf(0.999, DRAWS, 2 * data_snooping.SNOOPING_LEVEL)
 
 
 def test_a_marks_statistic_is_what_the_squares_fall_by_without_it() -> None:
