@@ -36,6 +36,7 @@ def run(
     session_folder: Path,
     config_path: Path,
     run_folder: Path,
+    *,
     workers: Workers = SERIAL,
     progress: Progress | None = None,
     finished: Callable[[str], object] = lambda _: None,
@@ -67,6 +68,7 @@ def run_stage(
     stages: Sequence[ModuleType],
     name: str,
     run_folder: Path,
+    *,
     settings: Settings | None = None,
     workers: Workers = SERIAL,
     progress: Progress | None = None,
@@ -142,7 +144,9 @@ def _execute(this: Run, stage: ModuleType) -> None:
         streams = _make_folders(partial, stage)
         total = _rows_to_map(this, stage)
         sink = FolderSink(partial, streams)
-        outputs = evaluate(stage, inputs, config, sink, this.workers.map, lambda: this.progress.begin(total))
+        outputs = evaluate(
+            stage, inputs, config, sink, mapper=this.workers.map, begin=lambda: this.progress.begin(total)
+        )
         rows = _write(partial, stage, outputs)
         if _raw_has_changed(this, stage):
             raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")

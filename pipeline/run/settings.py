@@ -142,3 +142,8 @@ def read_settings(run: Path) -> Settings:
         raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
     pool = parse(PoolConfig, content["config"], f"{path}: config")
     return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"))
+
+
+def calibrated_in(run: Path) -> Calibrated:
+    """Return the sensor that the run in this folder calibrates."""
+    return read_settings(run).session.calibrated

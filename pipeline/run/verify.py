@@ -14,7 +14,7 @@ from pipeline.run.stage_protocol import name_of
 from pipeline.run.workers import SERIAL, Workers
 
 
-def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
+def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
     """Read and hash again everything a run read and wrote; what is not as recorded."""
     settings = read_settings(run_folder)
     with folder.reading(run_folder):

@@ -11,10 +11,25 @@ from pipeline.config.marks import load_marks
 from pipeline.config.mount import Mount
 from pipeline.config.yaml_models import parse
 from pipeline.mount import mount_of
+from pipeline.run.output_files import refuse_output
+from stages.commands.answer import print_answer
 
 
-def coarse(file: Path, session: Path, out: Path | None, write: bool) -> tuple[str, bool]:
-    """What the screen says, and whether the marks agree."""
+def command(file: Path, session: Path, out: Path | None, write: bool) -> int:
+    """Print the mounts, and write them into session.yaml; 1 if the marks do not agree.
+
+    Parameters
+    ----------
+    file
+        The survey of the marks.
+    session
+        Folder with session.yaml.
+    out
+        File for all of it as YAML; None: none.
+    write
+        Put the mounts into session.yaml.
+    """
+    refuse_output("--yaml", out, session, begins=b"agrees:")
     text, content = read_session(session)
     path = session / "session.yaml"
     given = {name: content[name]["mount"] for name in SENSORS if "mount" in content[name]}
@@ -29,4 +44,4 @@ def coarse(file: Path, session: Path, out: Path | None, write: bool) -> tuple[st
         said.append(written(session, text, content, blocks) if write else f"{path}: not written (--no-write)")
         missing = [name for name in SENSORS if name not in present and name not in blocks]
         said += [f"But {name} still has no mount there." for name in missing]
-    return "\n".join(said), answer.agrees
+    return print_answer("\n".join(said), answer.agrees)
