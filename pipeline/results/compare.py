@@ -21,7 +21,7 @@ from pipeline.results.screen import summary
 from pipeline.run import manifest
 from pipeline.run.output_files import as_written
 from pipeline.run.results import Tables, agreeing, calibration
-from pipeline.run.settings import Settings, read_settings, refuse_other
+from pipeline.run.settings import Settings, read_settings, refuse_other_sensor
 
 LEVEL = 0.01  # of the joint test: so many false alarms where nothing has moved
 UNITS = ("deg",) * 3 + ("m",) * 3
@@ -44,9 +44,9 @@ class RunRead:
     def read(cls, path: Path, stages: tuple[str, ...]) -> "RunRead":
         if not path.is_dir():
             raise ArtefactError(f"{path}: there is no such folder; name a run folder")
-        refuse_other(path, "mbes")
+        refuse_other_sensor(path, "mbes")
         for stage in stages:
-            if manifest.read(path / stage) is None:
+            if manifest.read_manifest(path / stage) is None:
                 raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")
         found = agreeing(path, stages)
         for stage in stages:

@@ -107,7 +107,7 @@ def holds_run(run: Path) -> bool:
     return (run / RUN_YAML).is_file()
 
 
-def refuse_other(run: Path, calibrated: Calibrated) -> None:
+def refuse_other_sensor(run: Path, calibrated: Calibrated) -> None:
     """A run folder is the sonar's or the laser's, not both in turn. (Settings of an older program need not be read.)"""
     try:
         session = read_yaml(run / RUN_YAML)["session"] if holds_run(run) else None

@@ -18,7 +18,7 @@ from pipeline.run import folder
 from pipeline.run.results import PAGE, agreeing, recording_path
 from pipeline.run.settings import read_settings
 from stages import ORDER, names_in
-from stages.commands.one_drawing import RECORDINGS, DrawingFailure, draw, kind_of
+from stages.commands.one_drawing import RECORDINGS, DrawingFailure, draw_one, kind_of_drawing
 
 DECIDES = "angle_iterate"  # on which tabs there are
 WORKER = [sys.executable, "-P", "-m", "stages.commands.draw_worker"]  # -P: no code of the working folder is run
@@ -83,12 +83,12 @@ def _draw_all(run: Path, names: Sequence[str], processes: int) -> list[DrawingFa
     """Draw page and recordings side by side where there may be two processes, and else one after the other."""
     failures = None
     if processes and names:
-        by_kind = [[name for name in names if kind_of(name) == kind] for kind in (PAGE, RECORDINGS)]
+        by_kind = [[name for name in names if kind_of_drawing(name) == kind] for kind in (PAGE, RECORDINGS)]
         shares = [share for share in by_kind if share] if processes > 1 else [list(names)]
         with contextlib.suppress(OSError):  # where no process can be started, this one draws
             failures = _drawn_by_workers(run.absolute(), shares)
     if failures is None:
-        failures = [failure for name in names if (failure := draw(run, name)) is not None]
+        failures = [failure for name in names if (failure := draw_one(run, name)) is not None]
     return list({failure.kind: failure for failure in reversed(failures)}.values())
 
 
@@ -116,7 +116,7 @@ def _answer(worker: "subprocess.Popen[str]", share: Sequence[str]) -> list[Drawi
     assert worker.stdout is not None
     last = worker.stdout.read().rstrip().rpartition("\n")[2]
     if not last:
-        return [DrawingFailure(" and ".join(dict.fromkeys(map(kind_of, share))), "its process has ended")]
+        return [DrawingFailure(" and ".join(dict.fromkeys(map(kind_of_drawing, share))), "its process has ended")]
     return [DrawingFailure(**failure) for failure in json.loads(last)]
 
 

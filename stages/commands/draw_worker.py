@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from stages.commands.one_drawing import draw
+from stages.commands.one_drawing import draw_one
 
 
 def main(run: Path, names: Sequence[str]) -> None:
     """Draw page and recordings of ``run``, and print the failures."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    failures = [failure for name in names if (failure := draw(run, name)) is not None]
+    failures = [failure for name in names if (failure := draw_one(run, name)) is not None]
     print("\n" + json.dumps([asdict(failure) for failure in failures]), flush=True)
 
 

@@ -30,7 +30,7 @@ class DrawingFailure:
         return cls(kind, f"{type(error).__name__}: {first}", trace)
 
 
-def draw(run: Path, name: str) -> DrawingFailure | None:
+def draw_one(run: Path, name: str) -> DrawingFailure | None:
     """Draw the page, or a stage's recording; return what went wrong, if anything did."""
     try:
         if name == PAGE:
@@ -38,11 +38,11 @@ def draw(run: Path, name: str) -> DrawingFailure | None:
         else:
             _draw_recording(run, name)
     except Exception as error:
-        return DrawingFailure.of(kind_of(name), error)
+        return DrawingFailure.of(kind_of_drawing(name), error)
     return None
 
 
-def kind_of(name: str) -> str:
+def kind_of_drawing(name: str) -> str:
     """Return what a name is called in messages: the page by its name, a stage's recording by RECORDINGS."""
     return PAGE if name == PAGE else RECORDINGS
 

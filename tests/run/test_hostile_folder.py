@@ -83,7 +83,7 @@ def test_a_manifest_with_other_types_in_it_only_costs_a_rerun(pool: Pool, change
     pool.run()
     path = pool.run_folder / "take" / "manifest.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
-    assert manifest.read(path.parent) is None
+    assert manifest.read_manifest(path.parent) is None
     assert pool.run() == ["take"]
 
 
