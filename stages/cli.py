@@ -187,9 +187,11 @@ def _diff(
 
     Status 1 if the mounts differ significantly, or by more than a tolerance, or cannot be compared.
     """
+    from pipeline.results.mount_difference import Tolerances
     from stages.commands import diff
 
-    return diff.command(first, second, tolerance_deg, tolerance_mm, diff.DiffOutputs(as_json, html, rrd))
+    tolerances = Tolerances(tolerance_deg, tolerance_mm)
+    return diff.command(first, second, tolerances, diff.DiffOutputs(as_json, html, rrd))
 
 
 @app.command("history")

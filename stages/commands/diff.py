@@ -8,8 +8,10 @@ from typing import Any
 
 from pipeline.atomic_files import write_text, writing
 from pipeline.console import say
-from pipeline.results.compare import RunRead, diff, is_moved
-from pipeline.results.compare_text import text
+from pipeline.results.compare import run_difference
+from pipeline.results.compare_text import comparison_text
+from pipeline.results.finished_run import FinishedRun
+from pipeline.results.mount_difference import Tolerances, is_moved
 from pipeline.run.output_files import refuse_output
 from stages import ORDER
 
@@ -23,17 +25,15 @@ class DiffOutputs:
     rrd: Path | None
 
 
-def command(
-    first: Path, second: Path, tolerance_deg: float | None, tolerance_mm: float | None, outputs: DiffOutputs
-) -> int:
+def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutputs) -> int:
     """Compare two runs.
 
     Parameters
     ----------
     first, second
         Run folders.
-    tolerance_deg, tolerance_mm
-        An angle, or a coordinate of the lever arm, that differs by more is a no, significant or not; None: any may.
+    tolerances
+        A larger difference of the mount is a no, significant or not.
     outputs
         Forms of the comparison.
 
@@ -42,40 +42,46 @@ def command(
     int
         1: the mounts differ, or cannot be compared.
     """
-    comparison = compare_runs(first, second, tolerance_deg, tolerance_mm)
+    difference = compare_runs(first, second, tolerances)
     for option, file in (("--html", outputs.html), ("--rrd", outputs.rrd)):
         refuse_output(option, file, first, second)
     if outputs.html is not None:
-        from pipeline.results.pages.comparison import page
+        from pipeline.results.pages.comparison import comparison_page
 
-        write_text(outputs.html, page(comparison))
+        write_text(outputs.html, comparison_page(difference))
     if outputs.rrd is not None:
-        write_pair(first, second, comparison, outputs.rrd)
-    as_json = json.dumps(comparison, indent=1, ensure_ascii=False) if outputs.as_json else None
-    say(text(comparison) if as_json is None else as_json, sys.stdout)
-    return 1 if is_moved(comparison) else 0
+        write_two_runs(first, second, difference, outputs.rrd)
+    text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else comparison_text(difference)
+    say(text, sys.stdout)
+    return 1 if is_moved(difference) else 0
 
 
-def compare_runs(
-    first: Path, second: Path, tolerance_deg: float | None = None, tolerance_mm: float | None = None
-) -> dict[str, Any]:
-    """Return the comparison of two run folders; tolerances as in :func:`command`."""
-    return diff(RunRead.read(first, ORDER), RunRead.read(second, ORDER), tolerance_deg, tolerance_mm)
-
-
-def write_pair(first: Path, second: Path, comparison: dict[str, Any], path: Path) -> None:
-    """Write both runs as one recording.
+def compare_runs(first: Path, second: Path, tolerances: Tolerances) -> dict[str, Any]:
+    """Return the difference of two run folders, of :func:`pipeline.results.compare.run_difference`.
 
     Parameters
     ----------
     first, second
-        Run folders.
-    comparison
-        Theirs, of :func:`compare_runs`.
+        The run folders.
+    tolerances
+        Larger differences of the mount are listed.
+    """
+    return run_difference(FinishedRun.read(first, ORDER), FinishedRun.read(second, ORDER), tolerances)
+
+
+def write_two_runs(first: Path, second: Path, difference: dict[str, Any], path: Path) -> None:
+    """Write a recording of two run folders.
+
+    Parameters
+    ----------
+    first, second
+        The run folders.
+    difference
+        Their difference, of :func:`compare_runs`.
     path
         The recording's file.
     """
-    from stages.views.two_runs import save_pair
+    from stages.views.two_runs import save_two_runs
 
     with writing(path):
-        save_pair(first, second, comparison, path)
+        save_two_runs(first, second, difference, path)

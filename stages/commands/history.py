@@ -5,7 +5,7 @@ from datetime import date
 from pathlib import Path
 
 from pipeline.console import plural, say
-from pipeline.results.history import Filter, read_history
+from pipeline.results.history import SessionFilter, read_history
 from pipeline.results.pages.history import write_history
 
 
@@ -23,13 +23,13 @@ def command(folder: Path, out: Path | None, name: str, since: date | None, until
     since, until
         First and last day, UTC; None: any.
     """
-    chosen = Filter(name, since, until)
-    history = read_history(folder, chosen)
+    session_filter = SessionFilter(name, since, until)
+    history = read_history(folder, session_filter)
     target = folder / "history" if out is None else out
-    write_history(history, target, chosen)
+    write_history(history, target, session_filter)
     for problem in history.unreadable:
         say(f"left out: {problem}", sys.stderr)
-    if history.without:
-        say(history.without, sys.stdout)
+    if history.not_shown:
+        say(history.not_shown, sys.stdout)
     say(f"{plural(len(history.table), 'session')}: {target / 'history.html'}", sys.stdout)
     return 0

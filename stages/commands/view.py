@@ -4,10 +4,11 @@ from pathlib import Path
 
 from pipeline.atomic_files import temporary_folder
 from pipeline.errors import ConfigError
+from pipeline.results.mount_difference import Tolerances
 from pipeline.run.settings import read_settings
 from stages import ORDER
 from stages.commands.answer import say_failures
-from stages.commands.diff import compare_runs, write_pair
+from stages.commands.diff import compare_runs, write_two_runs
 from stages.commands.draw import Drawings, draw_missing
 from stages.views.recording import recordings_of
 from stages.views.viewer import show
@@ -41,6 +42,6 @@ def command(first: Path, second: Path | None, stage: str | None) -> int:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
     with temporary_folder() as place:
         path = place / "pair.rrd"
-        write_pair(first, second, compare_runs(first, second), path)
+        write_two_runs(first, second, compare_runs(first, second, Tolerances()), path)
         copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
         return show([path], copy)
