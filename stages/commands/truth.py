@@ -22,13 +22,19 @@ from pipeline.run.output_files import as_written
 from pipeline.run.results import calibration
 from pipeline.run.settings import read_settings
 from pipeline.text_table import text_table
+from stages.commands.answer import print_answer
 
 LIMIT = 4.0
 Array = NDArray[np.float64]
 
 
-def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
-    """The table for people, and whether the result stands up to the truth."""
+def command(run: Path, truth_path: Path) -> int:
+    """Print a run's result beside the truth in a file; 1 if it was rejected, or does not stand up to the truth."""
+    return print_answer(*compare_with_truth(run, truth_path))
+
+
+def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
+    """Return the table for people, and whether the result was accepted and stands up to the truth."""
     result, settings = calibration(run), read_settings(run)
     R_true, lever_arm_true_m = read_truth(truth_path)
     chosen = settings.pool.result
