@@ -89,16 +89,16 @@ def remove(path: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def settle(folder: Path) -> None:
+def flush_to_disk(folder: Path) -> None:
     """Have the disk hold a finished folder, with all its files, before a rename says that it is complete."""
     with writing(folder):
         for place, _, names in os.walk(folder, topdown=False):
             for name in names:
                 _sync(os.path.join(place, name))
-            settle_names(Path(place))
+            flush_names(Path(place))
 
 
-def settle_names(folder: Path) -> None:
+def flush_names(folder: Path) -> None:
     """Have the disk hold the names in a folder, as after a rename. (Some network disks refuse: their server sees to
     it.)"""
     with contextlib.suppress(OSError):

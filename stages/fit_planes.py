@@ -18,7 +18,7 @@ from pipeline.artefacts.catalogue.target import (
     TARGET_POSE,
 )
 from pipeline.artefacts.poses import trajectory_in_target
-from pipeline.artefacts.streams import Batch, Stream, xyz
+from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import FitPlanes
 from pipeline.config.session import Mbes
 from pipeline.errors import DegenerateGeometryError
@@ -83,13 +83,13 @@ def _groups(batch: Batch) -> Iterator[tuple[Key, NDArray[np.int64]]]:
 
 def laser_moments(batch: Batch) -> dict[Key, Moments]:
     """Moments of a batch's laser points by pass and face."""
-    points = xyz(batch, "target_m")
+    points = point_array(batch, "target_m")
     return {key: Moments.of(points[rows]) for key, rows in _groups(batch)}
 
 
 def sounding_moments(batch: Batch, trajectory: Trajectory, R_body_from_mbes: Array) -> dict[Key, Array]:
     """Lifted moments (40, 40) of a batch's soundings by pass and face."""
-    points = xyz(batch, "mbes_m") @ R_body_from_mbes.T
+    points = point_array(batch, "mbes_m") @ R_body_from_mbes.T
     positions, R_target_from_body = trajectory.poses_at(batch["t_ns"])
     features = lift(R_target_from_body, positions, points)
     return {key: features[rows].T @ features[rows] for key, rows in _groups(batch)}

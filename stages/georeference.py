@@ -19,7 +19,7 @@ from pipeline.artefacts.catalogue.points import (
     TRAJECTORY,
 )
 from pipeline.artefacts.counts import counts_table
-from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream, xyz
+from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream, point_array
 from pipeline.config.pool import Georeference
 from pipeline.config.session import Laser, Mbes
 from pipeline.config.target import Target
@@ -58,8 +58,8 @@ class Inputs:
 class Outputs:
     poses: Annotated[pd.DataFrame, POSES]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
-    laser_pool: Annotated[Stream, LASER_POOL] = EMPTY
-    soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY
+    laser_pool: Annotated[Stream, LASER_POOL] = EMPTY_STREAM
+    soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY_STREAM
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     )
 
 
-def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> Piece:
+def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> BatchResult:
     columns = chunk.columns
     t_ns = columns["t_ns"]
     number = pass_of(t_ns, prepared.starts_ns, prepared.ends_ns)
@@ -105,7 +105,7 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
         columns = {name: values[rows] for name, values in columns.items()}
         t_ns, number = columns["t_ns"], number[rows]
     if source == "laser_points":
-        sensor, pool = _laser(t_ns, xyz(columns, "m"), prepared, config)
+        sensor, pool = _laser(t_ns, point_array(columns, "m"), prepared, config)
         valid = np.ones(len(t_ns), dtype=bool)
     elif config.mbes is not None:
         mbes = config.mbes
@@ -136,7 +136,7 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
     for index, axis in enumerate("xyz"):
         kept[f"{axis}_{word}_m"] = sensor[near, index]
         kept[f"{axis}_pool_m"] = pool[near, index]
-    return Piece({"laser_pool" if source == "laser_points" else "soundings_pool": kept}, counts)
+    return BatchResult({"laser_pool" if source == "laser_points" else "soundings_pool": kept}, counts)
 
 
 def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: Config) -> tuple[Array, Array]:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.artefacts.schema import Artefact, Document, Raw
-from pipeline.artefacts.streams import EMPTY, MemoryPart, Stream
+from pipeline.artefacts.schema import Artefact, Document, RawFiles
+from pipeline.artefacts.streams import EMPTY_STREAM, MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.run.stage_protocol import declared, name_of, run_in_memory
@@ -27,9 +27,9 @@ def calibrate_in_memory(
     found: dict[str, Any] = {}
 
     def given(marker: Any) -> Any:
-        if isinstance(marker, Raw):
+        if isinstance(marker, RawFiles):
             there = getattr(session, marker.sensor) is not None
-            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if there else EMPTY
+            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if there else EMPTY_STREAM
         if isinstance(marker, (Artefact, Document)):
             return found[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}

@@ -20,8 +20,8 @@ from pipeline.artefacts.catalogue.target import (
 )
 from pipeline.artefacts.counts import counts_table
 from pipeline.artefacts.poses import trajectory_in_pool
-from pipeline.artefacts.sampling import Voxels, every_nth, points_above, voxel_means, voxel_sums
-from pipeline.artefacts.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
+from pipeline.artefacts.sampling import Voxels, points_above, sample_rows, voxel_means, voxel_sums
+from pipeline.artefacts.streams import EMPTY_STREAM, Batch, BatchResult, Chunk, Stream, point_array
 from pipeline.config.pool import Segment
 from pipeline.config.session import Laser, Mbes
 from pipeline.config.target import Target
@@ -66,8 +66,8 @@ class Outputs:
     target_pose: Annotated[pd.DataFrame, TARGET_POSE]
     provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
     counts: Annotated[pd.DataFrame, SEGMENT_COUNTS]
-    laser_labelled: Annotated[Stream, LASER_LABELLED] = EMPTY
-    soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED] = EMPTY
+    laser_labelled: Annotated[Stream, LASER_LABELLED] = EMPTY_STREAM
+    soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED] = EMPTY_STREAM
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,8 @@ def _laser_sample(inputs: Inputs, lowest_m: float) -> LaserSample:
 
 
 def _thinned(batch: Batch, rows: float, lowest_m: float) -> tuple[Voxels, NDArray[np.float64]]:
-    some = every_nth(batch, rows / LASER_SAMPLE)
-    few = every_nth(some, rows / RAW_SAMPLE)  # the same hash: a part of these
+    some = sample_rows(batch, rows / LASER_SAMPLE)
+    few = sample_rows(some, rows / RAW_SAMPLE)  # the same hash: a part of these
     return voxel_sums(points_above(some, "pool_m", lowest_m), VOXEL_M), points_above(few, "pool_m", lowest_m)
 
 
@@ -134,19 +134,19 @@ def _laser_poses(inputs: Inputs, trajectory: Trajectory, lowest_m: float) -> Las
 
 
 def _placed(batch: Batch, one_in: float, lowest_m: float) -> tuple[NDArray[np.int64], Array]:
-    some = every_nth(batch, one_in)
+    some = sample_rows(batch, one_in)
     dry = some["z_pool_m"] >= lowest_m
-    return some["t_ns"][dry], xyz(some, "laser_m", dry)
+    return some["t_ns"][dry], point_array(some, "laser_m", dry)
 
 
 def _sounding_sample(inputs: Inputs, trajectory: Trajectory) -> SoundingSample:
-    pieces = list(inputs.soundings_pool.fold(every_nth, _used(inputs, "soundings") / SOUNDING_SAMPLE))
+    pieces = list(inputs.soundings_pool.fold(sample_rows, _used(inputs, "soundings") / SOUNDING_SAMPLE))
     t_ns = np.concatenate([piece["t_ns"] for piece in pieces])
     points = np.column_stack([np.concatenate([piece[f"{axis}_mbes_m"] for piece in pieces]) for axis in "xyz"])
     return SoundingSample(*trajectory.poses_at(t_ns), points)
 
 
-def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> Piece:
+def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> BatchResult:
     if source == "laser_pool":
         return _label_laser(chunk.columns, prepared, config)
     if config.mbes is None:
@@ -154,16 +154,16 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
     return _label_soundings(chunk.columns, prepared, config, config.mbes)
 
 
-def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
+def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> BatchResult:
     model, segment = prepared.model, config.segment
     gate, grazing = prepared.target.gate_m, np.radians(segment.min_grazing_deg)
     coarse = mount_of(config.laser.mount)
     lever = coarse.lever_arm_body_m
     if config.mbes is None:
         R_body_from_laser, lever = prepared.mount.on(coarse)
-        points = prepared.trajectory.place(batch["t_ns"], xyz(batch, "laser_m") @ R_body_from_laser.T + lever)
+        points = prepared.trajectory.place(batch["t_ns"], point_array(batch, "laser_m") @ R_body_from_laser.T + lever)
     else:
-        pool = xyz(batch, "pool_m")
+        pool = point_array(batch, "pool_m")
         points = (prepared.target.R_target_from_pool @ (pool - prepared.target.origin_pool_m).T).T
     heights = (model.water_level_m + segment.water_margin_m, np.inf)
     dry = points[:, 2] > model.water_level_m + segment.water_margin_m / 2
@@ -180,13 +180,13 @@ def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
         columns[f"{axis}_laser_m"], columns[f"{axis}_target_m"] = batch[f"{axis}_laser_m"][rows], points[on, index]
     columns["cos_incidence"] = labels.cos_incidence[on]
     counts = _counts("below or near the water line", dry, "near an edge", near, labels)
-    return Piece({"laser_labelled": columns}, counts)
+    return BatchResult({"laser_labelled": columns}, counts)
 
 
-def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: Mbes) -> Piece:
+def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: Mbes) -> BatchResult:
     model, segment, mount = prepared.model, config.segment, prepared.mount
     R_body_from_mbes, lever = mount.on(mount_of(mbes.mount))
-    sensor = xyz(batch, "mbes_m")
+    sensor = point_array(batch, "mbes_m")
     points = prepared.trajectory.place(batch["t_ns"], sensor @ R_body_from_mbes.T + lever)
     heights = (-np.inf, model.water_level_m - segment.water_margin_m)
     wet = points[:, 2] < model.water_level_m - segment.water_margin_m / 2
@@ -205,7 +205,7 @@ def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: Mbe
     columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on]}
     counts = _counts("above or near the water line", wet, "footprint near an edge", near, labels)
     counts |= {"footprint partly on another face": int(hidden.sum()), "used": len(on)}
-    return Piece({"soundings_labelled": columns}, counts)
+    return BatchResult({"soundings_labelled": columns}, counts)
 
 
 def _counts(

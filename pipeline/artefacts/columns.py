@@ -11,13 +11,13 @@ I16, I32, I64, F32, F64, TEXT, BOOL = (
 FLOATS = pa.list_(pa.float64())
 
 
-def xyz(frame: str, unit: str = "m", stem: str = "", type_: pa.DataType = F64) -> tuple[Column, ...]:
+def coordinate_columns(frame: str, unit: str = "m", stem: str = "", type_: pa.DataType = F64) -> tuple[Column, ...]:
     return tuple(Column(f"{stem}{axis}_{frame}_{unit}", type_, unit, f"{axis} in frame {frame}") for axis in "xyz")
 
 
-def near(frame: str) -> tuple[Column, ...]:
+def float32_coordinates(frame: str) -> tuple[Column, ...]:
     """Coordinates near target or sensor, in single precision: within 16 m that is within half a micrometre."""
-    return xyz(frame, type_=F32)
+    return coordinate_columns(frame, type_=F32)
 
 
 ROTATION = tuple(

@@ -164,6 +164,6 @@ def write_empty_part(folder: Path, artefact: Artefact) -> Path:
     return path
 
 
-def rows_of(path: Path) -> int:
+def row_count(path: Path) -> int:
     """Rows of a Parquet file, from its footer."""
     return int(pq.read_metadata(path).num_rows)

@@ -5,22 +5,22 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import Batch, xyz
+from pipeline.artefacts.streams import Batch, point_array
 
-Array = NDArray[np.float64]
+_Array = NDArray[np.float64]
 KEY_BITS = 20
 
 
-Voxels = tuple[NDArray[np.int64], Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
+Voxels = tuple[NDArray[np.int64], _Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
 
 
-def points_above(batch: Batch, suffix: str, lowest_m: float) -> Array:
+def points_above(batch: Batch, suffix: str, lowest_m: float) -> _Array:
     """A batch's points above ``lowest_m``, (n, 3) m."""
-    points = xyz(batch, suffix)
+    points = point_array(batch, suffix)
     return np.asarray(points[points[:, 2] >= lowest_m])
 
 
-def voxel_sums(points: Array, voxel_m: float) -> Voxels:
+def voxel_sums(points: _Array, voxel_m: float) -> Voxels:
     """Points (n, 3) summed by voxel."""
     cells = np.floor(points / voxel_m).astype(np.int64) + (1 << (KEY_BITS - 1))
     keys, inverse = np.unique(
@@ -29,7 +29,7 @@ def voxel_sums(points: Array, voxel_m: float) -> Voxels:
     return keys, _sums(inverse, len(keys), np.column_stack([np.ones(len(points)), points]))
 
 
-def voxel_means(partials: Iterable[Voxels]) -> Array:
+def voxel_means(partials: Iterable[Voxels]) -> _Array:
     """Mean points (n, 3) of the voxels that hold a fair share of points: lone outliers fall away."""
     keys, sums = np.empty(0, np.int64), np.empty((0, 4))
     for more_keys, more_sums in partials:
@@ -43,11 +43,11 @@ def voxel_means(partials: Iterable[Voxels]) -> Array:
     return np.asarray(sums[fair, 1:] / sums[fair, :1])
 
 
-def _sums(group: NDArray[np.int64], groups: int, rows: Array) -> Array:
+def _sums(group: NDArray[np.int64], groups: int, rows: _Array) -> _Array:
     return np.column_stack([np.bincount(group, weights=column, minlength=groups) for column in rows.T])
 
 
-def every_nth(batch: Batch, one_in: float) -> Batch:
+def sample_rows(batch: Batch, one_in: float) -> Batch:
     """About one in ``one_in`` rows, chosen by a hash of time and beam: the same rows whatever the batches are."""
     if one_in <= 1:
         return batch

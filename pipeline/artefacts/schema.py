@@ -35,7 +35,7 @@ class Artefact:
 
 
 @dataclass(frozen=True)
-class Raw:
+class RawFiles:
     """A stage input that is not a table of an earlier stage: the raw files of one sensor."""
 
     sensor: Literal["ins", "laser", "mbes"]

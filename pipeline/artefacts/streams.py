@@ -18,7 +18,7 @@ from pipeline.errors import ArtefactError
 
 Batch = Mapping[str, np.ndarray]
 BATCH_ROWS = 131_072
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
@@ -27,7 +27,7 @@ def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
     return {name: a.astype(np.float64) if a.dtype == np.float32 else a for name, a in arrays.items()}
 
 
-def xyz(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarray:
+def point_array(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarray:
     """Points (n, 3) from the columns ``x_<suffix>``, ``y_…`` and ``z_…``; each axis lies together in memory."""
     return np.array([batch[f"{axis}_{suffix}"][rows] for axis in "xyz"]).T
 
@@ -96,10 +96,10 @@ class MemoryPart:
 class Mapper(Protocol):
     """Applies a function to each item; results come back in order. ``executor.py`` has the parallel one."""
 
-    def __call__(self, function: Callable[..., T], /, *items: Iterable[object]) -> Iterable[T]: ...
+    def __call__(self, function: Callable[..., _T], /, *items: Iterable[object]) -> Iterable[_T]: ...
 
 
-def serial(function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]:
+def serial(function: Callable[..., _T], *items: Iterable[object]) -> Iterable[_T]:
     """The plainest mapper: one item after another, here."""
     return map(function, *items)
 
@@ -117,7 +117,7 @@ class Stream:
             for chunk in part.chunks():
                 yield chunk.columns
 
-    def fold(self, function: Callable[..., T], *arguments: object) -> Iterator[T]:
+    def fold(self, function: Callable[..., _T], *arguments: object) -> Iterator[_T]:
         """``function(batch, *arguments)`` of every batch, in order; parts run side by side.
 
         Take the results one by one: together they may be many.
@@ -127,16 +127,16 @@ class Stream:
             yield from results
 
 
-EMPTY = Stream(())
+EMPTY_STREAM = Stream(())
 
 
-def _fold_part(work: tuple[Part, Callable[..., T], tuple[object, ...]]) -> list[T]:
+def _fold_part(work: tuple[Part, Callable[..., _T], tuple[object, ...]]) -> list[_T]:
     part, function, arguments = work
     return [function(chunk.columns, *arguments) for chunk in part.chunks()]
 
 
 @dataclass(frozen=True)
-class Piece:
+class BatchResult:
     """What a stage's ``run_batch`` makes of one chunk: rows for its output streams, and a small partial result."""
 
     streams: Mapping[str, Batch]

@@ -20,7 +20,7 @@ from pipeline.errors import ConfigError, RawDataError
 from pipeline.gps_time import NS, WEEK_NS
 from pipeline.readers import detect
 from pipeline.readers.claimed_counts import refuse_claim
-from pipeline.readers.crs import Frame, placing_of
+from pipeline.readers.crs import LaserFrame, frame_transform
 
 Sensor = Literal["ins", "laser", "mbes"]
 Settings = Ins | Laser | Mbes
@@ -104,7 +104,7 @@ def raw_parts(sensor: Sensor, settings: Settings, folder: Path) -> tuple[Part, .
         Something is missing or wrong in session.yaml: ``gps_week``, ``laser.frame``, ``laser.heights``.
     """
     if isinstance(settings, Laser):
-        placing_of(_frame(settings))
+        frame_transform(_frame(settings))
     files = _named(folder, found(folder, settings.files, f"{sensor}.files"))
     for path, name in files:
         _check_kind(path, name, sensor, settings)
@@ -169,7 +169,7 @@ def _inertial_explorer(files: Files, settings: Ins) -> tuple[Part, ...]:
 
 def _sbet(files: Files, accuracy: Files, settings: Ins) -> tuple[Part, ...]:
     from pipeline.readers import sbet
-    from pipeline.readers.smrmsg import AccuracyPart
+    from pipeline.readers.smrmsg import SmrmsgPart
 
     for path, name in files:
         sbet.check_size(path, name)
@@ -180,14 +180,14 @@ def _sbet(files: Files, accuracy: Files, settings: Ins) -> tuple[Part, ...]:
     weeks = _weeks(firsts, settings.gps_week, "ins", files[0][1])
     solutions = [sbet.SbetPart(*file, week, settings.latency_s) for file, week in zip(files, weeks, strict=False)]
     sigmas = [
-        AccuracyPart(*file, week, settings.latency_s) for file, week in zip(accuracy, weeks[len(files) :], strict=True)
+        SmrmsgPart(*file, week, settings.latency_s) for file, week in zip(accuracy, weeks[len(files) :], strict=True)
     ]
     return (*solutions, *sigmas)
 
 
 def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers import las
-    from pipeline.readers.las_times import refuse_contradiction
+    from pipeline.readers.las_times import refuse_wrong_time_type
 
     headers = [las.read_header(path, name, settings.time) for path, name in files]
     for (_, name), header in zip(files, headers, strict=True):
@@ -195,12 +195,12 @@ def _las(files: Files, settings: Laser) -> tuple[Part, ...]:
     weekly = [(name, header) for (_, name), header in zip(files, headers, strict=True) if not header.adjusted_time]
     firsts = [header.first_s for _, header in weekly]
     for name, header in weekly:
-        refuse_contradiction(np.array([header.first_s]), name, header.adjusted_time, header.told)
+        refuse_wrong_time_type(np.array([header.first_s]), name, header.adjusted_time, header.declared_time)
     weeks = iter(_weeks(firsts, settings.gps_week, "laser", weekly[0][0]) if weekly else [])
     parts: list[Part] = []
     for (path, name), header in zip(files, headers, strict=True):
         week = None if header.adjusted_time else next(weeks)
-        parts += las.parts(path, name, header, week, _frame(settings), settings.latency_s)
+        parts += las.las_parts(path, name, header, week, _frame(settings), settings.latency_s)
     return tuple(parts)
 
 
@@ -208,11 +208,11 @@ def _e57(files: Files, settings: Laser) -> tuple[Part, ...]:
     from pipeline.readers import e57
 
     frame, latency_s, most = _frame(settings), settings.latency_s, settings.max_records
-    return tuple(part for path, name in files for part in e57.parts(path, name, frame, latency_s, most))
+    return tuple(part for path, name in files for part in e57.e57_parts(path, name, frame, latency_s, most))
 
 
-def _frame(settings: Laser) -> Frame:
-    return Frame(settings.frame, settings.heights)
+def _frame(settings: Laser) -> LaserFrame:
+    return LaserFrame(settings.frame, settings.heights)
 
 
 def _weeks(first_seconds: list[float], gps_week: int | None, sensor: str, name: str) -> list[int]:
@@ -252,5 +252,5 @@ def _kongsberg(files: Files, settings: Mbes) -> tuple[Part, ...]:
 def _tables(files: Files, sensor: Sensor, settings: Settings) -> tuple[Part, ...]:
     from pipeline.readers.table import TablePart
 
-    frame = _frame(settings) if isinstance(settings, Laser) else Frame()
+    frame = _frame(settings) if isinstance(settings, Laser) else LaserFrame()
     return tuple(TablePart(path, name, sensor, frame, settings.latency_s, settings.max_records) for path, name in files)

@@ -39,7 +39,7 @@ from pipeline.readers.row_checks import (
     MAX_SPEED_M_S,
     MBES_COLUMNS,
     MIN_SPEED_M_S,
-    Sieve,
+    RowFilter,
     chunk,
     keep_possible_soundings,
     latency_ns,
@@ -242,7 +242,7 @@ def _chunk(pings: list[tuple[int, Ping, float]], latency_s: float, dropped: Coun
         return np.repeat(np.asarray(values, dtype=dtype), counts)
 
     smooth = [_is_smooth(ping.angle_deg) for _, ping, _ in pings]
-    sieve = Sieve(
+    sieve = RowFilter(
         {
             "t_ns": spread([ping.t_ns for _, ping, _ in pings], np.int64),
             "ping": spread([number for number, _, _ in pings], np.int64),

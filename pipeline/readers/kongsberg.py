@@ -17,7 +17,7 @@ from pipeline.readers.kongsberg_arrays import SAME, Arrays, Fan
 from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import (
     MBES_COLUMNS,
-    Sieve,
+    RowFilter,
     chunk,
     keep_possible_soundings,
     latency_ns,
@@ -140,7 +140,7 @@ class KongsbergPart(ABC):
         angle_rad, tilt_rad, time_s = fan.in_mbes(self.projector_offset_m)
         recorded = np.isfinite(fan.angle_rad) & np.isfinite(fan.two_way_time_s)
         delay_ns = joined(lambda ping: np.rint(ping.sectors.delay_s * NS).astype(np.int64)[ping.sector])
-        sieve = Sieve(
+        sieve = RowFilter(
             {
                 "t_ns": spread([ping.t_ns for ping in pings], np.int64) + delay_ns,
                 "ping": spread([ping.number for ping in pings], np.int64),

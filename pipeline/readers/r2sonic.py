@@ -34,7 +34,7 @@ from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import Repeats
 from pipeline.readers.row_checks import (
     MBES_COLUMNS,
-    Sieve,
+    RowFilter,
     chunk,
     keep_possible_soundings,
     latency_ns,
@@ -149,7 +149,7 @@ def _chunk(pings: list[Ping], latency_s: float, dropped: Counter[str]) -> Chunk:
     scale_s = spread([ping.range_scale_s for ping in pings], np.float64)
     two_way_time_s = np.concatenate([ping.ranges for ping in pings]).astype(np.float64) * scale_s
     angle_rad = np.concatenate([_angles(ping) for ping in pings])
-    sieve = Sieve(
+    sieve = RowFilter(
         {
             "t_ns": spread(t_ns, np.int64),
             "ping": spread([ping.number for ping in pings], np.int64),

@@ -50,7 +50,7 @@ def no_rows(names: tuple[str, ...], dropped: Counter[str]) -> Chunk:
 
 
 @dataclass
-class Sieve:
+class RowFilter:
     """Equally long columns that lose rows, test by test; each test's losses are counted under its reason."""
 
     columns: Columns
@@ -91,7 +91,7 @@ def latency_ns(latency_s: float) -> int:
     return round(latency_s * NS)
 
 
-def keep_possible_poses(sieve: Sieve) -> None:
+def keep_possible_poses(sieve: RowFilter) -> None:
     """INS rows (t_ns not needed yet): a position on the earth, angles of an attitude. Azimuths go to [0, 2 pi)."""
     sieve.keep_finite()
     latitude, longitude = sieve["latitude_rad"], sieve["longitude_rad"]
@@ -108,7 +108,8 @@ def sigma_rows(t_ns: NDArray[np.int64], given: Mapping[str, NDArray[Any]], dropp
     nothing. Zero is no standard deviation."""
     if not given or not len(t_ns):
         return {}
-    sieve = Sieve({"t_ns": t_ns} | {name: np.asarray(values, np.float64) for name, values in given.items()}, dropped)
+    columns = {name: np.asarray(values, np.float64) for name, values in given.items()}
+    sieve = RowFilter({"t_ns": t_ns} | columns, dropped)
     good = np.ones(len(sieve), dtype=bool)
     for name in given:
         good &= (sieve[name] > 0) & (sieve[name] <= MAX_SIGMA[name.rpartition("_")[2]])
@@ -116,7 +117,7 @@ def sigma_rows(t_ns: NDArray[np.int64], given: Mapping[str, NDArray[Any]], dropp
     return {name: sieve.columns.get(name, np.full(len(sieve), np.nan)) for name in SIGMA_COLUMNS}
 
 
-def keep_possible_soundings(sieve: Sieve) -> None:
+def keep_possible_soundings(sieve: RowFilter) -> None:
     """Soundings: a detection, with a travel time, an angle and a sound speed that water and sonar can have."""
     sieve.keep_finite()
     speed = sieve["sound_speed_m_s"]
@@ -137,7 +138,7 @@ class Order:
     records: int = 0
     backwards: int = 0
 
-    def keep(self, sieve: Sieve) -> None:
+    def keep(self, sieve: RowFilter) -> None:
         t_ns = sieve["t_ns"]
         latest = np.maximum.accumulate(np.concatenate([[self.last_ns], t_ns]))
         back = t_ns < latest[:-1]

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pipeline
-from pipeline.artefacts.schema import Raw
+from pipeline.artefacts.schema import RawFiles
 from pipeline.atomic_files import sha256
 from pipeline.run.import_closure import file_of, imported, reached
 from pipeline.run.stage_protocol import declared
@@ -39,7 +39,7 @@ def versions() -> dict[str, str]:
 
 def source_of(stage: ModuleType) -> dict[str, str]:
     """Digests of the program's files that the stage can reach; the readers' too, where it is given raw files."""
-    raw = any(isinstance(marker, Raw) for marker in declared(stage.Inputs).values())
+    raw = any(isinstance(marker, RawFiles) for marker in declared(stage.Inputs).values())
     return dict(_source(ROOT, stage.__name__, Path(str(stage.__file__)), raw))
 
 

@@ -19,7 +19,7 @@ LONGEST_STEP = 60_000  # section A2: of 65535
 
 
 @dataclass(frozen=True)
-class Fan:
+class FanAngles:
     """Angles as a BTH0 packet holds them: evenly from first to last (A0), or first plus whole steps (A2)."""
 
     first_rad: float  # exact in float32, as the last
@@ -29,16 +29,16 @@ class Fan:
     step_scale_rad: float = 0.0
 
 
-def fan(scenario: MbesScenario) -> Fan:
+def fan_angles(scenario: MbesScenario) -> FanAngles:
     """The recorded angles of all pings, port to starboard; equidistant: even in tan(angle), as on a flat floor."""
     half = np.radians(scenario.sector_deg) / 2
     first, last = float(np.float32(-half)), float(np.float32(half))
     if scenario.spacing == "equi_angle":
-        return Fan(first, last, np.linspace(first, last, scenario.beams))
+        return FanAngles(first, last, np.linspace(first, last, scenario.beams))
     wished = np.arctan(np.linspace(-np.tan(half), np.tan(half), scenario.beams)) - first
     scale = float(np.float32(np.diff(wished).max() / LONGEST_STEP))
     steps = np.diff(np.rint(wished / scale), prepend=0.0).astype(np.uint16)
-    return Fan(first, last, first + np.cumsum(steps.astype(np.float64)) * scale, steps, scale)
+    return FanAngles(first, last, first + np.cumsum(steps.astype(np.float64)) * scale, steps, scale)
 
 
 def transmit_tilts_rad(scenario: MbesScenario, angles_rad: Floats, pings: NDArray[np.int64]) -> Floats:
@@ -67,7 +67,7 @@ def directions_in_mbes(swing: Floats, tilt_rad: Floats) -> Floats:
     return np.stack([np.sin(swing) * along, forward, -np.cos(swing) * along], axis=-1)
 
 
-class Beams:
+class BeamBundles:
     """Beams as bundles of rays over their -3 dB width, weighted with a Gaussian pattern."""
 
     def __init__(self, scenario: MbesScenario, caster: RayCaster, water_level_m: float) -> None:

@@ -11,25 +11,25 @@ from pipeline.simulation.mounts import R_body_from_sensor, coarse_error, coarse_
 from pipeline.simulation.scenario import Scenario
 
 INS_SUFFIX = {"inspvas": "gps", "inspva": "gps", "inspvasa": "asc", "inspvaa": "asc", "sbet": "sbet"}
-Text = dict[str, Any]
+_Text = dict[str, Any]
 
 
-def session_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
+def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     """session.yaml. Sigmas are those put in; where one is zero it is left out, so that the default holds."""
     ins, laser, mbes = scenario.ins, scenario.laser, scenario.mbes
     first_ns = movement.ins_runs_ns(0)[0]
-    about_ins: Text = {"files": [f"ins/*.{INS_SUFFIX[ins.format]}"]}
+    about_ins: _Text = {"files": [f"ins/*.{INS_SUFFIX[ins.format]}"]}
     about_ins["format"] = "sbet" if ins.format == "sbet" else "novatel"
     if ins.format == "sbet":
         about_ins["gps_week"] = first_ns // WEEK_NS
     if scenario.declare_sigmas:
         about_ins |= {"drift": ins.drift.model_dump(), "white": ins.white.model_dump()}
-    about_laser: Text = {"files": [f"laser/*.{laser.format}"], "format": "las"}
+    about_laser: _Text = {"files": [f"laser/*.{laser.format}"], "format": "las"}
     if laser.time == "week_seconds":
         about_laser["gps_week"] = movement.starts_ns[0] // WEEK_NS
     about_laser |= {"frame": laser.frame, "mount": coarse_mount(laser, seed).model_dump()}
     about_laser["latency_s"] = laser.latency_declared_s
-    about_mbes: Text = {
+    about_mbes: _Text = {
         "files": [f"mbes/*.{mbes.format}"],
         "format": "table" if mbes.format == "parquet" else "r2sonic",
         "mount": coarse_mount(mbes, seed).model_dump(),
@@ -45,12 +45,12 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
     return {"name": name, "ins": about_ins, "laser": about_laser, "mbes": about_mbes}
 
 
-def _sigmas(range_m: float, angle_deg: float) -> Text:
+def _sigmas(range_m: float, angle_deg: float) -> _Text:
     given = {"range_sigma_m": range_m, "angle_sigma_deg": angle_deg}
     return {key: value for key, value in given.items() if value > 0}
 
 
-def pool_text(scenario: Scenario, movement: Movement) -> Text:
+def pool_text(scenario: Scenario, movement: Movement) -> _Text:
     """pool.yaml: the design, standing where the surveyor believes it to stand."""
     around, target = scenario.surroundings, scenario.target.model_dump(mode="json")
     if any(around.origin_error_m):
@@ -62,7 +62,7 @@ def pool_text(scenario: Scenario, movement: Movement) -> Text:
     return {"target": target}
 
 
-def truth_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
+def truth_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     """What a calibration should find, and what was done to the data."""
     mbes, mount = scenario.mbes, scenario.mbes.mount
     error: Mount = coarse_error(mbes, seed)

@@ -10,7 +10,7 @@ from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
 from pipeline.simulation.scenario import LaserScenario
 from pipeline.simulation.site import Floats, R_ecef_from_level
 
-CHUNK = 200_000
+_CHUNK = 200_000
 
 
 def laser_in_ecef(laser: Columns, ins: Columns, scenario: LaserScenario) -> Columns:
@@ -19,8 +19,8 @@ def laser_in_ecef(laser: Columns, ins: Columns, scenario: LaserScenario) -> Colu
     Poses are linear between the INS's epochs, at recorded time - declared latency; the times stay as recorded.
     """
     placed = {name: np.empty(len(laser["t_ns"])) for name in ("x_m", "y_m", "z_m")}
-    for start in range(0, len(laser["t_ns"]), CHUNK):
-        part = slice(start, start + CHUNK)
+    for start in range(0, len(laser["t_ns"]), _CHUNK):
+        part = slice(start, start + _CHUNK)
         points = _place({name: values[part] for name, values in laser.items()}, ins, scenario)
         for name, values in zip(placed, points.T, strict=True):
             placed[name][part] = values

@@ -11,12 +11,12 @@ from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import LaserScenario
 from pipeline.simulation.site import Floats
 
-CHUNK = 200_000
-SHORTEST_M = 0.5
+_CHUNK = 200_000
+_SHORTEST_M = 0.5
 BELOW_WATER_M = 0.3
 
 
-def direction(zenith_rad: Floats, azimuth_rad: Floats) -> Floats:
+def scan_directions(zenith_rad: Floats, azimuth_rad: Floats) -> Floats:
     """(n, 3): sin t cos p, sin t sin p, cos t in the scanner's frame; p = 0 is starboard."""
     return np.stack(
         [np.sin(zenith_rad) * np.cos(azimuth_rad), np.sin(zenith_rad) * np.sin(azimuth_rad), np.cos(zenith_rad)], axis=1
@@ -31,7 +31,7 @@ def record_laser(
     rows = [0]
     for k in movement.passes:
         scan = _Pass(scenario, movement, caster, water_level_m, seed, k)
-        pieces += [scan.chunk(start) for start in range(0, scan.count, CHUNK)]
+        pieces += [scan.chunk(start) for start in range(0, scan.count, _CHUNK)]
         rows.append(sum(len(t) for t, _ in pieces))
     columns: Columns = {"t_ns": np.concatenate([t for t, _ in pieces])}
     for axis, name in enumerate(("x_m", "y_m", "z_m")):
@@ -55,17 +55,18 @@ class _Pass:
     def chunk(self, start: int) -> tuple[Times, Floats]:
         """Recorded times (m,) and points (3, m) of the rays from number ``start`` on."""
         s = self.scenario
-        number = np.arange(start, min(start + CHUNK, self.count))
+        number = np.arange(start, min(start + _CHUNK, self.count))
         t_ns = self.start_ns + np.rint(number * (NS / s.point_rate_hz)).astype(np.int64)
         low, high = np.radians(s.field_deg)
         zenith = low + (high - low) * ((number * (s.line_rate_hz / s.point_rate_hz)) % 1.0)
-        ranges = self._true_ranges(t_ns, direction(zenith, np.zeros(len(number))))
+        ranges = self._true_ranges(t_ns, scan_directions(zenith, np.zeros(len(number))))
         ranges = ranges + s.range_sigma_m * self.random["range"].standard_normal(len(number))
         angles = np.radians(s.angle_sigma_deg) * self.random["angle"].standard_normal((len(number), 2))
         dice = self.random["outlier"].random((len(number), 2))
-        ranges = np.where(dice[:, 0] < s.outlier_share, SHORTEST_M + dice[:, 1] * (s.max_range_m - SHORTEST_M), ranges)
-        kept = np.isfinite(ranges) & (ranges <= s.max_range_m) & (ranges > SHORTEST_M / 2)
-        points = ranges[kept] * direction(zenith[kept] + angles[kept, 0], angles[kept, 1]).T
+        random_ranges = _SHORTEST_M + dice[:, 1] * (s.max_range_m - _SHORTEST_M)
+        ranges = np.where(dice[:, 0] < s.outlier_share, random_ranges, ranges)
+        kept = np.isfinite(ranges) & (ranges <= s.max_range_m) & (ranges > _SHORTEST_M / 2)
+        points = ranges[kept] * scan_directions(zenith[kept] + angles[kept, 0], angles[kept, 1]).T
         return t_ns[kept] + round(s.latency_s * NS), points
 
     def _true_ranges(self, t_ns: Times, direction_laser: Floats) -> Floats:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.gps_time import NS
-from pipeline.simulation.beams import Beams, directions_in_mbes, fan, swing_rad, transmit_tilts_rad
+from pipeline.simulation.beams import BeamBundles, directions_in_mbes, fan_angles, swing_rad, transmit_tilts_rad
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
@@ -16,7 +16,7 @@ from pipeline.simulation.site import Floats
 
 RAYS_AT_ONCE = 400_000
 CLOCK_RATE_ERROR = 3.7e-5  # the sonar's own clock: pings never fall into step with the INS
-SHORTEST_M = 0.5
+_SHORTEST_M = 0.5
 UPWARD_RAD = np.radians(-30.0)  # beams above this may get the water surface's echo
 
 
@@ -33,7 +33,7 @@ def record_mbes(
     scenario: MbesScenario, movement: Movement, pool: Pool, seed: int
 ) -> tuple[Columns, Columns]:
     """Detections (canonical raw columns), and all pings (t_ns, ping, pass)."""
-    angles = fan(scenario).angles_rad
+    angles = fan_angles(scenario).angles_rad
     parts: list[Columns] = []
     pings: list[Columns] = []
     first = 1000
@@ -63,7 +63,7 @@ class _Pass:
         self.t_ns: Times = t_ns[kept]
         self.recorded_ns: Times = self.t_ns + round(scenario.latency_s * NS)
         self.ping = first + np.flatnonzero(kept).astype(np.int64)
-        self.beams = Beams(scenario, pool.caster, pool.water_level_m)
+        self.beams = BeamBundles(scenario, pool.caster, pool.water_level_m)
         self.R_body_from_mbes = R_body_from_sensor(scenario.mount).as_matrix()
         names = ("range", "angle", "outlier", "surface", "corner")
         self.random = {name: generator(seed, f"mbes_{name}", k) for name in names}
@@ -86,7 +86,7 @@ class _Pass:
         paths = paths + s.range_sigma_m * self.random["range"].standard_normal(shape)
         paths = self._surface(paths, origins, directions)
         dice = self.random["outlier"].random((*shape, 2))
-        anything = SHORTEST_M + dice[..., 1] * (s.max_range_m - SHORTEST_M)
+        anything = _SHORTEST_M + dice[..., 1] * (s.max_range_m - _SHORTEST_M)
         paths = np.where(dice[..., 0] < s.outlier_share, anything, paths)
         ping, beam = np.nonzero(np.isfinite(paths) & looks & (paths > 0.1) & (paths <= s.max_range_m))
         return {

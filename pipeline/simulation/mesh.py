@@ -14,12 +14,12 @@ from pipeline.config.target import Faces, Letters, Target
 from pipeline.simulation.scenario import Surroundings
 from pipeline.simulation.site import Floats
 
-SIDES = {"south": -1.0, "north": 1.0}
-BEHIND_M = 30.0  # the floor reaches this far toward the vessel
+_SIDES = {"south": -1.0, "north": 1.0}
+_BEHIND_M = 30.0  # the floor reaches this far toward the vessel
 
 
 @dataclass(frozen=True)
-class Polygon:
+class FacePolygon:
     name: str
     vertices_m: Floats  # (k, 3), seen from outside counter-clockwise
 
@@ -33,24 +33,24 @@ def block_bases_m(target: Letters, side: str) -> list[float]:
     return [lowest + 2 * target.e * k for k in range(count)]
 
 
-def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = True) -> list[Polygon]:
+def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = True) -> list[FacePolygon]:
     """Side faces, top and bottom over a footprint (k, 2) that runs counter-clockwise seen from above."""
     def at(height_m: float) -> Floats:
         return np.column_stack([corners, np.full(len(corners), height_m)])
 
     low, high = at(low_m), at(high_m)
     after = np.roll(np.arange(len(corners)), -1)
-    faces = [Polygon(f"{name}_{k}", np.array([low[k], low[n], high[n], high[k]])) for k, n in enumerate(after)]
-    return faces + ([Polygon(f"{name}_top", high), Polygon(f"{name}_bottom", low[::-1])] if caps else [])
+    faces = [FacePolygon(f"{name}_{k}", np.array([low[k], low[n], high[n], high[k]])) for k, n in enumerate(after)]
+    return faces + ([FacePolygon(f"{name}_top", high), FacePolygon(f"{name}_bottom", low[::-1])] if caps else [])
 
 
-def target_polygons(target: Target) -> list[Polygon]:
+def target_polygons(target: Target) -> list[FacePolygon]:
     """The faces given; or the wall as a box back to the pool's wall, and the blocks."""
     if isinstance(target, Faces):
-        return [Polygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
+        return [FacePolygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
     a, half, c, e = target.a, target.b / 2, target.c, target.e
     polygons = prism("wall", np.array([[0, -half], [c, -half], [c, half], [0, half]]), -a / 2, a / 2)
-    for side, s in SIDES.items():
+    for side, s in _SIDES.items():
         footprint = np.array([[0, s * half], [c, s * half], [c, s * (half + c)]])
         footprint = footprint if s > 0 else footprint[::-1]
         for k, base in enumerate(block_bases_m(target, side)):
@@ -58,7 +58,7 @@ def target_polygons(target: Target) -> list[Polygon]:
     return polygons
 
 
-def extents(target: Target) -> Floats:
+def target_extents(target: Target) -> Floats:
     """(3, 2): least and greatest x, y, z of the target's faces."""
     if isinstance(target, Letters):
         half = target.b / 2 + target.c
@@ -67,14 +67,14 @@ def extents(target: Target) -> Floats:
     return np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
 
 
-def pool_polygons(target: Target, surroundings: Surroundings) -> list[Polygon]:
+def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygon]:
     """Back wall (of the patent's target the plane x = c) and floor."""
-    (_, c), _, (low, high) = extents(target)
+    (_, c), _, (low, high) = target_extents(target)
     reach = surroundings.half_length_m
     floor, top = low - surroundings.floor_gap_m, high + surroundings.wall_above_m
     wall = np.array([[c, -reach, floor], [c, -reach, top], [c, reach, top], [c, reach, floor]])
-    ground = np.array([[-BEHIND_M, -reach, floor], [c, -reach, floor], [c, reach, floor], [-BEHIND_M, reach, floor]])
-    return [Polygon("back_wall", wall)] * surroundings.back_wall + [Polygon("floor", ground)]
+    ground = np.array([[-_BEHIND_M, -reach, floor], [c, -reach, floor], [c, reach, floor], [-_BEHIND_M, reach, floor]])
+    return [FacePolygon("back_wall", wall)] * surroundings.back_wall + [FacePolygon("floor", ground)]
 
 
 def corner_lines(target: Target) -> Floats:
@@ -85,7 +85,7 @@ def corner_lines(target: Target) -> Floats:
     if isinstance(target, Faces):
         return np.empty((0, 4))
     lines = []
-    for side, s in SIDES.items():
+    for side, s in _SIDES.items():
         bases = block_bases_m(target, side)
         lines += [(target.c, s * (target.b / 2 + target.c), base, base + target.e) for base in bases]
         lines += [(target.c, s * target.b / 2, base + target.e, base + 2 * target.e) for base in bases[:-1]]
@@ -107,7 +107,7 @@ class Mesh:
 def build_mesh(target: Target, surroundings: Surroundings) -> Mesh:
     """Everything a ray may meet but the water."""
     tilt = Rotation.from_euler("XY", surroundings.tilt_deg, degrees=True)
-    polygons = [Polygon(p.name, tilt.apply(p.vertices_m)) for p in target_polygons(target)]
+    polygons = [FacePolygon(p.name, tilt.apply(p.vertices_m)) for p in target_polygons(target)]
     polygons += pool_polygons(target, surroundings)
     triangles: list[tuple[int, int, int]] = []
     planes: list[Floats] = []

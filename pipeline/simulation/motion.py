@@ -17,7 +17,7 @@ SECOND_PERIOD = 0.37
 
 
 @dataclass(frozen=True)
-class Pose:
+class TruePoses:
     """The INS's true poses at n moments."""
 
     position_target_m: Floats  # (n, 3)
@@ -49,7 +49,7 @@ class Movement:
         self.margin_ns, gap_ns = round(track.margin_s * NS), round(track.gap_s * NS)
         length_ns = round(2 * self.half_length_m / self.speed_m_s * NS)
         passes = range(len(track.distances_m))
-        first_ns = start_ns(scenario) + self.margin_ns
+        first_ns = session_start_ns(scenario) + self.margin_ns
         self.starts_ns = [first_ns + k * (length_ns + 2 * self.margin_ns + gap_ns) for k in passes]
         self.ends_ns = [start + length_ns for start in self.starts_ns]
         self.phases_rad = [generator(seed, "motion", k).uniform(0, 2 * np.pi, (6, 2)) for k in passes]
@@ -70,14 +70,14 @@ class Movement:
         after = 0 if end != self.ends_ns[k] else self.margin_ns
         return start - before, end + after
 
-    def pose(self, k: int, t_ns: Times) -> Pose:
+    def pose(self, k: int, t_ns: Times) -> TruePoses:
         """True poses in (or after) pass ``k``."""
         x, y, z, roll, pitch, azimuth = self._states(k, t_ns)
         position = np.stack([x, y, z], axis=1)
         latitude, longitude, height = self.site.geodetic_from_target(position)
         R_target_from_level = self.site.R_target_from_level(latitude, longitude)
         R_target_from_body = R_target_from_level @ R_level_from_body(roll, pitch, azimuth)
-        return Pose(position, R_target_from_body, latitude, longitude, height, roll, pitch, azimuth % (2 * np.pi))
+        return TruePoses(position, R_target_from_body, latitude, longitude, height, roll, pitch, azimuth % (2 * np.pi))
 
     def _states(self, k: int, t_ns: Times) -> Floats:
         """(6, n): x, y, z, roll, pitch, azimuth; a smooth change-over to the next pass after the margin."""
@@ -121,7 +121,7 @@ def R_level_from_body(roll_rad: Floats, pitch_rad: Floats, azimuth_rad: Floats) 
     return np.stack([np.stack(axis, axis=-1) for axis in (starboard, bow, mast)], axis=-1)
 
 
-def start_ns(scenario: Scenario) -> int:
+def session_start_ns(scenario: Scenario) -> int:
     """The session's first moment, GPS."""
     unix_s = round((datetime.fromisoformat(scenario.start_utc) - datetime(1970, 1, 1)).total_seconds())
     return int(gps_ns_from_unix_utc(np.array([unix_s]), np.array([0]))[0])

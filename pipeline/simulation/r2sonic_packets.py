@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.gps_time import GPS_EPOCH_UNIX_S, LEAP_SECONDS, NS
-from pipeline.simulation.beams import Fan
+from pipeline.simulation.beams import FanAngles
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.scenario import MbesScenario
 
-XTF_RECORD = 256  # XTF ping header, its first 14 bytes being the packet header
+_XTF_PING_HEADER_BYTES = 256  # XTF ping header, its first 14 bytes being the packet header
 PHASE_DETECT, MAGNITUDE_DETECT = 0b1011, 0b0111  # nibbles as a real head sets them
 MAGNITUDE_BELOW_RAD = np.radians(20.0)
 
@@ -46,7 +46,7 @@ def packet_dtype(scenario: MbesScenario) -> np.dtype[np.void]:
     return np.dtype([*start, ("H0", h0), ("R0", scaled), angles, *intensity, ("G0", g0), ("Q0", q0)])
 
 
-def packets(mbes: Columns, pings: Columns, fan: Fan, scenario: MbesScenario) -> np.ndarray:
+def bth0_packets(mbes: Columns, pings: Columns, fan: FanAngles, scenario: MbesScenario) -> np.ndarray:
     """Packets of some pings; beams that detected nothing have range 0. Ranges use the 16 bits of section R0 fully."""
     dtype = packet_dtype(scenario)
     packet = np.zeros(len(pings["t_ns"]), dtype)
@@ -98,7 +98,7 @@ def _quality(angles_rad: NDArray[np.float64]) -> NDArray[np.uint32]:
 def xtf_bytes(packet: np.ndarray, name: str) -> bytes:
     """An XTF file with the packets as records of type 65 (R2Sonic bathymetry), padded to 64 bytes."""
     inside = packet.dtype.itemsize
-    length = -(-(XTF_RECORD + inside) // 64) * 64
+    length = -(-(_XTF_PING_HEADER_BYTES + inside) // 64) * 64
     record = np.zeros(
         len(packet),
         np.dtype(
@@ -108,7 +108,7 @@ def xtf_bytes(packet: np.ndarray, name: str) -> bytes:
                     "half_sound_speed", "packet",
                 ],
                 "formats": ["<u2", "u1", "<u4", "<u2", "u1", "u1", "u1", "u1", "u1", "u1", "<u4", "<f4", packet.dtype],
-                "offsets": [0, 2, 10, 14, 16, 17, 18, 19, 20, 21, 28, 36, XTF_RECORD],
+                "offsets": [0, 2, 10, 14, 16, 17, 18, 19, 20, 21, 28, 36, _XTF_PING_HEADER_BYTES],
                 "itemsize": length,
             }
         ),

@@ -25,11 +25,11 @@ from pipeline.config.target_mesh import with_mesh
 from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.errors import ConfigError
 
-SCENARIOS = CONFIGS / "scenarios"
+SCENARIOS_FOLDER = CONFIGS / "scenarios"
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1, le=20)]
 STEEPEST_TILT_DEG = 45.0
-Tilt = Annotated[float, Field(ge=-STEEPEST_TILT_DEG, le=STEEPEST_TILT_DEG)]
+_Tilt = Annotated[float, Field(ge=-STEEPEST_TILT_DEG, le=STEEPEST_TILT_DEG)]
 
 
 def _moment(text: str) -> str:
@@ -73,7 +73,7 @@ class Motion(Model):
     heading_offset_deg: Angle = 0.0  # heading minus the target's azimuth
 
 
-class Track(Model):
+class TrackScenario(Model):
     """Passes along the target, in the direction of its +y axis."""
 
     distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # from wall
@@ -125,7 +125,7 @@ class MbesScenario(Model):
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
     spacing: Literal["equi_angle", "equidistant"] = "equi_angle"  # section A0 or A2
     sectors: TransmitSectors = ()  # tilts of the transmit fan by receive angle; none: no tilt
-    ping_tilts_deg: Annotated[tuple[Tilt, ...], Field(max_length=16)] = ()  # added to all sectors', in turn by ping
+    ping_tilts_deg: Annotated[tuple[_Tilt, ...], Field(max_length=16)] = ()  # added to all sectors', in turn by ping
     max_range_m: Annotated[float, Field(ge=1, le=500)] = 15.0
     range_sigma_m: NotNegative = 0.008
     angle_sigma_deg: NotNegative = 0.06
@@ -179,7 +179,7 @@ class Scenario(Model):
         origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0),
     )
     surroundings: Surroundings = Surroundings()
-    track: Track = Track()
+    track: TrackScenario = TrackScenario()
     motion: Motion = Motion()
     ins: InsScenario = InsScenario()
     laser: LaserScenario = LaserScenario()
@@ -225,9 +225,9 @@ def load_scenario(path: Path | None) -> Scenario:
         if path.name not in names:
             known = ", ".join(names)
             raise ConfigError(f"--scenario {path}: is neither a file nor the name of a scenario; these are {known}")
-        path = SCENARIOS / f"{path.name}.yaml"
+        path = SCENARIOS_FOLDER / f"{path.name}.yaml"
     return parse(Scenario, with_mesh(read_yaml(path), path), str(path))
 
 
 def scenario_names() -> list[str]:
-    return sorted(path.stem for path in SCENARIOS.glob("*.yaml"))
+    return sorted(path.stem for path in SCENARIOS_FOLDER.glob("*.yaml"))

@@ -14,7 +14,7 @@ import numpy as np
 import yaml
 
 from pipeline.errors import ConfigError
-from pipeline.simulation.beams import fan
+from pipeline.simulation.beams import fan_angles
 from pipeline.simulation.documents import INS_SUFFIX, pool_text, session_text, truth_text
 from pipeline.simulation.georeferenced import laser_in_ecef
 from pipeline.simulation.ins import Columns, record_ins
@@ -23,8 +23,8 @@ from pipeline.simulation.laser import record_laser
 from pipeline.simulation.mbes import Pool, record_mbes
 from pipeline.simulation.mesh import build_mesh, corner_lines
 from pipeline.simulation.motion import Movement
-from pipeline.simulation.novatel import aligning_bodies, bodies, novatel_bytes
-from pipeline.simulation.r2sonic_packets import packets, xtf_bytes
+from pipeline.simulation.novatel import aligning_bodies, inspva_bodies, novatel_bytes
+from pipeline.simulation.r2sonic_packets import bth0_packets, xtf_bytes
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.sbet import sbet_bytes
 from pipeline.simulation.scenario import Scenario, load_scenario
@@ -46,7 +46,7 @@ class SimulatedSession:
     pings: Columns  # every ping: t_ns, ping, pass
 
 
-def simulate(scenario: Scenario, seed: int) -> SimulatedSession:
+def simulate_session(scenario: Scenario, seed: int) -> SimulatedSession:
     """One session. The same scenario and seed give the same numbers; each noise source has its own generator."""
     if seed < 0:
         raise ConfigError(f"seed = {seed}: must not be negative; choose another seed")
@@ -99,7 +99,7 @@ def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> d
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"{folder.parent}: cannot be made ({error.strerror}); choose another folder") from error
-    simulated = simulate(scenario, seed)
+    simulated = simulate_session(scenario, seed)
     write_session(simulated, folder, scenario)
     return {
         "session": folder,
@@ -147,14 +147,14 @@ def _write_ins(simulated: SimulatedSession, folder: Path, scenario: Scenario) ->
             path.write_bytes(sbet_bytes(ins))
             continue
         before = aligning_bodies(int(ins["t_ns"][0]), scenario.ins.aligning_s if k == 0 else 0.0)
-        path.write_bytes(novatel_bytes(np.concatenate([before, bodies(ins)]), form))
+        path.write_bytes(novatel_bytes(np.concatenate([before, inspva_bodies(ins)]), form))
 
 
 def _write_mbes(mbes: Columns, pings: Columns, path: Path, scenario: Scenario) -> None:
     if scenario.mbes.format == "parquet":
         write_soundings(path, mbes)
         return
-    packet = packets(mbes, pings, fan(scenario.mbes), scenario.mbes)
+    packet = bth0_packets(mbes, pings, fan_angles(scenario.mbes), scenario.mbes)
     path.write_bytes(xtf_bytes(packet, path.name) if scenario.mbes.format == "xtf" else packet.tobytes())
 
 
