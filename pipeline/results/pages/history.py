@@ -123,8 +123,6 @@ def _no_formula(text: str) -> str:
 
 def write_history(history: History, out: Path, chosen: Filter) -> None:
     """history.html, .csv and .parquet in ``out``."""
-    from pipeline.results.pages.history import page
-
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
     content = io.BytesIO()
