@@ -22,31 +22,47 @@ def calibrate_in_memory(
     until: str = "report",
     changed: Callable[[str, Any], Any] = lambda _, value: value,
 ) -> dict[str, Any]:
-    """Every artefact of the stages up to ``until``, by "owner/name"; ``raw``: canonical columns of ins, laser, mbes;
-    ``changed`` gives what the stages that follow get in an artefact's place."""
-    found: dict[str, Any] = {}
+    """Run the stages on columns in memory.
 
-    def given(marker: Any) -> Any:
+    Parameters
+    ----------
+    session, pool
+        Settings.
+    raw : mapping
+        Canonical columns of ins, laser and mbes.
+    until : str
+        The last stage to run.
+    changed : callable
+        Function of an artefact's key and value: what the following stages get in its place.
+
+    Returns
+    -------
+    dict
+        Every artefact of these stages, by "owner/name".
+    """
+    artefacts: dict[str, Any] = {}
+
+    def input_of(marker: Any) -> Any:
         if isinstance(marker, RawFiles):
-            there = getattr(session, marker.sensor) is not None
-            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if there else EMPTY_STREAM
+            present = getattr(session, marker.sensor) is not None
+            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if present else EMPTY_STREAM
         if isinstance(marker, (Artefact, Document)):
-            return found[f"{marker.owner}/{marker.name}"]
+            return artefacts[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}
 
     for stage in load("mbes" if session.mbes is not None else "laser"):
-        inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
+        inputs = stage.Inputs(**{name: input_of(marker) for name, marker in declared(stage.Inputs).items()})
         outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
         for name, marker in declared(stage.Outputs).items():
             if isinstance(marker, (Artefact, Document)):
                 key = f"{marker.owner}/{marker.name}"
-                found[key] = changed(key, getattr(outputs, name))
+                artefacts[key] = changed(key, getattr(outputs, name))
         if name_of(stage) == until:
             break
-    return found
+    return artefacts
 
 
 def config_of(stage: ModuleType, session: SessionConfig, pool: PoolConfig) -> Any:
-    """The stage's Config from the two models, field by field."""
+    """Return a stage's Config, filled field by field from the settings."""
     names = [field.name for field in fields(stage.Config)]
     return stage.Config(**{name: getattr(pool if hasattr(pool, name) else session, name) for name in names})

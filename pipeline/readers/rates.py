@@ -27,7 +27,6 @@ def rate_hz(sensor: str, epochs_ns: NDArray[np.int64], records: int) -> float:
 
     Examples
     --------
-
     >>> ping = np.array([0, 220_000, 440_000])
     >>> rate_hz("mbes", np.concatenate([ping, ping + NS // 10, ping + NS // 5]), 900)
     10.0

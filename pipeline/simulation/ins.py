@@ -1,4 +1,4 @@
-"""What the INS records: its true pose, Gauss-Markov drift through the whole session, and white noise."""
+"""Records of the INS: the true poses, Gauss-Markov drift through the whole session, and white noise."""
 
 from itertools import pairwise
 
@@ -17,7 +17,24 @@ _POSE_COLUMNS = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch
 
 
 def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Columns, list[int]]:
-    """The canonical raw columns, and the first row of each pass (and of the end)."""
+    """Simulate the records of the INS.
+
+    Parameters
+    ----------
+    scenario : InsScenario
+        Rate and errors.
+    movement : Movement
+        True poses.
+    seed : int
+        Seed of the session.
+
+    Returns
+    -------
+    columns : Columns
+        Canonical raw columns.
+    first_rows : list of int
+        First row of each pass, and the number of rows.
+    """
     times = [_epochs(scenario.rate_hz, *movement.ins_runs_ns(k)) for k in movement.passes]
     t_ns = np.concatenate(times)
     errors = gauss_markov_drift(scenario.drift, t_ns, generator(seed, "ins_drift"))
@@ -39,27 +56,56 @@ def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Co
 
 
 def _epochs(rate_hz: float, start_ns: int, end_ns: int) -> Times:
-    """Epochs from start to before end at whole multiples of the record interval in GPS time, as receivers give them."""
+    """Return epochs from start to before end, whole multiples of the interval in GPS time, as receivers give them."""
     interval_ns = round(NS / rate_hz)
     return np.arange(-(-start_ns // interval_ns), -(-end_ns // interval_ns), dtype=np.int64) * interval_ns
 
 
 def pose_sigmas(position_m: tuple[float, float, float], attitude_deg: tuple[float, float, float]) -> Floats:
-    """(6, 1): east, north, up in m; roll, pitch, azimuth in rad."""
+    """Return sigmas (6, 1) of east, north, up in m and of roll, pitch, azimuth in rad."""
     return np.concatenate([position_m, np.radians(attitude_deg)])[:, None]
 
 
 def white_noise(scenario: InsScenario, count: int, seed: int) -> Floats:
-    """(6, count) independent errors of each record."""
+    """Return independent errors of the records.
+
+    Parameters
+    ----------
+    scenario : InsScenario
+        Their sigmas.
+    count : int
+        Number of records.
+    seed : int
+        Seed of the session.
+
+    Returns
+    -------
+    (6, count) array
+        East, north, up in m; roll, pitch, azimuth in rad.
+    """
     position, attitude = scenario.white.position_m, scenario.white.attitude_deg
     noise = generator(seed, "ins_white").standard_normal((6, count))
     return pose_sigmas((position,) * 3, (attitude,) * 3) * noise
 
 
 def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator) -> Floats:
-    """(6, n) first-order Gauss-Markov errors; the process goes on through gaps.
+    """Return first-order Gauss-Markov errors; the process goes on through gaps.
 
     x(t + dt) = f x(t) + sqrt(1 - f²) sigma w, f = exp(-dt / tau): stationary from the first record on.
+
+    Parameters
+    ----------
+    scenario : Drift
+        Sigmas and time constant.
+    t_ns : (n,) array
+        Times of the records, GPS ns.
+    random : Generator
+        Random numbers.
+
+    Returns
+    -------
+    (6, n) array
+        East, north, up in m; roll, pitch, azimuth in rad.
     """
     scale = pose_sigmas(
         (scenario.horizontal_m, scenario.horizontal_m, scenario.vertical_m),

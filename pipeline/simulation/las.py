@@ -15,7 +15,19 @@ _CHUNK = 1_000_000
 
 
 def write_las(path: Path, laser: Columns, scenario: LaserScenario, day: date) -> None:
-    """One file. The creation date is the session's day: the same session gives the same bytes."""
+    """Write one file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    laser : Columns
+        Points.
+    scenario : LaserScenario
+        Format, scale, kind of times.
+    day : date
+        Creation date: the session's day, so that the same session gives the same bytes.
+    """
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = np.full(3, scenario.scale_m), np.zeros(3)
     if scenario.frame != "laser" and len(laser["t_ns"]):

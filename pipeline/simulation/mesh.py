@@ -1,7 +1,7 @@
-"""Target and pool as planar polygons, built from the letters a, b, c, e or from the faces given; and their triangles.
+"""Target and pool as planar polygons, built from the letters a, b, c, e or from a list of faces; and their triangles.
 
-Of the letters: origin in the centre of the wall's front face; x into the wall, y along it ("north" is +y), z up. A
-block on side s = ±1 is the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
+With letters the origin is the centre of the wall's front face; x runs into the wall, y along it ("north" is +y), z up.
+A block on side s = ±1 is the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
 """
 
 from dataclasses import dataclass
@@ -20,12 +20,14 @@ _BEHIND_M = 30.0  # the floor reaches this far toward the vessel
 
 @dataclass(frozen=True)
 class FacePolygon:
+    """A planar face."""
+
     name: str
     vertices_m: Floats  # (k, 3), seen from outside counter-clockwise
 
 
 def block_bases_m(target: Letters, side: str) -> list[float]:
-    """Heights of the blocks' bases: the low side's first at first_base_m, the other side's stagger_m above it."""
+    """Return heights of blocks' bases: the low side's first at first_base_m, the other side's stagger_m above it."""
     first = -target.a / 2 if target.first_base_m is None else target.first_base_m
     stagger = target.e if target.stagger_m is None else target.stagger_m
     count = int(target.a / (2 * target.e) + 1e-9) if target.blocks_per_side is None else target.blocks_per_side
@@ -34,7 +36,19 @@ def block_bases_m(target: Letters, side: str) -> list[float]:
 
 
 def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = True) -> list[FacePolygon]:
-    """Side faces, top and bottom over a footprint (k, 2) that runs counter-clockwise seen from above."""
+    """Return side faces, top and bottom of a prism.
+
+    Parameters
+    ----------
+    name : str
+        First part of the faces' names.
+    corners : (k, 2) array
+        Footprint, counter-clockwise seen from above, m.
+    low_m, high_m : float
+        Heights of bottom and top.
+    caps : bool
+        Whether top and bottom are wanted.
+    """
     def at(height_m: float) -> Floats:
         return np.column_stack([corners, np.full(len(corners), height_m)])
 
@@ -45,7 +59,7 @@ def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = 
 
 
 def target_polygons(target: Target) -> list[FacePolygon]:
-    """The faces given; or the wall as a box back to the pool's wall, and the blocks."""
+    """Return the listed faces; or, with letters, the wall as a box back to the pool's wall, and the blocks."""
     if isinstance(target, Faces):
         return [FacePolygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
     a, half, c, e = target.a, target.b / 2, target.c, target.e
@@ -59,7 +73,7 @@ def target_polygons(target: Target) -> list[FacePolygon]:
 
 
 def target_extents(target: Target) -> Floats:
-    """(3, 2): least and greatest x, y, z of the target's faces."""
+    """Return least and greatest x, y, z of the target's faces, (3, 2), m."""
     if isinstance(target, Letters):
         half = target.b / 2 + target.c
         return np.array([[0.0, target.c], [-half, half], [-target.a / 2, target.a / 2]])
@@ -68,7 +82,7 @@ def target_extents(target: Target) -> Floats:
 
 
 def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygon]:
-    """Back wall (of the patent's target the plane x = c) and floor."""
+    """Return back wall (with letters the plane x = c) and floor."""
     (_, c), _, (low, high) = target_extents(target)
     reach = surroundings.half_length_m
     floor, top = low - surroundings.floor_gap_m, high + surroundings.wall_above_m
@@ -78,9 +92,9 @@ def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygo
 
 
 def corner_lines(target: Target) -> Floats:
-    """Inner corners with the back wall, (n, 4): x, y, lowest z, highest z; of the patent's target alone.
+    """Return inner corners with the back wall, (n, 4): x, y, lowest z, highest z; none without letters.
 
-    Slanted faces meet it at y = ±(b/2 + c); in the gaps between blocks the wall's sides do at y = ±b/2.
+    Slanted faces meet the back wall at y = ±(b/2 + c); in the gaps between blocks the wall's sides do at y = ±b/2.
     """
     if isinstance(target, Faces):
         return np.empty((0, 4))
@@ -105,7 +119,7 @@ class Mesh:
 
 
 def build_mesh(target: Target, surroundings: Surroundings) -> Mesh:
-    """Everything a ray may meet but the water."""
+    """Return the triangles of target and pool, without the water."""
     tilt = Rotation.from_euler("XY", surroundings.tilt_deg, degrees=True)
     polygons = [FacePolygon(p.name, tilt.apply(p.vertices_m)) for p in target_polygons(target)]
     polygons += pool_polygons(target, surroundings)

@@ -32,13 +32,15 @@ RADIUS_M = 6_378_137.0
 
 @dataclass(frozen=True)
 class Velocities:
+    """Velocities of the INS, (n,) each, m/s."""
+
     north: np.ndarray
     east: np.ndarray
     up: np.ndarray
 
 
 def velocities(ins: Columns) -> Velocities:
-    """Velocities over about a second, from the positions (to a few mm/s; nobody calibrates with them)."""
+    """Return velocities over about a second, from the positions (to a few mm/s; no calibration uses them)."""
     t_ns = ins["t_ns"]
     half = np.searchsorted(t_ns, t_ns[0] + NS // 2) if len(t_ns) else 0
     row = np.arange(len(t_ns))
@@ -51,7 +53,7 @@ def velocities(ins: Columns) -> Velocities:
 
 
 def inspva_bodies(ins: Columns) -> np.ndarray:
-    """INSPVA(S) message bodies, degrees, status good."""
+    """Return INSPVA(S) message bodies, degrees, status good."""
     body = np.zeros(len(ins["t_ns"]), _BODY)
     body["week"], body["seconds"] = ins["t_ns"] // WEEK_NS, ins["t_ns"] % WEEK_NS / NS
     speed = velocities(ins)
@@ -63,7 +65,7 @@ def inspva_bodies(ins: Columns) -> np.ndarray:
 
 
 def aligning_bodies(first_ns: int, seconds: float) -> np.ndarray:
-    """What an INS that is still aligning logs, once a second: no position, latitude -90."""
+    """Return message bodies of an aligning INS, once a second before ``first_ns``: no position, latitude -90."""
     count = int(seconds)
     t_ns = first_ns - NS * np.arange(count, 0, -1, dtype=np.int64)
     body = np.zeros(count, _BODY)
@@ -73,12 +75,12 @@ def aligning_bodies(first_ns: int, seconds: float) -> np.ndarray:
 
 
 def crc32(data: bytes) -> int:
-    """NovAtel's CRC: the usual polynomial, but started from zero and not inverted."""
+    """Return NovAtel's CRC: the usual polynomial, but started from zero and not inverted."""
     return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def novatel_bytes(body: np.ndarray, form: str) -> bytes:
-    """Records of the form inspvas, inspva (binary), inspvasa or inspvaa (ASCII)."""
+    """Return records of the form inspvas, inspva (binary), inspvasa or inspvaa (ASCII)."""
     if form in ("inspvasa", "inspvaa"):
         return b"".join(_ascii(record, form) for record in body)
     header = _headers(body, form)

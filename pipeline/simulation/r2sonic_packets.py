@@ -14,7 +14,7 @@ MAGNITUDE_BELOW_RAD = np.radians(20.0)
 
 
 def utc_from_gps_ns(t_ns: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Unix seconds and nanoseconds (UTC) of GPS times: the leap seconds of that moment are taken off."""
+    """Return Unix seconds and nanoseconds (UTC) of GPS times, with the leap seconds of that instant."""
     starts = np.array([(start - GPS_EPOCH_UNIX_S + leap) * NS for start, leap in LEAP_SECONDS], dtype=np.int64)
     leaps = np.array([leap for _, leap in LEAP_SECONDS], dtype=np.int64)
     leap = leaps[np.maximum(np.searchsorted(starts, t_ns, side="right") - 1, 0)]
@@ -22,7 +22,7 @@ def utc_from_gps_ns(t_ns: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray
 
 
 def packet_dtype(scenario: MbesScenario) -> np.dtype[np.void]:
-    """One packet of the scenario's number of beams and sections."""
+    """Return the layout of a packet with the scenario's number of beams and its sections."""
     n, pad = scenario.beams, scenario.beams % 2
     section = [("name", "S2"), ("size", ">u2")]
     h0 = np.dtype(
@@ -47,7 +47,21 @@ def packet_dtype(scenario: MbesScenario) -> np.dtype[np.void]:
 
 
 def bth0_packets(mbes: Columns, pings: Columns, fan: FanAngles, scenario: MbesScenario) -> np.ndarray:
-    """Packets of some pings; beams that detected nothing have range 0. Ranges use the 16 bits of section R0 fully."""
+    """Return the packets of some pings.
+
+    Beams without detection have range 0. Ranges use all 16 bits of section R0.
+
+    Parameters
+    ----------
+    mbes : Columns
+        Detections of these pings.
+    pings : Columns
+        Times and numbers of the pings.
+    fan : FanAngles
+        Recorded angles.
+    scenario : MbesScenario
+        The sonar.
+    """
     dtype = packet_dtype(scenario)
     packet = np.zeros(len(pings["t_ns"]), dtype)
     packet["magic"], packet["size"] = b"BTH0", dtype.itemsize
@@ -88,7 +102,7 @@ def _fill_head(head: np.ndarray, pings: Columns, scenario: MbesScenario) -> None
 
 
 def _quality(angles_rad: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Flag nibbles, beam 0 the topmost: amplitude detections near the middle of the fan, phase outside."""
+    """Return flag nibbles, beam 0 the topmost: amplitude detections near the middle of the fan, phase outside."""
     nibbles = np.where(np.abs(angles_rad) < MAGNITUDE_BELOW_RAD, MAGNITUDE_DETECT, PHASE_DETECT).astype(np.uint32)
     nibbles = np.pad(nibbles, (0, -len(nibbles) % 8)).reshape(-1, 8)
     flags: NDArray[np.uint32] = np.bitwise_or.reduce(nibbles << np.arange(28, -1, -4, dtype=np.uint32), axis=1)
@@ -96,7 +110,7 @@ def _quality(angles_rad: NDArray[np.float64]) -> NDArray[np.uint32]:
 
 
 def xtf_bytes(packet: np.ndarray, name: str) -> bytes:
-    """An XTF file with the packets as records of type 65 (R2Sonic bathymetry), padded to 64 bytes."""
+    """Return an XTF file with the packets as records of type 65 (R2Sonic bathymetry), padded to 64 bytes."""
     inside = packet.dtype.itemsize
     length = -(-(_XTF_PING_HEADER_BYTES + inside) // 64) * 64
     record = np.zeros(

@@ -1,4 +1,4 @@
-"""A scenario: what a simulated pool session is like. The defaults of all keys are "the default scenario"."""
+"""Scenarios: the settings of a simulated pool session. The defaults of all keys are "the default scenario"."""
 
 from datetime import datetime
 from pathlib import Path
@@ -32,15 +32,15 @@ STEEPEST_TILT_DEG = 45.0
 _Tilt = Annotated[float, Field(ge=-STEEPEST_TILT_DEG, le=STEEPEST_TILT_DEG)]
 
 
-def _moment(text: str) -> str:
-    moment = datetime.fromisoformat(text)
-    if moment.tzinfo is not None or not 2000 <= moment.year < 2070:
+def _utc(text: str) -> str:
+    instant = datetime.fromisoformat(text)
+    if instant.tzinfo is not None or not 2000 <= instant.year < 2070:
         raise ValueError("must be a UTC moment without zone, such as 2026-05-12T08:00:00, from 2000 to 2069")
     return text
 
 
 class Surroundings(Model):
-    """The pool round the target, and how far the pool's config is from the target as it stands."""
+    """The pool round the target, and errors of the target's build and of its position in pool.yaml."""
 
     half_length_m: Annotated[float, Field(gt=0, le=200)] = 15.0  # back wall and floor reach this far along y
     floor_gap_m: NotNegative = 0.3  # the floor lies this much below the target's foot
@@ -53,14 +53,14 @@ class Surroundings(Model):
 
 
 class Wave(Model):
-    """One coordinate's unrest: 3/4 of the amplitude at the period, 1/4 at 0.37 of it; phases are random."""
+    """The waves of one coordinate: 3/4 of the amplitude at the period, 1/4 at 0.37 of it; phases are random."""
 
     amplitude: NotNegative
     period_s: Positive
 
 
 class Motion(Model):
-    """How the vessel moves about its track (amplitudes in m and deg)."""
+    """The vessel's movement about its track (amplitudes in m and deg)."""
 
     surge: Wave = Wave(amplitude=0.03, period_s=8.0)
     sway: Wave = Wave(amplitude=0.06, period_s=9.0)
@@ -86,6 +86,8 @@ class TrackScenario(Model):
 
 
 class InsScenario(Model):
+    """The INS: rate, noise and files."""
+
     rate_hz: Annotated[float, Field(ge=1, le=1000)] = 200.0
     white: White = White()
     drift: Drift = Drift(horizontal_m=0.0, vertical_m=0.0, roll_pitch_deg=0.0, heading_deg=0.0)
@@ -95,6 +97,8 @@ class InsScenario(Model):
 
 
 class LaserScenario(Model):
+    """The laser scanner: mount, rates, noise and files."""
+
     mount: Mount = Mount(roll_deg=0.35, pitch_deg=-0.22, yaw_deg=0.41, x_m=0.21, y_m=0.48, z_m=1.10)  # the truth
     coarse_angle_deg: NotNegative = 0.0  # error of each angle in session.yaml, its sign random
     coarse_lever_m: NotNegative = 0.0  # the same of the lever arm
@@ -116,6 +120,8 @@ class LaserScenario(Model):
 
 
 class MbesScenario(Model):
+    """The sonar: mount, beams, noise, sound speed and files."""
+
     mount: Mount = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.30, y_m=0.20, z_m=-2.01)  # the truth
     coarse_angle_deg: NotNegative = 0.8  # error of each coarse angle, its sign random
     coarse_lever_m: NotNegative = 0.08  # the same of the coarse lever arm
@@ -163,7 +169,7 @@ class MbesScenario(Model):
                 f"format = {self.format}: the sonar's own packets hold no transmit tilt, which sectors and "
                 "ping_tilts_deg give; write format: parquet"
             )
-        tilts = [one.tilt_deg + more for one in self.sectors for more in self.ping_tilts_deg]
+        tilts = [sector.tilt_deg + tilt_deg for sector in self.sectors for tilt_deg in self.ping_tilts_deg]
         steepest = max(tilts, key=abs, default=0.0)
         if abs(steepest) > STEEPEST_TILT_DEG:
             raise ValueError(f"sectors and ping_tilts_deg add up to {steepest}°: at most 45° is possible")
@@ -171,8 +177,10 @@ class MbesScenario(Model):
 
 
 class Scenario(Model):
+    """A simulated session."""
+
     name: Annotated[str, Field(min_length=1, max_length=200)] = "default"
-    start_utc: Annotated[str, AfterValidator(_moment)] = "2026-05-12T08:00:00"
+    start_utc: Annotated[str, AfterValidator(_utc)] = "2026-05-12T08:00:00"
     declare_sigmas: bool = True  # false: session.yaml says nothing of noise, drift and beam width
     target: Target = Letters(
         a=8.0, b=3.0, c=1.0, e=0.5, azimuth_deg=0.0,
@@ -201,7 +209,7 @@ class Scenario(Model):
 
     @property
     def half_length_m(self) -> float:
-        """A pass runs from -y to +y of this; as it is, 2 m beyond the target."""
+        """Half the length of a pass, which runs from -y to +y of this; by default 2 m beyond the target."""
         target = self.target
         if isinstance(target, Letters):
             reach_m = target.b / 2 + target.c
@@ -211,13 +219,24 @@ class Scenario(Model):
 
     @property
     def azimuth_deg(self) -> float:
+        """Azimuth of the target."""
         assert self.target.azimuth_deg is not None  # checked above
         return self.target.azimuth_deg
 
 
 def load_scenario(path: Path | None) -> Scenario:
-    """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario. A single word that is no
-    file names one of configs/scenarios."""
+    """Read a scenario from YAML; keys that are left out have their defaults.
+
+    Parameters
+    ----------
+    path : Path or None
+        The file; a single word that is no file names one of configs/scenarios; None: the default scenario.
+
+    Raises
+    ------
+    ConfigError
+        There is no such scenario, or its content is not valid.
+    """
     if path is None:
         return Scenario()
     if path.name == str(path) and not path.suffix and not path.is_file():
@@ -230,4 +249,5 @@ def load_scenario(path: Path | None) -> Scenario:
 
 
 def scenario_names() -> list[str]:
+    """Return the names of configs/scenarios."""
     return sorted(path.stem for path in SCENARIOS_FOLDER.glob("*.yaml"))

@@ -1,4 +1,4 @@
-"""Soundings as a table that the program reads by the names of its columns: it alone holds transmit tilts."""
+"""Soundings as a table, the only simulated format that holds transmit tilts."""
 
 from pathlib import Path
 
@@ -13,8 +13,11 @@ _UNCHANGED = ("ping", "beam", "two_way_time_s", "sound_speed_m_s")
 
 
 def write_soundings(path: Path, mbes: Columns) -> None:
-    """Parquet: gps_ns, ping, beam, two_way_time_s, sound_speed_m_s, angle_deg (starboard +), transmit_tilt_deg
-    (forward +), a row a detection."""
+    """Write a Parquet file, one row per detection.
+
+    Columns: gps_ns, ping, beam, two_way_time_s, sound_speed_m_s, angle_deg (starboard +), transmit_tilt_deg
+    (forward +).
+    """
     columns = {"gps_ns": mbes["t_ns"]} | {name: mbes[name] for name in _UNCHANGED}
     columns |= {name: np.degrees(mbes[source]) for name, source in _DEGREES.items()}
     arrays = {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
