@@ -1,8 +1,6 @@
 """Simulated sessions through the stages in memory: for tests and ``make montecarlo``, without any file."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -11,6 +9,7 @@ from pipeline.artefacts.schema import Artefact, Document, RawFiles
 from pipeline.artefacts.streams import EMPTY_STREAM, MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
+from pipeline.config.stage_settings import settings_by_name, stage_config
 from pipeline.run.stage_protocol import declared, name_of, run_in_memory
 from stages import load
 
@@ -50,9 +49,10 @@ def calibrate_in_memory(
             return artefacts[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}
 
-    for stage in load("mbes" if session.mbes is not None else "laser"):
+    settings = settings_by_name(pool, session)
+    for stage in load(session.calibrated):
         inputs = stage.Inputs(**{name: input_of(marker) for name, marker in declared(stage.Inputs).items()})
-        outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
+        outputs = run_in_memory(stage, inputs, stage_config(stage.Config, settings))
         for name, marker in declared(stage.Outputs).items():
             if isinstance(marker, (Artefact, Document)):
                 key = f"{marker.owner}/{marker.name}"
@@ -60,9 +60,3 @@ def calibrate_in_memory(
         if name_of(stage) == until:
             break
     return artefacts
-
-
-def config_of(stage: ModuleType, session: SessionConfig, pool: PoolConfig) -> Any:
-    """Return a stage's Config, filled field by field from the settings."""
-    names = [field.name for field in fields(stage.Config)]
-    return stage.Config(**{name: getattr(pool if hasattr(pool, name) else session, name) for name in names})

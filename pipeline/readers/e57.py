@@ -33,6 +33,7 @@ from pipeline.readers.claimed_counts import refuse_claim
 from pipeline.readers.crs import COORDINATES, Array, LaserFrame, transform_to_ecef
 from pipeline.readers.declared_crs import refuse_other_crs
 from pipeline.readers.decoder_process import REMEDY, DecodedColumns, decoded_batches, decoded_text
+from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.row_checks import (
     LASER_COLUMNS,
@@ -42,7 +43,6 @@ from pipeline.readers.row_checks import (
     latency_ns,
     no_rows,
     possible_ns,
-    through_float32,
 )
 
 E57_WORKER = Path(__file__).with_name("e57_worker.py")

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artefacts.streams import Chunk
+from pipeline.readers.float32_checks import refuse_float32
 from pipeline.readers.inertial_explorer_layout import ExportLayout, read_layout
 from pipeline.readers.inertial_explorer_rows import read_blocks
 from pipeline.readers.inertial_explorer_times import keep_possible_times
@@ -34,7 +35,6 @@ from pipeline.readers.row_checks import (
     keep_possible_poses,
     latency_ns,
     no_rows,
-    refuse_float32,
     sigma_rows,
 )
 from pipeline.readers.sbet import running_weeks
