@@ -9,6 +9,7 @@ import pandas as pd
 import yaml
 
 from pipeline.adjustment.pattern_tests import pattern_tests
+from pipeline.artefacts.from_tables import vector_of
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.gps_time import utc_text
 from pipeline.maths.adjustment.parameters import SIX
@@ -61,7 +62,7 @@ def free_block(freed: pd.DataFrame) -> dict[str, Any]:
 def target_block(pose: pd.Series) -> dict[str, Any]:
     """Return where the target stands against the pool's config, from a row of the table ``target_pose``."""
     return {
-        "offset_m": [float(pose[f"origin_{axis}_pool_m"]) for axis in "xyz"],
+        "offset_m": vector_of(pose, "origin_{}_pool_m").tolist(),
         "azimuth_correction_deg": float(pose["azimuth_correction_deg"]),
         "tilt_deg": [float(pose["tilt_x_deg"]), float(pose["tilt_y_deg"])],
         "rms_m": json_number(pose["rms_m"]),

@@ -12,7 +12,7 @@ from pipeline.report.ambiguities import MountSearch
 from pipeline.report.evidence import Evidence
 from pipeline.report.method_blocks import adjustment_block
 from pipeline.report.sensor_report import SensorReport
-from pipeline.target.laser_search import FARTHEST
+from pipeline.target.laser_search import LARGEST_TURN
 
 
 def laser_report(laser: Laser, evidence: Evidence, segment: Segment) -> SensorReport:
@@ -32,7 +32,7 @@ def laser_report(laser: Laser, evidence: Evidence, segment: Segment) -> SensorRe
         methods=methods,
         method="adjustment",
         search=MountSearch(
-            sensor="laser", max_angle_deg=FARTHEST * segment.search_laser_deg, max_lever_arm_m=np.inf
+            sensor="laser", max_angle_deg=LARGEST_TURN * segment.search_laser_deg, max_lever_arm_m=np.inf
         ),
         sides="the target's left and right",
         advice=_advice(fixed),

@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.artefacts.from_tables import rotation_vector_deg, vector_of
 from pipeline.config.session import Calibrated
 from pipeline.maths.adjustment.parameters import NAMES, SIX
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
-from pipeline.mount import WITHIN_95, Mounted, change_of, six_of
+from pipeline.mount import WITHIN_95, Mounted, parameters_of, setting_change
 
 Array = NDArray[np.float64]
 Block = dict[str, Any]
@@ -115,10 +116,10 @@ def patent_blocks(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, Block
     """Return the blocks of the patent's forms, by method, from the table ``corrections``."""
     blocks = {}
     for row in corrections.to_dict("records"):
-        rotation_vector_deg = [row[f"rotation_{axis}_deg"] for axis in "xyz"]
-        lever_arm_m = np.array([row[f"lever_arm_{axis}_m"] for axis in "xyz"])
         result = MethodResult(
-            rotation_vector_rad=np.radians(rotation_vector_deg), lever_arm_m=lever_arm_m, outcome=row
+            rotation_vector_rad=np.radians(rotation_vector_deg(row)),
+            lever_arm_m=vector_of(row, "lever_arm_{}_m"),
+            outcome=row,
         )
         blocks[str(row["method"])] = method_block(result, coarse)
     return blocks
@@ -134,7 +135,7 @@ def calibration_table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted)
     """Return the table ``calibration``: one row per method and mount parameter."""
     rows = []
     for method, block in methods.items():
-        correction, sigma = (six_of(block[name]) for name in ("correction", "sigma"))
+        correction, sigma = (parameters_of(block[name]) for name in ("correction", "sigma"))
         names = ("mount", "sigma_mount", "sigma_mount_total")
         total, random, sigma_mount = (block[name] or dict.fromkeys(SETTINGS, np.nan) for name in names)
         for parameter, place, key, unit in PARAMETERS:
@@ -145,7 +146,7 @@ def calibration_table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted)
                     "unit": unit,
                     "coarse": coarse.settings()[key],
                     "total": total[key],
-                    "change": change_of(total, coarse.settings(), key) if block["mount"] else np.nan,
+                    "change": setting_change(total, coarse.settings(), key) if block["mount"] else np.nan,
                     "correction": correction[place],
                     "sigma": sigma[place],
                     "sigma_random": random[key],

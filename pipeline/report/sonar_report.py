@@ -6,10 +6,11 @@ from typing import Any
 
 import pandas as pd
 
+from pipeline.artefacts.from_tables import rotation_vector_deg
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Method, Segment
 from pipeline.config.session import Mbes
-from pipeline.mount import Mounted, mount_of, turned
+from pipeline.mount import Mounted, corrected_mount, mount_of
 from pipeline.report.ambiguities import MountSearch
 from pipeline.report.cast_checks import cast_warnings, describe_cast
 from pipeline.report.evidence import Evidence
@@ -74,7 +75,7 @@ def sonar_report(settings: SonarSettings, evidence: Evidence, passes: Sequence[M
 
 def _angles_advice(coarse: Mount, provisional: pd.Series) -> str:
     """Say which angles to enter, where the coarse ones have been checked and the soundings still ask for others."""
-    settings = turned(coarse, [float(provisional[f"rotation_{axis}_deg"]) for axis in "xyz"]).settings()
+    settings = corrected_mount(coarse, rotation_vector_deg(provisional)).settings()
     values = ", ".join(f"{key} {settings[key]:.1f}" for key in ("roll_deg", "pitch_deg", "yaw_deg"))
     return f"; if you have checked the signs, enter {values} as mbes.mount and run again"
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.config.stage_settings import plain_settings, stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
@@ -39,10 +39,10 @@ class Run:
 
 def out_of_date(this: Run, stage: ModuleType) -> list[str]:
     """Why the stage has to be run; empty when its result is current."""
-    old = manifest.read(this.folder(name_of(stage)))
+    old = manifest.read_manifest(this.folder(name_of(stage)))
     if old is None:
         return ["has no result yet"]
-    return manifest.reasons(old, key_of(this, stage), present(this, this.folder(name_of(stage)), old))
+    return manifest.reasons_out_of_date(old, key_of(this, stage), present(this, this.folder(name_of(stage)), old))
 
 
 def present(this: Run, where: Path, old: manifest.Manifest) -> dict[str, str | None]:
@@ -56,7 +56,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
     for marker in inputs_in(this.stages, stage).values():
-        if isinstance(marker, Raw):
+        if isinstance(marker, RawFiles):
             raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):
             raw |= all_raw(this)
@@ -65,7 +65,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     config = plain_settings(vars(stage_config(stage.Config, this.settings.resolved())))
     if "svp" in (config.get("mbes") or {}):
         raw |= cast_digest(this)
-    return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
+    return manifest.Key(config, raw, inputs, provenance.source_digests(stage), provenance.library_versions())
 
 
 def raw_of(this: Run, sensor: str) -> dict[str, str]:
@@ -111,7 +111,7 @@ def cast_digest(this: Run) -> dict[str, str]:
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:
-    owner = manifest.read(this.folder(marker.owner))
+    owner = manifest.read_manifest(this.folder(marker.owner))
     found = manifest.artefact_digests(owner.outputs) if owner is not None else {}
     name = file_name(marker)
     if name not in found:

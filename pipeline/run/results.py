@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.artefacts.parquet import read_table, rows_of
+from pipeline.artefacts.parquet import read_table, row_count
 from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import ParquetPart, Stream
 from pipeline.atomic_files import read_json
@@ -35,7 +35,7 @@ class Tables:
     def sample(self, artefact: Artefact, at_most: int, *columns: str) -> tuple[dict[str, np.ndarray], int]:
         """These columns of evenly spaced rows of a stream, at most so many; and one in how many that is."""
         stream = self.stream(artefact, *columns)
-        total = sum(rows_of(part.path) for part in stream.parts if isinstance(part, ParquetPart))
+        total = sum(row_count(part.path) for part in stream.parts if isinstance(part, ParquetPart))
         step, seen = max(1, -(-total // at_most)), 0
         pieces: list[dict[str, np.ndarray]] = []
         for batch in stream.batches():
@@ -73,7 +73,7 @@ def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
     settings = plain_settings(read_settings(run).resolved())
     found: dict[str, manifest.Manifest] = {}
     for stage in stages:
-        one = manifest.read(run / stage)
+        one = manifest.read_manifest(run / stage)
         if one is not None and manifest.consistent(found | {stage: one}) and _as_set(one, settings):
             found[stage] = one
     return found

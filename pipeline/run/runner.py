@@ -12,9 +12,9 @@ from types import ModuleType
 from typing import Any
 
 from pipeline.artefacts import parquet
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.artefacts.sinks import FolderSink
-from pipeline.artefacts.streams import EMPTY, Chunk, ParquetPart, Part, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, Chunk, ParquetPart, Part, Stream
 from pipeline.atomic_files import remove, write_text, writing
 from pipeline.config.session import Calibrated
 from pipeline.config.stage_settings import stage_config
@@ -24,9 +24,16 @@ from pipeline.run import folder, manifest, provenance
 from pipeline.run.digests import Digests
 from pipeline.run.freshness import Run, all_raw, key_of, out_of_date, raw_digests, raw_of
 from pipeline.run.kept_results import keep_accepted
-from pipeline.run.other_session import refuse_another
+from pipeline.run.other_session import refuse_other_session
 from pipeline.run.progress import Progress
-from pipeline.run.settings import Settings, load_settings, read_settings, refuse_folders, refuse_other, write_settings
+from pipeline.run.settings import (
+    Settings,
+    load_settings,
+    read_settings,
+    refuse_folders,
+    refuse_other_sensor,
+    write_settings,
+)
 from pipeline.run.stage_protocol import declared, evaluate, inputs_in, is_stream, name_of, sources
 from pipeline.run.workers import SERIAL, Stopped, Workers
 
@@ -36,6 +43,7 @@ def run(
     session_folder: Path,
     config_path: Path,
     run_folder: Path,
+    *,
     workers: Workers = SERIAL,
     progress: Progress | None = None,
     finished: Callable[[str], object] = lambda _: None,
@@ -50,12 +58,12 @@ def run(
     refuse_folders(run_folder, session_folder)
     names = [name_of(stage) for stage in stages]
     with folder.locked(run_folder, names):
-        refuse_other(run_folder, calibrated)
+        refuse_other_sensor(run_folder, calibrated)
         this = _open(run_folder, settings, names, workers, progress)
         if not overwrite:
-            refuse_another(this, names)
+            refuse_other_session(this, names)
         write_settings(run_folder, settings)
-        first = not any(manifest.read(this.folder(name)) for name in names)
+        first = not any(manifest.read_manifest(this.folder(name)) for name in names)
         had_to_run = []
         for stage in stages:
             if _bring_up_to_date(this, stage, first):
@@ -68,6 +76,7 @@ def run_stage(
     stages: Sequence[ModuleType],
     name: str,
     run_folder: Path,
+    *,
     settings: Settings | None = None,
     workers: Workers = SERIAL,
     progress: Progress | None = None,
@@ -81,7 +90,7 @@ def run_stage(
     with folder.locked(run_folder, names):
         this = _open(run_folder, settings, names, workers, progress)
         if new:
-            refuse_another(this, names)
+            refuse_other_session(this, names)
         write_settings(run_folder, settings)
         for stage in stages[: names.index(name)]:
             if why := out_of_date(this, stage):
@@ -110,7 +119,7 @@ def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool
         this.progress.reasons(name, reasons)
     with this.progress.stage(name):
         _execute(this, stage)
-    for line in _losses(manifest.read(this.folder(name))):
+    for line in _losses(manifest.read_manifest(this.folder(name))):
         this.progress.note(f"{name}: {line}")
     return True
 
@@ -144,7 +153,9 @@ def _execute(this: Run, stage: ModuleType) -> None:
         streams = _make_folders(partial, stage)
         total = _rows_to_map(this, stage)
         sink = FolderSink(partial, streams)
-        outputs = evaluate(stage, inputs, config, sink, this.workers.map, lambda: this.progress.begin(total))
+        outputs = evaluate(
+            stage, inputs, config, sink, mapper=this.workers.map, begin=lambda: this.progress.begin(total)
+        )
         rows = _write(partial, stage, outputs)
         if _raw_has_changed(this, stage):
             raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")
@@ -170,7 +181,7 @@ def _execute(this: Run, stage: ModuleType) -> None:
 
 def _raw_has_changed(this: Run, stage: ModuleType) -> bool:
     """Whether a raw file is not what it was when this run first looked at it, of those that the stage has read."""
-    sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, Raw)]
+    sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, RawFiles)]
     return any(raw_digests(this, sensor) != raw_of(this, sensor) for sensor in sensors)
 
 
@@ -197,27 +208,27 @@ def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
     total = 0
     for source in sources(stage):
         marker = markers[source]
-        owner = manifest.read(this.folder(marker.owner)) if isinstance(marker, Artefact) else None
+        owner = manifest.read_manifest(this.folder(marker.owner)) if isinstance(marker, Artefact) else None
         if owner is None or not isinstance(marker, Artefact):
             return None
         total += owner.rows.get(marker.name, 0)
     return total
 
 
-def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
+def _read(this: Run, marker: Artefact | Document | RawFiles | Provenance) -> Any:
     if isinstance(marker, Provenance):
-        return {"inputs": all_raw(this), "software": provenance.versions()}
-    if isinstance(marker, Raw):
+        return {"inputs": all_raw(this), "software": provenance.library_versions()}
+    if isinstance(marker, RawFiles):
         settings = getattr(this.settings.session, marker.sensor)
         if settings is None:
-            return EMPTY
+            return EMPTY_STREAM
         return _stream(this, dispatch.raw_parts(marker.sensor, settings, this.settings.session_folder))
     where = this.folder(marker.owner)
     if isinstance(marker, Document):
         return (where / marker.name).read_text(encoding="utf-8")
     if marker.kind == "table":
         return parquet.read_table(where / f"{marker.name}.parquet", marker)
-    owner = manifest.read(where)
+    owner = manifest.read_manifest(where)
     names = sorted(owner.outputs) if owner is not None else []
     return _stream(this, [ParquetPart(where / name) for name in names if name.startswith(f"{marker.name}/")])
 
@@ -259,7 +270,7 @@ def _write(partial: Path, stage: ModuleType, outputs: Any) -> dict[str, int]:
             parquet.write_table(partial / f"{marker.name}.parquet", parquet.to_arrow(value, marker))
             rows[marker.name] = len(value)
         elif isinstance(marker, Artefact):
-            rows[marker.name] = sum(parquet.rows_of(path) for path in sorted((partial / marker.name).iterdir()))
+            rows[marker.name] = sum(parquet.row_count(path) for path in sorted((partial / marker.name).iterdir()))
     return rows
 
 

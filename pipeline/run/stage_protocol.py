@@ -18,11 +18,11 @@ from types import ModuleType
 from typing import Any, get_type_hints
 
 from pipeline.artefacts.parquet import from_arrow, to_arrow
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.artefacts.sinks import MemorySink, Sink, Written
-from pipeline.artefacts.streams import EMPTY, Mapper, Part, Stream, serial
+from pipeline.artefacts.streams import EMPTY_STREAM, Mapper, Part, Stream, serial
 
-Marker = Artefact | Raw | Document | Provenance
+Marker = Artefact | RawFiles | Document | Provenance
 
 
 def name_of(stage: ModuleType) -> str:
@@ -35,7 +35,7 @@ def declared(fields_of: type) -> dict[str, Marker]:
     found: dict[str, Marker] = {}
     for name, hint in get_type_hints(fields_of, include_extras=True).items():
         markers = [m() if m is Provenance else m for m in getattr(hint, "__metadata__", ())]
-        markers = [m for m in markers if isinstance(m, (Artefact, Raw, Document, Provenance))]
+        markers = [m for m in markers if isinstance(m, (Artefact, RawFiles, Document, Provenance))]
         if len(markers) != 1:
             raise TypeError(f"{fields_of.__module__}.{fields_of.__name__}.{name} must be annotated with one artefact")
         found[name] = markers[0]
@@ -56,7 +56,7 @@ def inputs_in(stages: Collection[str], stage: ModuleType) -> dict[str, Marker]:
 
 
 def is_stream(marker: Marker) -> bool:
-    return isinstance(marker, Raw) or (isinstance(marker, Artefact) and marker.kind == "stream")
+    return isinstance(marker, RawFiles) or (isinstance(marker, Artefact) and marker.kind == "stream")
 
 
 def sources(stage: ModuleType) -> tuple[str, ...]:
@@ -72,6 +72,7 @@ def evaluate(
     inputs: Any,
     config: Any,
     sink: Sink,
+    *,
     mapper: Mapper = serial,
     begin: Callable[[], None] = lambda: None,
 ) -> Any:
@@ -87,7 +88,15 @@ def evaluate(
     for source in sources(stage):
         stream: Stream = getattr(inputs, source)
         work = [
-            _Work(source, number, part, stage.run_batch, prepared, config, sink)
+            _Work(
+                source=source,
+                number=number,
+                part=part,
+                run_batch=stage.run_batch,
+                prepared=prepared,
+                config=config,
+                sink=sink,
+            )
             for number, part in enumerate(stream.parts)
         ]
         partials[source] = []
@@ -140,7 +149,7 @@ def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], map
                 raise TypeError(f"{stage.__name__}: {name} must be text, not {type(value).__name__}")
         elif isinstance(marker, Artefact) and marker.kind == "table":
             values[name] = from_arrow(to_arrow(value, marker))
-        elif name not in streams or value != EMPTY:
+        elif name not in streams or value != EMPTY_STREAM:
             raise TypeError(f"{stage.__name__}: stream {name} is filled from run_batch's pieces; leave it EMPTY")
     return dataclasses.replace(outputs, **values)
 
@@ -149,4 +158,4 @@ def run_in_memory(stage: ModuleType, inputs: Any, config: Any, mapper: Mapper = 
     """The stage without any file: for simulated campaigns and tests."""
     outputs = declared(stage.Outputs)
     streams = {name: marker for name, marker in outputs.items() if isinstance(marker, Artefact) and is_stream(marker)}
-    return evaluate(stage, inputs, config, MemorySink(streams), mapper)
+    return evaluate(stage, inputs, config, MemorySink(streams), mapper=mapper)

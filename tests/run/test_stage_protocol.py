@@ -10,11 +10,11 @@ import pytest
 
 from pipeline.artefacts.parquet import read_table
 from pipeline.artefacts.schema import Artefact
-from pipeline.artefacts.streams import EMPTY, Chunk, MemoryPart, Piece, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, MemoryPart, Stream
 from pipeline.config.pool import Segment
-from pipeline.run.manifest import read
+from pipeline.run.manifest import read_manifest
 from pipeline.run.stage_protocol import declared, inputs_in, run_in_memory
-from pipeline.run.verify import verify
+from pipeline.run.verify import problems_of_run
 from tests.support import toys
 from tests.support.toy_run import Pool
 
@@ -63,8 +63,12 @@ def test_only_named_sources_are_mapped() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("run_batch", lambda source, chunk, prepared, config: Piece({"far": chunk.columns}, 0), "far"),
-        ("run_batch", lambda source, chunk, prepared, config: Piece({"near": chunk.columns}, 0), "missing columns"),
+        ("run_batch", lambda source, chunk, prepared, config: BatchResult({"far": chunk.columns}, 0), "far"),
+        (
+            "run_batch",
+            lambda source, chunk, prepared, config: BatchResult({"near": chunk.columns}, 0),
+            "missing columns",
+        ),
         ("combine", lambda prepared, partials, config: None, "must return its Outputs"),
         ("combine", lambda prepared, partials, config: toys.SiftOutputs(pd.DataFrame({"a": [1]})), "missing columns"),
         (
@@ -95,7 +99,7 @@ def test_every_field_names_its_artefact() -> None:
 class OptionalInputs:
     near: Annotated[Stream, toys.NEAR]
     means: Annotated[pd.DataFrame | None, toys.MEANS] = None
-    points: Annotated[Stream, toys.POINTS] = EMPTY
+    points: Annotated[Stream, toys.POINTS] = EMPTY_STREAM
 
 
 @dataclass(frozen=True)
@@ -120,8 +124,8 @@ def test_an_optional_table_is_left_out_where_no_stage_makes_it(pool: Pool) -> No
     stage = pool.stages[2]
     assert list(inputs_in(("take", "sift"), stage)) == ["near", "means", "points"]
     assert list(inputs_in(("take",), stage)) == ["near", "points"]  # what is not optional is missed later
-    outputs = stage.run(OptionalInputs(EMPTY), None)
-    assert run_in_memory(stage, OptionalInputs(EMPTY), None) == outputs
+    outputs = stage.run(OptionalInputs(EMPTY_STREAM), None)
+    assert run_in_memory(stage, OptionalInputs(EMPTY_STREAM), None) == outputs
     assert outputs.counts is None
 
 
@@ -130,7 +134,7 @@ def test_an_optional_table_is_read_and_written_where_there_is_one(pool: Pool) ->
     pool.run()
     assert (pool.run_folder / "tell" / "calibration.json").read_text() == "True\n"
     assert (pool.run_folder / "tell" / "counts.parquet").is_file()
-    assert "sift/means" in read(pool.run_folder / "tell").key.inputs
+    assert "sift/means" in read_manifest(pool.run_folder / "tell").key.inputs
 
 
 def test_without_it_nothing_is_written_and_the_stage_is_current(pool: Pool) -> None:
@@ -146,22 +150,22 @@ def test_without_it_nothing_is_written_and_the_stage_is_current(pool: Pool) -> N
     pool.run()
     assert (pool.run_folder / "tell" / "calibration.json").read_text() == "False\n"
     assert not (pool.run_folder / "tell" / "counts.parquet").exists()
-    assert list(read(pool.run_folder / "tell").key.inputs) == ["sift/near"]
+    assert list(read_manifest(pool.run_folder / "tell").key.inputs) == ["sift/near"]
     assert pool.run() == []
-    assert verify(pool.stages, pool.run_folder) == []
+    assert problems_of_run(pool.stages, pool.run_folder) == []
 
 
 def test_dropped_records_reach_the_stage() -> None:
     seen: list[int] = []
     stage = toys.stages()[0]
 
-    def keep(source: str, chunk: Chunk, prepared: None, config: object) -> Piece:
+    def keep(source: str, chunk: Chunk, prepared: None, config: object) -> BatchResult:
         seen.append(chunk.dropped["bad"])
-        return Piece({}, 0)
+        return BatchResult({}, 0)
 
     stage.run_batch = keep  # type: ignore[attr-defined]
     path = Path(toys.__file__).with_name("nothing.bin")
     with pytest.raises(FileNotFoundError):
         run_in_memory(stage, toys.TakeInputs(Stream((toys.RawPart(path),))), None)
-    assert run_in_memory(stage, toys.TakeInputs(EMPTY), None).points.parts == ()
+    assert run_in_memory(stage, toys.TakeInputs(EMPTY_STREAM), None).points.parts == ()
     assert seen == []
