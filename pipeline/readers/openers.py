@@ -11,7 +11,7 @@ from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.gps_time import NS, WEEK_NS
-from pipeline.readers import detect, e57, file_kind, las, sbet
+from pipeline.readers import detect, e57, file_kind, las, las_header, sbet
 from pipeline.readers.claimed_counts import refuse_claim
 from pipeline.readers.crs import LaserFrame
 from pipeline.readers.gsf import GsfPart
@@ -130,7 +130,7 @@ def open_sbet(request: SensorFiles[Ins]) -> Parts:
 def open_las(request: SensorFiles[Laser]) -> Parts:
     """Return the parts of LAS and LAZ files: stretches of points; files with seconds of week need ``gps_week``."""
     settings = request.settings
-    headers = [las.read_header(file.path, file.name, settings.time) for file in request.files]
+    headers = [las_header.read_header(file.path, file.name, settings.time) for file in request.files]
     for file, header in zip(request.files, headers, strict=True):
         refuse_claim(header.present, header.size, settings.max_records, "laser", file.name)
     without_week = {
