@@ -13,7 +13,7 @@ import pytest
 
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, unix_ns_from_gps
-from pipeline.readers import kmall
+from pipeline.readers import e57_scans, kmall
 from pipeline.readers.gsf_pings import GsfScales, decode_gsf_ping
 from pipeline.readers.gsf_records import PING, gsf_records
 from pipeline.readers.kmall_datagrams import kmall_datagrams
