@@ -21,26 +21,37 @@ def calibrate_in_memory(
     until: str = "report",
     changed: Callable[[str, Any], Any] = lambda _, value: value,
 ) -> dict[str, Any]:
-    """Every artefact of the stages up to ``until``, by "owner/name"; ``raw``: canonical columns of ins, laser, mbes;
-    ``changed`` gives what the stages that follow get in an artefact's place."""
-    found: dict[str, Any] = {}
+    """Run the stages up to ``until``; return every artefact by "owner/name".
 
-    def given(marker: Any) -> Any:
+    Parameters
+    ----------
+    session, pool
+        The settings.
+    raw
+        Canonical columns by sensor: ins, laser, mbes.
+    until
+        The last stage that is run.
+    changed
+        Returns what the following stages get in place of an artefact, from its key and value.
+    """
+    artefacts: dict[str, Any] = {}
+
+    def input_for(marker: Any) -> Any:
         if isinstance(marker, Raw):
             there = getattr(session, marker.sensor) is not None
             return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if there else EMPTY
         if isinstance(marker, (Artefact, Document)):
-            return found[f"{marker.owner}/{marker.name}"]
+            return artefacts[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}
 
     settings = settings_by_name(pool, session)
     for stage in load(session.calibrated):
-        inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
+        inputs = stage.Inputs(**{name: input_for(marker) for name, marker in declared(stage.Inputs).items()})
         outputs = run_in_memory(stage, inputs, stage_config(stage.Config, settings))
         for name, marker in declared(stage.Outputs).items():
             if isinstance(marker, (Artefact, Document)):
                 key = f"{marker.owner}/{marker.name}"
-                found[key] = changed(key, getattr(outputs, name))
+                artefacts[key] = changed(key, getattr(outputs, name))
         if name_of(stage) == until:
             break
-    return found
+    return artefacts
