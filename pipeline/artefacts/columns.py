@@ -1,4 +1,4 @@
-"""What several tables have in common: types, coordinates, recurring columns."""
+"""Types, coordinates and other columns that several tables share."""
 
 # fmt: off: the tables are laid out by hand
 import pyarrow as pa
@@ -11,13 +11,26 @@ I16, I32, I64, F32, F64, TEXT, BOOL = (
 FLOATS = pa.list_(pa.float64())
 
 
-def xyz(frame: str, unit: str = "m", stem: str = "", type_: pa.DataType = F64) -> tuple[Column, ...]:
+def coordinate_columns(frame: str, unit: str = "m", stem: str = "", type_: pa.DataType = F64) -> tuple[Column, ...]:
+    """Return the columns of x, y, z.
+
+    Parameters
+    ----------
+    frame : str
+        Frame of the coordinates.
+    unit : str
+        Their unit.
+    stem : str
+        First part of the columns' names.
+    type_ : DataType
+        Their type.
+    """
     return tuple(Column(f"{stem}{axis}_{frame}_{unit}", type_, unit, f"{axis} in frame {frame}") for axis in "xyz")
 
 
-def near(frame: str) -> tuple[Column, ...]:
-    """Coordinates near target or sensor, in single precision: within 16 m that is within half a micrometre."""
-    return xyz(frame, type_=F32)
+def float32_coordinates(frame: str) -> tuple[Column, ...]:
+    """Return the columns of x, y, z near target or sensor: single precision is exact to 0.5 µm within 16 m."""
+    return coordinate_columns(frame, type_=F32)
 
 
 ROTATION = tuple(
@@ -26,6 +39,7 @@ ROTATION = tuple(
 MOUNT_CORRECTION = (
     *ROTATION, *(Column(f"lever_arm_{axis}_m", F64, "m", f"lever arm correction, body {axis}") for axis in "xyz")
 )
+ALL_PASSES = -1  # number in place of a pass, in rows of all passes together
 T_NS = Column("t_ns", I64, "ns", "GPS time: nanoseconds since 1980-01-06 00:00:00 GPS, latency removed")
 PASS = Column("pass", I16, "1", "number of the pass, from 0; -1: none (or all of them together)")
 COUNTS = (

@@ -65,7 +65,7 @@ def no_rows(names: tuple[str, ...], dropped: Counter[str]) -> Chunk:
 
 
 @dataclass
-class Sieve:
+class RowFilter:
     """Equally long columns that lose rows, test by test; each test's losses are counted under its reason."""
 
     columns: Columns
@@ -113,7 +113,7 @@ def latency_ns(latency_s: float) -> int:
     return round(latency_s * NS)
 
 
-def keep_possible_poses(sieve: Sieve) -> None:
+def keep_possible_poses(sieve: RowFilter) -> None:
     """Keep the INS rows with a position on the earth and angles of an attitude; bring azimuths into [0, 2 pi).
 
     The column t_ns is not needed yet.
@@ -142,7 +142,8 @@ def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dr
     """
     if not recorded or not len(t_ns):
         return {}
-    sieve = Sieve({"t_ns": t_ns} | {name: np.asarray(values, np.float64) for name, values in recorded.items()}, dropped)
+    columns = {name: np.asarray(values, np.float64) for name, values in recorded.items()}
+    sieve = RowFilter({"t_ns": t_ns} | columns, dropped)
     good = np.ones(len(sieve), dtype=bool)
     for name in recorded:
         good &= (sieve[name] > 0) & (sieve[name] <= MAX_SIGMA[name.rpartition("_")[2]])
@@ -150,7 +151,7 @@ def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dr
     return {name: sieve.columns.get(name, np.full(len(sieve), np.nan)) for name in SIGMA_COLUMNS}
 
 
-def keep_possible_soundings(sieve: Sieve) -> None:
+def keep_possible_soundings(sieve: RowFilter) -> None:
     """Keep the soundings with a detection, and a travel time, angles and a sound speed that are possible."""
     sieve.keep_finite()
     speed = sieve["sound_speed_m_s"]
@@ -171,7 +172,7 @@ class Order:
     records: int = 0
     backwards: int = 0
 
-    def keep(self, sieve: Sieve) -> None:
+    def keep(self, sieve: RowFilter) -> None:
         """Keep the rows that are later than all rows before, in this batch and the ones before it."""
         t_ns = sieve["t_ns"]
         latest = np.maximum.accumulate(np.concatenate([[self.last_ns], t_ns]))

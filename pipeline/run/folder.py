@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
-from pipeline.atomic_files import remove, settle, settle_names, writing
+from pipeline.atomic_files import flush_names, flush_to_disk, remove, writing
 from pipeline.errors import ArtefactError
 from pipeline.run import manifest
 from pipeline.run.settings import RUN_YAML
@@ -94,13 +94,13 @@ def swap_in(stage: Path) -> None:
     If the process is killed at any step, :func:`recover` finds a whole result. So it does after a power cut, for the
     disk holds every file before the first rename.
     """
-    settle(partial(stage))
+    flush_to_disk(partial(stage))
     with writing(stage):
         remove(_old(stage))
         if os.path.lexists(stage):
             stage.rename(_old(stage))
         partial(stage).rename(stage)
-        settle_names(stage.parent)
+        flush_names(stage.parent)
     remove(_old(stage))
 
 

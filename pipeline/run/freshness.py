@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.config.stage_settings import plain_settings, stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
@@ -68,7 +68,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
     for marker in declared(stage.Inputs).values():
-        if isinstance(marker, Raw):
+        if isinstance(marker, RawFiles):
             raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):
             raw |= all_raw(this)

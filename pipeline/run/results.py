@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.artefacts.parquet import read_table, rows_of
+from pipeline.artefacts.parquet import read_table, row_count
 from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import ParquetPart, Stream
 from pipeline.atomic_files import read_json
@@ -47,7 +47,7 @@ class Tables:
             Their names.
         """
         stream = self.stream(artefact, *columns)
-        total = sum(rows_of(part.path) for part in stream.parts if isinstance(part, ParquetPart))
+        total = sum(row_count(part.path) for part in stream.parts if isinstance(part, ParquetPart))
         step, rows_before = max(1, -(-total // at_most)), 0
         pieces: list[dict[str, np.ndarray]] = []
         for batch in stream.batches():

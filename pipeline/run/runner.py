@@ -12,9 +12,9 @@ from types import ModuleType
 from typing import Any
 
 from pipeline.artefacts import parquet
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.artefacts.sinks import FolderSink
-from pipeline.artefacts.streams import EMPTY, Chunk, ParquetPart, Part, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, Chunk, ParquetPart, Part, Stream
 from pipeline.atomic_files import remove, write_text, writing
 from pipeline.config.session import Calibrated
 from pipeline.config.stage_settings import stage_config
@@ -221,7 +221,7 @@ def _execute(this: Run, stage: ModuleType) -> None:
 
 def _raw_has_changed(this: Run, stage: ModuleType) -> bool:
     """Return whether a raw file that the stage has read is not what it was when this run first looked at it."""
-    sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, Raw)]
+    sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, RawFiles)]
     return any(raw_digests(this, sensor) != raw_of(this, sensor) for sensor in sensors)
 
 
@@ -255,13 +255,13 @@ def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
     return total
 
 
-def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
+def _read(this: Run, marker: Artefact | Document | RawFiles | Provenance) -> Any:
     if isinstance(marker, Provenance):
         return {"inputs": all_raw(this), "software": provenance.library_versions()}
-    if isinstance(marker, Raw):
+    if isinstance(marker, RawFiles):
         settings = getattr(this.settings.session, marker.sensor)
         if settings is None:
-            return EMPTY
+            return EMPTY_STREAM
         return _stream(this, dispatch.raw_parts(marker.sensor, settings, this.settings.session_folder))
     where = this.folder(marker.owner)
     if isinstance(marker, Document):
@@ -308,7 +308,7 @@ def _write(partial: Path, stage: ModuleType, outputs: Any) -> dict[str, int]:
             parquet.write_table(partial / f"{marker.name}.parquet", parquet.to_arrow(value, marker))
             rows[marker.name] = len(value)
         elif isinstance(marker, Artefact):
-            rows[marker.name] = sum(parquet.rows_of(path) for path in sorted((partial / marker.name).iterdir()))
+            rows[marker.name] = sum(parquet.row_count(path) for path in sorted((partial / marker.name).iterdir()))
     return rows
 
 

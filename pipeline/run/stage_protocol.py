@@ -15,11 +15,11 @@ from types import ModuleType
 from typing import Any, get_type_hints
 
 from pipeline.artefacts.parquet import from_arrow, to_arrow
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.artefacts.sinks import MemorySink, Sink, Written
-from pipeline.artefacts.streams import EMPTY, Mapper, Part, Stream, serial
+from pipeline.artefacts.streams import EMPTY_STREAM, Mapper, Part, Stream, serial
 
-Marker = Artefact | Raw | Document | Provenance
+Marker = Artefact | RawFiles | Document | Provenance
 
 
 def name_of(stage: ModuleType) -> str:
@@ -32,7 +32,7 @@ def declared(fields_of: type) -> dict[str, Marker]:
     artefacts: dict[str, Marker] = {}
     for name, hint in get_type_hints(fields_of, include_extras=True).items():
         markers = [m() if m is Provenance else m for m in getattr(hint, "__metadata__", ())]
-        markers = [m for m in markers if isinstance(m, (Artefact, Raw, Document, Provenance))]
+        markers = [m for m in markers if isinstance(m, (Artefact, RawFiles, Document, Provenance))]
         if len(markers) != 1:
             raise TypeError(f"{fields_of.__module__}.{fields_of.__name__}.{name} must be annotated with one artefact")
         artefacts[name] = markers[0]
@@ -41,7 +41,7 @@ def declared(fields_of: type) -> dict[str, Marker]:
 
 def is_stream(marker: Marker) -> bool:
     """Return whether a field is a stream, and no table or document."""
-    return isinstance(marker, Raw) or (isinstance(marker, Artefact) and marker.kind == "stream")
+    return isinstance(marker, RawFiles) or (isinstance(marker, Artefact) and marker.kind == "stream")
 
 
 def sources(stage: ModuleType) -> tuple[str, ...]:
@@ -145,7 +145,7 @@ def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], map
                 raise TypeError(f"{stage.__name__}: {name} must be text, not {type(value).__name__}")
         elif isinstance(marker, Artefact) and marker.kind == "table":
             values[name] = from_arrow(to_arrow(value, marker))
-        elif name not in streams or value != EMPTY:
+        elif name not in streams or value != EMPTY_STREAM:
             raise TypeError(f"{stage.__name__}: stream {name} is filled from run_batch's pieces; leave it EMPTY")
     return dataclasses.replace(outputs, **values)
 

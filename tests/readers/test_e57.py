@@ -198,5 +198,5 @@ def test_end_of_the_worker_is_an_error_of_the_file(
 ) -> None:
     worker = tmp_path / "worker.py"
     worker.write_text(program)
-    monkeypatch.setattr(e57, "WORKER", worker)
+    monkeypatch.setattr(e57, "E57_WORKER", worker)
     _refused(file, "is damaged")
