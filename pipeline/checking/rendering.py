@@ -1,20 +1,20 @@
-"""What was seen and found, for people and for programs."""
+"""What poolcal check says, for people and for programs."""
 
 import json
 from typing import Any
 
 import numpy as np
 
-from pipeline.checking.check_session import Examined
+from pipeline.checking.check_session import SessionCheck
 from pipeline.checking.expected_soundings import USUAL
-from pipeline.checking.file_survey import Seen
-from pipeline.checking.ins_quality import Quality
+from pipeline.checking.file_survey import SurveyedFile
+from pipeline.checking.ins_quality import InsQuality
 from pipeline.gps_time import utc_text
 from pipeline.maths.target.model import names_in_order
 
 
-def text(examined: Examined) -> str:
-    """Files, passes, findings."""
+def check_text(examined: SessionCheck) -> str:
+    """Return files, passes and findings for the screen."""
     width = max([4, *(len(seen.name) for seen in examined.files)])
     lines = [f"{'sensor':<7}{'file':<{width + 2}}{'kind':<24}{'records':>11}  {'from (UTC)':<21}{'to':<10}{'rate':>9}"]
     lines += [_file_line(seen, width) for seen in examined.files]
@@ -40,7 +40,7 @@ def text(examined: Examined) -> str:
     return "\n".join(lines)
 
 
-def _quality_lines(found: Quality) -> list[str]:
+def _quality_lines(found: InsQuality) -> list[str]:
     """What the INS says of itself; nothing where it says nothing."""
     lines = []
     for name, kinds in found.by_file.items():
@@ -55,7 +55,7 @@ def _quality_lines(found: Quality) -> list[str]:
     return lines
 
 
-def _by_face(examined: Examined) -> list[dict[str, Any]]:
+def _by_face(examined: SessionCheck) -> list[dict[str, Any]]:
     """Wet faces with the soundings expected and found on them; none where they were not counted."""
     if examined.model is None or examined.soundings is None:
         return []
@@ -68,7 +68,7 @@ def _by_face(examined: Examined) -> list[dict[str, Any]]:
     ]
 
 
-def _soundings_lines(examined: Examined) -> list[str]:
+def _soundings_lines(examined: SessionCheck) -> list[str]:
     """By family; by face they are in the JSON."""
     faces = _by_face(examined)
     if not faces:
@@ -82,7 +82,7 @@ def _soundings_lines(examined: Examined) -> list[str]:
     return lines
 
 
-def _file_line(seen: Seen, width: int) -> str:
+def _file_line(seen: SurveyedFile, width: int) -> str:
     about = "" if seen.share == 1.0 and seen.ended else "~"
     first, last = (utc_text(t) for t in seen.span_ns) if len(seen.epochs_ns) else ("-", "-")
     last = last[11:] if last[:10] == first[:10] else last
@@ -99,8 +99,8 @@ def _rate(rate_hz: float) -> str:
     return f"{float(f'{rate_hz:.3g}'):.15g} Hz"
 
 
-def as_json(examined: Examined) -> str:
-    """The same, times as GPS nanoseconds."""
+def check_json(examined: SessionCheck) -> str:
+    """Return the same as JSON, times as GPS nanoseconds."""
     content: dict[str, Any] = {
         "faulty": examined.faulty,
         "findings": [{"question": f.question, "severity": f.severity, "words": f.words} for f in examined.findings],

@@ -12,8 +12,9 @@ from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import mount_of
 from pipeline.planning import assessment
-from pipeline.planning.assessment import Answer, Outlook, shares_of_limits
-from pipeline.planning.prediction import Setting
+from pipeline.planning.assessment import Accuracy, PlanAssessment, shares_of_limits
+from pipeline.planning.plan_document import plan_document
+from pipeline.planning.prediction import PredictionSetting
 from pipeline.run.settings import load_settings
 
 NARROWEST = 9  # columns of the table of passes
@@ -24,7 +25,7 @@ def plan(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path
     """What the screen says, and whether the passes will do."""
     settings = load_settings(session, pool_file)
     pool, wanted = settings.pool, assessment.load_plan(file, settings.session)
-    answer = assessment.judge(wanted, pool, settings.session)
+    answer = assessment.assess_plan(wanted, pool, settings.session)
     said = table(answer, pool.verdict)
     if rrd is not None:
         from stages.views.plan import save_plan
@@ -32,11 +33,11 @@ def plan(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path
         with writing(rrd):
             save_plan(answer, said, rrd)
     if out is not None:
-        write_text(out, yaml.safe_dump(assessment.as_plain(answer), sort_keys=False))
+        write_text(out, yaml.safe_dump(plan_document(answer), sort_keys=False))
     return said, assessment.is_enough(answer, pool.verdict)
 
 
-def table(answer: Answer, limits: Verdict) -> str:
+def table(answer: PlanAssessment, limits: Verdict) -> str:
     """For the screen."""
     setting, plan = answer.setting, answer.setting.plan
     rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
@@ -57,7 +58,7 @@ def table(answer: Answer, limits: Verdict) -> str:
     return "\n".join(lines)
 
 
-def _chosen(answer: Answer, better: Outlook, limits: Verdict) -> list[str]:
+def _chosen(answer: PlanAssessment, better: Accuracy, limits: Verdict) -> list[str]:
     """The list chosen, like passes together, and what it does to the sigmas: not all of them need get smaller."""
     alike: dict[Pass, tuple[int, float, dict[str, assessment.Array]]] = {}
     for one, seconds, points in better.each():
@@ -83,7 +84,7 @@ def _chosen(answer: Answer, better: Outlook, limits: Verdict) -> list[str]:
     return [*lines, f"Larger than as given: {', '.join(grown)}."] if grown else lines
 
 
-def _passes(setting: Setting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
+def _passes(setting: PredictionSetting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
     """One line a kind of pass: how many, the time of one, and the points of all of them."""
     families = list(dict.fromkeys(face.family for face in setting.model.faces))
     widths = {family: max(NARROWEST, len(family) + 2) for family in families}
@@ -99,7 +100,7 @@ def _passes(setting: Setting, rows: list[tuple[int, Pass, float, dict[str, asses
     return lines
 
 
-def _sigmas(setting: Setting, outlook: Outlook, limits: Verdict) -> list[str]:
+def _sigmas(setting: PredictionSetting, outlook: Accuracy, limits: Verdict) -> list[str]:
     lines = [f"  {'sigma':<8}{'random':>12}{'total':>12}{'limit':>12}"]
     if outlook.solution.deficiency:
         open_ones = plural(outlook.solution.deficiency, "direction")
