@@ -13,8 +13,8 @@ from typing import BinaryIO
 import numpy as np
 
 from pipeline.artefacts.streams import Part
+from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, Laser, Mbes
-from pipeline.readers.dispatch import Sensor
 from pipeline.readers.las import LasPart
 from pipeline.readers.raw_file import opened, read_at, size_of
 from pipeline.readers.sbet import RECORD

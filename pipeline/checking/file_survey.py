@@ -14,11 +14,12 @@ from pipeline.artefacts.sampling import every_nth
 from pipeline.artefacts.streams import Part
 from pipeline.atomic_files import temporary_folder
 from pipeline.checking.excerpts import SensorFiles, excerpt, stretches
+from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, SessionConfig
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.gps_time import NS
 from pipeline.readers import detect
-from pipeline.readers.dispatch import Sensor, Settings, raw_files, raw_parts
+from pipeline.readers.dispatch import SensorSettings, raw_files, raw_parts
 from pipeline.readers.file_summaries import thinned
 from pipeline.readers.las import LasPart
 from pipeline.readers.rates import rate_hz
@@ -101,7 +102,7 @@ def survey_files(session: SessionConfig, folder: Path) -> tuple[list[SurveyedFil
     list_faults: list[str] = []
     with temporary_folder() as copies:
         for sensor in SENSORS:
-            settings: Settings | None = getattr(session, sensor)
+            settings: SensorSettings | None = getattr(session, sensor)
             if settings is None:
                 continue
             names, complaints = _listed(settings, folder)
@@ -131,7 +132,7 @@ def _with_accuracy(
     return [replace(file, sigmas=sigmas) if k == good else file for k, file in enumerate(files)], list(list_faults)
 
 
-def _listed(settings: Settings, folder: Path) -> tuple[list[str], list[str]]:
+def _listed(settings: SensorSettings, folder: Path) -> tuple[list[str], list[str]]:
     """Return the names of the files that the patterns match, and the refusals of patterns that match none."""
     names: list[str] = []
     faults = []
@@ -144,12 +145,12 @@ def _listed(settings: Settings, folder: Path) -> tuple[list[str], list[str]]:
     return sorted(dict.fromkeys(names)), faults
 
 
-def _without_accuracy(settings: Settings) -> dict[str, Any]:
+def _without_accuracy(settings: SensorSettings) -> dict[str, Any]:
     return {"accuracy": []} if isinstance(settings, Ins) else {}
 
 
 def _parts(
-    sensor: Sensor, settings: Settings, folder: Path, names: Sequence[str]
+    sensor: Sensor, settings: SensorSettings, folder: Path, names: Sequence[str]
 ) -> Iterator[tuple[str, Sequence[Part] | RawDataError]]:
     """Yield by file its parts, or why there are none.
 

@@ -146,8 +146,8 @@ def sample_points(
         columns["angle_rad"],
         columns["transmit_tilt_rad"],
         columns["sound_speed_m_s"],
-        mbes.sound_speed_m_s,
-        offset,
+        true_sound_speed_m_s=mbes.sound_speed_m_s,
+        projector_offset_m=offset,
     )
     return PointSample(sensor, columns["t_ns"][valid], points[valid], mbes.mount)
 
@@ -164,5 +164,5 @@ def place_points(track: Track, sample: PointSample, placing: Placing = AS_GIVEN)
     t_ns = sample.t_ns - round(placing.clock_ahead_s * NS)
     covered = track.trajectory.covers(t_ns, NS)
     placed = np.full(body.shape, np.nan)
-    placed[covered] = track.trajectory.place(t_ns[covered], body[covered])
+    placed[covered] = track.trajectory.points_from_body(t_ns[covered], body[covered])
     return placed

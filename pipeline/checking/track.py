@@ -10,8 +10,8 @@ from pipeline.checking.file_survey import Columns, SurveyedFile
 from pipeline.config.pool import Ingest, TargetPlace
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
-from pipeline.maths.geometry.passes import beside, estimate_azimuth, find_passes
-from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.geometry.passes import abeam, estimate_azimuth, find_passes
+from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_in_pool
 from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
@@ -109,7 +109,7 @@ def track_of(
     settings : Ingest
         What ends a pass.
     """
-    positions, R = poses_in_pool(frame, *(ins[name] for name in NAMES))
+    positions, R = poses_in_pool(frame, GeodeticPoses(**{name: ins[name] for name in NAMES}))
     t_ns = ins["t_ns"]
     low, high = model.bounds()
     reach, max_gap_ns = float(max(-low[1], high[1])), round(settings.max_gap_s * NS)
@@ -153,7 +153,7 @@ def askew_deg(track: Track) -> float | None:
     """
     x, y = track.trajectory.positions_m[:, :2].T
     ahead = track.trajectory.R_frame_from_body[:, :2, 1]
-    near = beside(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
+    near = abeam(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
     if not near.any():
         return None
     steps = np.flatnonzero(near[1:] & near[:-1])

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.artefacts.from_tables import rotation_vector_deg, target_frame
 from pipeline.checking.findings import Finding
 from pipeline.checking.heights import SideOfWater, profile, way
 from pipeline.checking.point_samples import PointSample, place_points
@@ -16,7 +17,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.target import Letters, Target
 from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import mount_of, turned
+from pipeline.mount import corrected_mount, mount_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
@@ -52,8 +53,8 @@ def pose_findings(
         The pool's settings.
     """
     found = pose.iloc[0]
-    R = np.array(found["R_target_from_pool"]).reshape(3, 3)
-    origin = np.array([found[f"origin_{axis}_pool_m"] for axis in "xyz"])
+    frame = target_frame(pose)
+    R, origin = frame.R_target_from_pool, frame.origin_pool_m
     points = place_points(track, laser.in_good_legs(track))
     points = (points[np.isfinite(points[:, 0])] - origin) @ R.T
     if not len(points):
@@ -143,10 +144,10 @@ def sign_findings(
     if np.linalg.matrix_rank(normals, tol=DIRECTIONS) < 3:
         return
     row = provisional.iloc[0]
-    turn_deg = [float(row[f"rotation_{axis}_deg"]) for axis in "xyz"]
+    turn_deg = rotation_vector_deg(row)
     if not np.isfinite(turn_deg).all():
         return
-    wanted = turned(coarse, turn_deg)
+    wanted = corrected_mount(coarse, turn_deg)
 
     def off_deg(mount: Mount) -> float:
         R = mount_of(mount).R_body_from_sensor

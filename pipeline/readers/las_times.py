@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from pipeline.config.recording import LasTime
 from pipeline.errors import RawDataError
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS
-from pipeline.readers.row_checks import FIRST_WEEK, LAST_WEEK, through_float32
+from pipeline.readers.float32_checks import through_float32
+from pipeline.readers.row_checks import FIRST_WEEK, LAST_WEEK
 
 WEEK_S = WEEK_NS / NS
 NAMES = {True: "adjusted standard GPS time", False: "seconds of GPS week"}

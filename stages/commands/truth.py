@@ -10,23 +10,31 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from pipeline.atomic_files import read_json
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Verdict
 from pipeline.errors import ConfigError
+from pipeline.maths.comparison import mount_error
 from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
+from pipeline.mount import Mounted
 from pipeline.run.output_files import as_written
 from pipeline.run.results import calibration
 from pipeline.run.settings import read_settings
+from pipeline.text_table import text_table
+from stages.commands.answer import print_answer
 
 LIMIT = 4.0
 Array = NDArray[np.float64]
 
 
-def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
-    """The table for people, and whether the result stands up to the truth."""
+def command(run: Path, truth_path: Path) -> int:
+    """Print a run's result beside the truth in a file; 1 if it was rejected, or does not stand up to the truth."""
+    return print_answer(*compare_with_truth(run, truth_path))
+
+
+def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
+    """Return the table for people, and whether the result was accepted and stands up to the truth."""
     result, settings = calibration(run), read_settings(run)
     R_true, lever_arm_true_m = read_truth(truth_path)
     chosen = settings.pool.result
@@ -37,9 +45,12 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
     lines = [f"session {result['session']}: {result['verdict']}", *(f"  {reason}" for reason in result["reasons"])]
     lines += ["", f"{chosen} (the result)"]
     lines += _table(settings.session.sonar.mount, values, R_true, lever_arm_true_m, sigma)
-    lines += ["", f"errors of all:       {''.join(f'{name:>10}' for name, *_ in PARAMETERS)}   (deg, m)"]
-    for method, other in result["methods"].items():
-        lines.append(f"  {method:19}{_error_row(errors_of(other, R_true, lever_arm_true_m))}")
+    rows = [
+        (f"  {method}", *_error_cells(errors_of(other, R_true, lever_arm_true_m)))
+        for method, other in result["methods"].items()
+    ]
+    heads = ("errors of all:", *(name for name, *_ in PARAMETERS), "(deg, m)")
+    lines += ["", *text_table(f"<21{'>10' * len(PARAMETERS)}   <1", heads, rows)]
     limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
     within = error is not None and bool(np.all(np.abs(error) <= limit))
     accepted = result["verdict"] == "accepted"
@@ -66,8 +77,8 @@ def _refuse_damaged(result: dict[str, Any], chosen: str) -> None:
     " ".join(result["reasons"])
 
 
-def _error_row(error: Array | None) -> str:
-    return "  no result" if error is None else "".join(f"{error[index]:10.5f}" for _, index, *_ in PARAMETERS)
+def _error_cells(error: Array | None) -> list[str]:
+    return ["no result"] if error is None else [f"{error[index]:.5f}" for _, index, *_ in PARAMETERS]
 
 
 def read_truth(path: Path) -> tuple[Array, Array]:
@@ -87,8 +98,8 @@ def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) ->
     """What is still wrong: rotation vector in degrees and lever arm in metres, true minus found; None: no result."""
     if values["R_body_from_mbes"] is None or values["lever_arm_m"] is None:
         return None
-    turn = Rotation.from_matrix(R_true @ np.array(values["R_body_from_mbes"]).T).as_rotvec()
-    return np.concatenate([np.degrees(turn), lever_arm_true_m - np.array(values["lever_arm_m"])])
+    error = mount_error(R_true, lever_arm_true_m, np.array(values["R_body_from_mbes"]), np.array(values["lever_arm_m"]))
+    return np.asarray(error * np.repeat([np.degrees(1.0), 1.0], 3))
 
 
 def _sigma_of(values: dict[str, Any]) -> Array | None:
@@ -108,11 +119,11 @@ def _table(
     error = errors_of(values, R_true, lever_arm_true_m)
     if error is None:
         return ["  no result"]
-    yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
-    truth = (pitch, roll, yaw, *lever_arm_true_m)
-    lines = [f"  {'':6}{'coarse':>11}{'calibrated':>12}{'truth':>11}{'error':>11}{'sigma':>10}{'error/sigma':>13}"]
+    truth = Mounted(R_true, lever_arm_true_m).settings()
+    rows = []
     for name, k, key, unit in PARAMETERS:
-        spread = f"{'-':>10}{'-':>13}" if sigma is None else f"{sigma[k]:10.5f}{error[k] / sigma[k]:13.1f}"
-        numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[k]:11.5f}{error[k]:11.5f}"
-        lines.append(f"  {name:6}{numbers}{spread} {unit}")
-    return lines
+        spread = ("-", "-") if sigma is None else (f"{sigma[k]:.5f}", f"{error[k] / sigma[k]:.1f}")
+        numbers = (f"{value:.5f}" for value in (getattr(coarse, key), values["mount"][key], truth[key], error[k]))
+        rows.append((name, *numbers, *spread, unit))
+    heads = ("", "coarse", "calibrated", "truth", "error", "sigma", "error/sigma")
+    return text_table("  <6>11>12>11>11>10>13 <1", heads, rows)
