@@ -54,7 +54,7 @@ def command(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: P
 
 
 def table(answer: PlanAssessment, limits: Verdict) -> str:
-    """For the screen."""
+    """Return a plan's assessment for the screen."""
     setting, plan = answer.setting, answer.setting.plan
     rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
     lines = ["As given:", *_passes(setting, rows), *_sigmas(setting, answer.given, limits)]
@@ -75,7 +75,7 @@ def table(answer: PlanAssessment, limits: Verdict) -> str:
 
 
 def _chosen(answer: PlanAssessment, better: Accuracy, limits: Verdict) -> list[str]:
-    """The list chosen, like passes together, and what it does to the sigmas: not all of them need get smaller."""
+    """Return the list chosen, like passes together, and what it does to the sigmas: some of them may grow."""
     alike: dict[Pass, tuple[int, float, dict[str, assessment.Array]]] = {}
     for one, seconds, points in better.each():
         number, longest, sums = alike.get(one, (0, 0.0, dict.fromkeys(points, np.zeros(1))))
@@ -101,7 +101,7 @@ def _chosen(answer: PlanAssessment, better: Accuracy, limits: Verdict) -> list[s
 
 
 def _passes(setting: PredictionSetting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
-    """One line a kind of pass: how many, the time of one, and the points of all of them."""
+    """Return one line for each kind of pass: how many, the time of one, and the points of all of them."""
     families = list(dict.fromkeys(face.family for face in setting.model.faces))
     cells = []
     for number, one, seconds, points in rows:
@@ -115,13 +115,13 @@ def _passes(setting: PredictionSetting, rows: list[tuple[int, Pass, float, dict[
     return text_table(f"  >6>10>10>8>8>15{'  >7' * len(families)}>15", heads, cells)
 
 
-def _sigmas(setting: PredictionSetting, outlook: Accuracy, limits: Verdict) -> list[str]:
+def _sigmas(setting: PredictionSetting, accuracy: Accuracy, limits: Verdict) -> list[str]:
     heads, layout = ("sigma", "random", "total", "limit"), "  <8>12>12>12  <1"
-    if outlook.solution.deficiency:
-        open_ones = plural(outlook.solution.deficiency, "direction")
+    if accuracy.solution.deficiency:
+        open_ones = plural(accuracy.solution.deficiency, "direction")
         return [*text_table(layout, heads, []), f"  {open_ones} of the unknowns left open: no result"]
     mounted = mount_of(setting.mbes.mount)
-    random, total = mounted.sigmas(outlook.random), mounted.sigmas(outlook.total)
+    random, total = mounted.sigmas(accuracy.random), mounted.sigmas(accuracy.total)
     rows = []
     for name, _, key, unit in PARAMETERS:
         limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, "m")
