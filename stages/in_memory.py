@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -11,6 +12,7 @@ from pipeline.artefacts.schema import Artefact, Document, Raw
 from pipeline.artefacts.streams import EMPTY, MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
+from pipeline.run.settings import Settings
 from pipeline.run.stage_protocol import declared, name_of, run_in_memory
 from stages import load
 
@@ -47,6 +49,14 @@ def calibrate_in_memory(
 
 
 def config_of(stage: ModuleType, session: SessionConfig, pool: PoolConfig) -> Any:
-    """The stage's Config from the two models, field by field."""
-    names = [field.name for field in fields(stage.Config)]
-    return stage.Config(**{name: getattr(pool if hasattr(pool, name) else session, name) for name in names})
+    """Return the stage's Config from both models, field by field.
+
+    Parameters
+    ----------
+    stage : module
+        The stage.
+    session, pool : SessionConfig, PoolConfig
+        The session's and the pool's settings.
+    """
+    settings = Settings(Path(), pool, session).resolved()
+    return stage.Config(**{field.name: settings[field.name] for field in fields(stage.Config)})

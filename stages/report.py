@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.adjustment.pattern_tests import pattern_tests
 from pipeline.artefacts.catalogue.patent import CORRECTIONS
 from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES
@@ -119,8 +119,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.freed,
         inputs.patterns,
     )
-    from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
-    drift = drift_of(config.ins, inputs.ins_sigmas, inputs.passes)
+    from_files = sigmas_from_files(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest, level = config.segment.farthest_mount, config.adjust.test_level
     tolerated = config.adjust.test_tolerance_m

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.ins_drift import rms
+from pipeline.adjustment.ins_drift import median_sigmas
 from pipeline.checking.file_survey import Seen
 from pipeline.checking.findings import Finding
 from pipeline.checking.track import Leg
@@ -53,7 +53,9 @@ def quality(files: Sequence[Seen], legs: Sequence[Leg]) -> Quality:
     return Quality(
         {seen.name: {kind: _counted(kind, numbers) for kind, numbers in seen.states.items()} for seen in of_ins},
         together,
-        rms({name: np.concatenate([one[name][_inside(one["t_ns"], legs)] for one in told]) for name in told[0]})
+        median_sigmas(
+            {name: np.concatenate([one[name][_inside(one["t_ns"], legs)] for one in told]) for name in told[0]}
+        )
         if told
         else {},
         bool(legs),

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.consider import considered_of, correlated
-from pipeline.adjustment.iteration import free_unknowns
+from pipeline.adjustment.consider import sonar_errors
+from pipeline.adjustment.iteration import estimated_parameters
 from pipeline.config.instruments import under
 from pipeline.config.plan import Budget, Pass, Plan
 from pipeline.config.pool import PoolConfig, Verdict
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse, read_yaml
 from pipeline.errors import ConfigError
-from pipeline.maths.adjustment.parameters import SIX
-from pipeline.maths.adjustment.solution import Solution, solve, weakest_direction
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.adjustment.estimability import weakest_direction
+from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve
+from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
 from pipeline.planning.observability import VAGUE, Seen, geometry_of
 from pipeline.planning.prediction import Predicted, Setting, predict, state_by_design
@@ -93,9 +93,9 @@ def _rates(session: SessionConfig) -> dict[str, Any]:
 def judge(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Answer:
     setting = setting_of(plan, pool, session)
     depth = setting.model.depth_m
-    considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
+    considered = sonar_errors(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
-    free = free_unknowns(setting.state, pool.adjust.free)
+    free = estimated_parameters(setting.state, pool.adjust.free)
     given = _outlook(setting, plan.passes, turn_s, considered, free)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
     distances = [one.distance_m for one, _, points in given.each() if points["mbes"].any()]
@@ -109,15 +109,14 @@ def judge(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Answer:
 
 
 def _outlook(
-    setting: Setting, passes: Sequence[Pass], turn_s: float, considered: Array, free: list[int]
+    setting: Setting, passes: Sequence[Pass], turn_s: float, considered: ConsiderErrors, free: list[int]
 ) -> Outlook:
     predicted = predict(setting, passes, turn_s)
     normal = predicted.normal
     solution = solve(normal, np.zeros(len(normal)), free)
-    together = correlated(setting.state.names, setting.laser)
-    random, total = solution.covariance[:SIX, :SIX], solution.total(considered, *together)[:SIX, :SIX]
+    random, total = solution.covariance[:N_MOUNT, :N_MOUNT], solution.total_covariance(considered)[:N_MOUNT, :N_MOUNT]
     if solution.deficiency:
-        random, total = np.full((SIX, SIX), np.nan), np.full((SIX, SIX), np.nan)
+        random, total = np.full((N_MOUNT, N_MOUNT), np.nan), np.full((N_MOUNT, N_MOUNT), np.nan)
     return Outlook(tuple(passes), predicted, random, total, solution)
 
 
@@ -142,7 +141,12 @@ def soundings(setting: Setting, outlook: Outlook) -> dict[str, int]:
 
 
 def _better(
-    setting: Setting, candidates: Sequence[Pass], seconds: float, turn_s: float, considered: Array, free: list[int]
+    setting: Setting,
+    candidates: Sequence[Pass],
+    seconds: float,
+    turn_s: float,
+    considered: ConsiderErrors,
+    free: list[int],
 ) -> Outlook | None:
     """Pass after pass the candidate that brings most for its time, as long as there is time; None: not even for one.
 
@@ -156,7 +160,7 @@ def _better(
     vague[free, free] = VAGUE**-2
 
     def cost(normal: Array) -> float:
-        covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:SIX, :SIX]
+        covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:N_MOUNT, :N_MOUNT]
         return float(np.mean(np.diag(covariance) / bounds**2))
 
     chosen: list[int] = []

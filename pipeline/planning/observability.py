@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.plan import Pass
-from pipeline.maths.adjustment.parameters import SIX
-from pipeline.maths.adjustment.solution import WORDS, Solution, solve, together
+from pipeline.maths.adjustment.estimability import correlated_pair
+from pipeline.maths.adjustment.solution import Solution, solve
+from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 from pipeline.planning.prediction import Setting, predict
 
 Array = NDArray[np.float64]
@@ -47,10 +48,10 @@ def geometry_of(setting: Setting, seen: Seen, normal: Array, solution: Solution)
     """``normal`` (u, u): the session's."""
     bounds, gaps = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3), _gaps(seen)
     sigma = _sigmas(normal, solution)
-    pair = None if solution.deficiency else together(solution.covariance[:SIX, :SIX])
+    pair = None if solution.deficiency else correlated_pair(solution.covariance[:N_MOUNT, :N_MOUNT])
     if not (gaps or np.any(sigma > bounds)):
         return Geometry([], "")  # where all are sure enough, two that move together do no harm
-    among = range(SIX) if pair is None else pair[:2]
+    among = range(N_MOUNT) if pair is None else pair[:2]
     target = max(among, key=lambda k: sigma[k] / bounds[k])
     return Geometry(gaps, _remedy(setting, seen, normal, solution, target, bounds))
 
@@ -58,9 +59,9 @@ def geometry_of(setting: Setting, seen: Seen, normal: Array, solution: Solution)
 def _sigmas(normal: Array, solution: Solution) -> Array:
     """Of the six (6,), with :data:`VAGUE` for what is known before any pass: finite where the data leave all open."""
     prior = np.zeros(len(normal))
-    prior[solution.free] = VAGUE**-2
-    known = solve(normal + np.diag(prior), np.zeros(len(normal)), solution.free.tolist())
-    return np.asarray(np.sqrt(np.diag(known.covariance))[:SIX])
+    prior[solution.estimated] = VAGUE**-2
+    known = solve(normal + np.diag(prior), np.zeros(len(normal)), solution.estimated.tolist())
+    return np.asarray(np.sqrt(np.diag(known.covariance))[:N_MOUNT])
 
 
 def _gaps(seen: Seen) -> list[str]:
@@ -100,10 +101,10 @@ def _remedy(
     for distance in TRIED_M:
         one = Pass(distance_m=distance, speed_m_s=seen.speed_m_s, heading_swing_deg=seen.heading_swing_deg)
         further = predict(setting, [one], phases=1).normal
-        after = solve(normal + TWICE * further, np.zeros(len(normal)), solution.free.tolist())
+        after = solve(normal + TWICE * further, np.zeros(len(normal)), solution.estimated.tolist())
         if after.deficiency:
             continue
-        sigma = np.sqrt(np.diag(after.covariance))[:SIX]
+        sigma = np.sqrt(np.diag(after.covariance))[:N_MOUNT]
         worst = float(np.max(sigma / bounds))
         if best is None or worst < best[0]:
             best = worst, distance, float(sigma[target])
@@ -111,7 +112,7 @@ def _remedy(
         return ""
     was = "open" if before > VAGUE / 2 else _sized(before, target)
     now = _sized(best[2], target)
-    return f"two more passes at {best[1]:.0f} m would bring sigma {WORDS[target]} from {was} to {now}"
+    return f"two more passes at {best[1]:.0f} m would bring sigma {MOUNT_WORDS[target]} from {was} to {now}"
 
 
 def _sized(sigma: float, which: int) -> str:

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.gps_time import utc_text
-from pipeline.maths.adjustment.parameters import NAMES, SIX
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
+from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT, PARAMETERS, SETTINGS
 from pipeline.mount import WITHIN_95, Mounted, change_of, six_of
 from pipeline.report.suspected_causes import estimated
 
@@ -132,14 +131,14 @@ def mounted_of(block: Mapping[str, Any]) -> Mounted:
 def adjustment_block(
     estimate: pd.DataFrame, covariance: pd.DataFrame, summary: Mapping[Any, Any], coarse: Mounted, sensor: str = "mbes"
 ) -> dict[str, Any]:
-    values = estimate.set_index("unknown").loc[list(NAMES), "value"].to_numpy()
-    tables = (covariance[name].to_numpy().reshape(SIX, SIX) for name in ("covariance", "covariance_total"))
+    values = estimate.set_index("unknown").loc[list(MOUNT_NAMES), "value"].to_numpy()
+    tables = (covariance[name].to_numpy().reshape(N_MOUNT, N_MOUNT) for name in ("covariance", "covariance_total"))
     random, total = tables
     return method_block(values[:3], values[3:], coarse, summary, random, total, sensor)
 
 
 def matrix(table: pd.DataFrame, column: str) -> list[list[float]] | None:
-    values = table[column].to_numpy().reshape(SIX, SIX)
+    values = table[column].to_numpy().reshape(N_MOUNT, N_MOUNT)
     return values.tolist() if np.all(np.isfinite(values)) else None
 
 

@@ -10,11 +10,10 @@ import pandas as pd
 from pipeline.config.pool import Method, Verdict
 from pipeline.config.session import Drift
 from pipeline.console import plural
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.residual_tests import Tables, off
 from pipeline.report.suspected_causes import causes, estimated
 
-SIX = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # body x, y, z
 WORDS_OF_GROUP = {
     "laser": "laser points",
     "mbes_vertical": "soundings on vertical faces",
@@ -146,7 +145,7 @@ def _beyond(mount: pd.Series, farthest: tuple[float, float]) -> str:
     """Where the mount that fits best lies outside of what is taken."""
     angles = [(float(mount[f"rotation_{axis}_deg"]), "°", farthest[0]) for axis in "xyz"]
     arms = [(float(mount[f"lever_arm_{axis}_m"]), " m", farthest[1]) for axis in "xyz"]
-    named = zip(SIX, angles + arms, strict=True)
+    named = zip(MOUNT_WORDS, angles + arms, strict=True)
     off = [f"{value:+.2f}{unit} in {name}" for name, (value, unit, limit) in named if abs(value) > limit]
     return f"; best fits {', '.join(off)}" if off else ""
 
@@ -188,7 +187,7 @@ def _wide_sigmas(sigma: Mapping[str, float] | None, limits: Verdict, held: Colle
         return ["the adjustment has no covariance"]
     bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
     return [
-        f"total sigma of {SIX[place]} is {sigma[key]:.4g}{bounds[unit][1]}, above the limit of "
+        f"total sigma of {MOUNT_WORDS[place]} is {sigma[key]:.4g}{bounds[unit][1]}, above the limit of "
         f"{bounds[unit][0]:g}{bounds[unit][1]}"
         for name, place, key, unit in PARAMETERS
         if name not in held and not sigma[key] <= bounds[unit][0]
@@ -204,7 +203,8 @@ def _patent(chosen: str, row: Any, methods: Mapping[str, Mapping[str, Any]], lim
     ours, theirs = methods[chosen]["correction"], methods["adjustment"]["correction"]
     bounds = {"rotation_vector_deg": (limits.max_sigma_deg, "°", 0), "lever_arm_m": (limits.max_sigma_m, " m", 3)}
     return [
-        f"{chosen} differs from the adjustment by {a - b:+.4f}{unit} in {SIX[first + k]}, more than {limit:g}{unit}"
+        f"{chosen} differs from the adjustment by {a - b:+.4f}{unit} in {MOUNT_WORDS[first + k]}, "
+        f"more than {limit:g}{unit}"
         for part, (limit, unit, first) in bounds.items()
         for k, (a, b) in enumerate(zip(ours[part], theirs[part], strict=True))
         if abs(a - b) > limit
@@ -283,6 +283,7 @@ def _so(sigma: Mapping[str, float] | None) -> str:
     if sigma is None:
         return ""
     angle, arm = (
-        max((sigma[key], SIX[place]) for _, place, key, unit in PARAMETERS if unit == wanted) for wanted in ("deg", "m")
+        max((sigma[key], MOUNT_WORDS[place]) for _, place, key, unit in PARAMETERS if unit == wanted)
+        for wanted in ("deg", "m")
     )
     return f"; total sigmas are up to {angle[0]:.3f}° ({angle[1]}) and {1000 * arm[0]:.1f} mm ({arm[1]})"

@@ -15,8 +15,7 @@ from pipeline.artefacts.families import families_of, level_families
 from pipeline.errors import ArtefactError
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.geometry.planes import angle_between
-from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.report.verdict import SIX
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.results.screen import summary
 from pipeline.run import manifest
 from pipeline.run.output_files import as_written
@@ -135,7 +134,7 @@ def _mount(
     rows: list[Row] = []
     beyond = []
     for _, k, *_ in PARAMETERS:
-        name = SIX[k]
+        name = MOUNT_WORDS[k]
         difference = float(found.difference[k] * scale[k])
         limit = limits[k]
         if limit is not None and abs(difference) > limit:
@@ -223,7 +222,7 @@ def sentence(found: Mapping[str, Any]) -> str:
     chance = f"p = {found['joint']['probability']:.2g}"
     if moved:
         each = [_with_sigma(row) for row in moved]
-        rest = "" if len(moved) == len(SIX) else "; the rest within noise"
+        rest = "" if len(moved) == len(MOUNT_WORDS) else "; the rest within noise"
         text = f"the sonar has moved, {_listed(each)}: significant ({chance}){rest}"
     elif first_is_second(found):
         text = "the same result in both"

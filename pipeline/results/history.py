@@ -19,8 +19,7 @@ from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.maths.comparison import Estimate, compare
-from pipeline.maths.mount_parameters import SETTINGS
-from pipeline.report.verdict import SIX
+from pipeline.maths.mount_parameters import MOUNT_WORDS, SETTINGS
 from pipeline.results.compare import LEVEL, estimate_of
 from pipeline.run.results import calibration
 from pipeline.run.settings import RUN_YAML
@@ -154,7 +153,7 @@ def _with_jumps(found: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator
         if row["verdict"] == "accepted" and now is not None:
             if before is not None:
                 compared = compare(before, now)
-                moved = ", ".join(SIX[k] for k in compared.moved(LEVEL))
+                moved = ", ".join(MOUNT_WORDS[k] for k in compared.moved(LEVEL))
                 row = row | {"probability": compared.probability, "moved": moved}
             before = now
         yield row

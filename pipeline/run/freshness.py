@@ -62,7 +62,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
     config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
-    if "mbes" in config:
+    if "mbes" in config or "calibration" in config:
         raw |= cast_digest(this)
     return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
 

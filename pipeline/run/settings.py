@@ -29,10 +29,17 @@ class Settings:
     session: SessionConfig
 
     def resolved(self) -> dict[str, Any]:
-        """Every setting by the name under which a stage's Config asks for it."""
+        """Return every setting by the name under which a stage's Config asks for it.
+
+        ``calibration`` is what is calibrated: the sonar, or without one the laser, with the settings that this takes.
+        """
         blocks = (self.pool, self.session)
-        found = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
-        return found | {"target_place": self.pool.target_place, "recordings": self.session.recordings}
+        settings = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
+        return settings | {
+            "target_place": self.pool.target_place,
+            "recordings": self.session.recordings,
+            "calibration": self.pool.laser_calibration if self.session.mbes is None else self.session.mbes,
+        }
 
     def resolved_plainly(self) -> dict[str, Any]:
         """The same as plain values."""

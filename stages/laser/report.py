@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.adjustment.pattern_tests import pattern_tests
 from pipeline.artefacts.catalogue.points import INS_SIGMAS, PASSES
 from pipeline.artefacts.catalogue.results import (
@@ -105,8 +105,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         inputs.freed,
         inputs.patterns,
     )
-    from_files = told(config.ins, inputs.ins_sigmas, inputs.passes)
-    drift, level = drift_of(config.ins, inputs.ins_sigmas, inputs.passes), config.adjust.test_level
+    from_files = sigmas_from_files(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift, level = drift_model(config.ins, inputs.ins_sigmas, inputs.passes), config.adjust.test_level
     tolerated = config.adjust.test_tolerance_m
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
     farthest = (FARTHEST * config.segment.search_laser_deg, np.inf)

@@ -65,8 +65,7 @@ def is_stale(copy: Path, monkeypatch: pytest.MonkeyPatch, stage: str, changed: s
         ("ingest", "pipeline/__init__.py"),  # BLAS's threads
         ("segment", "pipeline/maths/target/registration.py"),
         ("adjust", "pipeline/maths/adjustment/eliminate_white_noise.py"),
-        ("laser.adjust", "stages/adjust.py"),  # its sibling
-        ("laser.adjust", "pipeline/adjustment/laser_design.py"),
+        ("adjust", "pipeline/adjustment/laser_design.py"),
         ("report", "pipeline/report/verdict.py"),
     ],
 )
@@ -85,7 +84,7 @@ def test_what_a_stage_can_reach_makes_it_stale(
         ("ingest", "pipeline/maths/adjustment/normal_equations.py"),
         ("ingest", "stages/adjust.py"),
         ("georeference", "pipeline/readers/las.py"),  # its inputs tell whether that made a difference
-        ("adjust", "stages/laser/adjust.py"),
+        ("adjust", "stages/laser/report.py"),
         ("report", "pipeline/results/pages/report.html"),
         ("report", "pipeline/simulation/laser.py"),
     ],

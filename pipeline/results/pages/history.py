@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from pipeline.atomic_files import write_bytes, write_text, writing
 from pipeline.console import plural
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.mount import WITHIN_95
-from pipeline.report.verdict import SIX
 from pipeline.results.history import TEXTS, Filter, History
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
 
@@ -94,7 +93,7 @@ def _chart(table: pd.DataFrame) -> Markup:
             for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
                 bars = WITHIN_95 * np.nan_to_num(sigma[use])
                 axis.errorbar(place[use], values[use], bars, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
-            word_of_six = SIX[place_of_six]
+            word_of_six = MOUNT_WORDS[place_of_six]
             moved = np.array([word_of_six in words.split(", ") for words in table["moved"]], dtype=bool)
             ring = {"color": ALARM, "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.4}
             axis.plot(place[moved], values[moved], "o", **ring)
