@@ -33,8 +33,9 @@ from pipeline.artefacts.catalogue.results import (
 )
 from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.streams import Stream
-from pipeline.config.pool import Adjust, AsBuilt, Ingest, LaserCalibration, Segment
+from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
 from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.config.stage_settings import LaserCalibration
 from pipeline.config.target import Target
 from pipeline.planning.prediction import Setting
 from pipeline.planning.session_geometry import geometry_table, sailed_plan
@@ -43,7 +44,7 @@ from pipeline.target.design import target_of
 
 @dataclass(frozen=True)
 class Config:
-    """Settings; ``calibration``: the sonar that is calibrated, or how the laser is."""
+    """Settings; ``mbes`` is None where the laser is calibrated, ``laser_fit`` where the sonar is."""
 
     target: Target
     segment: Segment
@@ -52,7 +53,14 @@ class Config:
     as_built: AsBuilt
     ins: Ins
     laser: Laser
-    calibration: Mbes | LaserCalibration
+    mbes: Mbes | None
+    laser_fit: LaserCalibration | None
+
+    @property
+    def calibration(self) -> Mbes | LaserCalibration:
+        """What is calibrated: the sonar, or the laser in this way."""
+        (calibration,) = (block for block in (self.mbes, self.laser_fit) if block is not None)
+        return calibration
 
 
 @dataclass(frozen=True)
@@ -144,7 +152,7 @@ def weak_geometry(
     statistics : ResidualStatistics
         Numbers of soundings by surface and pass.
     """
-    if not isinstance(config.calibration, Mbes):
+    if config.mbes is None:
         return fixed_parameters_table(adjustment.fixed_mount)
     setting = Setting(
         model=session.target,
@@ -153,7 +161,7 @@ def weak_geometry(
         segment=config.segment,
         ins=session.ins,
         laser=config.laser,
-        mbes=config.calibration,
+        mbes=config.mbes,
     )
     passes = inputs.passes.set_index("pass").loc[statistics.passes_of("mbes")]
     surfaces = enumerate(adjustment.state.surfaces)

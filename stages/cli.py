@@ -210,21 +210,21 @@ def diff(
     import json
 
     from pipeline.atomic_files import write_text
-    from pipeline.results import compare as comparing
-    from pipeline.results.compare_text import text
+    from pipeline.results.compare_text import comparison_text
+    from pipeline.results.mount_difference import is_moved
     from pipeline.run.output_files import refuse_output
 
     found = comparison(first, second, tolerance_deg, tolerance_mm)
     for option, file in (("--html", html), ("--rrd", rrd)):
         refuse_output(option, file, first, second)
     if html is not None:
-        from pipeline.results.pages.comparison import page
+        from pipeline.results.pages.comparison import comparison_page
 
-        write_text(html, page(found))
+        write_text(html, comparison_page(found))
     if rrd is not None:
         save_pair(first, second, found, rrd)
-    say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else text(found), sys.stdout)
-    return 1 if comparing.is_moved(found) else 0
+    say(json.dumps(found, indent=1, ensure_ascii=False) if as_json else comparison_text(found), sys.stdout)
+    return 1 if is_moved(found) else 0
 
 
 @app.command()
@@ -240,17 +240,17 @@ def history(
     Writes history.html, history.csv and history.parquet.
     """
     from pipeline.console import plural
-    from pipeline.results.history import Filter, read_history
+    from pipeline.results.history import SessionFilter, read_history
     from pipeline.results.pages.history import write_history
 
-    chosen = Filter(name, since.date() if since else None, until.date() if until else None)
+    chosen = SessionFilter(name, since.date() if since else None, until.date() if until else None)
     found = read_history(folder, chosen)
     target = folder / "history" if out is None else out
     write_history(found, target, chosen)
     for problem in found.unreadable:
         say(f"left out: {problem}", sys.stderr)
-    if found.without:
-        say(found.without, sys.stdout)
+    if found.not_shown:
+        say(found.not_shown, sys.stdout)
     say(f"{plural(len(found.table), 'session')}: {target / 'history.html'}", sys.stdout)
     return 0
 

@@ -1,6 +1,8 @@
 """Rules of the house that no linter holds: who may import what, and what make promises."""
 
 import ast
+import graphlib
+import statistics
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -8,7 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.run.import_closure import imported
 from tests.support.roots import ROOT
+
+MOST_LINES_OF_A_MODULE, MEDIAN_LINES_OF_A_MODULE, MOST_LINES_OF_A_FUNCTION = 300, 110, 60
 
 
 def _imports(path: Path) -> Iterator[str]:
@@ -17,6 +22,12 @@ def _imports(path: Path) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _sources() -> dict[str, Path]:
+    """Every module of the program by its dotted name."""
+    files = [*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "stages").rglob("*.py")]
+    return {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
 
 
 def test_maths_is_pure() -> None:
@@ -29,15 +40,42 @@ def test_maths_is_pure() -> None:
 
 def test_open3d_and_rerun_have_their_places() -> None:
     allowed = {"open3d": ("pipeline/target/surface.py", "pipeline/simulation/raycast.py"), "rerun": ("stages/views/",)}
-    for path in [*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "stages").rglob("*.py")]:
+    for path in _sources().values():
         for name in _imports(path):
             places = allowed.get(name.split(".")[0], ("",))
             assert path.relative_to(ROOT).as_posix().startswith(places), (path, name)
 
 
-def test_modules_are_short() -> None:
-    for path in [*(ROOT / "pipeline").rglob("*.py"), *(ROOT / "stages").rglob("*.py")]:
-        assert len(path.read_text(encoding="utf-8").splitlines()) <= 310, path
+def test_no_module_needs_itself() -> None:
+    """No circle of imports, those inside functions included."""
+    sources = _sources()
+    needs = {
+        module: {name if name in sources else name.rpartition(".")[0] for name in imported(ROOT, path, module)}
+        for module, path in sources.items()
+    }
+    try:
+        graphlib.TopologicalSorter(needs).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_modules_and_functions_are_short() -> None:
+    lengths = {}
+    for module, path in _sources().items():
+        text = path.read_text(encoding="utf-8")
+        if path.name != "__init__.py":
+            lengths[module] = len(text.splitlines())
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef):
+                assert (node.end_lineno or 0) - node.lineno < MOST_LINES_OF_A_FUNCTION, (path, node.name)
+    assert {name: lines for name, lines in lengths.items() if lines > MOST_LINES_OF_A_MODULE} == {}
+    assert statistics.median(lengths.values()) < MEDIAN_LINES_OF_A_MODULE
+
+
+def test_the_library_has_rooms() -> None:
+    """No module lies beside the packages but those that all of them may use."""
+    leaves = {path.stem for path in (ROOT / "pipeline").glob("*.py")}
+    assert leaves == {"__init__", "atomic_files", "console", "errors", "gps_time", "mount", "text_table"}
 
 
 def _make(*words: str) -> str:

@@ -46,6 +46,7 @@ from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.site import Site
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 SETTINGS = Segment()
 KNOT_S = 0.25
 STEP = np.array([1e-5] * 3 + [1e-4] * 3)  # of differences, rad and m
@@ -88,7 +89,7 @@ class World:
             if name in ("floor", "back_wall"):
                 self.family[surface] = -1
 
-    def hits(self, sensor: str, k: int, t_ns: Array, rays: Array) -> tuple[Array, Array, Array]:
+    def hits(self, sensor: str, k: int, t_ns: Integers, rays: Array) -> tuple[Array, Integers, Array]:
         """Of bundles of rays (n, m, 3), the axis and, of a beam of some width, one on its rim across and one along:
         range and plane of the point hit, how steeply the axis rises (n,). Plane -1: not on the target as the segment
         stage's settings want it: the whole footprint on one face and a margin more, not grazed, away from the water

@@ -139,12 +139,13 @@ def one(task: tuple[str, int]) -> dict[str, Any]:
     row |= {"accepted": result["verdict"] == "accepted", "reasons": " | ".join(result["reasons"])}
     if block["covariance_total"] is None:
         return row
-    error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), made.truth)
+    errors = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), made.truth)
     covariance = np.array(block["covariance_total"])
     sigma = np.sqrt(np.diag(covariance))
-    row |= {"nse": float(error @ np.linalg.solve(covariance, error)), "sigmas": float(np.max(np.abs(error) / sigma))}
+    row |= {"nse": float(errors @ np.linalg.solve(covariance, errors))}
+    row |= {"sigmas": float(np.max(np.abs(errors) / sigma))}
     for k, axis in enumerate(NAMES):
-        row |= {f"error_{axis}": error[k] / UNITS[k], f"sigma_{axis}": sigma[k] / UNITS[k]}
+        row |= {f"error_{axis}": errors[k] / UNITS[k], f"sigma_{axis}": sigma[k] / UNITS[k]}
     return row
 
 

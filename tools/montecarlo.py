@@ -229,7 +229,7 @@ def pairs(table: pd.DataFrame) -> str:
     """Sessions 0 and 1, 2 and 3, … compared as poolcal diff does: as they are, and with one of the six moved."""
     from pipeline.maths.comparison import Estimate, compare
     from pipeline.maths.geometry.rotations import exp_so3
-    from pipeline.results.compare import LEVEL
+    from pipeline.results.mount_difference import SIGNIFICANCE
 
     def estimate(row: Any, moved: Array) -> Estimate:
         """As found on a mount of zero moved by ``moved``: found = Exp(-error) · true."""
@@ -242,12 +242,12 @@ def pairs(table: pd.DataFrame) -> str:
 
     rows = table.to_dict("records")
     two = list(zip(rows[::2], rows[1::2], strict=True))
-    alarms = sum(compare(estimate(a, np.zeros(6)), estimate(b, np.zeros(6))).probability < LEVEL for a, b in two)
+    alarms = sum(compare(estimate(a, np.zeros(6)), estimate(b, np.zeros(6))).probability < SIGNIFICANCE for a, b in two)
     lines = [f"  compared in {len(two)} pairs: {alarms} false alarms, {100 * alarms / len(two):.1f} % (level 1 %)"]
     for k, name in enumerate(NAMES):
         move = np.zeros(6)
         move[k] = np.radians(MOVED_DEG) if k < 3 else MOVED_MM / 1000
-        told = [compare(estimate(a, np.zeros(6)), estimate(b, move)).moved(LEVEL) for a, b in two]
+        told = [compare(estimate(a, np.zeros(6)), estimate(b, move)).moved(SIGNIFICANCE) for a, b in two]
         found, named = (100 * np.mean([bool(one) for one in told]), 100 * np.mean([k in one for one in told]))
         size = f"{MOVED_DEG}°" if k < 3 else f"{MOVED_MM} mm"
         lines.append(f"  {name} moved by {size}: found in {found:.1f} % of the pairs, {name} named in {named:.1f} %")

@@ -69,7 +69,7 @@ def viewer(*recordings: Path) -> Iterator[Any]:
         port = free.getsockname()[1]
     with tempfile.TemporaryDirectory() as home, silent() as environment:
         kept = {name: os.environ.get(name) for name in ("HOME", "PATH", "XDG_CONFIG_HOME")}
-        os.environ |= environment | {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+        os.environ |= dict(environment) | {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
         try:
             client = ViewerClient.spawn(headless=True, port=port, hide_welcome_screen=True)
             try:

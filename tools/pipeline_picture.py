@@ -54,13 +54,14 @@ def picture(path: Path) -> None:
 def _arrow(axis: Axes, start: float, end: float) -> None:
     """Straight to the next stage; to a later one round the left, the wider the farther."""
     steps = round((start - end) / STEP)
+    ends: tuple[tuple[float, float], tuple[float, float]]
     if steps == 1:
         ends, colour, bend = ((0, start - HEIGHT / 2 - 0.05), (0, end + HEIGHT / 2 + 0.05)), INK, "arc3"
     else:
         left = -WIDTH / 2 - 0.05
         ends, colour, bend = ((left, start), (left, end)), QUIET, f"arc3,rad={0.62 - 0.03 * steps:.2f}"
-    style = {"arrowstyle": "-|>", "mutation_scale": 9, "color": colour, "connectionstyle": bend}
-    axis.add_patch(FancyArrowPatch(*ends, **style))
+    arrow = FancyArrowPatch(*ends, arrowstyle="-|>", mutation_scale=9, color=colour, connectionstyle=bend)
+    axis.add_patch(arrow)
 
 
 if __name__ == "__main__":

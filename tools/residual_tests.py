@@ -187,8 +187,8 @@ def one(task: Task) -> dict[str, Any]:
     row: dict[str, Any] = {"fault": fault, "kind": kind, "seed": seed, "accepted": result["verdict"] == "accepted"}
     row |= {"reasons": " | ".join(result["reasons"]), "tests": len(patterns), "found": bool(said)}
     row |= {"named": bool(said) and expected in said[0]}
-    values = [patterns[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof")]
-    patterns = patterns.assign(bare=normal_deviates(*values, 0.0))
+    mean_m, sigma_m, dof = (patterns[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
+    patterns = patterns.assign(bare=normal_deviates(mean_m, sigma_m, dof, tolerated=0.0))
     for by in BY:
         rows = patterns[patterns["by"] == by]
         row |= {f"number_{by}": len(rows), f"u_{by}": rows["normalised"].abs().max()}

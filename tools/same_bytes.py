@@ -184,10 +184,10 @@ def _what_differs(one: Path, other: Path) -> str:
         names = [name for name in {**before, **after} if before.get(name) != after.get(name)]
         return f"keys {', '.join(sorted(name for name in names if not name.startswith('software'))[:8])}"
     if one.suffix == ".parquet":
-        before, after = pd.read_parquet(one), pd.read_parquet(other)
-        if list(before) != list(after) or len(before) != len(after):
-            return f"columns or rows: {before.shape} {list(before)} and {after.shape} {list(after)}"
-        names = [name for name in before if not before[name].equals(after[name])]
+        old, new = pd.read_parquet(one), pd.read_parquet(other)
+        if list(old) != list(new) or len(old) != len(new):
+            return f"columns or rows: {old.shape} {list(old)} and {new.shape} {list(new)}"
+        names = [str(name) for name in old if not old[name].equals(new[name])]
         return f"columns {', '.join(names)}" if names else "only what is said of its columns"
     lines = [path.read_text(encoding="utf-8", errors="replace").splitlines() for path in (one, other)]
     pairs = [pair for pair in zip(*lines, strict=False) if pair[0] != pair[1]]
@@ -227,7 +227,7 @@ def compare(base: str, names: list[str], pages: bool, work: Path) -> list[str]:
             for tree in trees:
                 shutil.copytree(work / "simulated" / name, tree.work / name)
                 calibrate(tree, KINDS[name], tree.work / name, pages)
-            found = list(differences(name, *(tree.work / name for tree in trees), pages))
+            found = list(differences(name, trees[0].work / name, trees[1].work / name, pages))
             print("\n".join(found) or f"{name}: the same", flush=True)
             return found
 

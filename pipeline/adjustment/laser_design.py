@@ -16,8 +16,9 @@ from pipeline.adjustment.problem import (
     observation_model,
     sensor_sigmas,
 )
-from pipeline.config.pool import LaserCalibration, LaserFit
+from pipeline.config.pool import LaserFit
 from pipeline.config.session import Laser
+from pipeline.config.stage_settings import LaserCalibration
 from pipeline.maths.adjustment.pseudo_observations import DesignPrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS

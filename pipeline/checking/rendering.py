@@ -11,26 +11,18 @@ from pipeline.checking.file_survey import Seen
 from pipeline.checking.ins_quality import Quality
 from pipeline.gps_time import utc_text
 from pipeline.maths.target.model import names_in_order
+from pipeline.text_table import text_table
 
 
 def text(examined: Examined) -> str:
     """Files, passes, findings."""
-    width = max([4, *(len(seen.name) for seen in examined.files)])
-    lines = [f"{'sensor':<7}{'file':<{width + 2}}{'kind':<24}{'records':>11}  {'from (UTC)':<21}{'to':<10}{'rate':>9}"]
-    lines += [_file_line(seen, width) for seen in examined.files]
+    heads = ("sensor", "file", "kind", "records", "from (UTC)", "to", "rate")
+    lines = text_table("<7<4  <24>11  <21<10>9", heads, [_file_cells(seen) for seen in examined.files])
     if any(seen.share < 1 or not seen.ended for seen in examined.files):
         lines.append("~: read in part")
     lines += _quality_lines(examined.quality)
     if examined.legs:
-        head = f"{'pass':<6}{'from (UTC)':<22}{'seconds':>8}{'distance':>10}{'speed':>10}{'laser':>8}{'sonar':>8}"
-        lines += ["", head]
-    for number, leg in enumerate(examined.legs):
-        seconds = (leg.end_ns - leg.start_ns) / 1e9
-        side = "" if leg.good else "  the wall is not to starboard"
-        lines.append(
-            f"{number:<6}{utc_text(leg.start_ns):<22}{seconds:>8.1f}{leg.distance_m:>8.2f} m{leg.speed_m_s:>6.2f} m/s"
-            f"{leg.ran['laser']:>8.0%}{leg.ran['mbes']:>8.0%}{side}"
-        )
+        lines += ["", *_pass_lines(examined)]
     lines += _soundings_lines(examined)
     lines.append("")
     for severity, head in (("fault", "Wrong"), ("look", "But look")):
@@ -38,6 +30,24 @@ def text(examined: Examined) -> str:
     if not examined.findings:
         lines.append("Nothing found.")
     return "\n".join(lines)
+
+
+def _pass_lines(examined: Examined) -> list[str]:
+    rows = [
+        (
+            str(number),
+            utc_text(leg.start_ns),
+            f"{(leg.end_ns - leg.start_ns) / 1e9:.1f}",
+            f"{leg.distance_m:.2f} m",
+            f"{leg.speed_m_s:.2f} m/s",
+            f"{leg.ran['laser']:.0%}",
+            f"{leg.ran['mbes']:.0%}",
+            "" if leg.good else "the wall is not to starboard",
+        )
+        for number, leg in enumerate(examined.legs)
+    ]
+    heads = ("pass", "from (UTC)", "seconds", "distance", "speed", "laser", "sonar")
+    return text_table("<6<22>8>10>10>8>8  <1", heads, rows)
 
 
 def _quality_lines(found: Quality) -> list[str]:
@@ -73,22 +83,21 @@ def _soundings_lines(examined: Examined) -> list[str]:
     faces = _by_face(examined)
     if not faces:
         return []
-    lines = ["", f"{'soundings on':<22}{'expected':>10}{'found':>10}   share ({USUAL})"]
+    rows = []
     order = names_in_order(examined.model.families) if examined.model is not None else ()
     for family in [family.name for family in order if any(face["family"] == family.name for face in faces)]:
         expected, found = (sum(f[key] for f in faces if f["family"] == family) for key in ("expected", "found"))
         share = f"{found / expected:.0%}" if expected else "-"
-        lines.append(f"{family:<22}{'~' + str(expected):>10}{'~' + str(found):>10}{share:>8}")
-    return lines
+        rows.append((family, f"~{expected}", f"~{found}", share))
+    return ["", *text_table("<22>10>10>8 <1", ("soundings on", "expected", "found", "share", f"({USUAL})"), rows)]
 
 
-def _file_line(seen: Seen, width: int) -> str:
+def _file_cells(seen: Seen) -> tuple[str, ...]:
     about = "" if seen.share == 1.0 and seen.ended else "~"
     first, last = (utc_text(t) for t in seen.span_ns) if len(seen.epochs_ns) else ("-", "-")
     last = last[11:] if last[:10] == first[:10] else last
     rate = _rate(seen.rate_hz) if np.isfinite(seen.rate_hz) else "-"
-    records = f"{about}{seen.records}"
-    return f"{seen.sensor:<7}{seen.name:<{width + 2}}{seen.kind:<24}{records:>11}  {first:<21}{last:<10}{rate:>9}"
+    return seen.sensor, seen.name, seen.kind, f"{about}{seen.records}", first, last, rate
 
 
 def _rate(rate_hz: float) -> str:

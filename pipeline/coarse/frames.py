@@ -1,8 +1,4 @@
-"""Marks of a survey and of drawings as frames to be adjusted; what is wrong with them is named before any result.
-
-Refused, one frame at a time: fewer than three marks, marks in a line, drawings in other units, mirror-imaged ones,
-names interchanged.
-"""
+"""Marks of a survey and of drawings as frames to be adjusted."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,22 +10,30 @@ from pipeline.config.marks import Mark, Marks, Sigmas
 from pipeline.maths.survey.frame_adjustment import FORWARD, STARBOARD, Axes, Frame, Survey
 
 Array = NDArray[np.float64]
-NEAR_UNIT, NEAR_ONE = 0.05, 0.4  # natural logarithms: a drawing may be wrong by so much in size
-FAR_DEG, NEAR_DEG = 90.0, 30.0  # from the session's mount: turned over, and right
-AXES = "xyz"
+NEAR_DEG = 30.0  # a mount that is nearer to the session's is right
 
 
 @dataclass(frozen=True)
-class Placed:
-    """The survey's marks in use by name, in its order; frames by name, the body first."""
+class MarkFrames:
+    """Marks in use, and the frames that are drawn with them.
 
-    names: tuple[str, ...]
+    Attributes
+    ----------
+    mark_names
+        Names of the survey's marks in use, in the survey's order.
+    survey
+        Their surveyed places.
+    by_name
+        The frames by name, the body first.
+    """
+
+    mark_names: tuple[str, ...]
     survey: Survey
-    frames: Mapping[str, Frame]
+    by_name: Mapping[str, Frame]
 
 
-def place(marks: Marks) -> Placed:
-    """Those marks that some frame names and that are not left out."""
+def frames_of_marks(marks: Marks) -> MarkFrames:
+    """Return the frames with those marks that a frame names and that are not left out."""
     wanted = {name for names in marks.named.values() for name in names} - set(marks.leave_out)
     names = tuple(name for name in marks.survey.marks if name in wanted)
     surveyed = [marks.survey.marks[name] for name in names]
@@ -38,8 +42,8 @@ def place(marks: Marks) -> Placed:
     number = {name: k for k, name in enumerate(names)}
     body = marks.body
     frames = {"body": _by_axes(marks, number) if body.marks is None else _by_marks(body.marks, body.sigma_m, number)}
-    frames |= {name: _by_marks(one.marks, one.sigma_m, number) for name, one in marks.sensors.items()}
-    return Placed(names, survey, frames)
+    frames |= {name: _by_marks(sensor.marks, sensor.sigma_m, number) for name, sensor in marks.sensors.items()}
+    return MarkFrames(names, survey, frames)
 
 
 def _by_marks(marks: Mapping[str, Mark], sigma_m: Sigmas, number: Mapping[str, int]) -> Frame:
@@ -65,8 +69,3 @@ def _by_axes(marks: Marks, number: Mapping[str, int]) -> Frame:
 
 def _diagonal(sigmas_m: Array) -> Array:
     return np.asarray(np.eye(3) * (sigmas_m**2)[:, None, :])
-
-
-# --- what is wrong ---------------------------------------------------------------------------------------------------
-
-

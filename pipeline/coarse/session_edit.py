@@ -1,211 +1,252 @@
-"""session.yaml edited as text: the mounts and what goes with them, and not one byte else.
+"""Mounts written into the text of session.yaml, through the YAML library that keeps comments (ruamel.yaml).
 
-Places come from the YAML's own nodes: each number of a ``mount`` is replaced where it stands, so that comments, order,
-line ends and styles stay; a key that is missing is put in after its neighbour. What comes of it is read again and must
-be the session that was meant, or nothing is written.
+The text becomes YAML nodes, the nodes of the mounts are changed, and the nodes become text again. Comments, the order
+of keys, quotes, block and flow style, line ends and a byte order mark stay. Every list, mapping or text in brackets or
+over several lines that is not itself changed is taken over as it was written. The library writes the rest in one style:
+
+* the indentation of nested blocks and of lists is the same everywhere, that of the first one;
+* there is one space after a key's colon and none before it, and a comment may move along its line;
+* ``? key`` on a line of its own becomes ``key:``, and a tag that says nothing (``!!map``) goes;
+* a changed mapping or list in brackets stands on one line.
+
+The library loses a comment inside such brackets. So the edited text is read again: it must say what was meant, with
+every comment in its order, or the edit is refused.
 """
 
-import itertools
-import json
-import os
-from collections.abc import Iterable, Mapping
-from datetime import UTC, datetime
+import re
+from collections.abc import Iterator, Mapping
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
-from numpy.typing import NDArray
+from ruamel.yaml import YAML
+from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.tokens import CommentToken
 
-import pipeline
-from pipeline.atomic_files import sha256, write_bytes, writing
-from pipeline.config.instruments import applied
-from pipeline.config.session import SessionConfig
-from pipeline.config.yaml_models import compose, content_of, parse, text_of
+from pipeline.config.yaml_file import content_of
 from pipeline.errors import ConfigError
-from pipeline.maths.mount_parameters import SETTINGS
-from pipeline.mount import Mounted
-from pipeline.readers.casts import with_cast
 
-SENSORS = ("laser", "mbes")
-NOWHERE = dict.fromkeys(SETTINGS, 0.0)
-Array = NDArray[np.float64]
 Content = dict[str, Any]
-Edit = tuple[int, int, str]  # the text from here to there becomes this
+DOCUMENT = re.compile(  # the library keeps neither a byte order mark nor what stands outside the document's own marks
+    r"(\ufeff?(?:(?:[#%].*)?\n)*---[ \t]*\n|\ufeff?)(.*?)(^\.\.\.(?:\s.*)?)?", re.DOTALL | re.MULTILINE
+)
+FIRST_MARKER = 0xF0000  # of characters for private use: each stands for one text that is taken over
+MARKER = re.compile("([\U000f0000-\U0010fffd])\\1*")
+TEXT_BLOCK = ("|", ">")
+TAGS = {str: "tag:yaml.org,2002:str", float: "tag:yaml.org,2002:float", dict: "tag:yaml.org,2002:map",
+        list: "tag:yaml.org,2002:seq"}  # fmt: skip
+DIGITS = {"mount_covariance": ".9e"}  # always with a point: YAML takes 1e-06 for a word
 
 
-def read_session(folder: Path) -> tuple[str, Content]:
-    """Text and content of session.yaml, which may still lack mounts: all else in it is checked."""
-    if not folder.is_dir():
-        raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
-    path = folder / "session.yaml"
-    text = text_of(path)
-    content = content_of(text, path)
-    _check(content, folder)
-    return text, content
+def edit_mounts(text: str, blocks: Mapping[str, Content], path: Path) -> str:
+    """Return the text of session.yaml with the blocks' keys set in each sensor's block.
 
-
-def _check(content: Content, folder: Path) -> SessionConfig:
-    path = folder / "session.yaml"
-    filled = with_cast(applied(content, folder)[0], folder)
-    for name in SENSORS:
-        if isinstance(filled.get(name), dict):
-            filled[name] = {"mount": NOWHERE} | filled[name]
-    return parse(SessionConfig, {"name": "session"} | filled, str(path))
-
-
-def origin_of(method: str, file: Path, **more: Any) -> Content:
-    """Where a mount comes from, as it stands beside it."""
-    name = "".join(letter if letter.isprintable() else "?" for letter in file.name)[:300]
-    today = datetime.now(UTC).date().isoformat()
-    software = f"poolcal {pipeline.__version__}"
-    return {"method": method, "file": name, "sha256": sha256(file), "date": today, "software": software} | more
-
-
-def block_of(mounted: Mounted, covariance: Array, origin: Content) -> Content:
-    """What a sensor's block is to say: numbers rounded as they will be written; ``covariance`` (6, 6)."""
-    six = {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()}
-    return {
-        "mount": six,
-        "mount_origin": origin | {"mount": six},
-        "mount_covariance": [[float(f"{one:.9e}") for one in row] for row in covariance.tolist()],
-    }
-
-
-def written(folder: Path, text: str, content: Content, blocks: Mapping[str, Content]) -> str:
-    """The blocks into session.yaml, unless it says so already (the day and the version alone are no change); what was
-    done, in words."""
-    path = folder / "session.yaml"
-    if all(_same(content[name], block) for name, block in blocks.items()):
-        return f"{path}: has these mounts already; not written"
-    new = edited(text, blocks, path)
-    refuse_other(new, content, blocks, path)
-    kept = replace_session(folder, text, new)
-    return f"{path}: {' and '.join(f'{name}.mount' for name in blocks)} written; what was there is in {kept.name}"
-
-
-def _same(there: Content, block: Content) -> bool:
-    one, other = (side.get("mount_origin") or {} for side in (there, block))
-    origins = one.get("sha256") == other["sha256"] and one.get("method") == other["method"]
-    return origins and all(there.get(key) == block[key] for key in ("mount", "mount_covariance"))
-
-
-def edited(text: str, blocks: Mapping[str, Content], path: Path) -> str:
-    """The text with keys ``mount``, ``mount_origin`` and ``mount_covariance`` of each sensor as in its block.
+    Parameters
+    ----------
+    text
+        What session.yaml says now. It is valid for :func:`~pipeline.config.yaml_models.content_of`.
+    blocks
+        By sensor, values of ``mount``, ``mount_origin`` and ``mount_covariance``.
+    path
+        The file that an error names.
 
     Raises
     ------
     ConfigError
-        The text is written so that this cannot be done in place.
+        A sensor's block has no format, after which a mount could be written; or the edit would change or lose
+        something else.
     """
-    edits = [edit for name, block in blocks.items() for edit in _edits(text, name, block, path)]
-    for start, end, new in sorted(edits, reverse=True):
-        text = text[:start] + new + text[end:]
-    return text
+    for name in blocks:
+        if "format" not in content_of(text, path).get(name, {}):
+            raise ConfigError(f"{path}: {name}: has no format; add it")
+    try:
+        new = _edited(text, blocks)
+    except Exception as error:  # the library alone runs here, and raises anything at a text that it cannot write
+        raise _refusal(path) from error
+    check_edit(text, new, blocks, path)
+    return new
 
 
-def refuse_other(text: str, content: Content, blocks: Mapping[str, Content], path: Path) -> None:
-    """The edited text must say what the content said, but for the blocks; and be a session."""
+def check_edit(before: str, after: str, blocks: Mapping[str, Content], path: Path) -> None:
+    """Raise ConfigError unless the new text says what the old one did but for the blocks, with every comment.
+
+    Parameters
+    ----------
+    before, after
+        Texts of session.yaml.
+    blocks
+        By sensor, the keys that were to change.
+    path
+        The file that an error names.
+    """
+    content = content_of(before, path)
     meant = content | {name: content[name] | block for name, block in blocks.items()}
     try:
-        found = content_of(text, path)
+        same = content_of(after, path) == meant
     except ConfigError:
-        found = {}
-    if found != meant:
+        same = False
+    if not same:
+        raise _refusal(path)
+    comments, kept = _comments(before), _comments(after)
+    if kept != comments:
+        lost = next((comment for comment in comments if comments.count(comment) > kept.count(comment)), comments[0])
         raise ConfigError(
-            f"{path}: mount cannot be edited where it stands; write laser and mbes as plain blocks, one key a line"
+            f"{path}: mount cannot be edited where it stands, for the comment {lost!r} would be lost; put it on a line "
+            "of its own, outside brackets"
         )
-    _check(found, path.parent)
 
 
-def _edits(text: str, sensor: str, block: Content, path: Path) -> Iterable[Edit]:
-    node = _value(compose(text, path), sensor)
-    mount = _value(node, "mount") if node is not None else None
-    anchor = mount if mount is not None else _value(node, "format")
-    if node is None or anchor is None:
-        raise ConfigError(f"{path}: {sensor}: has no format; add it")
-    break_ = "\r\n" if "\r\n" in text else "\n"
-    indent = " " * node.value[0][0].start_mark.column
-    between = ", " if node.flow_style else f",{break_}{indent}  "
-    missing = []
-    for key, value in block.items():
-        there = _value(node, key)
-        if key == "mount" and isinstance(there, yaml.MappingNode):
-            for name, number in value.items():
-                scalar = _value(there, name)
-                if scalar is not None:
-                    yield scalar.start_mark.index, scalar.end_mark.index, f"{number:.6f}"
-        elif there is not None:  # from the key on: what stood in lines of its own may not be indented enough
-            name = next(name for name, _ in node.value if name.value == key)
-            yield name.end_mark.index, _end(there), f": {in_yaml(key, value, between)}"
+def _refusal(path: Path) -> ConfigError:
+    return ConfigError(
+        f"{path}: mount cannot be edited where it stands; write laser and mbes as plain blocks, one key a line"
+    )
+
+
+def _comments(text: str) -> list[str]:
+    """Return all comments in their order: they stand between YAML's tokens, or behind the head of a block of text."""
+    comments: list[str] = []
+    end = 0
+    for token in yaml.scan(text, Loader=yaml.SafeLoader):
+        start, stop = token.start_mark.index, token.end_mark.index
+        is_block = isinstance(token, yaml.ScalarToken) and token.style in TEXT_BLOCK
+        comments += re.findall("#.*", text[end:start] + (text[start:stop].partition("\n")[0] if is_block else ""))
+        end = max(end, stop)
+    return [comment.strip() for comment in comments + re.findall("#.*", text[end:])]
+
+
+def _edited(text: str, blocks: Mapping[str, Content]) -> str:
+    newline = "\r\n" if "\r\n" in text else "\n"
+    parts = DOCUMENT.fullmatch(text.replace("\r\n", "\n"))
+    assert parts is not None
+    head, body, tail = parts.groups(default="")
+    library = YAML()
+    library.width = len(text) + 10_000  # lines are not broken
+    root = library.compose(body)
+    _keep_indents(library, root)
+    taken: list[str] = []
+    for position, (key, node) in enumerate(root.value):
+        if key.value in blocks:
+            _edit_sensor(node, blocks[key.value], body, taken)
         else:
-            missing.append(f"{key}: {in_yaml(key, value, between)}")
-    if not missing:
+            root.value[position] = key, _taken_over(node, body, taken)
+    stream = StringIO()
+    library.serialize(root, stream)
+    new = MARKER.sub(lambda marker: taken[ord(marker[1]) - FIRST_MARKER], stream.getvalue())
+    new = new if body.endswith("\n") else new.removesuffix("\n")
+    return (head + new + tail).replace("\n", newline)
+
+
+def _keep_indents(library: YAML, root: Node) -> None:
+    """Set the library's indents to those of the first nested block and of the first block list."""
+    library.indent(mapping=2, sequence=4, offset=2)
+    pairs = list(_nested_blocks(root))
+    for parent, child in reversed(pairs):
+        column = parent.start_mark.column
+        if isinstance(child, MappingNode):
+            library.map_indent = child.start_mark.column - column
+        elif isinstance(parent, MappingNode):
+            library.sequence_dash_offset = child.start_mark.column - column
+            library.sequence_indent = child.value[0].start_mark.column - column
+
+
+def _nested_blocks(parent: Node) -> Iterator[tuple[Node, Node]]:
+    """Yield each block mapping or list with the block that it stands in."""
+    if not isinstance(parent, CollectionNode) or parent.flow_style:
         return
-    place = len(text[: _end(anchor)].rstrip())
-    if node.flow_style:
-        yield place, place, "".join(f", {words}" for words in missing)
-        return
-    line = len(text) if (found := text.find("\n", place)) < 0 else found + 1
-    words = "".join(f"{indent}{one}{break_}" for one in missing)
-    yield line, line, words if text[:line].endswith("\n") else break_ + words
+    for item in parent.value:
+        child = item[1] if isinstance(item, tuple) else item
+        if isinstance(child, CollectionNode) and not child.flow_style:
+            yield parent, child
+            yield from _nested_blocks(child)
 
 
-def _value(node: Any, key: str) -> Any:
-    """The value's node of a mapping's key; None where there is none."""
-    pairs = node.value if isinstance(node, yaml.MappingNode) else ()
-    return next((value for name, value in pairs if name.value == key), None)
+def _taken_over(node: Node, text: str, taken: list[str]) -> Node:
+    """Return the node with a marker in place of what was written in brackets or over several lines.
 
-
-def _end(node: Any) -> int:
-    """Where a node's text ends: of a block, where its last part does (YAML counts the blank lines and comments on)."""
-    if isinstance(node, yaml.ScalarNode) or node.flow_style or not node.value:
-        return int(node.end_mark.index)
-    last = node.value[-1]
-    return _end(last[1] if isinstance(last, tuple) else last)
-
-
-def in_yaml(key: str, value: Any, between: str) -> str:
-    """Numbers with a point, for YAML takes 1e-06 for a word; ``between``: what stands between a matrix's rows."""
-    if key == "mount":
-        return "{" + ", ".join(f"{name}: {number:.6f}" for name, number in value.items()) + "}"
-    if key == "mount_origin":
-        words = {name: in_yaml(name, one, between) if name == "mount" else json.dumps(one, ensure_ascii=False)
-                 for name, one in value.items()}
-        return "{" + ", ".join(f"{name}: {one}" for name, one in words.items()) + "}"
-    return "[" + between.join("[" + ", ".join(f"{one:.9e}" for one in row) + "]" for row in value) + "]"
-
-
-def replace_session(folder: Path, old: str, text: str) -> Path:
-    """``old``, what was there, is kept as session.1.yaml, session.2.yaml … (the first free), whose path is given back.
-
-    Whole or not at all: the new one is written beside and renamed over.
+    Parameters
+    ----------
+    node
+        A node that does not change.
+    text
+        The text that the node's marks count in.
+    taken
+        Texts taken over so far; this call adds to them.
     """
-    path = folder / "session.yaml"
-    kept = _keep(folder, old.encode("utf-8"))
-    try:
-        write_bytes(path, text.encode("utf-8"))
-    except BaseException:
-        kept.unlink(missing_ok=True)
-        raise
-    return kept
+    start, end = node.start_mark, node.end_mark
+    if isinstance(node, CollectionNode) and not node.flow_style:
+        for position, item in enumerate(node.value):
+            if isinstance(item, tuple):
+                node.value[position] = item[0], _taken_over(item[1], text, taken)
+            else:
+                node.value[position] = _taken_over(item, text, taken)
+        return node
+    if isinstance(node, ScalarNode) and (start.line == end.line or node.style in TEXT_BLOCK):
+        return node
+    marker = chr(FIRST_MARKER + len(taken))
+    taken.append(text[start.index : end.index])
+    length = max(1, end.column - start.column)  # as long as the text's last line: a comment behind it stays in place
+    return ScalarNode(TAGS[str], marker * length, comment=node.comment)
 
 
-def _keep(folder: Path, content: bytes) -> Path:
-    for number in itertools.count(1):
-        path = folder / f"session.{number}.yaml"
-        with writing(path):
-            try:
-                file = path.open("xb")
-            except FileExistsError:
-                continue
-            try:
-                with file:
-                    file.write(content)
-                    file.flush()
-                    os.fsync(file.fileno())
-            except BaseException:
-                path.unlink(missing_ok=True)
-                raise
-            return path
-    raise AssertionError
+def _edit_sensor(sensor: Node, block: Content, text: str, taken: list[str]) -> None:
+    """Set the block's keys in a sensor's mapping; a key that is missing comes after ``mount``, or after ``format``."""
+    places = {key.value: position for position, (key, _) in enumerate(sensor.value)}
+    for key, position in places.items():
+        name, node = sensor.value[position]
+        node = _changed(node, block[key], key) if key in block else _taken_over(node, text, taken)
+        sensor.value[position] = name, node
+    missing = [(ScalarNode(TAGS[str], key), _new(block[key], key)) for key in block if key not in places]
+    if missing:
+        anchor = places.get("mount", places["format"])
+        _move_comments(_last(sensor.value[anchor][1]), _last(missing[-1][1]))
+        sensor.value[anchor + 1 : anchor + 1] = missing
+
+
+def _changed(node: Node, value: Any, key: str) -> Node:
+    """Return the node with a new value; in a mapping or a block list each entry keeps its place and its comment."""
+    if isinstance(node, MappingNode) and isinstance(value, dict):
+        there = {name.value for name, _ in node.value}
+        node.value = [(name, _changed(old, value[name.value], key)) for name, old in node.value if name.value in value]
+        node.value += [(ScalarNode(TAGS[str], name), _new(value[name], key)) for name in value if name not in there]
+        return node
+    if isinstance(node, SequenceNode) and isinstance(value, list) and len(node.value) == len(value):
+        is_matrix = isinstance(value[0], list)
+        if not (is_matrix and node.flow_style):
+            node.value = [_changed(old, entry, key) for old, entry in zip(node.value, value, strict=True)]
+            return node
+    new = _new(value, key)
+    _last(new).comment = _last(node).comment
+    return new
+
+
+def _new(value: Any, key: str) -> Node:
+    """Return a node that says a value of one of the keys; a matrix is a list of rows, one a line."""
+    if isinstance(value, dict):
+        pairs = [(ScalarNode(TAGS[str], name), _new(entry, key)) for name, entry in value.items()]
+        return MappingNode(TAGS[dict], pairs, flow_style=True)
+    if isinstance(value, list):
+        matrix = bool(value) and isinstance(value[0], list)
+        return SequenceNode(TAGS[list], [_new(entry, key) for entry in value], flow_style=not matrix)
+    if isinstance(value, float):
+        return ScalarNode(TAGS[float], format(value, DIGITS.get(key, ".6f")))
+    return ScalarNode(TAGS[str], value, style='"')
+
+
+def _last(node: Node) -> Node:
+    """Return the node that a comment behind this one belongs to: of a block, its last entry."""
+    if isinstance(node, CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        return _last(last[1] if isinstance(last, tuple) else last)
+    return node
+
+
+def _move_comments(old: Node, new: Node) -> None:
+    """Move the lines of comment below the old node below the new one; a comment on the old node's own line stays."""
+    if not old.comment or old.comment[0] is None:
+        return
+    comment = old.comment[0]
+    is_text_block = isinstance(old, ScalarNode) and old.style in TEXT_BLOCK  # its last line has no place for a comment
+    own, _, below = ("", "", comment.value) if is_text_block else comment.value.partition("\n")
+    new.comment = [CommentToken(f"\n{below}", comment.start_mark), None]
+    old.comment = [CommentToken(f"{own}\n", comment.start_mark) if own else None, *old.comment[1:]]

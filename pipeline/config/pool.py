@@ -115,13 +115,6 @@ class Verdict(Model):
     max_sigma_m: Positive = 0.005
 
 
-class LaserCalibration(LaserFit):
-    """Settings of a laser's own calibration: ``laser_fit`` with the verdict's limits of the sigmas."""
-
-    max_sigma_deg: Positive
-    max_sigma_m: Positive
-
-
 Method = Literal["patent_sequential", "patent_alternating", "adjustment"]
 
 
@@ -144,14 +137,6 @@ class PoolConfig(Model):
     @property
     def target_place(self) -> TargetPlace:
         return TargetPlace(origin=self.target.origin, azimuth_deg=self.target.azimuth_deg)
-
-    @property
-    def laser_calibration(self) -> LaserCalibration:
-        """Settings of a laser's own calibration."""
-        limits = self.verdict
-        return LaserCalibration(
-            **self.laser_fit.model_dump(), max_sigma_deg=limits.max_sigma_deg, max_sigma_m=limits.max_sigma_m
-        )
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------

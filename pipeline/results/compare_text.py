@@ -1,52 +1,84 @@
-"""A comparison of two runs as text for the screen."""
+"""The comparison of two runs as text for the screen."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from pipeline.console import plural
-from pipeline.results.compare import FACE_KEYS, Row, shown
+from pipeline.results.mount_difference import Row, quantity_text
+from pipeline.text_table import text_table
+
+FACE_KEYS = "target.faces."
 
 
-def text(found: Mapping[str, Any]) -> str:
-    """The whole comparison for the screen; what does not differ is not listed."""
-    lines = [f"{key}: {found[key]['session']} ({found[key]['verdict']}), {found[key]['run']}" for key in ("a", "b")]
-    if found["inputs"]:
-        new, gone = (sum(row[key] is None for row in found["inputs"]) for key in ("a", "b"))
-        lines += ["", f"raw files: {len(found['inputs']) - new - gone} changed, {new} in b alone, {gone} in a alone"]
+def comparison_text(difference: Mapping[str, Any]) -> str:
+    """Return the comparison for the screen; values that do not differ are not listed."""
+    lines = [
+        f"{key}: {difference[key]['session']} ({difference[key]['verdict']}), {difference[key]['run']}"
+        for key in ("a", "b")
+    ]
+    inputs = difference["inputs"]
+    if inputs:
+        new, gone = (sum(row[key] is None for row in inputs) for key in ("a", "b"))
+        lines += ["", f"raw files: {len(inputs) - new - gone} changed, {new} in b alone, {gone} in a alone"]
     for title, key in (("config and session", "config"), ("software", "software")):
-        if found[key]:
-            rows = folded(found[key])
+        if difference[key]:
+            rows = own_faces_counted(difference[key])
             lines += ["", f"{title}:", *(f"  {row['key']}: {_brief(row['a'])} -> {_brief(row['b'])}" for row in rows)]
-    if found["counts"]:
+    if difference["counts"]:
         lines += ["", "counts:"]
-        lines += [f"  {r['stage']}, {r['source']}, {r['reason']}: {r['a']:,} -> {r['b']:,}" for r in found["counts"]]
-    if found["planes"]:
-        lines += ["", f"{'planes, b - a':<16}{'turned':>12}{'distance':>14}{'rms':>14}"]
-        for r in found["planes"]:
-            name = f"  {r['sensor']} {r['plane']}"
-            cells = (shown(r["angle_deg"], "deg", ""), shown(r["distance_m"], "m"), shown(r["rms_m"], "m"))
-            lines.append(f"{name:<16}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}")
-    if any(row["difference"] for row in found["parameters"]):
-        lines += [""]
-        lines.append(f"{'mount, b - a':<16}{'difference':>14}{'sigma':>14}{'in sigmas':>12}")
-        for r in found["parameters"]:
-            size = f"{shown(r['difference'], r['unit']):>14}{shown(r['sigma'], r['unit'], ''):>14}{r['z']:>12.1f}"
-            lines.append(f"  {r['parameter']:<14}{size}{'  moved' if r['moved'] else ''}")
-    lines += [f"not compared: {why}" for why in found["not_compared"]]
-    return "\n".join([*lines, "", found["sentence"] + "."])
+        lines += [
+            f"  {row['stage']}, {row['source']}, {row['reason']}: {row['a']:,} -> {row['b']:,}"
+            for row in difference["counts"]
+        ]
+    if difference["planes"]:
+        lines += ["", *_plane_table(difference["planes"])]
+    if any(row["difference"] for row in difference["parameters"]):
+        lines += ["", *_parameter_table(difference["parameters"])]
+    lines += [f"not compared: {why}" for why in difference["not_compared"]]
+    return "\n".join([*lines, "", difference["sentence"] + "."])
 
 
-def folded(rows: Sequence[Row]) -> Iterator[Row]:
-    """For people: faces that only one of the runs has are counted in place of their keys."""
-    faces = [row for row in rows if row["key"].startswith(FACE_KEYS) and row["key"].endswith(".corners")]
-    alone = {key: [r["key"].removesuffix("corners") for r in faces if r[other] is None] for key, other in ("ab", "ba")}
-    for row in rows:
-        if not row["key"].startswith((*alone["a"], *alone["b"])):
+def _plane_table(planes: Sequence[Row]) -> list[str]:
+    rows = [
+        (
+            f"  {row['sensor']} {row['plane']}",
+            quantity_text(row["angle_deg"], "deg", ""),
+            quantity_text(row["distance_m"], "m"),
+            quantity_text(row["rms_m"], "m"),
+        )
+        for row in planes
+    ]
+    return text_table("<16>12>14>14", ("planes, b - a", "turned", "distance", "rms"), rows)
+
+
+def _parameter_table(parameters: Sequence[Row]) -> list[str]:
+    rows = [
+        (
+            f"  {row['parameter']}",
+            quantity_text(row["difference"], row["unit"]),
+            quantity_text(row["sigma"], row["unit"], ""),
+            f"{row['z']:.1f}",
+            "moved" if row["moved"] else "",
+        )
+        for row in parameters
+    ]
+    return text_table("<16>14>14>12  <1", ("mount, b - a", "difference", "sigma", "in sigmas"), rows)
+
+
+def own_faces_counted(changes: Sequence[Row]) -> Iterator[Row]:
+    """Yield the changes of settings, with faces that one run alone has counted in place of their keys."""
+    faces = [row for row in changes if row["key"].startswith(FACE_KEYS) and row["key"].endswith(".corners")]
+    own = {
+        key: [row["key"].removesuffix("corners") for row in faces if row[other] is None]
+        for key, other in ("ab", "ba")
+    }
+    for row in changes:
+        if not row["key"].startswith((*own["a"], *own["b"])):
             yield row
-    if alone["a"] or alone["b"]:
-        own = {key: f"{plural(len(names), 'face')} of its own" for key, names in alone.items()}
-        yield {"key": FACE_KEYS[:-1]} | own
+    if own["a"] or own["b"]:
+        counts = {key: f"{plural(len(names), 'face')} of its own" for key, names in own.items()}
+        yield {"key": FACE_KEYS[:-1]} | counts
 
 
 def _brief(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""All sessions of one boat on one page: has the mount moved, and when?
+"""All sessions of one boat in one table: whether the mount has moved, and when.
 
 Each accepted session is compared with the accepted one before it by the joint test of :mod:`pipeline.maths.comparison`.
 Rejected sessions are shown, never compared.
@@ -20,54 +20,66 @@ from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.maths.comparison import Estimate, compare
 from pipeline.maths.mount_parameters import MOUNT_WORDS, SETTINGS
-from pipeline.results.compare import LEVEL, estimate_of
+from pipeline.results.finished_run import estimate_of
+from pipeline.results.mount_difference import SIGNIFICANCE
 from pipeline.run.results import calibration
 from pipeline.run.settings import RUN_YAML
 
-TEXTS = ("date_utc", "session", "run", "verdict", "moved")  # columns
+TEXT_COLUMNS = ("date_utc", "session", "run", "verdict", "moved")
 
 
 @dataclass(frozen=True)
-class Filter:
-    """Which sessions to show; dates are those of the first pass, UTC."""
+class SessionFilter:
+    """Sessions to show: a pattern of their names, and the first and last day of their first pass, UTC."""
 
     name: str = "*"
     since: date | None = None
     until: date | None = None
 
     def takes(self, session: str, day: str) -> bool:
+        """Whether a session of this name and day (YYYY-MM-DD) is shown."""
         inside = (self.since is None or day >= self.since.isoformat()) and (
             self.until is None or day <= self.until.isoformat()
         )
         return inside and fnmatch.fnmatchcase(session.casefold(), self.name.casefold())
 
     def words(self) -> str:
-        said = [f"name {self.name}"] if self.name != "*" else []
-        said += [f"since {self.since}"] if self.since else []
-        return ", ".join([*said, *([f"until {self.until}"] if self.until else [])])
+        """Return the filter in words; nothing where all sessions are shown."""
+        words = [f"name {self.name}"] if self.name != "*" else []
+        words += [f"since {self.since}"] if self.since else []
+        return ", ".join([*words, *([f"until {self.until}"] if self.until else [])])
 
 
 @dataclass(frozen=True)
 class History:
-    """One row a session in order of time; the runs that could not be read, with the reason; and those of a laser, which
-    has a mount of its own."""
+    """All sessions of a boat.
+
+    Attributes
+    ----------
+    table
+        One row a session in order of time.
+    unreadable
+        Runs that could not be read, with the reason.
+    lasers
+        Runs that calibrate a laser, which has a mount of its own.
+    """
 
     table: pd.DataFrame
     unreadable: list[str] = field(default_factory=list)
     lasers: list[str] = field(default_factory=list)
 
     @property
-    def without(self) -> str:
-        """What is not shown because it is of the laser, in words."""
-        many = len(self.lasers)
-        return f"{plural(many, 'laser run')} not shown: {', '.join(self.lasers)}" if many else ""
+    def not_shown(self) -> str:
+        """The runs that are not shown because they calibrate a laser, in words."""
+        number = len(self.lasers)
+        return f"{plural(number, 'laser run')} not shown: {', '.join(self.lasers)}" if number else ""
 
 
-def read_history(folder: Path, chosen: Filter) -> History:
-    """Every run in ``folder``, two levels deep."""
+def read_history(folder: Path, chosen: SessionFilter) -> History:
+    """Return the history of every run in ``folder``, up to two levels deep, that ``chosen`` takes."""
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; RUNS_DIR is the folder that holds run folders")
-    found, unreadable, lasers = [], [], []
+    sessions, unreadable, lasers = [], [], []
     finished, begun = _runs_in(folder)
     if not finished and not begun:
         itself = (folder / RUN_YAML).is_file()
@@ -87,15 +99,15 @@ def read_history(folder: Path, chosen: Filter) -> History:
             unreadable.append(f"{run}: its calibration.json is not as poolcal writes it")
             continue
         if chosen.takes(row["session"], row["date_utc"][:10]):
-            found.append((row["date_utc"], row["run"], row, estimate))
+            sessions.append((row["date_utc"], row["run"], row, estimate))
     unreadable += [_why_without(run) for run in begun]
-    found.sort(key=lambda one: one[:2])
-    rows = list(_with_jumps([(row, estimate) for *_, row, estimate in found]))
+    sessions.sort(key=lambda session: session[:2])
+    rows = list(_with_jumps([(row, estimate) for *_, row, estimate in sessions]))
     return History(pd.DataFrame(rows, columns=list(_columns())), unreadable, lasers)
 
 
 def _runs_in(folder: Path) -> tuple[list[Path], list[Path]]:
-    """Run folders up to two levels deep, with a result and without one that can be read."""
+    """Return run folders up to two levels deep: those with a result, and those without one that can be read."""
     finished, begun = set(), set()
     for depth in ("*", "*/*"):
         finished |= {path.parent.parent for path in folder.glob(f"{depth}/report/{CALIBRATION_JSON.name}")}
@@ -121,13 +133,13 @@ def _columns() -> Iterator[str]:
 
 
 def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
-    """The adjustment's values and sigmas, whichever method the session's result is; NaN where there are none."""
+    """Return a session's row: the adjustment's values and sigmas, whichever method its result is; NaN for none."""
     block = result["methods"]["adjustment"]
     nothing = dict.fromkeys(SETTINGS, np.nan)
     mount, sigma = (block[name] or nothing for name in ("mount", "sigma_mount"))
     passes: Sequence[Mapping[str, Any]] = result["passes"]
     row: dict[str, Any] = {
-        "date_utc": _moment(passes[0]["start_utc"]) if passes else "",
+        "date_utc": _checked_time(passes[0]["start_utc"]) if passes else "",
         "session": str(result["session"]),
         "run": run,
         "verdict": str(result["verdict"]),
@@ -139,23 +151,22 @@ def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
     return row | {"probability": np.nan, "moved": ""}
 
 
-def _moment(text: str) -> str:
-    """A date and time as poolcal writes them; a ValueError at anything else."""
+def _checked_time(text: str) -> str:
+    """Return the text if it is a date and time as poolcal writes them; else raise ValueError."""
     if not fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z", text):
         raise ValueError(f"{text!r} is no date and time")
     datetime.fromisoformat(text)
     return text
 
 
-def _with_jumps(found: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator[dict[str, Any]]:
+def _with_jumps(sessions: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator[dict[str, Any]]:
+    """Yield the rows, each accepted one tested against the accepted one before it."""
     before: Estimate | None = None
-    for row, now in found:
+    for row, now in sessions:
         if row["verdict"] == "accepted" and now is not None:
             if before is not None:
-                compared = compare(before, now)
-                moved = ", ".join(MOUNT_WORDS[k] for k in compared.moved(LEVEL))
-                row = row | {"probability": compared.probability, "moved": moved}
+                comparison = compare(before, now)
+                moved = ", ".join(MOUNT_WORDS[k] for k in comparison.moved(SIGNIFICANCE))
+                row = row | {"probability": comparison.probability, "moved": moved}
             before = now
         yield row
-
-

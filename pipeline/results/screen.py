@@ -1,48 +1,38 @@
-"""The result on one screen."""
+"""The result of a run on one screen."""
 
 import textwrap
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import change_of
+from pipeline.text_table import text_table
 
 
-def verdict_in_words(verdict: str, held: Collection[str] = ()) -> str:
-    """The verdict as people read it; ``held``: of an accepted calibration the values that it could not find.
+def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
+    """Return the verdict as people read it; ``fixed``: mount parameters that an accepted calibration did not estimate.
 
     >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
     ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
     """
-    if verdict != "accepted" or not held:
+    if verdict != "accepted" or not fixed:
         return verdict
-    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in held)}"
+    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in fixed)}"
 
 
 def summary(calibration: Mapping[str, Any]) -> str:
-    """The result on one screen, from calibration.json."""
-    held = calibration.get("held", {})
-    kind, colon, found = verdict_in_words(calibration["verdict"], held).partition(": ")
-    lines = [f"{calibration['session']}: {kind.upper()}{colon}{found}"]
+    """Return the result's lines for the screen, from the content of calibration.json."""
+    fixed = calibration.get("held", {})
+    verdict, colon, estimated = verdict_in_words(calibration["verdict"], fixed).partition(": ")
+    lines = [f"{calibration['session']}: {verdict.upper()}{colon}{estimated}"]
     rejected = calibration["verdict"] == "rejected"
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    lines += [f"  not found, held at the coarse value: {', '.join(held)}"] if colon else []
+    lines += [f"  not found, held at the coarse value: {', '.join(fixed)}"] if colon else []
     lines += [f"  warning: {warning}" for warning in calibration["warnings"]]
     sensor = calibration.get("calibrated", "mbes")
-    heads = f"{sensor + ' mount':<12}{'coarse':>12}{'computed' if rejected else 'calibrated':>14}"
-    heads += f"{'change':>14}{'sigma':>12}{'total':>12}"
-    lines += ["", f"{heads}   (result: {calibration['result']})"]
-    block, coarse = calibration[sensor], calibration["coarse"]["mount"]
-    for parameter, _, key, of_setting in PARAMETERS:
-        unit = "°" if of_setting == "deg" else of_setting
-        total = f"{block['mount'][key]:.4f} {unit}" if block["mount"] else "-"
-        change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}" if block["mount"] else "-"
-        names = ("sigma_mount", "sigma_mount_total")
-        sigmas = [f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in names]
-        if parameter in held:
-            change, sigmas[0] = "held", "-"
-        lines.append(f"{parameter:<12}{coarse[key]:>10.4f} {unit}{total:>14}{change:>14}{sigmas[0]:>12}{sigmas[1]:>12}")
+    lines += ["", *_mount_table(calibration, sensor)]
+    block = calibration[sensor]
     use = "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."
     lines += ["", "Do not use these values." if rejected else use]
     if block["sigma_mount"]:
@@ -50,25 +40,52 @@ def summary(calibration: Mapping[str, Any]) -> str:
         lines.append(f"sigma: from noise, {relative}; total: with what does not average.")
     if not block["sigma_mount"] and calibration["result"] != "adjustment":
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
-    lines += [f"Free: {one['words']}." for one in calibration["free"].values()]
+    lines += [f"Free: {parameter['words']}." for parameter in calibration["free"].values()]
     lines.append(_target_line(calibration["target"]))
-    what = "soundings + laser points" if sensor == "mbes" else "laser points"
-    lines.append(f"Points on the target by pass, distance of the INS from the wall, {what}:")
-    seen = [p for p in calibration["passes"] if p["soundings"] or p["laser_points"]]
-    both = sensor == "mbes"
-    listed = (
-        f"{p['pass']}: {p['distance_m']:.1f} m {str(p['soundings']) + ' + ' if both else ''}{p['laser_points']}"
-        for p in seen
-    )
-    lines += textwrap.wrap(", ".join(listed), 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+    lines += _pass_lines(calibration["passes"], sensor)
     for key in ("weakest", "advice"):
         if calibration["geometry"][key]:
             lines.append(f"Geometry: {calibration['geometry'][key]}.")
     return "\n".join(lines)
 
 
+def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
+    """Return lines of the mount's parameters: coarse and calibrated values, their difference and sigmas."""
+    block, coarse, fixed = calibration[sensor], calibration["coarse"]["mount"], calibration.get("held", {})
+    rows = []
+    for parameter, _, key, unit_of_setting in PARAMETERS:
+        unit = "°" if unit_of_setting == "deg" else unit_of_setting
+        total, change = "-", "-"
+        if block["mount"]:
+            total = f"{block['mount'][key]:.4f} {unit}"
+            change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}"
+        sigma, sigma_total = (
+            f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in ("sigma_mount", "sigma_mount_total")
+        )
+        if parameter in fixed:
+            change, sigma = "held", "-"
+        rows.append((parameter, f"{coarse[key]:.4f} {unit}", total, change, sigma, sigma_total))
+    computed = "computed" if calibration["verdict"] == "rejected" else "calibrated"
+    result = f"(result: {calibration['result']})"
+    heads = (f"{sensor} mount", "coarse", computed, "change", "sigma", "total", result)
+    return text_table("<12>12>14>14>12>12   <1", heads, rows)
+
+
+def _pass_lines(passes: Sequence[Mapping[str, Any]], sensor: str) -> list[str]:
+    """Return lines that say for each pass how far the wall was and how many points lie on the target."""
+    is_sonar = sensor == "mbes"
+    points = "soundings + laser points" if is_sonar else "laser points"
+    listed = []
+    for row in passes:
+        if row["soundings"] or row["laser_points"]:
+            counts = f"{row['soundings']} + {row['laser_points']}" if is_sonar else f"{row['laser_points']}"
+            listed.append(f"{row['pass']}: {row['distance_m']:.1f} m {counts}")
+    wrapped = textwrap.wrap(", ".join(listed), 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+    return [f"Points on the target by pass, distance of the INS from the wall, {points}:", *wrapped]
+
+
 def _target_line(target: Mapping[str, Any]) -> str:
-    """The target's pose for the screen: an error of the laser's mount or of the origin is seen here first."""
+    """Return the target's pose in words: an error of the laser's mount or of the origin shows here first."""
     x, y, z = (signed(value, 3) for value in target["offset_m"])
     azimuth, first, second = (signed(angle, 2) for angle in (target["azimuth_correction_deg"], *target["tilt_deg"]))
     return f"Target found at x {x}, y {y}, z {z} m from target.origin, azimuth {azimuth}°, tilt {first}° {second}°."

@@ -5,8 +5,9 @@ from pathlib import Path
 import yaml
 
 from pipeline.atomic_files import write_text
-from pipeline.coarse import mounts_from_marks as calibrating
-from pipeline.coarse.session_edit import SENSORS, origin_of, read_session, written
+from pipeline.coarse.marks_text import as_plain, marks_text
+from pipeline.coarse.mounts_from_marks import assess_marks, mount_blocks
+from pipeline.coarse.session_file import SENSORS, mount_origin, read_session, write_mounts
 from pipeline.config.marks import load_marks
 from pipeline.config.mount import Mount
 from pipeline.config.yaml_models import parse
@@ -14,19 +15,31 @@ from pipeline.mount import mount_of
 
 
 def coarse(file: Path, session: Path, out: Path | None, write: bool) -> tuple[str, bool]:
-    """What the screen says, and whether the marks agree."""
+    """Return the text for the screen, and whether the marks agree.
+
+    Parameters
+    ----------
+    file
+        The survey's marks.
+    session
+        The session's folder.
+    out
+        A YAML file to write everything to.
+    write
+        Whether to write the mounts into session.yaml if the marks agree.
+    """
     text, content = read_session(session)
     path = session / "session.yaml"
-    given = {name: content[name]["mount"] for name in SENSORS if "mount" in content[name]}
-    present = {name: mount_of(parse(Mount, mount, f"{path}: {name}.mount")) for name, mount in given.items()}
+    settings = {name: content[name]["mount"] for name in SENSORS if "mount" in content[name]}
+    present = {name: mount_of(parse(Mount, mount, f"{path}: {name}.mount")) for name, mount in settings.items()}
     marks = load_marks(file)
-    answer = calibrating.judge(marks, str(file), present)
-    said = [calibrating.table(answer, present)]
+    assessment = assess_marks(marks, str(file), present)
+    lines = [marks_text(assessment, present)]
     if out is not None:
-        write_text(out, yaml.safe_dump(calibrating.as_plain(answer, present), sort_keys=False, allow_unicode=True))
-    if answer.agrees:
-        blocks = calibrating.blocks_of(answer, origin_of("coarse", file))
-        said.append(written(session, text, content, blocks) if write else f"{path}: not written (--no-write)")
+        write_text(out, yaml.safe_dump(as_plain(assessment, present), sort_keys=False, allow_unicode=True))
+    if assessment.agrees:
+        blocks = mount_blocks(assessment, mount_origin("coarse", file))
+        lines.append(write_mounts(session, text, content, blocks) if write else f"{path}: not written (--no-write)")
         missing = [name for name in SENSORS if name not in present and name not in blocks]
-        said += [f"But {name} still has no mount there." for name in missing]
-    return "\n".join(said), answer.agrees
+        lines += [f"But {name} still has no mount there." for name in missing]
+    return "\n".join(lines), assessment.agrees

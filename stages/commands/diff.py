@@ -6,15 +6,40 @@ from typing import Any
 from stages import ORDER
 
 
-def comparison(first: Path, second: Path, *tolerances: float | None) -> dict[str, Any]:
-    from pipeline.results.compare import RunRead, diff
+def comparison(
+    first: Path, second: Path, tolerance_deg: float | None = None, tolerance_mm: float | None = None
+) -> dict[str, Any]:
+    """Return the difference of two run folders, of :func:`pipeline.results.compare.run_difference`.
 
-    return diff(RunRead.read(first, ORDER), RunRead.read(second, ORDER), *tolerances)
+    Parameters
+    ----------
+    first, second
+        The run folders.
+    tolerance_deg, tolerance_mm
+        Differences of an angle and of a lever arm's component that are tolerated.
+    """
+    from pipeline.results.compare import run_difference
+    from pipeline.results.finished_run import FinishedRun
+    from pipeline.results.mount_difference import Tolerances
+
+    tolerances = Tolerances(tolerance_deg, tolerance_mm)
+    return run_difference(FinishedRun.read(first, ORDER), FinishedRun.read(second, ORDER), tolerances)
 
 
-def save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:
+def save_pair(first: Path, second: Path, difference: dict[str, Any], path: Path) -> None:
+    """Write a recording of two run folders.
+
+    Parameters
+    ----------
+    first, second
+        The run folders.
+    difference
+        Their difference, of :func:`comparison`.
+    path
+        The recording's file.
+    """
     from pipeline.atomic_files import writing
-    from stages.views.two_runs import save_pair as write_pair
+    from stages.views.two_runs import save_two_runs
 
     with writing(path):
-        write_pair(first, second, found, path)
+        save_two_runs(first, second, difference, path)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.coarse.session_edit import block_of, origin_of, read_session, written
+from pipeline.coarse.session_file import mount_block, mount_origin, read_session, write_mounts
 from pipeline.report.calibration_document import mounted_of
 from pipeline.run.results import calibration
 
@@ -13,6 +13,6 @@ def write(session: Path, run: Path) -> str:
     """An accepted result into SESSION/session.yaml; what was done, in words."""
     result = calibration(run)
     block = result["laser"]
-    origin = origin_of("fine", run / "report" / "calibration.json", held=list(result["held"]))
-    blocks = {"laser": block_of(mounted_of(block), np.array(block["covariance_total"]), origin)}
-    return written(session, *read_session(session), blocks)
+    origin = mount_origin("fine", run / "report" / "calibration.json", held=list(result["held"]))
+    blocks = {"laser": mount_block(mounted_of(block), np.array(block["covariance_total"]), origin)}
+    return write_mounts(session, *read_session(session), blocks)

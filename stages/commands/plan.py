@@ -15,8 +15,8 @@ from pipeline.planning import assessment
 from pipeline.planning.assessment import Answer, Outlook, shares_of_limits
 from pipeline.planning.prediction import Setting
 from pipeline.run.settings import load_settings
+from pipeline.text_table import text_table
 
-NARROWEST = 9  # columns of the table of passes
 WORSE = 1.05  # a sigma that grows by less is the same
 
 
@@ -86,29 +86,28 @@ def _chosen(answer: Answer, better: Outlook, limits: Verdict) -> list[str]:
 def _passes(setting: Setting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
     """One line a kind of pass: how many, the time of one, and the points of all of them."""
     families = list(dict.fromkeys(face.family for face in setting.model.faces))
-    widths = {family: max(NARROWEST, len(family) + 2) for family in families}
-    heads = "".join(f"{family:>{width}}" for family, width in widths.items())
-    lines = [f"  passes  distance     speed   swing    time   soundings on{heads}   laser points"]
+    cells = []
     for number, one, seconds, points in rows:
         by_family = dict.fromkeys(families, 0.0)
         for face, count in zip(setting.model.faces, points["mbes"], strict=True):
             by_family[face.family] += float(count)
-        counts = "".join(f"{by_family[family]:>{width},.0f}" for family, width in widths.items())
-        sailed = f"  {number:>6}  {one.distance_m:>6.1f} m  {one.speed_m_s:>4.2f} m/s  {one.heading_swing_deg:>5.1f}°"
-        lines.append(f"{sailed}  {seconds:>4.0f} s               {counts}{points['laser'].sum():>15,.0f}")
-    return lines
+        sailed = (f"{one.distance_m:.1f} m", f"{one.speed_m_s:.2f} m/s", f"{one.heading_swing_deg:.1f}°")
+        counts = [f"{by_family[family]:,.0f}" for family in families]
+        cells.append((str(number), *sailed, f"{seconds:.0f} s", "", *counts, f"{points['laser'].sum():,.0f}"))
+    heads = ("passes", "distance", "speed", "swing", "time", "soundings on", *families, "laser points")
+    return text_table(f"  >6>10>10>8>8>15{'  >7' * len(families)}>15", heads, cells)
 
 
 def _sigmas(setting: Setting, outlook: Outlook, limits: Verdict) -> list[str]:
-    lines = [f"  {'sigma':<8}{'random':>12}{'total':>12}{'limit':>12}"]
+    heads, layout = ("sigma", "random", "total", "limit"), "  <8>12>12>12  <1"
     if outlook.solution.deficiency:
         open_ones = plural(outlook.solution.deficiency, "direction")
-        return [*lines, f"  {open_ones} of the unknowns left open: no result"]
+        return [*text_table(layout, heads, []), f"  {open_ones} of the unknowns left open: no result"]
     mounted = mount_of(setting.mbes.mount)
     random, total = mounted.sigmas(outlook.random), mounted.sigmas(outlook.total)
+    rows = []
     for name, _, key, unit in PARAMETERS:
         limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, "m")
-        over = "  above the limit" if not total[key] <= limit else ""
-        row = "".join(f"{value:>10.4f} {sign}" for value in (random[key], total[key], limit))
-        lines.append(f"  {name:<8}{row}{over}")
-    return lines
+        over = "above the limit" if not total[key] <= limit else ""
+        rows.append((name, *(f"{value:.4f} {sign}" for value in (random[key], total[key], limit)), over))
+    return text_table(layout, heads, rows)

@@ -20,6 +20,7 @@ from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
 from pipeline.run.output_files import as_written
 from pipeline.run.results import calibration
 from pipeline.run.settings import read_settings
+from pipeline.text_table import text_table
 
 LIMIT = 4.0
 Array = NDArray[np.float64]
@@ -37,9 +38,12 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
     lines = [f"session {result['session']}: {result['verdict']}", *(f"  {reason}" for reason in result["reasons"])]
     lines += ["", f"{chosen} (the result)"]
     lines += _table(settings.session.sonar.mount, values, R_true, lever_arm_true_m, sigma)
-    lines += ["", f"errors of all:       {''.join(f'{name:>10}' for name, *_ in PARAMETERS)}   (deg, m)"]
-    for method, other in result["methods"].items():
-        lines.append(f"  {method:19}{_error_row(errors_of(other, R_true, lever_arm_true_m))}")
+    rows = [
+        (f"  {method}", *_error_cells(errors_of(other, R_true, lever_arm_true_m)))
+        for method, other in result["methods"].items()
+    ]
+    heads = ("errors of all:", *(name for name, *_ in PARAMETERS), "(deg, m)")
+    lines += ["", *text_table(f"<21{'>10' * len(PARAMETERS)}   <1", heads, rows)]
     limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
     within = error is not None and bool(np.all(np.abs(error) <= limit))
     accepted = result["verdict"] == "accepted"
@@ -66,8 +70,8 @@ def _refuse_damaged(result: dict[str, Any], chosen: str) -> None:
     " ".join(result["reasons"])
 
 
-def _error_row(error: Array | None) -> str:
-    return "  no result" if error is None else "".join(f"{error[index]:10.5f}" for _, index, *_ in PARAMETERS)
+def _error_cells(error: Array | None) -> list[str]:
+    return ["no result"] if error is None else [f"{error[index]:.5f}" for _, index, *_ in PARAMETERS]
 
 
 def read_truth(path: Path) -> tuple[Array, Array]:
@@ -110,9 +114,10 @@ def _table(
         return ["  no result"]
     yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
     truth = (pitch, roll, yaw, *lever_arm_true_m)
-    lines = [f"  {'':6}{'coarse':>11}{'calibrated':>12}{'truth':>11}{'error':>11}{'sigma':>10}{'error/sigma':>13}"]
+    rows = []
     for name, k, key, unit in PARAMETERS:
-        spread = f"{'-':>10}{'-':>13}" if sigma is None else f"{sigma[k]:10.5f}{error[k] / sigma[k]:13.1f}"
-        numbers = f"{getattr(coarse, key):11.5f}{values['mount'][key]:12.5f}{truth[k]:11.5f}{error[k]:11.5f}"
-        lines.append(f"  {name:6}{numbers}{spread} {unit}")
-    return lines
+        spread = ("-", "-") if sigma is None else (f"{sigma[k]:.5f}", f"{error[k] / sigma[k]:.1f}")
+        numbers = (f"{value:.5f}" for value in (getattr(coarse, key), values["mount"][key], truth[k], error[k]))
+        rows.append((name, *numbers, *spread, unit))
+    heads = ("", "coarse", "calibrated", "truth", "error", "sigma", "error/sigma")
+    return text_table("  <6>11>12>11>11>10>13 <1", heads, rows)

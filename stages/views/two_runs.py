@@ -10,7 +10,7 @@ from pipeline.artefacts.catalogue.target import SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.poses import trajectory_in_target
 from pipeline.artefacts.streams import xyz
 from pipeline.atomic_files import write_bytes
-from pipeline.results.compare_text import text
+from pipeline.results.compare_text import comparison_text
 from pipeline.run.results import Tables, calibration
 from stages.views.blueprint import side_by_side
 from stages.views.recording import DOT_M, LASER, SONAR, content, log, recording_id, words
@@ -35,15 +35,25 @@ class Below:
         self._recording.set_time(timeline, **at)
 
 
-def save_pair(first: Path, second: Path, found: dict[str, Any], path: Path) -> None:
-    """``found``: the comparison of the two, from :func:`pipeline.results.compare.diff`."""
+def save_two_runs(first: Path, second: Path, difference: dict[str, Any], path: Path) -> None:
+    """Write a recording of two runs.
+
+    Parameters
+    ----------
+    first, second
+        The run folders.
+    difference
+        Their difference, of :func:`pipeline.results.compare.run_difference`.
+    path
+        The recording's file.
+    """
 
     def draw(recording: Any) -> None:
         for name, run in (("a", first), ("b", second)):
             for stage in SHOWN:
                 log(Below(recording, name), stage, Tables(run))
         _on_one_target(recording, Tables(first), Tables(second))
-        recording.log("tables/comparison", words(text(found)), static=True)
+        recording.log("tables/comparison", words(comparison_text(difference)), static=True)
 
     write_bytes(path, content(recording_id(first, second), side_by_side(), draw))
 

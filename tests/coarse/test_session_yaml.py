@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.coarse.session_edit import edited, refuse_other
+from pipeline.coarse.session_edit import check_edit, edit_mounts
 from pipeline.config.load import load_session
 from pipeline.config.session import Laser
 from pipeline.config.yaml_models import parse
@@ -19,20 +19,22 @@ from pipeline.errors import ConfigError
 from tests.support.marks import KEYS, PLAIN, marks_of, mounts_in, run
 from tests.support.surveys import World
 
-
 # --- session.yaml as text --------------------------------------------------------------------------------------------
+NEW = r"  (mount_origin: \{.*\}|mount_covariance:|  - \[.*\])\r?\n?"
+
+
 def _only_mounts_changed(before: str, after: str) -> None:
-    """Every line but numbers of mounts and the new keys is as it was."""
+    """Every line but numbers of mounts and the new keys is as it was; a comment behind a number may have moved."""
     lines = iter(after.splitlines(keepends=True))
     for line in before.splitlines(keepends=True):
         pattern = re.sub(r"((?:roll|pitch|yaw)_deg: |[xyz]_m: )[-+.e0-9]+", r"\1NUMBER", line)
         wanted = re.escape(pattern).replace("NUMBER", r"-?[0-9]+\.[0-9]{6}")
+        wanted = re.sub(r"(\\ )+\\#", " +#", wanted) if "NUMBER" in pattern else wanted
         found = next(lines)
         while not re.fullmatch(wanted, found):
-            ours = r"  (mount_origin: \{.*\}|mount_covariance: \[.*,|  \[.*\][,\]])\r?\n"
-            assert re.fullmatch(ours, found), (found, wanted)
+            assert re.fullmatch(NEW, found), (found, wanted)
             found = next(lines)
-    assert next(lines, None) is None
+    assert all(re.fullmatch(NEW, line) for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +49,7 @@ def test_nothing_but_mounts_is_changed(text: str, session: Path) -> None:
     after = path.read_bytes().decode("utf-8")
     _only_mounts_changed(text, after)
     assert ("\r\n" in after) == ("\r\n" in text)
-    assert after.count("\n") == text.count("\n") + 2 * 7
+    assert after.count("\n") == text.count("\n") + 2 * 8
     for name, found in mounts_in(session).items():
         np.testing.assert_allclose(found, World().mounts[name], atol=3e-6)
     assert (session / "session.1.yaml").read_bytes() == text.encode("utf-8")
@@ -55,7 +57,7 @@ def test_nothing_but_mounts_is_changed(text: str, session: Path) -> None:
 
 FLOW = (
     "{name: a, ins: {files: [i], format: table}, laser: {files: [l], format: las,\n"
-    "  mount: {roll_deg: 0, pitch_deg: 0, yaw_deg: 0, x_m: 0, y_m: 0, z_m: 0}},  # 激光\n"
+    "  mount: {roll_deg: 0, pitch_deg: 0, yaw_deg: 0, x_m: 0, y_m: 0, z_m: 0}},\n"
     " mbes: {files: [m], format: table}}\n"
 )
 
@@ -68,7 +70,6 @@ def test_flow_style_and_a_missing_mount(session: Path) -> None:
     assert told.status == 0, told.err
     for name, found in mounts_in(session).items():
         np.testing.assert_allclose(found, World().mounts[name], atol=3e-6)
-    assert "},  # 激光\n" in (session / "session.yaml").read_text(encoding="utf-8")
 
 
 def test_a_missing_mount_of_what_was_not_surveyed_is_said(session: Path) -> None:
@@ -170,14 +171,96 @@ def test_a_mount_comes_after_a_format_however_that_is_written(after: str, sessio
 
 def test_what_cannot_be_edited_in_place_is_refused() -> None:
     """What comes of an edit must say what was meant."""
-    content = yaml.safe_load(PLAIN)
-    refuse_other(PLAIN, content, {"laser": {"format": "las"}}, Path("session.yaml"))
-    with pytest.raises(ConfigError, match="cannot be edited where it stands"):
-        refuse_other(PLAIN, content, {"laser": {"format": "table"}}, Path("session.yaml"))
-    with pytest.raises(ConfigError, match="cannot be edited where it stands"):
-        refuse_other(PLAIN + "  {", content, {"laser": {}}, Path("session.yaml"))
+    path = Path("session.yaml")
+    check_edit(PLAIN, PLAIN, {"laser": {"format": "las"}}, path)
+    with pytest.raises(ConfigError, match="cannot be edited where it stands; write"):
+        check_edit(PLAIN, PLAIN, {"laser": {"format": "table"}}, path)
+    with pytest.raises(ConfigError, match="cannot be edited where it stands; write"):
+        check_edit(PLAIN, PLAIN + "  {", {"laser": {}}, path)
+    with pytest.raises(ConfigError, match="'# end' would be lost"):
+        check_edit(PLAIN, PLAIN.replace("# end\n", ""), {"laser": {}}, path)
     with pytest.raises(ConfigError, match=r"mbes: has no format"):
-        edited("mbes: {files: [m]}\n", {"mbes": {"mount": {}}}, Path("session.yaml"))
+        edit_mounts("mbes: {files: [m]}\n", {"mbes": {"mount": {}}}, path)
+
+
+@pytest.mark.parametrize(
+    ("text", "comment"),
+    [
+        (FLOW.replace("}},\n", "}},  # 激光\n"), "# 激光"),
+        (PLAIN.replace("yaw_deg: -2.8, ", "yaw_deg: -2.8,  # inside\n    "), "# inside"),
+    ],
+    ids=["changed block", "changed mount"],
+)
+def test_a_comment_is_never_lost(text: str, comment: str, session: Path) -> None:
+    """Inside brackets that change the library loses it: nothing is written, and the comment is named."""
+    (session / "session.yaml").write_text(text, encoding="utf-8")
+    told = run(session, marks_of(World(), None))
+    assert told.status == 2
+    assert f"the comment {comment!r} would be lost; put it on a line of its own" in told.err
+    assert len(told.err.splitlines()) == 1
+    assert [path.name for path in session.iterdir()] == ["session.yaml"]
+    assert (session / "session.yaml").read_text(encoding="utf-8") == text
+
+
+STYLES = """\
+# 会话
+---
+name:  水池 a   # two blanks
+ins: {files:   [i, # one
+     j],   format: table}   # 惯导
+
+# the laser
+
+laser:
+    format : las
+    files:
+        - 'a'   # a
+        - "b"
+    mount:
+        roll_deg: 1  # r
+        pitch_deg: 1
+        yaw_deg: 1
+        x_m: 1
+        y_m: 1
+        # z follows
+        z_m: 1
+
+# The sonar: a head
+
+mbes:  # M
+    svp: [[0, 1480],  # top
+          [5, 1481]]  # bottom
+
+    # which
+    format: >-   # why
+        r2sonic
+
+    # two
+    files: [m,n]
+...
+# after
+"""
+
+
+def test_style_and_comments_stay(session: Path) -> None:
+    """But for blanks round a key's colon and in front of comments every line that is not a mount's stays, in its order;
+    new keys stand in front of the next block's comment."""
+    (session / "session.yaml").write_text(STYLES, encoding="utf-8")
+    told = run(session, marks_of(World(), None))
+    assert told.status == 0, told.err
+    after = (session / "session.yaml").read_text(encoding="utf-8")
+
+    def plain(text: str) -> str:
+        return re.sub(r" +#", " #", re.sub(r"(_deg|_m): [-0-9.]+", r"\1: NUMBER", text))
+
+    ours = re.compile(r" {4}(mount_origin: \{.*\}|mount: \{.*\}|mount_covariance:|    - \[.*e.*\])\n")
+    left = "".join(line for line in after.splitlines(keepends=True) if not ours.fullmatch(line))
+    assert plain(left) == plain(STYLES.replace("name:  ", "name: ").replace("format :", "format:"))
+    assert after.index("mount_covariance") < after.index("# The sonar")
+    content, new = yaml.safe_load(STYLES), yaml.safe_load(after)
+    assert list(new) == list(content)
+    assert list(new["laser"]) == [*content["laser"], "mount_origin", "mount_covariance"]
+    assert list(new["mbes"]) == ["svp", "format", "mount", "mount_origin", "mount_covariance", "files"]
 
 
 def test_hostile_text_never_ends_otherwise(session: Path) -> None:

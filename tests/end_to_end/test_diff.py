@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.results.compare_text import folded
+from pipeline.results.compare_text import own_faces_counted
 from tests.support.places import Place, Told, poolcal, simulate
 
 
@@ -93,8 +93,8 @@ def test_faces_of_one_run_alone_are_counted_and_others_are_listed() -> None:
         {"key": "target.faces.wall.role", "a": None, "b": "P2"},
     ]
     kept, told = rows[2:], {"key": "target.faces", "a": "0 faces of its own", "b": "1 face of its own"}
-    assert list(folded(rows)) == [*kept, told]
-    assert list(folded(kept)) == kept
+    assert list(own_faces_counted(rows)) == [*kept, told]
+    assert list(own_faces_counted(kept)) == kept
 
 
 def test_a_rejected_run_answers_nothing(undisturbed: tuple[Path, Told], again: Place) -> None:

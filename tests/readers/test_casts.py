@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.coarse.session_edit import read_session
+from pipeline.coarse.session_file import read_session
 from pipeline.config.load import load_session
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.maths.sonar.cast_profile import MOST, ascending, one_way, thinned

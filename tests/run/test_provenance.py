@@ -19,7 +19,8 @@ from tests.support import toys
 from tests.support.roots import ROOT
 from tests.support.toy_run import Pool
 
-NO_DIGIT = {"rerun-sdk", "typer", "pydantic", "PyYAML", "jinja2", "matplotlib"}  # settings are in the key as values
+# Settings are in the key as values.
+NO_DIGIT = {"rerun-sdk", "typer", "pydantic", "PyYAML", "ruamel.yaml", "jinja2", "matplotlib"}
 
 
 # --- files of the program --------------------------------------------------------------------------------------------

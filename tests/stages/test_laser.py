@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 from pipeline.adjustment.laser_design import coarse_covariance, required_sigmas
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.stage_settings import laser_calibration
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.maths.adjustment.estimability import parameters_to_fix
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.mount import Mounted, mount_of
@@ -151,7 +153,7 @@ def test_the_worst_is_held_first_and_what_is_left_is_surer() -> None:
 
 def test_bounds_are_the_stricter_of_verdict_and_coarse() -> None:
     config = parse(PoolConfig, made(OFF, seed=2).pool, "pool")
-    bounds = required_sigmas(np.diag([1e-8] * 3 + [1.0] * 3), config.laser_calibration)
+    bounds = required_sigmas(np.diag([1e-8] * 3 + [1.0] * 3), laser_calibration(config))
     assert bounds == pytest.approx([0.5e-4] * 3 + [0.005] * 3)
 
 

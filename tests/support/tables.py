@@ -42,7 +42,7 @@ def write_tables(
             columns = {"gps_week": t_ns // WEEK_NS, "seconds_of_week": t_ns % WEEK_NS / 1e9} | columns
         else:
             columns = {"gps_ns": t_ns} | columns
-        table = pa.table({name: np.ascontiguousarray(values) for name, values in columns.items()})
+        table = pa.table({name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()})
         path = folder / sensor / f"{sensor}.{kind}"
         path.parent.mkdir(parents=True, exist_ok=True)
         if kind == "csv":
@@ -81,4 +81,5 @@ def place_soundings(simulated: SimulatedSession) -> np.ndarray:
     forward = np.arcsin(np.sin(mbes["transmit_tilt_rad"]) / np.cos(angle))  # the turn about x that looks so far forward
     sonar = ranges[:, None] * Rotation.from_euler("x", forward[:, None]).apply(upright)
     R_body_from_mbes = np.array(truth["mbes"]["R_body_from_mbes"])
-    return position + attitude.apply(sonar @ R_body_from_mbes.T + truth["mbes"]["lever_arm_m"])
+    lever_arm_m = np.array(truth["mbes"]["lever_arm_m"])
+    return np.asarray(position + attitude.apply(sonar @ R_body_from_mbes.T + lever_arm_m))

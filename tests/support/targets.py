@@ -7,7 +7,7 @@ from pipeline.maths.target.outlines import build_target
 from pipeline.maths.target.patent_target import lettered
 
 
-def by_letters(a: float, b: float, c: float, e: float, water_level_m: float = 0.0, **more: object) -> TargetModel:
+def by_letters(a: float, b: float, c: float, e: float, water_level_m: float = 0.0, **more: Any) -> TargetModel:
     outlines, relations, repeats_m = lettered(a, b, c, e, **more)
     return build_target(outlines, relations, water_level_m, repeats_m)
 

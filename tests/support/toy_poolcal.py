@@ -66,14 +66,14 @@ def install() -> None:
     vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
     stages.commands.draw.Painters.begin = lambda *_: None  # type: ignore[method-assign]  # toys have nothing to show
     stages.commands.draw.Painters.draw = lambda *_: []  # type: ignore[method-assign]
-    pipeline.results.screen.summary = lambda result: f"{result['session']}: {result['verdict']}"
+    pipeline.results.screen.summary = lambda calibration: f"{calibration['session']}: {calibration['verdict']}"
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
     for module in (take, sift, report):
         sys.modules[module.__name__] = module
     stages.ORDER = ("take", "sift", "report")  # type: ignore[assignment]
-    pipeline.readers.dispatch.raw_files = toys.raw_files  # type: ignore[attr-defined,assignment]
-    pipeline.readers.dispatch.raw_parts = toys.raw_parts  # type: ignore[attr-defined,assignment]
+    pipeline.readers.dispatch.raw_files = toys.raw_files
+    pipeline.readers.dispatch.raw_parts = toys.raw_parts
 
 
 if __name__ == "__main__":

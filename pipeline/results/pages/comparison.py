@@ -1,4 +1,4 @@
-"""The page of a comparison of two runs: the same that ``poolcal diff`` prints."""
+"""The page of a comparison of two runs, which says what ``poolcal diff`` prints."""
 
 import json
 from collections.abc import Mapping
@@ -9,27 +9,27 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pipeline.mount import WITHIN_95
-from pipeline.results.compare import shown
-from pipeline.results.compare_text import folded
+from pipeline.results.compare_text import own_faces_counted
+from pipeline.results.mount_difference import quantity_text
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
 
 
-def page(found: Mapping[str, Any]) -> str:
-    """``found``: from :func:`pipeline.results.compare.diff`."""
-    rows = found["parameters"]
+def comparison_page(difference: Mapping[str, Any]) -> str:
+    """Return the page of the difference of two runs, of :func:`pipeline.results.compare.run_difference`."""
+    rows = difference["parameters"]
     return render(
         "comparison.html",
-        found=found,
+        difference=difference,
         rows=rows,
-        config=list(folded(found["config"])),
-        shown=shown,
+        config=list(own_faces_counted(difference["config"])),
+        shown=quantity_text,
         plain=lambda value: "–" if value is None else value if isinstance(value, str) else json.dumps(value),
-        chart=_chart(rows) if rows else None,
+        chart=_difference_chart(rows) if rows else None,
     )
 
 
-def _chart(rows: list[dict[str, Any]]) -> Markup:
-    """Each difference in its own sigmas, with its 95 % interval; red: moved."""
+def _difference_chart(rows: list[dict[str, Any]]) -> Markup:
+    """Return a chart of each difference in its own sigmas, with its 95 % interval; red: moved."""
     with style():
         figure = Figure(figsize=(WIDTH_IN, 2.0))
         axis = figure.add_axes((0.13, 0.24, 0.85, 0.72))

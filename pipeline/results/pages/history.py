@@ -1,26 +1,29 @@
-"""The history's page: a control chart of each parameter, and the table behind it."""
+"""The page of a boat's history: a control chart of each mount parameter, and the table behind it."""
 
 import io
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.atomic_files import write_bytes, write_text, writing
 from pipeline.console import plural
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.mount import WITHIN_95
-from pipeline.results.history import TEXTS, Filter, History
+from pipeline.results.history import TEXT_COLUMNS, History, SessionFilter
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
 
 
-def page(history: History, filters: str) -> str:
+def history_page(history: History, filters: str) -> str:
+    """Return the page; ``filters``: which sessions it shows, in words."""
     table = history.table
     parameters = [{"name": name, "unit": "°" if unit == "deg" else unit} for name, *_, unit in PARAMETERS]
     rows = [
@@ -42,77 +45,83 @@ def page(history: History, filters: str) -> str:
         "history.html",
         rows=rows,
         parameters=parameters,
-        chart=_chart(table),
+        chart=_control_charts(table),
         sentence=sentence,
         filters=filters,
         unreadable=history.unreadable,
-        without=history.without,
+        without=history.not_shown,
         sessions=plural(len(rows), "session"),
     )
 
 
-def _moments(dates: Sequence[str]) -> list[str]:
-    """The days of sessions in order of time; of a day with several, hour and minute as well; the chart takes them as
-    labels, which begin with the number in the table where even these are the same.
+def _time_labels(dates: Sequence[str]) -> list[str]:
+    """Return labels of sessions for the chart: the day, and for a day with several sessions hour and minute as well.
 
-    >>> _moments(["2026-05-12T08:00:00Z", "2026-05-12T14:30:00Z", "2026-05-13T08:00:00Z"])
+    Where even these are the same, a label begins with the session's number in the table.
+
+    >>> _time_labels(["2026-05-12T08:00:00Z", "2026-05-12T14:30:00Z", "2026-05-13T08:00:00Z"])
     ['2026-05-12 08:00', '2026-05-12 14:30', '2026-05-13']
-    >>> _moments(["2026-05-12T08:00:00Z", "2026-05-12T08:00:00Z"])
+    >>> _time_labels(["2026-05-12T08:00:00Z", "2026-05-12T08:00:00Z"])
     ['1: 2026-05-12 08:00', '2: 2026-05-12 08:00']
     """
-    days, minutes = Counter(one[:10] for one in dates), Counter(one[:16] for one in dates)
-    found = []
-    for number, one in enumerate(dates, 1):
-        words = one[:16].replace("T", " ") if days[one[:10]] > 1 else one[:10]
-        found.append(f"{number}: {words}" if minutes[one[:16]] > 1 else words)
-    return found
+    days, minutes = Counter(date[:10] for date in dates), Counter(date[:16] for date in dates)
+    labels = []
+    for number, date in enumerate(dates, 1):
+        label = date[:16].replace("T", " ") if days[date[:10]] > 1 else date[:10]
+        labels.append(f"{number}: {label}" if minutes[date[:16]] > 1 else label)
+    return labels
 
 
 def _number(value: float, digits: int) -> str:
     return "" if np.isnan(value) else f"{value:.{digits}f}"
 
 
-def _chart(table: pd.DataFrame) -> Markup:
-    """Six panels over the sessions in order of time."""
+def _control_charts(table: pd.DataFrame) -> Markup:
+    """Return six charts over the sessions in order of time."""
     with style():
         figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
         axes = figure.subplots(3, 2, sharex=True).T.ravel()
-        place = np.arange(len(table))
-        accepted = (table["verdict"] == "accepted").to_numpy()
-        for axis, (name, place_of_six, key, unit) in zip(axes, PARAMETERS, strict=True):
-            word, scale = UNITS[unit]
-            values = table[key].to_numpy(dtype=float)
-            sigma = table[f"sigma_{key}"].to_numpy(dtype=float) * scale
-            good = accepted & np.isfinite(values)
-            if good.any():
-                values = values - np.median(values[good])
-            if unit == "deg":
-                values = values - 360.0 * np.round(values / 360.0)  # a head turned round lies near ±180°
-            values = values * scale
-            axis.axhline(0.0, color=QUIET, linewidth=0.6)
-            for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
-                bars = WITHIN_95 * np.nan_to_num(sigma[use])
-                axis.errorbar(place[use], values[use], bars, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
-            word_of_six = MOUNT_WORDS[place_of_six]
-            moved = np.array([word_of_six in words.split(", ") for words in table["moved"]], dtype=bool)
-            ring = {"color": ALARM, "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.4}
-            axis.plot(place[moved], values[moved], "o", **ring)
-            axis.set_title(f"{name}, {word}")
-            axis.margins(x=0.05, y=0.15)
-            if good.any():  # a rejected session far off must not hide the others: it goes to the edge
-                reach = 1.15 * float(np.max(np.abs(values[good]) + WITHIN_95 * np.nan_to_num(sigma[good]))) + 1e-9
-                axis.set_ylim(-reach, reach)
-                beyond = np.isfinite(values) & (np.abs(values) > reach)
-                for x, up in zip(place[beyond], values[beyond] > 0, strict=True):
-                    edge, mark = (0.96 * reach, "^") if up else (-0.96 * reach, "v")
-                    axis.plot([x], [edge], mark, color=QUIET, markersize=4)
+        for axis, parameter in zip(axes, PARAMETERS, strict=True):
+            _control_chart(axis, table, parameter)
         for axis in (axes[2], axes[5]):
-            axis.set_xticks(place, _moments(table["date_utc"].tolist()), rotation=30, ha="right")
+            axis.set_xticks(range(len(table)), _time_labels(table["date_utc"].tolist()), rotation=30, ha="right")
         return picture(figure, f"control charts of roll, pitch, yaw, x, y and z over {len(table)} sessions")
 
 
+def _control_chart(axis: Axes, table: pd.DataFrame, parameter: tuple[str, int, str, str]) -> None:
+    """Draw one mount parameter of each session, less the median of the accepted ones, with 95 % intervals."""
+    name, index, key, unit = parameter
+    word, scale = UNITS[unit]
+    place = np.arange(len(table))
+    accepted = (table["verdict"] == "accepted").to_numpy()
+    values = table[key].to_numpy(dtype=float)
+    sigma = table[f"sigma_{key}"].to_numpy(dtype=float) * scale
+    good = accepted & np.isfinite(values)
+    if good.any():
+        values = values - np.median(values[good])
+    if unit == "deg":
+        values = values - 360.0 * np.round(values / 360.0)  # a head turned round lies near ±180°
+    values = values * scale
+    axis.axhline(0.0, color=QUIET, linewidth=0.6)
+    for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
+        bars = WITHIN_95 * np.nan_to_num(sigma[use])
+        axis.errorbar(place[use], values[use], bars, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
+    moved = np.array([MOUNT_WORDS[index] in words.split(", ") for words in table["moved"]], dtype=bool)
+    ring: dict[str, Any] = {"color": ALARM, "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.4}
+    axis.plot(place[moved], values[moved], "o", **ring)
+    axis.set_title(f"{name}, {word}")
+    axis.margins(x=0.05, y=0.15)
+    if good.any():  # a rejected session far off must not hide the others: it goes to the edge
+        reach = 1.15 * float(np.max(np.abs(values[good]) + WITHIN_95 * np.nan_to_num(sigma[good]))) + 1e-9
+        axis.set_ylim(-reach, reach)
+        beyond = np.isfinite(values) & (np.abs(values) > reach)
+        for x, up in zip(place[beyond], values[beyond] > 0, strict=True):
+            edge, mark = (0.96 * reach, "^") if up else (-0.96 * reach, "v")
+            axis.plot([x], [edge], mark, color=QUIET, markersize=4)
+
+
 def _no_formula(text: str) -> str:
-    """A spreadsheet takes text that begins like this for a formula, and would run it.
+    """Return text that a spreadsheet does not take for a formula, which it would run.
 
     >>> _no_formula("=1+1"), _no_formula("2026-05-12")
     ("'=1+1", '2026-05-12')
@@ -120,15 +129,23 @@ def _no_formula(text: str) -> str:
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
-def write_history(history: History, out: Path, chosen: Filter) -> None:
-    """history.html, .csv and .parquet in ``out``."""
-    from pipeline.results.pages.history import page
+def write_history(history: History, out: Path, chosen: SessionFilter) -> None:
+    """Write history.html, .csv and .parquet.
 
+    Parameters
+    ----------
+    history
+        The sessions.
+    out
+        The folder to write to; it is made if it is missing.
+    chosen
+        Which sessions they are, as the page says it.
+    """
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
     content = io.BytesIO()
     history.table.to_parquet(content, index=False)
     write_bytes(out / "history.parquet", content.getvalue())
-    plain = history.table.assign(**{name: history.table[name].map(_no_formula) for name in TEXTS})
+    plain = history.table.assign(**{name: history.table[name].map(_no_formula) for name in TEXT_COLUMNS})
     write_text(out / "history.csv", plain.to_csv(index=False, lineterminator="\n"))
-    write_text(out / "history.html", page(history, chosen.words()))
+    write_text(out / "history.html", history_page(history, chosen.words()))

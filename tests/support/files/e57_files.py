@@ -73,11 +73,13 @@ def _add(image: libe57.ImageFile, data: libe57.VectorNode, scan: Scan) -> None:
     if scan.rotation is not None or scan.translation is not None:
         pose = libe57.StructureNode(image)
         node.set("pose", pose)
-        for name, axes, values in (("rotation", "wxyz", scan.rotation), ("translation", "xyz", scan.translation)):
-            if values is not None:
+        parts: tuple[tuple[str, str, Sequence[float] | None], ...]
+        parts = (("rotation", "wxyz", scan.rotation), ("translation", "xyz", scan.translation))
+        for name, axes, numbers in parts:
+            if numbers is not None:
                 part = libe57.StructureNode(image)
                 pose.set(name, part)
-                for axis, value in reversed(list(zip(axes, values, strict=True))):  # by name, in whatever order
+                for axis, value in reversed(list(zip(axes, numbers, strict=True))):  # by name, in whatever order
                     part.set(axis, libe57.FloatNode(image, value))
     prototype = libe57.StructureNode(image)
     buffers = libe57.VectorSourceDestBuffer()

@@ -1,0 +1,149 @@
+"""session.yaml as ``poolcal coarse`` and ``poolcal laser`` read it, and write mounts into it."""
+
+import itertools
+import os
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pipeline
+from pipeline.atomic_files import sha256, write_bytes, writing
+from pipeline.coarse.session_edit import edit_mounts
+from pipeline.config.instruments import merge_presets
+from pipeline.config.session import SessionConfig
+from pipeline.config.yaml_file import content_of, text_of
+from pipeline.config.yaml_models import parse
+from pipeline.errors import ConfigError
+from pipeline.maths.mount_parameters import SETTINGS
+from pipeline.mount import Mounted
+from pipeline.readers.casts import with_cast
+
+SENSORS = ("laser", "mbes")
+ZERO_MOUNT = dict.fromkeys(SETTINGS, 0.0)
+Array = NDArray[np.float64]
+Content = dict[str, Any]
+
+
+def read_session(folder: Path) -> tuple[str, Content]:
+    """Return text and content of session.yaml, which may still lack mounts; all else in it is checked."""
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
+    path = folder / "session.yaml"
+    text = text_of(path)
+    content = content_of(text, path)
+    _check(content, folder)
+    return text, content
+
+
+def _check(content: Content, folder: Path) -> SessionConfig:
+    path = folder / "session.yaml"
+    filled = with_cast(merge_presets(content, folder)[0], folder)
+    for name in SENSORS:
+        if isinstance(filled.get(name), dict):
+            filled[name] = {"mount": ZERO_MOUNT} | filled[name]
+    return parse(SessionConfig, {"name": "session"} | filled, str(path))
+
+
+def mount_origin(method: str, file: Path, **more: Any) -> Content:
+    """Return where a mount comes from, as session.yaml says it beside the mount.
+
+    Parameters
+    ----------
+    method
+        ``coarse`` or ``fine``.
+    file
+        The file that the mount was computed from.
+    more
+        Further keys.
+    """
+    name = "".join(letter if letter.isprintable() else "?" for letter in file.name)[:300]
+    today = datetime.now(UTC).date().isoformat()
+    software = f"poolcal {pipeline.__version__}"
+    return {"method": method, "file": name, "sha256": sha256(file), "date": today, "software": software} | more
+
+
+def mount_block(mounted: Mounted, covariance: Array, origin: Content) -> Content:
+    """Return the keys of a sensor's block that hold a mount, with numbers rounded as they will be written.
+
+    Parameters
+    ----------
+    mounted
+        The mount.
+    covariance
+        Its covariance, (6, 6): rotation x, y, z and lever arm x, y, z in body axes; rad and m.
+    origin
+        Where the mount comes from, of :func:`mount_origin`.
+    """
+    mount = {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()}
+    return {
+        "mount": mount,
+        "mount_origin": origin | {"mount": mount},
+        "mount_covariance": [[float(f"{value:.9e}") for value in row] for row in covariance.tolist()],
+    }
+
+
+def write_mounts(folder: Path, text: str, content: Content, blocks: Mapping[str, Content]) -> str:
+    """Write mounts into session.yaml and return in words what was done.
+
+    Nothing is written where session.yaml has these mounts already; their date and software version may differ.
+
+    Parameters
+    ----------
+    folder
+        The session's folder.
+    text, content
+        What session.yaml says, of :func:`read_session`.
+    blocks
+        By sensor, the keys to write, of :func:`mount_block`.
+    """
+    path = folder / "session.yaml"
+    if all(_is_same(content[name], block) for name, block in blocks.items()):
+        return f"{path}: has these mounts already; not written"
+    new = edit_mounts(text, blocks, path)
+    _check(content_of(new, path), folder)
+    kept = _replace_session(folder, text, new)
+    return f"{path}: {' and '.join(f'{name}.mount' for name in blocks)} written; what was there is in {kept.name}"
+
+
+def _is_same(present: Content, block: Content) -> bool:
+    old, new = (side.get("mount_origin") or {} for side in (present, block))
+    same_source = old.get("sha256") == new["sha256"] and old.get("method") == new["method"]
+    return same_source and all(present.get(key) == block[key] for key in ("mount", "mount_covariance"))
+
+
+def _replace_session(folder: Path, old: str, new: str) -> Path:
+    """Keep the old text as session.1.yaml, session.2.yaml … (the first name that is free) and return that file's path.
+
+    The new text is written whole or not at all: beside session.yaml, then renamed over it.
+    """
+    kept = _keep(folder, old.encode("utf-8"))
+    try:
+        write_bytes(folder / "session.yaml", new.encode("utf-8"))
+    except BaseException:
+        kept.unlink(missing_ok=True)
+        raise
+    return kept
+
+
+def _keep(folder: Path, content: bytes) -> Path:
+    for number in itertools.count(1):
+        path = folder / f"session.{number}.yaml"
+        with writing(path):
+            try:
+                file = path.open("xb")
+            except FileExistsError:
+                continue
+            try:
+                with file:
+                    file.write(content)
+                    file.flush()
+                    os.fsync(file.fileno())
+            except BaseException:
+                path.unlink(missing_ok=True)
+                raise
+            return path
+    raise AssertionError

@@ -1,0 +1,62 @@
+"""A finished run as it was written, to be compared with others."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import ArtefactError
+from pipeline.maths.comparison import Estimate
+from pipeline.results.screen import summary
+from pipeline.run import manifest
+from pipeline.run.output_files import as_written
+from pipeline.run.results import agreeing, calibration
+from pipeline.run.settings import Settings, read_settings, refuse_other
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A run folder's settings, calibration.json and manifests by stage."""
+
+    path: Path
+    settings: Settings
+    result: Mapping[str, Any]
+    manifests: Mapping[str, manifest.Manifest]
+
+    @classmethod
+    def read(cls, path: Path, stages: tuple[str, ...]) -> "FinishedRun":
+        """Return the run in a folder; raise ArtefactError unless all ``stages`` are complete and agree."""
+        if not path.is_dir():
+            raise ArtefactError(f"{path}: there is no such folder; name a run folder")
+        refuse_other(path, "mbes")
+        for stage in stages:
+            if manifest.read(path / stage) is None:
+                raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")
+        manifests = agreeing(path, stages)
+        for stage in stages:
+            if stage not in manifests:
+                raise ArtefactError(f"{path}: {stage} was made from other settings or results; run poolcal run again")
+        result = calibration(path)
+        with as_written(path):
+            estimate_of(result)
+            for name in ("inputs", "software"):
+                manifest.flattened(result[name])
+            summary(result)  # with --rrd
+        return cls(path, read_settings(path), result, manifests)
+
+
+def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
+    """Return the adjustment's estimate of the mount, from the content of calibration.json; None if it has none.
+
+    The patent's methods have no covariance to test with.
+    """
+    block = result["methods"]["adjustment"]
+    if block["covariance"] is None or block["mount"] is None:
+        return None
+    shapes = {"R_body_from_mbes": (3, 3), "lever_arm_m": (3,), "covariance": (6, 6)}
+    estimate = Estimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
+    if not np.linalg.eigvalsh(estimate.covariance).min() > 0:
+        raise ValueError("the covariance is not positive")
+    return estimate

@@ -1,0 +1,40 @@
+"""Tables of text for the screen and for recordings."""
+
+import re
+from collections.abc import Iterable, Sequence
+
+
+def text_table(layout: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    r"""Return a table's lines, the header first.
+
+    A column grows where a cell does not fit, so that a blank is left between two columns at least.
+
+    Parameters
+    ----------
+    layout
+        By column ``<`` (flush left) or ``>`` (flush right) and its least width; blanks are printed as they stand.
+    header
+        The columns' heads.
+    rows
+        Cells by row; those missing at a row's end are empty.
+
+    >>> print("\n".join(text_table("  <6>8 <1", ["", "sigma"], [["roll", "0.012", "deg"], ["x", "0.0000003", "m"]])))
+                 sigma
+      roll       0.012 deg
+      x      0.0000003 m
+    """
+    columns = [(len(gap), side, int(width)) for gap, side, width in re.findall(r"( *)([<>])(\d+)", layout)]
+    lines = [[*row, *[""] * (len(columns) - len(row))] for row in (header, *rows)]
+    widths = []
+    for place, (gap, side, width) in enumerate(columns):
+        following = columns[place + 1] if place + 1 < len(columns) else None
+        before = side == ">" and place > 0 and gap == 0
+        behind = side == "<" and following is not None and following[:2] == (0, "<")
+        widths.append(max(width, max(len(line[place]) for line in lines) + before + behind))
+    return [
+        "".join(
+            f"{'':{gap}}{cell:{side}{width}}"
+            for (gap, side, _), width, cell in zip(columns, widths, line, strict=True)
+        ).rstrip()
+        for line in lines
+    ]

@@ -1,0 +1,160 @@
+"""How easily a checkout is found one's way in: three counts, and the sizes of its modules and functions.
+
+1. Public classes and functions of ``pipeline/`` and ``stages/`` whose name is defined in more than one module. Names
+   that a protocol prescribes (PROTOCOLS) are left out.
+2. Files that a reader enters on the way of stage adjust. A small simulated session is calibrated, and each function of
+   the project is taken once, in the order of first calls during ``stages.adjust.run``. An entry is a function in
+   another file than the function before it.
+3. Calls with six or more positional arguments, in which two values are easily exchanged.
+
+    python -m tools.house_counts [CHECKOUT] [--list]
+
+CHECKOUT is another commit's worktree, for instance that of the commit before a change; default: this one. ``--list``
+names what is counted.
+"""
+
+import argparse
+import ast
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("pipeline", "stages")
+PROTOCOLS = {
+    "Config": "a stage", "Inputs": "a stage", "Outputs": "a stage", "run": "a stage", "prepare": "a stage over streams",
+    "run_batch": "a stage over streams", "combine": "a stage over streams", "log": "a view of a stage",
+    "command": "a command", "main": "a program",
+}  # fmt: skip
+MANY_ARGUMENTS = 6
+TRACE = """
+import json, sys, tempfile
+from pathlib import Path
+source, packages = Path(sys.argv[1]), ("pipeline", "stages")
+sys.path.insert(0, str(source))
+from stages.cli import call
+order, inside = {}, [0]
+def follow(frame, event, _):
+    code = frame.f_code
+    try:
+        file = Path(code.co_filename).relative_to(source)
+    except ValueError:
+        return
+    if file.parts[0] not in packages or code.co_name.startswith("<"):
+        return
+    begin = file.as_posix() == "stages/adjust.py" and code.co_name == "run"
+    if event == "call":
+        inside[0] += begin
+        if inside[0]:
+            order.setdefault((file.as_posix(), code.co_qualname), None)
+    elif event == "return":
+        inside[0] -= begin
+session, run = sys.argv[2:4]
+sys.setprofile(follow)
+words = f"run {session} --config {session}/pool.yaml --run {run} --jobs 1 --no-report --no-recordings"
+call(words.split())
+sys.setprofile(None)
+Path(sys.argv[4]).write_text(json.dumps(list(order)))
+"""
+SMALL = {
+    "track": {"distances_m": [4.0, 7.0], "half_length_m": 3.6},
+    "laser": {"point_rate_hz": 2000.0, "line_rate_hz": 20.0, "format": "las"},
+    "mbes": {"ping_rate_hz": 8.0},
+    "ins": {"rate_hz": 50.0},
+}
+
+
+def trees(source: Path) -> Iterator[tuple[str, ast.Module]]:
+    """Yield the name and the syntax tree of each module of PACKAGES in a checkout, sorted by name."""
+    for package in PACKAGES:
+        for path in sorted((source / package).rglob("*.py")):
+            yield path.relative_to(source).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def names_with_two_meanings(source: Path) -> dict[str, list[str]]:
+    """Return the modules that define each public class or function name which several modules define."""
+    places: dict[str, list[str]] = defaultdict(list)
+    for file, tree in trees(source):
+        for node in tree.body:
+            if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.name.startswith("_"):
+                places[node.name].append(file)
+    return {name: files for name, files in sorted(places.items()) if len(files) > 1 and name not in PROTOCOLS}
+
+
+def calls_with_many_arguments(source: Path) -> list[str]:
+    """Return ``file:line name`` of each call with MANY_ARGUMENTS or more positional arguments."""
+    return [
+        f"{file}:{node.lineno} {ast.unparse(node.func)}"
+        for file, tree in trees(source)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and len(node.args) >= MANY_ARGUMENTS
+    ]
+
+
+def way_of_adjust(source: Path) -> list[tuple[str, str]]:
+    """Return (file, function) of each function called in stage adjust, in the order of first calls."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, environment = Path(name), os.environ | {"PYTHONPATH": str(source)}
+        (folder / "scenario.yaml").write_text(json.dumps(SMALL), encoding="utf-8")
+        python = [sys.executable, "-P"]
+        simulate = [*python, "-m", "stages.cli", "simulate", "session", "--scenario", "scenario.yaml"]
+        subprocess.run(simulate, cwd=folder, env=environment, check=True, capture_output=True)
+        trace = [*python, "-c", TRACE, str(source), "session", "run", "order.json"]
+        subprocess.run(trace, cwd=folder, env=environment, check=True, capture_output=True)
+        return [(file, function) for file, function in json.loads((folder / "order.json").read_text(encoding="utf-8"))]
+
+
+def entries(way: list[tuple[str, str]]) -> int:
+    """Return how often a file is entered on a way through functions.
+
+    >>> entries([("a", "f"), ("a", "g"), ("b", "h"), ("a", "k")])
+    3
+    """
+    files = [file for file, _ in way]
+    return sum(file != before for file, before in zip(files, [None, *files], strict=False))
+
+
+def sizes(source: Path) -> str:
+    """Return a line on the lengths of modules and functions, in lines."""
+    modules = {path: len((source / path).read_text(encoding="utf-8").splitlines()) for path, _ in trees(source)}
+    functions = {
+        f"{file}:{node.name}": (node.end_lineno or 0) - node.lineno + 1
+        for file, tree in trees(source)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+    }
+    whole = {file: lines for file, lines in modules.items() if not file.endswith("__init__.py")}
+    flat = sum(file.count("/") == 1 for file in whole if file.startswith("pipeline/"))
+    longest, slowest = max(whole, key=lambda file: whole[file]), max(functions, key=lambda name: functions[name])
+    return (
+        f"{len(whole)} modules, {flat} of them flat in pipeline/; median {statistics.median(whole.values()):g} lines, "
+        f"longest {whole[longest]} ({longest}); longest function {functions[slowest]} ({slowest})"
+    )
+
+
+def main() -> None:
+    """Print the counts of a checkout."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("checkout", type=Path, nargs="?", default=ROOT)
+    parser.add_argument("--list", action="store_true", help="name what is counted")
+    given = parser.parse_args()
+    source = given.checkout.resolve()
+    names, calls, way = names_with_two_meanings(source), calls_with_many_arguments(source), way_of_adjust(source)
+    if given.list:
+        print("\n".join(f"{name}: {', '.join(files)}" for name, files in names.items()))
+        print("\n".join(calls))
+        print("\n".join(f"{file} {function}" for file, function in way))
+    print(f"public names defined in more than one module: {len(names)}")
+    print(f"files on the way of stage adjust: {len({file for file, _ in way})}, entered {entries(way)} times")
+    print(f"calls with {MANY_ARGUMENTS} or more positional arguments: {len(calls)}")
+    print(sizes(source))
+
+
+if __name__ == "__main__":
+    main()
