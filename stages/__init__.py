@@ -19,14 +19,7 @@ def load(calibrated: "Calibrated" = "mbes") -> tuple[ModuleType, ...]:
 
 def names_in(run: Path) -> tuple[str, ...]:
     """The stages of what a run folder calibrates, by their folders' names; of no run folder the sonar's."""
-    from pipeline.run.settings import holds_run
+    from pipeline.run.settings import calibrated_in, holds_run
 
     of_laser = holds_run(run) and calibrated_in(run) == "laser"
     return tuple(name.rpartition(".")[2] for name in LASER) if of_laser else ORDER
-
-
-def calibrated_in(run: Path) -> "Calibrated":
-    """What the run in this folder calibrates."""
-    from pipeline.run.settings import read_settings
-
-    return read_settings(run).session.calibrated

@@ -16,6 +16,7 @@ from pipeline.adjustment.problem import (
     observation_model,
     sensor_sigmas,
 )
+from pipeline.artefacts.from_tables import target_frame
 from pipeline.config.pool import LaserFit
 from pipeline.config.session import Laser
 from pipeline.config.stage_settings import LaserCalibration
@@ -58,8 +59,6 @@ def design_prior(target: TargetModel, target_pose: pd.DataFrame, settings: Laser
         corners = [target.faces[k].vertices_m - target.faces[k].offset_m * family.normal for k in family.faces]
         planes[family.name] = family.normal, np.concatenate(corners).mean(axis=0)
     pose = target_pose.iloc[0]
-    R_target_from_pool = np.array(pose["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
-    origin = np.array([pose[f"origin_{axis}_pool_m"] for axis in "xyz"], dtype=np.float64)
     turned = np.radians(float(pose["azimuth_correction_deg"]))
     place = settings.origin_sigma_m
     heading, plumb = settings.azimuth_sigma_deg, np.radians(settings.plumb_sigma_deg)
@@ -68,7 +67,7 @@ def design_prior(target: TargetModel, target_pose: pd.DataFrame, settings: Laser
         planes=planes,
         turn_rad=float(np.radians(settings.face_sigma_deg)),
         shift_m=settings.face_sigma_m,
-        set_up=np.r_[-R_target_from_pool @ origin, 0.0, 0.0, turned],
+        set_up=np.r_[target_frame(target_pose).shift_m, 0.0, 0.0, turned],
         set_up_sigma=np.array([np.inf if place is None else place] * 3 + [plumb, plumb, heading_rad]),
     )
 

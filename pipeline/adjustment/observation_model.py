@@ -111,7 +111,7 @@ class ObservationModel:
         """
         state = values.state
         points, surface = self._ordered(batch)
-        record, share = self.body.trajectory.located(points["t_ns"])
+        record, share = self.body.trajectory.interval_of(points["t_ns"])
         n, n_features = len(surface), N_FEATURES[sensor]
         v, mean, sigma = np.empty((3, n))
         features, slopes = np.empty((n_features, n)), np.empty((n_features - 1, n))

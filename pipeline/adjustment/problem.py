@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pipeline.adjustment.consider import sonar_errors
 from pipeline.adjustment.ins_drift import pose_noise
 from pipeline.adjustment.observation_model import ObservationModel
-from pipeline.artefacts.from_tables import ALL_PASSES, laser_planes
-from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.columns import ALL_PASSES
+from pipeline.artefacts.from_tables import laser_planes, trajectory_in_target
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.maths.adjustment.normal_equations import BodyMotion

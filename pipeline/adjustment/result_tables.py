@@ -12,6 +12,7 @@ from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_statistics import ResidualStatistics
 from pipeline.artefacts.catalogue.results import CELLS
+from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
 from pipeline.maths.adjustment.estimability import weakest_direction
 from pipeline.maths.adjustment.parameters import State
@@ -164,7 +165,7 @@ def _single_parameter_table(
 def _surfaces_table(adjustment: MountAdjustment, statistics: ResidualStatistics) -> pd.DataFrame:
     rows = []
     for k, surface in enumerate(adjustment.state.surfaces):
-        row: dict[str, Any] = {f"normal_{axis}_target_1": surface.normal[i] for i, axis in enumerate("xyz")}
+        row = normal_columns(surface.normal)
         row |= {"family": surface.family, "distance_m": surface.distance_m}
         for sensor, column in (("laser", "laser_points"), ("mbes", "soundings")):
             row[column] = statistics.count(sensor, k)

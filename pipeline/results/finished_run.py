@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import ArtefactError
-from pipeline.maths.comparison import Estimate
+from pipeline.maths.comparison import MountEstimate
 from pipeline.results.screen import summary
 from pipeline.run import manifest
 from pipeline.run.output_files import as_written
 from pipeline.run.results import agreeing, calibration
-from pipeline.run.settings import Settings, read_settings, refuse_other
+from pipeline.run.settings import Settings, read_settings, refuse_other_sensor
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class FinishedRun:
         """Return the run in a folder; raise ArtefactError unless all ``stages`` are complete and agree."""
         if not path.is_dir():
             raise ArtefactError(f"{path}: there is no such folder; name a run folder")
-        refuse_other(path, "mbes")
+        refuse_other_sensor(path, "mbes")
         for stage in stages:
-            if manifest.read(path / stage) is None:
+            if manifest.read_manifest(path / stage) is None:
                 raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")
         manifests = agreeing(path, stages)
         for stage in stages:
@@ -47,7 +47,7 @@ class FinishedRun:
         return cls(path, read_settings(path), result, manifests)
 
 
-def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
+def estimate_of(result: Mapping[str, Any]) -> MountEstimate | None:
     """Return the adjustment's estimate of the mount, from the content of calibration.json; None if it has none.
 
     The patent's methods have no covariance to test with.
@@ -56,7 +56,8 @@ def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
     if block["covariance"] is None or block["mount"] is None:
         return None
     shapes = {"R_body_from_mbes": (3, 3), "lever_arm_m": (3,), "covariance": (6, 6)}
-    estimate = Estimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
+    arrays = (np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items())
+    estimate = MountEstimate(*arrays)
     if not np.linalg.eigvalsh(estimate.covariance).min() > 0:
         raise ValueError("the covariance is not positive")
     return estimate

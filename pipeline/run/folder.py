@@ -107,7 +107,7 @@ def recover(stage: Path) -> None:
     with writing(stage):
         if not os.path.lexists(stage):
             for candidate in (partial(stage), _old(stage)):  # between the two renames: both are complete
-                if manifest.read(candidate) is not None:
+                if manifest.read_manifest(candidate) is not None:
                     candidate.rename(stage)
                     break
         remove(partial(stage))

@@ -38,10 +38,10 @@ class Run:
 
 def out_of_date(this: Run, stage: ModuleType) -> list[str]:
     """Why the stage has to be run; empty when its result is current."""
-    old = manifest.read(this.folder(name_of(stage)))
+    old = manifest.read_manifest(this.folder(name_of(stage)))
     if old is None:
         return ["has no result yet"]
-    return manifest.reasons(old, key_of(this, stage), present(this, this.folder(name_of(stage)), old))
+    return manifest.reasons_out_of_date(old, key_of(this, stage), present(this, this.folder(name_of(stage)), old))
 
 
 def present(this: Run, where: Path, old: manifest.Manifest) -> dict[str, str | None]:
@@ -64,7 +64,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     config = plain_settings(vars(stage_config(stage.Config, this.settings.resolved())))
     if "svp" in (config.get("mbes") or {}):
         raw |= cast_digest(this)
-    return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
+    return manifest.Key(config, raw, inputs, provenance.source_digests(stage), provenance.library_versions())
 
 
 def raw_of(this: Run, sensor: str) -> dict[str, str]:
@@ -110,7 +110,7 @@ def cast_digest(this: Run) -> dict[str, str]:
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:
-    owner = manifest.read(this.folder(marker.owner))
+    owner = manifest.read_manifest(this.folder(marker.owner))
     found = manifest.artefact_digests(owner.outputs) if owner is not None else {}
     name = file_name(marker)
     if name not in found:

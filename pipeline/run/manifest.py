@@ -43,7 +43,7 @@ class Manifest:
         write_text(folder / NAME, json.dumps(content, indent=1, ensure_ascii=True) + "\n")
 
 
-def read(folder: Path) -> Manifest | None:
+def read_manifest(folder: Path) -> Manifest | None:
     """The manifest in ``folder``; None when there is none, or none that makes sense."""
     try:
         content: Any = read_json(folder / NAME)
@@ -99,7 +99,7 @@ def consistent(manifests: Mapping[str, Manifest]) -> bool:
 
 
 # --- reasons ---------------------------------------------------------------------------------------------------------
-def reasons(old: Manifest, key: Key, digests: Mapping[str, str | None]) -> list[str]:
+def reasons_out_of_date(old: Manifest, key: Key, digests: Mapping[str, str | None]) -> list[str]:
     """Why ``old`` is out of date; empty: it is current. ``digests``: its files as they are now (None: gone)."""
     written = {name: entry["sha256"] for name, entry in old.outputs.items()}
     return [

@@ -18,7 +18,7 @@ from pipeline.run.freshness import EMPTY, Run, raw_of
 from pipeline.run.settings import RUN_YAML
 
 
-def refuse_another(this: Run, stages: Sequence[str]) -> None:
+def refuse_other_session(this: Run, stages: Sequence[str]) -> None:
     """One line, where the run folder's results are of another session than ``this`` run's."""
     session = this.settings.session
     there = _digests_in(this.path, stages)
@@ -39,7 +39,8 @@ def refuse_another(this: Run, stages: Sequence[str]) -> None:
 
 def _digests_in(run: Path, stages: Sequence[str]) -> set[str]:
     """Digests of the raw files that the results in a run folder were made from."""
-    found = {digest for stage in stages if (one := manifest.read(run / stage)) for digest in one.key.raw.values()}
+    manifests = [manifest.read_manifest(run / stage) for stage in stages]
+    found = {digest for one in manifests if one is not None for digest in one.key.raw.values()}
     if not found:  # manifests of another version of the program, say
         try:
             content = read_json(run / "report" / CALIBRATION_JSON.name)

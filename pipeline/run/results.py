@@ -73,7 +73,7 @@ def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
     settings = plain_settings(read_settings(run).resolved())
     found: dict[str, manifest.Manifest] = {}
     for stage in stages:
-        one = manifest.read(run / stage)
+        one = manifest.read_manifest(run / stage)
         if one is not None and manifest.consistent(found | {stage: one}) and _as_set(one, settings):
             found[stage] = one
     return found

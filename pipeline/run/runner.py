@@ -24,9 +24,16 @@ from pipeline.run import folder, manifest, provenance
 from pipeline.run.digests import Digests
 from pipeline.run.freshness import Run, all_raw, key_of, out_of_date, raw_digests, raw_of
 from pipeline.run.kept_results import keep_accepted
-from pipeline.run.other_session import refuse_another
+from pipeline.run.other_session import refuse_other_session
 from pipeline.run.progress import Progress
-from pipeline.run.settings import Settings, load_settings, read_settings, refuse_folders, refuse_other, write_settings
+from pipeline.run.settings import (
+    Settings,
+    load_settings,
+    read_settings,
+    refuse_folders,
+    refuse_other_sensor,
+    write_settings,
+)
 from pipeline.run.stage_protocol import declared, evaluate, is_stream, name_of, sources
 from pipeline.run.workers import SERIAL, Stopped, Workers
 
@@ -36,6 +43,7 @@ def run(
     session_folder: Path,
     config_path: Path,
     run_folder: Path,
+    *,
     workers: Workers = SERIAL,
     progress: Progress | None = None,
     finished: Callable[[str], object] = lambda _: None,
@@ -49,12 +57,12 @@ def run(
     settings = load_settings(session_folder, config_path, calibrated)
     refuse_folders(run_folder, session_folder)
     with folder.locked(run_folder, [name_of(stage) for stage in stages]):
-        refuse_other(run_folder, calibrated)
+        refuse_other_sensor(run_folder, calibrated)
         this = _open(run_folder, settings, workers, progress)
         if not overwrite:
-            refuse_another(this, [name_of(stage) for stage in stages])
+            refuse_other_session(this, [name_of(stage) for stage in stages])
         write_settings(run_folder, settings)
-        first = not any(manifest.read(this.folder(name_of(stage))) for stage in stages)
+        first = not any(manifest.read_manifest(this.folder(name_of(stage))) for stage in stages)
         had_to_run = []
         for stage in stages:
             if _bring_up_to_date(this, stage, first):
@@ -67,6 +75,7 @@ def run_stage(
     stages: Sequence[ModuleType],
     name: str,
     run_folder: Path,
+    *,
     settings: Settings | None = None,
     workers: Workers = SERIAL,
     progress: Progress | None = None,
@@ -80,7 +89,7 @@ def run_stage(
     with folder.locked(run_folder, names):
         this = _open(run_folder, settings, workers, progress)
         if new:
-            refuse_another(this, names)
+            refuse_other_session(this, names)
         write_settings(run_folder, settings)
         for stage in stages[: names.index(name)]:
             if why := out_of_date(this, stage):
@@ -107,7 +116,7 @@ def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool
         this.progress.reasons(name, reasons)
     with this.progress.stage(name):
         _execute(this, stage)
-    for line in _losses(manifest.read(this.folder(name))):
+    for line in _losses(manifest.read_manifest(this.folder(name))):
         this.progress.note(f"{name}: {line}")
     return True
 
@@ -141,7 +150,9 @@ def _execute(this: Run, stage: ModuleType) -> None:
         streams = _make_folders(partial, stage)
         total = _rows_to_map(this, stage)
         sink = FolderSink(partial, streams)
-        outputs = evaluate(stage, inputs, config, sink, this.workers.map, lambda: this.progress.begin(total))
+        outputs = evaluate(
+            stage, inputs, config, sink, mapper=this.workers.map, begin=lambda: this.progress.begin(total)
+        )
         rows = _write(partial, stage, outputs)
         if _raw_has_changed(this, stage):
             raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")
@@ -194,7 +205,7 @@ def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
     total = 0
     for source in sources(stage):
         marker = markers[source]
-        owner = manifest.read(this.folder(marker.owner)) if isinstance(marker, Artefact) else None
+        owner = manifest.read_manifest(this.folder(marker.owner)) if isinstance(marker, Artefact) else None
         if owner is None or not isinstance(marker, Artefact):
             return None
         total += owner.rows.get(marker.name, 0)
@@ -203,7 +214,7 @@ def _rows_to_map(this: Run, stage: ModuleType) -> int | None:
 
 def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
     if isinstance(marker, Provenance):
-        return {"inputs": all_raw(this), "software": provenance.versions()}
+        return {"inputs": all_raw(this), "software": provenance.library_versions()}
     if isinstance(marker, Raw):
         settings = getattr(this.settings.session, marker.sensor)
         if settings is None:
@@ -214,7 +225,7 @@ def _read(this: Run, marker: Artefact | Document | Raw | Provenance) -> Any:
         return (where / marker.name).read_text(encoding="utf-8")
     if marker.kind == "table":
         return parquet.read_table(where / f"{marker.name}.parquet", marker)
-    owner = manifest.read(where)
+    owner = manifest.read_manifest(where)
     names = sorted(owner.outputs) if owner is not None else []
     return _stream(this, [ParquetPart(where / name) for name in names if name.startswith(f"{marker.name}/")])
 

@@ -99,7 +99,7 @@ def holds_run(run: Path) -> bool:
     return (run / RUN_YAML).is_file()
 
 
-def refuse_other(run: Path, calibrated: Calibrated) -> None:
+def refuse_other_sensor(run: Path, calibrated: Calibrated) -> None:
     """A run folder is the sonar's or the laser's, not both in turn. (Settings of an older program need not be read.)"""
     try:
         session = read_yaml(run / RUN_YAML)["session"] if holds_run(run) else None
@@ -134,3 +134,8 @@ def read_settings(run: Path) -> Settings:
         raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
     pool = parse(PoolConfig, content["config"], f"{path}: config")
     return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"))
+
+
+def calibrated_in(run: Path) -> Calibrated:
+    """Return the sensor that the run in this folder calibrates."""
+    return read_settings(run).session.calibrated

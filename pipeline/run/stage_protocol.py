@@ -56,6 +56,7 @@ def evaluate(
     inputs: Any,
     config: Any,
     sink: Sink,
+    *,
     mapper: Mapper = serial,
     begin: Callable[[], None] = lambda: None,
 ) -> Any:
@@ -71,7 +72,15 @@ def evaluate(
     for source in sources(stage):
         stream: Stream = getattr(inputs, source)
         work = [
-            _Work(source, number, part, stage.run_batch, prepared, config, sink)
+            _Work(
+                source=source,
+                number=number,
+                part=part,
+                run_batch=stage.run_batch,
+                prepared=prepared,
+                config=config,
+                sink=sink,
+            )
             for number, part in enumerate(stream.parts)
         ]
         partials[source] = []
@@ -130,4 +139,4 @@ def run_in_memory(stage: ModuleType, inputs: Any, config: Any, mapper: Mapper = 
     """The stage without any file: for simulated campaigns and tests."""
     outputs = declared(stage.Outputs)
     streams = {name: marker for name, marker in outputs.items() if isinstance(marker, Artefact) and is_stream(marker)}
-    return evaluate(stage, inputs, config, MemorySink(streams), mapper)
+    return evaluate(stage, inputs, config, MemorySink(streams), mapper=mapper)

@@ -14,7 +14,7 @@ from pipeline.run.stage_protocol import name_of
 from pipeline.run.workers import SERIAL, Workers
 
 
-def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
+def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
     """Read and hash again everything a run read and wrote; what is not as recorded."""
     settings = read_settings(run_folder)
     with folder.reading(run_folder):
@@ -23,7 +23,7 @@ def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SE
 
 
 def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
-    old = manifest.read(this.folder(name_of(stage)))
+    old = manifest.read_manifest(this.folder(name_of(stage)))
     if old is None:
         yield "has no complete result"
         return
@@ -33,7 +33,7 @@ def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
         yield str(error)
         return
     recorded = dataclasses.replace(now, config=old.key.config, source=old.key.source, versions=old.key.versions)
-    yield from manifest.reasons(old, recorded, present(this, this.folder(name_of(stage)), old))
+    yield from manifest.reasons_out_of_date(old, recorded, present(this, this.folder(name_of(stage)), old))
     where = this.folder(name_of(stage))
     for path in sorted(where.rglob("*.parquet")):
         if path.relative_to(where).as_posix() not in old.outputs:

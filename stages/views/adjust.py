@@ -19,13 +19,13 @@ from pipeline.artefacts.catalogue.results import (
     SURFACES,
 )
 from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
-from pipeline.artefacts.families import families_of, shown_as
-from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.from_tables import family_names, normal_of, normals_of, trajectory_in_target
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.face_grid import face_axes
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, mount_of
+from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
 from stages.views.ingest import moments_of
@@ -43,10 +43,10 @@ def log(recording: Any, tables: Tables) -> None:
     faces, residuals = tables.table(FACES), tables.table(RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span, steps = _span(residuals), _steps(tables, residuals)
-    _clouds(recording, tables, residuals, family, span, steps, shown_as(families_of(faces), COLOURS))
+    _clouds(recording, tables, residuals, family, span, steps, styles_of_families(family_names(faces), COLOURS))
     _maps(recording, tables.table(RESIDUAL_MAP), faces, span)
     _fans(recording, tables, residuals)
-    _over_time(recording, tables.table(RESIDUAL_BINS), steps, shown_as(families_of(faces), COLOURS))
+    _over_time(recording, tables.table(RESIDUAL_BINS), steps, styles_of_families(family_names(faces), COLOURS))
     _words(recording, tables, span)
 
 
@@ -90,7 +90,7 @@ def _clouds(
 
     surfaces: Any = tables.table(SURFACES).to_dict("records")
     # shown on its surface: in front of it a point would hide those behind, and all would look as if they stood before
-    normals = {row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in surfaces}
+    normals = {row["family"]: normal_of(row) for row in surfaces}
     solved = bool(np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all())
     for sensor in SENSORS:
         of_sensor = (residuals["sensor"] == sensor).to_numpy()
@@ -114,10 +114,10 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
     import rerun as rr
 
     cells = cells[np.isfinite(cells["mean_m"]) & (cells["count"] >= FEWEST)]
-    normals = np.column_stack([faces[f"normal_{axis}_target_1"] for axis in "xyz"])
+    normals = normals_of(faces)
     family = faces["family"].to_numpy()
     for sensor in SENSORS:
-        for name in families_of(faces):
+        for name in family_names(faces):
             numbers = cells["face"].to_numpy().astype(int)
             rows = cells[(cells["sensor"] == sensor).to_numpy() & (family[numbers] == name)]
             if not len(rows):

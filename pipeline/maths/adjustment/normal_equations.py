@@ -77,7 +77,7 @@ class BodyMotion:
         drift : DriftEstimate or None
             The drift estimated so far.
         """
-        positions, T = self.trajectory.between(record, share)
+        positions, T = self.trajectory.poses_within(record, share)
         if drift is not None:
             error = drift.at(self.times(record, share))
             positions, T = positions + error[:, :3], exp_so3(error[:, 3:]) @ T

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from pipeline.maths.geometry.planes import tangents_of
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
-from pipeline.maths.target.model import LEVEL
+from pipeline.maths.target.face import HORIZONTAL_COSINE
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -71,7 +71,7 @@ class Surface:
     @property
     def level(self) -> bool:
         """Whether the surface is horizontal."""
-        return bool(abs(self.normal[2]) > LEVEL)
+        return bool(abs(self.normal[2]) > HORIZONTAL_COSINE)
 
     @property
     def distance_m(self) -> float:

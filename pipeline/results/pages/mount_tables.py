@@ -11,7 +11,7 @@ import pandas as pd
 from pipeline.adjustment.residual_tables import FEWEST
 from pipeline.artefacts.catalogue.results import CELLS, CLOSING, RESIDUALS
 from pipeline.artefacts.catalogue.target import FACES
-from pipeline.artefacts.families import families_of
+from pipeline.artefacts.from_tables import family_names
 from pipeline.config.pool import Verdict
 from pipeline.config.session import SessionConfig
 from pipeline.maths.adjustment.estimability import CORRELATION_LIMIT
@@ -102,7 +102,7 @@ def closing(tables: Tables) -> list[dict[str, Any]]:
     residuals, cells = tables.table(RESIDUALS, *columns), tables.table(CELLS)
     family = names[residuals["face"].to_numpy().astype(int)]
     solved = calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
-    for name in families_of(faces):
+    for name in family_names(faces):
         of_family = {sensor: residuals[(residuals["sensor"] == sensor) & (family == name)] for sensor in SENSORS}
         counts = cells[cells["family"] == name].groupby("sensor")["count"].sum()
         if one_plane[name] or any(len(one) < FEWEST for one in of_family.values()):

@@ -52,16 +52,6 @@ def style() -> Iterator[None]:
         yield
 
 
-def prepare() -> None:
-    """Load what the first picture needs: fonts, drivers."""
-    with style():
-        figure = Figure()
-        axis = figure.subplots()
-        axis.plot(range(2), "o", rasterized=True, label="0")
-        axis.legend()
-        picture(figure, "")
-
-
 def render(template: str, **values: Any) -> str:
     """A page from ``pipeline/results/pages/<template>``."""
     environment = jinja2.Environment(

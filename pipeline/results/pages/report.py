@@ -103,7 +103,7 @@ def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterab
         commit=done["report"].git_commit,
         utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
         drawn_from=drawn_from(tables.run, done),
-        pictures=dict(zip(pictures_of(tables.run), pictures, strict=True)),  # last: others may still be drawing them
+        pictures=dict(zip(pictures_of(tables.run), pictures, strict=True)),
     )
 
 

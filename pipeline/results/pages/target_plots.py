@@ -14,8 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
-from pipeline.artefacts.families import families_of, level_families
-from pipeline.maths.target.model import LEVEL
+from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal
 from pipeline.results.pages.rendering import COARSE, INK, LASER, SONAR, WIDTH_IN, picture
 
 Array = NDArray[np.float64]
@@ -55,7 +54,7 @@ class _Plane:
 def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Markup:
     """Target from above, a section through it, to scale, and a part of that enlarged; without panels that are empty."""
     corners = [np.reshape(one, (-1, 3)) for one in faces["vertices_target_m"]]
-    level = faces["normal_z_target_1"].abs().to_numpy() > LEVEL
+    level = is_horizontal(faces)
     face = residuals["face"].to_numpy().astype(int)
     calibrated = _calibrated(residuals)
     of_sensor = {sensor: (residuals["sensor"] == sensor).to_numpy() for sensor in ("laser", "mbes")}
@@ -182,8 +181,9 @@ def _cut(corners: Array, plane: _Plane) -> list[Array]:
 
 def distances(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any], solved: bool) -> Markup:
     """Each family's points by their distance from the adjusted surface, in mm; ``family``: of each residual."""
-    names, level = [name for name in families_of(faces) if (family == name).any()][:MOST_PANELS], level_families(faces)
-    names = names or families_of(faces)[:1]
+    names = [name for name in family_names(faces) if (family == name).any()][:MOST_PANELS]
+    level = horizontal_families(faces)
+    names = names or family_names(faces)[:1]
     clouds = CLOUDS[_calibrated(residuals)][: None if solved else -1]  # without a result nothing is calibrated
     figure = Figure(figsize=(WIDTH_IN, 3.2))
     where = {"left": 0.07, "right": 0.97, "bottom": 0.23, "top": 0.92, "wspace": 0.16}
