@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.weighting import Observations, Weighting, group_of
-from pipeline.artefacts.streams import Batch, xyz
+from pipeline.artefacts.streams import Batch, point_array
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
 from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
 from pipeline.maths.adjustment.observations import (
@@ -153,7 +153,7 @@ class ObservationModel:
     def points_in_target(self, batch: Batch, state: State) -> Array:
         """Return the calibrated sensor's points (n, 3) m in the target frame, with the mount of the state."""
         positions, R_target_from_body = self.body.trajectory.poses_at(batch["t_ns"])
-        points_body_m = xyz(batch, f"{state.calibrated}_m") @ state.R_body_from_sensor.T + state.lever_arm_m
+        points_body_m = point_array(batch, f"{state.calibrated}_m") @ state.R_body_from_sensor.T + state.lever_arm_m
         return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, points_body_m))
 
     def _ordered(self, batch: Batch) -> tuple[Batch, Integers]:
@@ -180,14 +180,14 @@ class ObservationModel:
         step = axes @ trajectory.positions_m[record + 1].T - start
         lever_arm = axes @ (trajectory.R_frame_from_body[record] @ self.body.lever_arm("laser", state)).T
         is_calibrated = state.calibrated == "laser"
-        points = self.points_in_target(batch.points, state) if is_calibrated else xyz(batch.points, "target_m")
+        points = self.points_in_target(batch.points, state) if is_calibrated else point_array(batch.points, "target_m")
         along_axes = axes @ points.T
         r = along_axes - batch.spread(start) - batch.share * batch.spread(step)
         v = along_axes[2] - batch.surface.distance_m - self.height_of_face[batch.points["face"]]
         return LinearisedBatch(r, v, laser_point_design(r, batch.spread(lever_arm), range_m, self.sigmas["laser"]))
 
     def _linearised_sonar(self, batch: SurfaceBatch, state: State) -> LinearisedBatch:
-        points_m, axes = xyz(batch.points, "mbes_m").T, batch.axes
+        points_m, axes = point_array(batch.points, "mbes_m").T, batch.axes
         pings = Runs.of(batch.points["t_ns"])  # beams of a ping share their pose
         positions, R_target_from_body = self.body.trajectory.poses_at(batch.points["t_ns"][pings.starts])
         R = R_target_from_body @ state.R_body_from_sensor

@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.artefacts.catalogue.results import RESIDUALS
-from pipeline.artefacts.streams import Batch, xyz
+from pipeline.artefacts.streams import Batch, point_array
 from pipeline.maths.sonar.soundings import receive_angle
 
 AT_MOST = 100_000  # points of a sensor in the table
@@ -38,11 +38,11 @@ def residual_sample(model: ObservationModel, sensor: str, batch: Batch, values: 
     numbered = {**batch, "row": np.arange(len(batch["t_ns"]))}
     observations = model.linearise(sensor, numbered, values)
     points = observations.points
-    own = xyz(points, f"{sensor}_m")
+    own = point_array(points, f"{sensor}_m")
     ranges = np.linalg.norm(own, axis=1)
     angle = receive_angle(own) if sensor == "mbes" else np.arcsin(own[:, 2] / ranges)
     if sensor != state.calibrated:
-        positions = coarse_positions = xyz(points, "target_m")
+        positions = coarse_positions = point_array(points, "target_m")
         coarse_residual = observations.v_m
     else:
         coarse = replace(model.coarse, surfaces=state.surfaces)

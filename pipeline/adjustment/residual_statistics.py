@@ -14,7 +14,7 @@ from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_sample import residual_sample, residuals_table, sampling_step
 from pipeline.adjustment.weighting import Observations
 from pipeline.artefacts.catalogue.results import PATTERNS
-from pipeline.artefacts.streams import Batch, Stream, xyz
+from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.drift_test import drift_between_passes
@@ -143,7 +143,7 @@ def _batch(
 def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, Array | Integers]]:
     """Yield each variable by which residuals are sorted, and its value (n,) of each point."""
     batch = observations.points
-    own = xyz(batch, f"{sensor}_m")
+    own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
     yield "pass", batch["pass"].astype(np.int64)

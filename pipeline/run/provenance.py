@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pipeline
-from pipeline.artefacts.schema import Raw
+from pipeline.artefacts.schema import RawFiles
 from pipeline.atomic_files import sha256
 from pipeline.run.import_closure import file_of_module, import_closure, imported_modules
 from pipeline.run.stage_protocol import declared
@@ -40,7 +40,7 @@ def library_versions() -> dict[str, str]:
 
 def source_digests(stage: ModuleType) -> dict[str, str]:
     """Return the digests of the program's files that the stage can reach; also of the readers, if it gets raw files."""
-    raw = any(isinstance(marker, Raw) for marker in declared(stage.Inputs).values())
+    raw = any(isinstance(marker, RawFiles) for marker in declared(stage.Inputs).values())
     return dict(_source_digests(ROOT, stage.__name__, Path(str(stage.__file__)), raw))
 
 

@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pipeline.artefacts.streams import EMPTY
+from pipeline.artefacts.streams import EMPTY_STREAM
 from pipeline.checking import rendering
 from pipeline.checking.check_session import examine
 from pipeline.checking.trial_calibration import Calibrated, Raw
@@ -54,4 +54,4 @@ def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrate
     with suppress(PoolcalError):
         calibrate_in_memory(session, pool, raw, "adjust", kept)
     tables = (found.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
-    return Calibrated(found.get("segment/soundings_labelled", EMPTY), *tables)
+    return Calibrated(found.get("segment/soundings_labelled", EMPTY_STREAM), *tables)
