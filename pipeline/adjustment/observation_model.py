@@ -18,7 +18,7 @@ from pipeline.maths.adjustment.observations import (
     laser_point_design,
     sonar_point_design,
 )
-from pipeline.maths.adjustment.parameters import State, Surface
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
 
 Array = NDArray[np.float64]
@@ -47,11 +47,11 @@ class SurfaceBatch:
     share: Array
     record: Integers
     intervals: Runs
-    surface: Surface
+    surface: ObservedSurface
     axes: Array
 
     @classmethod
-    def of(cls, points: Batch, record: Integers, share: Array, surface: Surface) -> "SurfaceBatch":
+    def of(cls, points: Batch, record: Integers, share: Array, surface: ObservedSurface) -> "SurfaceBatch":
         """Return the batch of points with records (n,) and shares (n,) on one surface.
 
         Parameters
@@ -60,12 +60,19 @@ class SurfaceBatch:
             Columns of n points.
         record, share : (n,) arrays
             INS record before each point, and place between it and the next.
-        surface : Surface
+        surface : ObservedSurface
             Their surface.
         """
         intervals = Runs.of(record)
         axes = np.vstack([surface.tangents, surface.normal])
-        return cls(points, share, record[intervals.starts], intervals, surface, axes)
+        return cls(
+            points=points,
+            share=share,
+            record=record[intervals.starts],
+            intervals=intervals,
+            surface=surface,
+            axes=axes,
+        )
 
     def spread(self, values: Array) -> Array:
         """Return for each point (…, n) the value (…, g) of its interval."""

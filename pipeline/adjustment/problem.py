@@ -16,7 +16,7 @@ from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.maths.adjustment.normal_equations import BodyMotion
 from pipeline.maths.adjustment.observations import SensorSigmas
-from pipeline.maths.adjustment.parameters import Sensor, State, Surface
+from pipeline.maths.adjustment.parameters import ObservedSurface, Sensor, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, SurfacePrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
@@ -100,7 +100,7 @@ def mount_state(session: SessionData, sensor: Laser | Mbes, calibrated: Sensor) 
     for family in session.target.families:
         plane = planes.get((ALL_PASSES, family.name)) if family.one_plane and not family.level else None
         if plane is not None:
-            surfaces.append(Surface.at(family.name, plane.normal, plane.centroid_m, 0.0))
+            surfaces.append(ObservedSurface.at(family.name, plane.normal, plane.centroid_m, 0.0))
         else:
             surfaces.append(design_surface(session.target, family))
     mount = mount_of(sensor.mount)
@@ -137,11 +137,12 @@ def sensor_sigmas(sensor: Laser | Mbes) -> SensorSigmas:
     return SensorSigmas(sensor.range_sigma_m, float(np.radians(sensor.angle_sigma_deg)))
 
 
-def design_surface(target: TargetModel, family: Family) -> Surface:
+def design_surface(target: TargetModel, family: Family) -> ObservedSurface:
     """Return the family's plane as designed, its centre in the midst of the corners of its faces."""
     corners_m = np.concatenate([target.faces[number].vertices_m for number in family.faces])
     centre = corners_m.mean(axis=0)
-    return Surface.at(family.name, family.normal, centre - (centre @ family.normal - family.distance_m) * family.normal)
+    on_plane = centre - (centre @ family.normal - family.distance_m) * family.normal
+    return ObservedSurface.at(family.name, family.normal, on_plane)
 
 
 def _parallel_families(target: TargetModel, as_built: AsBuilt) -> ParallelPrior | None:

@@ -17,7 +17,7 @@ from pipeline.config.mount import Mount, MountSigma
 from pipeline.config.pool import Adjust, AsBuilt
 from pipeline.config.session import Drift, Ins, Laser, Mbes, White
 from pipeline.maths.adjustment.normal_equations import BodyMotion
-from pipeline.maths.adjustment.parameters import State, Surface
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.solution import ConsiderErrors, single_parameter_tests, solve
 from pipeline.maths.geometry.trajectory import Trajectory
 from tests.support.effort import often
@@ -124,8 +124,8 @@ def made(
     mbes = columns(((moment + latency_s) * NS).round().astype(np.int64), face, x, "mbes_m")
 
     numbers = {"P1": 0, "P2": 1, "P3": 2, "H": 3}
-    surfaces = [Surface.at(FACES[k][0], np.array(FACES[k][1]), np.array(FACES[k][2]), 0.0) for k in range(3)]
-    surfaces.append(Surface.at("H", np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.0]), 0.0))
+    surfaces = [ObservedSurface.at(FACES[k][0], np.array(FACES[k][1]), np.array(FACES[k][2]), 0.0) for k in range(3)]
+    surfaces.append(ObservedSurface.at("H", np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.0]), 0.0))
     coarse = Rotation.from_rotvec(np.radians([2.5, -2.0, 2.2])).as_matrix()
     model = ObservationModel(
         BodyMotion.of(trajectory, LASER_LEVER),

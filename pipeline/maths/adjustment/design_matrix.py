@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import N_MOVED
-from pipeline.maths.adjustment.parameters import N_SURFACE, State, Surface
+from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE
 from pipeline.maths.mount_parameters import N_MOUNT
 
@@ -56,7 +56,7 @@ class SensorOnSurface:
     features: int
 
 
-def pose_design(surfaces: Sequence[Surface], surface: Integers) -> Array:
+def pose_design(surfaces: Sequence[ObservedSurface], surface: Integers) -> Array:
     """Return the design K (g, 3, 6) of pose errors (δ, ω) by the first three features, for surface numbers (g,)."""
     blocks = np.zeros((len(surfaces), N_MOVED, N_POSE))
     for block, plane in zip(blocks, surfaces, strict=True):

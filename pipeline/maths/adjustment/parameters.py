@@ -38,7 +38,7 @@ N_SURFACE = len(SURFACE_PARAMETERS)
 
 
 @dataclass(frozen=True)
-class Surface:
+class ObservedSurface:
     """The plane of one family of faces: normal · (X - centre) = shift, target frame.
 
     The tangents (2, 3) satisfy t1 × t2 = normal. They are carried along as the surface turns, because sums are kept in
@@ -52,7 +52,7 @@ class Surface:
     shift_m: float
 
     @classmethod
-    def at(cls, family: str, normal: Array, centre_m: Array, shift_m: float = 0.0) -> "Surface":
+    def at(cls, family: str, normal: Array, centre_m: Array, shift_m: float = 0.0) -> "ObservedSurface":
         """Return the surface with tangents of its own choice.
 
         Parameters
@@ -78,7 +78,7 @@ class Surface:
         """Value of normal · X on the surface."""
         return float(self.normal @ self.centre_m + self.shift_m)
 
-    def updated(self, turn_1: float, turn_2: float, shift_m: float) -> "Surface":
+    def updated(self, turn_1: float, turn_2: float, shift_m: float) -> "ObservedSurface":
         """Return the surface after a step of its three parameters.
 
         Parameters
@@ -106,13 +106,17 @@ class State:
 
     R_body_from_sensor: Array
     lever_arm_m: Array
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[ObservedSurface, ...]
     additional: Array
     calibrated: Sensor = "mbes"
 
     @classmethod
     def at(
-        cls, R_body_from_sensor: Array, lever_arm_m: Array, surfaces: Sequence[Surface], calibrated: Sensor = "mbes"
+        cls,
+        R_body_from_sensor: Array,
+        lever_arm_m: Array,
+        surfaces: Sequence[ObservedSurface],
+        calibrated: Sensor = "mbes",
     ) -> "State":
         """Return the state with zero for every additional parameter.
 
@@ -122,7 +126,7 @@ class State:
             Mount of the calibrated sensor.
         lever_arm_m : (3,) array
             Lever arm of the calibrated sensor, body axes.
-        surfaces : sequence of Surface
+        surfaces : sequence of ObservedSurface
             The surfaces that the sensors observe.
         calibrated : {"mbes", "laser"}
             The sensor that is calibrated.

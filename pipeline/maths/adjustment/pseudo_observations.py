@@ -30,7 +30,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.parameters import State, Surface
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
 
 Array = NDArray[np.float64]
 N_DISPLACEMENT = 6  # d and ω
@@ -119,7 +119,7 @@ class ParallelPrior:
         return PseudoObservations(N, b, squares)
 
 
-def _misclosures(surface: Surface, n0: Array, q: Array) -> tuple[Array, Array, Array]:
+def _misclosures(surface: ObservedSurface, n0: Array, q: Array) -> tuple[Array, Array, Array]:
     """Return misclosures (3,), their design by the surface's parameters (3, 3), and by g (3, 6)."""
     n, from_centre = surface.normal, q - surface.centre_m
     r = np.r_[surface.tangents @ (n - n0), n @ from_centre - surface.shift_m]

@@ -179,8 +179,10 @@ def bin_means(sums: ResidualSums) -> list[BinMean]:
 
 def _common_variance(bins: list[_SlotSums]) -> float:
     """Return the variance c² that points of a slot share, from the scatter of all slots about their bins' means."""
-    scatter = sum(float(np.sum((one.weighted - one.weight * one.mean) ** 2 - one.weight)) for one in bins)
-    return max(0.0, scatter / sum(float(one.weight @ one.weight) for one in bins))
+    scatter = sum(
+        float(np.sum((slots.weighted - slots.weight * slots.mean) ** 2 - slots.weight)) for slots in bins
+    )
+    return max(0.0, scatter / sum(float(slots.weight @ slots.weight) for slots in bins))
 
 
 def differences_from_rest(sums: ResidualSums) -> list[BinMean]:

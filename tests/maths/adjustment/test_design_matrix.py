@@ -8,14 +8,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
-from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, State, Surface
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, ObservedSurface, State
 from pipeline.maths.geometry.rotations import exp_so3
 
 STEP = 1e-6
 ROOT = np.sqrt(0.5)
 NORMALS = np.array([[-ROOT, -ROOT, 0.05], [-1.0, 0.02, -0.03], [-ROOT, ROOT, 0.0], [0.01, -0.02, 1.0]])
 SURFACES = tuple(
-    Surface.at(name, normal / np.linalg.norm(normal), np.array([0.3, -2.0 + k, 1.0]), 0.01 * k)
+    ObservedSurface.at(name, normal / np.linalg.norm(normal), np.array([0.3, -2.0 + k, 1.0]), 0.01 * k)
     for k, (name, normal) in enumerate(zip(("P1", "P2", "P3", "H"), NORMALS, strict=True))
 )
 P, VELOCITY, TURNING = np.array([-5.0, 1.0, 0.2]), np.array([0.1, 0.5, -0.05]), np.array([0.02, -0.01, 0.03])

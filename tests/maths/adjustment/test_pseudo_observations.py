@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment.parameters import State, Surface
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pseudo_observations import DesignPrior, ParallelPrior
 
 RANDOM = np.random.default_rng(5)
@@ -22,7 +22,7 @@ def state(turn: float = 0.002, shift: float = 0.004) -> State:
         normal = Rotation.from_rotvec(turn * RANDOM.standard_normal(3)).apply(n)
         centre = q + 0.3 * RANDOM.standard_normal(3)
         centre -= normal * (normal @ (centre - q))
-        surfaces.append(Surface.at(name, normal, centre, shift * RANDOM.standard_normal()))
+        surfaces.append(ObservedSurface.at(name, normal, centre, shift * RANDOM.standard_normal()))
     return State.at(np.eye(3), np.zeros(3), surfaces, "laser")
 
 
@@ -69,7 +69,7 @@ def test_the_design_is_what_least_squares_over_its_displacement_leave(surveyed: 
 
 def test_a_design_displaced_as_a_whole_is_no_misclosure() -> None:
     shift, turn = np.array([0.1, -0.2, 0.05]), Rotation.from_rotvec([0.0, 0.0, 1e-4])
-    surfaces = [Surface.at(name, turn.apply(n), turn.apply(q) + shift) for name, (n, q) in PLANES.items()]
+    surfaces = [ObservedSurface.at(name, turn.apply(n), turn.apply(q) + shift) for name, (n, q) in PLANES.items()]
     at = State.at(np.eye(3), np.zeros(3), surfaces, "laser")
     free = np.array([np.inf] * 3 + [1e-4] * 2 + [np.inf])
     assert DesignPrior(PLANES, 4e-4, 0.002, np.zeros(6), free).pseudo_observations(at).squares < 1e-4
@@ -82,7 +82,8 @@ def test_a_design_displaced_as_a_whole_is_no_misclosure() -> None:
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_ties_draw_two_normals_together(sense: float) -> None:
     turned = Rotation.from_rotvec([0.0, 0.002, 0.001]).apply(PLANES["b"][0])
-    surfaces = [Surface.at("b", PLANES["b"][0], PLANES["b"][1]), Surface.at("e", sense * turned, np.ones(3))]
+    first = ObservedSurface.at("b", PLANES["b"][0], PLANES["b"][1])
+    surfaces = [first, ObservedSurface.at("e", sense * turned, np.ones(3))]
     at = State.at(np.eye(3), np.zeros(3), surfaces)
     known = ParallelPrior([("b", "e")], 1e-4).pseudo_observations(at)
     angle = np.linalg.norm(np.cross(turned, PLANES["b"][0]))
