@@ -37,7 +37,7 @@ from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.config.stage_settings import LaserCalibration
 from pipeline.config.target import Target
-from pipeline.planning.prediction import Setting
+from pipeline.planning.prediction import PredictionSetting
 from pipeline.planning.session_geometry import geometry_table, sailed_plan
 from pipeline.target.design import target_of
 
@@ -154,7 +154,7 @@ def weak_geometry(
     """
     if config.mbes is None:
         return fixed_parameters_table(adjustment.fixed_mount)
-    setting = Setting(
+    setting = PredictionSetting(
         model=session.target,
         state=adjustment.state,
         plan=sailed_plan(inputs.files),

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from pipeline.config.plan import LaserFigures, MbesFigures, Pass, Plan
 from pipeline.maths.adjustment.solution import Solution
-from pipeline.planning.observability import Seen, geometry_of
-from pipeline.planning.prediction import Setting
+from pipeline.planning.observability import Coverage, geometry_advice
+from pipeline.planning.prediction import PredictionSetting
 
 Array = NDArray[np.float64]
 
@@ -30,13 +30,17 @@ def sailed_plan(files: pd.DataFrame) -> Plan:
 
 
 def geometry_table(
-    setting: Setting, passes: pd.DataFrame, soundings: Mapping[str, int], normal: Array, solution: Solution
+    setting: PredictionSetting,
+    passes: pd.DataFrame,
+    soundings: Mapping[str, int],
+    normal: Array,
+    solution: Solution,
 ) -> pd.DataFrame:
     """Return table ``geometry``: what the passes lack, and what would cure it.
 
     Parameters
     ----------
-    setting : Setting
+    setting : PredictionSetting
         Target and instruments.
     passes : DataFrame
         Rows of table passes, of the passes that have soundings.
@@ -48,7 +52,7 @@ def geometry_table(
         The session's solution.
     """
     usual = setting.plan.passes[0]
-    seen = Seen(
+    coverage = Coverage(
         distances_m=[float(distance) for distance in passes["distance_m"] if np.isfinite(distance)],
         soundings=soundings,
         level={family.name for family in setting.model.families if family.level},
@@ -56,8 +60,8 @@ def geometry_table(
         # of a wave: its amplitude
         heading_swing_deg=_measured(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg),
     )
-    geometry = geometry_of(setting, seen, normal, solution)
-    rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
+    advice = geometry_advice(setting, coverage, normal, solution)
+    rows = [("gap", words) for words in advice.gaps] + ([("remedy", advice.remedy)] if advice.remedy else [])
     return pd.DataFrame(rows, columns=["kind", "words"]).assign(sigma=np.nan)
 
 

@@ -129,13 +129,13 @@ class KongsbergPart(ABC):
         def joined(values: Callable[[KongsbergPing], NDArray[Any]]) -> NDArray[Any]:
             return np.concatenate([values(ping) for ping in pings])
 
-        axis, part_m, centre_m = joined(self._axes_and_positions).swapaxes(0, 1)
+        axis_mbes, part_mbes_m, centre_mbes_m = joined(self._axes_and_positions).swapaxes(0, 1)
         recorded = SectorSoundings(
             angle_rad=-np.radians(joined(lambda ping: ping.angle_deg)),
             tilt_rad=np.radians(joined(lambda ping: ping.sectors.tilt_deg[ping.sector])),
-            axis=axis,
-            part_m=part_m,
-            centre_m=centre_m,
+            axis_mbes=axis_mbes,
+            part_mbes_m=part_mbes_m,
+            centre_mbes_m=centre_mbes_m,
             two_way_time_s=joined(lambda ping: ping.two_way_time_s),
             sound_speed_m_s=per_sounding([ping.sound_speed_m_s for ping in pings], counts, np.float64),
         )

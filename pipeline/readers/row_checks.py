@@ -164,7 +164,7 @@ def keep_possible_soundings(rows: RowFilter) -> None:
 
 
 @dataclass
-class Order:
+class TimeOrder:
     """Keeps the INS records of one file in ascending order of time; records that step back are left out and counted."""
 
     name: str
