@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from pipeline.config.session import Calibrated
 
 ORDER = ("ingest", "georeference", "segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")
-LASER = ("ingest", "georeference", "segment", "fit_planes", "laser.adjust", "report")  # calibrates the laser
+LASER = ("ingest", "georeference", "segment", "fit_planes", "adjust", "report")  # calibrates the laser
 
 
 def load(calibrated: "Calibrated" = "mbes") -> tuple[ModuleType, ...]:

@@ -1,20 +1,20 @@
-"""The rigorous solution: both sensors observe shared surfaces from one moving body; unknowns and their covariance."""
+"""The rigorous solution: sensors observe shared surfaces from one moving body; parameters and their covariance.
 
-from collections.abc import Callable
+The sonar is calibrated against the surfaces that the laser sees, or the laser against the target's design.
+"""
+
 from dataclasses import dataclass
-from functools import partial
 from typing import Annotated
 
-import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.consider import considered_of, correlated
-from pipeline.adjustment.ins_drift import drift_of
-from pipeline.adjustment.iteration import Adjusted, Given, adjust, noise_of
-from pipeline.adjustment.observation_model import scene_of
-from pipeline.adjustment.residual_statistics import Cells, drift_rows, look
+from pipeline.adjustment.ins_drift import drift_model
+from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
+from pipeline.adjustment.laser_design import fixed_parameters_table, laser_problem
+from pipeline.adjustment.problem import SessionData, sonar_problem
+from pipeline.adjustment.residual_statistics import ResidualStatistics, residual_statistics
 from pipeline.adjustment.residual_tables import bins_table, map_table
-from pipeline.adjustment.result_tables import tables
+from pipeline.adjustment.result_tables import result_tables
 from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES, POSES
 from pipeline.artefacts.catalogue.results import (
     ADJUST_SUMMARY,
@@ -33,25 +33,19 @@ from pipeline.artefacts.catalogue.results import (
 )
 from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.streams import Stream
-from pipeline.config.plan import LaserFigures, MbesFigures, Pass, Plan
 from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
 from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.config.stage_settings import LaserCalibration
 from pipeline.config.target import Target
-from pipeline.maths.adjustment.design_constraints import Known
-from pipeline.maths.adjustment.parallel_constraints import of_ties
-from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.target.model import TargetModel
-from pipeline.mount import mount_of
-from pipeline.planning.observability import Coverage, geometry_advice
 from pipeline.planning.prediction import PredictionSetting
+from pipeline.planning.session_geometry import geometry_table, sailed_plan
 from pipeline.target.design import target_of
-
-SHOWN = 100_000  # points of a sensor in the table residuals, at most
-LEAST_RAD = 1e-7  # nothing is known better
 
 
 @dataclass(frozen=True)
 class Config:
+    """Settings; ``mbes`` is None where the laser is calibrated, ``laser_fit`` where the sonar is."""
+
     target: Target
     segment: Segment
     adjust: Adjust
@@ -59,11 +53,20 @@ class Config:
     as_built: AsBuilt
     ins: Ins
     laser: Laser
-    mbes: Mbes
+    mbes: Mbes | None
+    laser_fit: LaserCalibration | None
+
+    @property
+    def calibration(self) -> Mbes | LaserCalibration:
+        """What is calibrated: the sonar, or the laser in this way."""
+        (calibration,) = (block for block in (self.mbes, self.laser_fit) if block is not None)
+        return calibration
 
 
 @dataclass(frozen=True)
 class Inputs:
+    """Artefacts read; there are no labelled soundings where the laser is calibrated."""
+
     files: Annotated[pd.DataFrame, FILES]
     passes: Annotated[pd.DataFrame, PASSES]
     ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
@@ -77,6 +80,8 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
+    """Artefacts written."""
+
     estimate: Annotated[pd.DataFrame, ESTIMATE]
     covariance: Annotated[pd.DataFrame, COVARIANCE]
     geometry: Annotated[pd.DataFrame, GEOMETRY]
@@ -93,68 +98,72 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    settings = config.adjust
-    model = target_of(config.target)
-    given = (model, inputs.poses, inputs.target_pose, inputs.planes)
-    ins = config.ins.model_copy(update={"drift": drift_of(config.ins, inputs.ins_sigmas, inputs.passes)})
-    scene = scene_of(*given, ins, config.laser, config.mbes, config.as_built.faces)
-    streams = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
-    known = Given(noise_of(ins), _ties(model, config.as_built))
-    found = adjust(streams, scene, known, settings, config.ingest.max_gap_s)
-    of_drift = drift_rows(found.drift, noise_of(ins), inputs.poses, inputs.passes)
-    seen = look(streams, scene, found, settings, of_drift, SHOWN)
-    sigmas = considered_of(found.state.names, config.laser, config.mbes, config.as_built, model.depth_m)
-    together = correlated(found.state.names, config.laser)
-    coarse = mount_of(config.mbes.mount)
+    """Adjust the mount of the sensor that is calibrated."""
+    # Say what is calibrated, and what is known of it.
+    session, calibration = session_data(inputs, config), config.calibration
+    problem = (
+        sonar_problem(session, calibration) if isinstance(calibration, Mbes) else laser_problem(session, calibration)
+    )
+
+    # Adjust the mount by all labelled points of the sensors that observe.
+    labelled = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
+    points = {sensor: labelled[sensor] for sensor in problem.model.sigmas}
+    adjustment = adjust_mount(problem, points, config.adjust, config.ingest.max_gap_s)
+
+    # Take the residuals of all points at the adjusted values, and make the tables.
+    statistics = residual_statistics(problem, adjustment, points, inputs.passes, config.adjust)
     return Outputs(
-        **tables(found, seen.cells, seen.patterns, sigmas, together, coarse, settings, inputs.poses, inputs.passes),
-        geometry=_geometry_table(found, seen.cells, inputs, config, ins),
-        patterns=seen.patterns,
-        residuals=seen.residuals,
-        residual_bins=bins_table(seen.residuals, inputs.faces),
-        residual_map=map_table(seen.residuals, inputs.faces),
+        **result_tables(problem, adjustment, statistics, inputs.passes, config.adjust.test_level),
+        geometry=weak_geometry(inputs, config, session, adjustment, statistics),
+        patterns=statistics.patterns,
+        residuals=statistics.residuals,
+        residual_bins=bins_table(statistics.residuals, inputs.faces),
+        residual_map=map_table(statistics.residuals, inputs.faces),
     )
 
 
-def _ties(model: TargetModel, as_built: AsBuilt) -> Callable[[State], Known] | None:
-    """Families that are parallel, within what they may be turned as built."""
-    if not model.parallel:
-        return None
-    sigma = max(float(np.radians(as_built.angle_sigma_deg)), LEAST_RAD)
-    return partial(of_ties, model.parallel, sigma)
+def session_data(inputs: Inputs, config: Config) -> SessionData:
+    """Return the session as earlier stages left it, with the drift model that the adjustment is to use."""
+    drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
+    return SessionData(
+        target=target_of(config.target),
+        poses=inputs.poses,
+        target_pose=inputs.target_pose,
+        planes=inputs.planes,
+        ins=config.ins.model_copy(update={"drift": drift}),
+        laser=config.laser,
+        as_built=config.as_built,
+    )
 
 
-def _geometry_table(
-    found: Adjusted, cells: Cells, inputs: Inputs, config: Config, ins: Ins
+def weak_geometry(
+    inputs: Inputs, config: Config, session: SessionData, adjustment: MountAdjustment, statistics: ResidualStatistics
 ) -> pd.DataFrame:
-    """What the passes lack, and what would cure it."""
-    passes = inputs.passes.set_index("pass").loc[sorted({number for sensor, _, number in cells if sensor == "mbes"})]
-    rates = inputs.files.groupby("sensor")["rate_hz"].median()
-    figures = Plan(passes=(Pass(distance_m=1.0),))
-    plan = figures.model_copy(
-        update={
-            "ins_rate_hz": max(10.0, _or(rates["ins"], figures.ins_rate_hz)),
-            "laser": LaserFigures(point_rate_hz=_or(rates["laser"], figures.laser.point_rate_hz)),
-            "mbes": MbesFigures(ping_rate_hz=float(np.clip(_or(rates["mbes"], figures.mbes.ping_rate_hz), 0.1, 200.0))),
-        }
+    """Return table ``geometry``: the laser's parameters that had to be fixed, or what the sonar's passes lack.
+
+    Parameters
+    ----------
+    inputs, config : Inputs, Config
+        Those of the stage.
+    session : SessionData
+        Target and instruments.
+    adjustment : MountAdjustment
+        The adjusted values.
+    statistics : ResidualStatistics
+        Numbers of soundings by surface and pass.
+    """
+    if config.mbes is None:
+        return fixed_parameters_table(adjustment.fixed_mount)
+    setting = PredictionSetting(
+        model=session.target,
+        state=adjustment.state,
+        plan=sailed_plan(inputs.files),
+        segment=config.segment,
+        ins=session.ins,
+        laser=config.laser,
+        mbes=config.mbes,
     )
-    model = target_of(config.target)
-    setting = PredictionSetting(model, found.state, plan, config.segment, ins, config.laser, config.mbes)
-    families = [surface.family for surface in found.state.surfaces]
-    soundings = dict.fromkeys(families, 0)
-    for (sensor, surface, _), cell in cells.items():
-        soundings[families[surface]] += cell.count if sensor == "mbes" else 0
-    distances = [float(one) for one in passes["distance_m"] if np.isfinite(one)]
-    usual = figures.passes[0]
-    speed = _or(passes["speed_m_s"].abs().median(), usual.speed_m_s)
-    swing = _or(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg)  # of a wave: its amplitude
-    level = {family.name for family in model.families if family.level}
-    coverage = Coverage(distances, soundings, level, speed, swing)
-    geometry = geometry_advice(setting, coverage, found.equations.normal, found.solution)
-    rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
-    return pd.DataFrame(rows, columns=["kind", "words"]).assign(sigma=np.nan)
-
-
-def _or(measured: float, otherwise: float) -> float:
-    """What the session had, where it tells; as a plan's figures may have it."""
-    return float(np.clip(measured, 0.05, 1e7)) if np.isfinite(measured) else otherwise
+    passes = inputs.passes.set_index("pass").loc[statistics.passes_of("mbes")]
+    surfaces = enumerate(adjustment.state.surfaces)
+    soundings = {surface.family: statistics.count("mbes", number) for number, surface in surfaces}
+    return geometry_table(setting, passes, soundings, adjustment.equations.normal, adjustment.solution)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import pandas as pd
 
-from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
 from pipeline.config.pool import Adjust, Method, Segment, Verdict
@@ -80,8 +80,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     model = target_of(config.target)
     shape = measured_shape(inputs.planes, inputs.patterns, model)
     target = target_block(inputs.target_pose.iloc[0]) | {"as_found": shape}
-    drift_figures = told(config.ins, inputs.ins_sigmas, inputs.passes)
-    drift = drift_of(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift_figures = sigmas_from_files(config.ins, inputs.ins_sigmas, inputs.passes)
+    drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     source = "the INS's files say" if drift_figures else "ins.drift says"
     drift_check = check_ins_drift(inputs.drift, drift, source)
 

@@ -61,23 +61,29 @@ print(time.perf_counter() - start, points)
 ACCUMULATE = """
 import resource, sys, time
 from pathlib import Path
-from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.adjustment.accumulation import accumulate
+from pipeline.adjustment.observation_model import CurrentValues
+from pipeline.adjustment.problem import SessionData, sonar_problem
+from pipeline.adjustment.weighting import Weighting
 from pipeline.artefacts.catalogue.points import POSES
-from pipeline.folder import read_settings
-from pipeline.reading import read
-from pipeline.scene import Weighting, scene_of
-from pipeline.tables import Tables
+from pipeline.artefacts.catalogue.target import LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.run.results import Tables
+from pipeline.run.settings import read_settings
+from pipeline.target.design import target_of
 run = Path(sys.argv[1]); tables, settings = Tables(run), read_settings(run)
-given = (tables.table(one) for one in (FACES, POSES, TARGET_POSE, PLANES))
-session = settings.session
-scene = scene_of(*given, session.ins, session.laser, session.mbes, settings.pool.as_built.faces)
+pool, session = settings.pool, settings.session
+data = SessionData(
+    target=target_of(pool.target), poses=tables.table(POSES), target_pose=tables.table(TARGET_POSE),
+    planes=tables.table(PLANES), ins=session.ins, laser=session.laser, as_built=pool.as_built,
+)
+model = sonar_problem(data, session.mbes).model
 streams = {"laser": tables.stream(LASER_LABELLED), "mbes": tables.stream(SOUNDINGS_LABELLED)}
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 start = time.perf_counter()
-reading = read(streams, scene, scene.coarse, None, Weighting(robust=(3.0, 6.0)))
+accumulation = accumulate(streams, model, CurrentValues(model.coarse, None, Weighting(robust=(3.0, 6.0))))
 spent = time.perf_counter() - start
 after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-print(spent, sum(one.count for one in reading.counts.values()), (after - before) / 1024)
+print(spent, sum(group.count for group in accumulation.groups.values()), (after - before) / 1024)
 """
 
 

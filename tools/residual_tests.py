@@ -157,7 +157,7 @@ def one(task: Task) -> dict[str, Any]:
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
-    from pipeline.maths.adjustment.mean_tests import standardised
+    from pipeline.maths.adjustment.mean_tests import normal_deviates
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate_session
     from stages.in_memory import calibrate_in_memory
@@ -188,7 +188,7 @@ def one(task: Task) -> dict[str, Any]:
     row |= {"reasons": " | ".join(result["reasons"]), "tests": len(patterns), "found": bool(said)}
     row |= {"named": bool(said) and expected in said[0]}
     mean_m, sigma_m, dof = (patterns[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
-    patterns = patterns.assign(bare=standardised(mean_m, sigma_m, dof, tolerated=0.0))
+    patterns = patterns.assign(bare=normal_deviates(mean_m, sigma_m, dof, tolerated=0.0))
     for by in BY:
         rows = patterns[patterns["by"] == by]
         row |= {f"number_{by}": len(rows), f"u_{by}": rows["normalised"].abs().max()}
@@ -209,7 +209,7 @@ def read(path: Path) -> pd.DataFrame:
 
 def summary(rows: pd.DataFrame) -> str:
     """False alarms at two levels, with and without the tolerance; then each fault."""
-    from pipeline.maths.adjustment.mean_tests import limit_of
+    from pipeline.maths.adjustment.mean_tests import joint_limit
 
     heads = [f"{100 * level:g} %, {what}" for what in ("tolerance 0", "as it is") for level in LEVELS]
     lines = [f"| good sessions | number | {' | '.join(heads)} | accepted |", "|---|---:|---:|---:|---:|---:|---:|"]
@@ -219,7 +219,7 @@ def summary(rows: pd.DataFrame) -> str:
         for start in ("bare_", "u_"):
             largest = group[[f"{start}{by}" for by in BY]].max(axis=1)
             for level in LEVELS:
-                limits = np.array([limit_of(number, level) for number in group["tests"]])
+                limits = np.array([joint_limit(number, level) for number in group["tests"]])
                 most = int(binom.ppf(0.995, len(group), level))
                 cells.append(f"{int((largest > limits).sum())} (≤ {most})")
         lines.append(f"| {kind} | {len(group)} | " + " | ".join(cells) + f" | {int(group['accepted'].sum())} |")

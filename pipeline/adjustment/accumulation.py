@@ -1,4 +1,4 @@
-"""One reading of the labelled points: sums by epoch at a state, and what the next reading's weights follow from."""
+"""One pass over the labelled points: sums by interval at the current values, and the next weights."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -6,23 +6,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.observation_model import Scene
-from pipeline.adjustment.weighting import GROUPS, Weighting
+from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.weighting import GROUPS, Weighting, group_of
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
+from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.pose_errors import Drift
-from pipeline.maths.adjustment.robust import LEAST_SCALE, histogram, scale_of
+from pipeline.maths.adjustment.robust import LEAST_SCALE, histogram, robust_scale
 from pipeline.maths.adjustment.variance_components import rescaled, scatter
 
 Array = NDArray[np.float64]
-LEAST_FREE = 30  # degrees of freedom for a variance factor
+LEAST_DOF = 30  # degrees of freedom for a variance factor
 
 
 @dataclass(frozen=True)
-class Counts:
-    """Of a group of observations: how many, Σ of robust weights, how many were cut, reduced; |v| against what is
-    expected of it (histogram)."""
+class GroupStatistics:
+    """Statistics of a group of observations.
+
+    count: their number; weights: Σ of robust weights; cut, reduced: how many have no weight, or less than full weight;
+    histogram: of the normalised |v|.
+    """
 
     count: int
     weights: float
@@ -30,69 +32,103 @@ class Counts:
     reduced: int
     histogram: Array
 
-    def __add__(self, other: "Counts") -> "Counts":
-        return Counts(*(getattr(self, name) + getattr(other, name) for name in self.__dataclass_fields__))
+    def __add__(self, other: "GroupStatistics") -> "GroupStatistics":
+        return GroupStatistics(
+            **{name: getattr(self, name) + getattr(other, name) for name in self.__dataclass_fields__}
+        )
 
 
 @dataclass(frozen=True)
-class Reading:
-    """Both sensors' sums, counts by group."""
+class Accumulation:
+    """All points of one pass over the data: interval sums by sensor, statistics by group."""
 
-    sums: Mapping[str, EpochSums]
-    counts: Mapping[str, Counts]
+    sums: Mapping[str, IntervalSums]
+    groups: Mapping[str, GroupStatistics]
 
     def observations(self, sensor: str) -> int:
-        return sum(one.count for name, one in self.counts.items() if name.startswith(sensor))
+        """Return the number of a sensor's observations."""
+        return sum(group.count for name, group in self.groups.items() if name.startswith(sensor))
+
+    def robust_scales(self) -> dict[str, float]:
+        """Return the robust scale of the normalised |v|, by group."""
+        return {name: robust_scale(group.histogram) for name, group in self.groups.items()}
 
 
-def _read(
-    batch: Batch, scene: Scene, sensor: str, state: State, drift: Drift | None, weighting: Weighting
-) -> tuple[EpochSums, dict[str, Counts]]:
-    seen = scene.observe(sensor, batch, state, drift, weighting)
-    robust, weight = weighting.weights(seen)
-    normalised = weighting.normalised(seen)
-    sums = epoch_sums(seen.record, seen.share, seen.surface, seen.adjusted(weight), weight, seen.v_m)
-    counts = {}
-    for number in np.flatnonzero(np.bincount(seen.group)).tolist():
-        rows = seen.group == number
+def _accumulate_batch(
+    batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues
+) -> tuple[IntervalSums, dict[str, GroupStatistics]]:
+    observations, weighting = model.linearise(sensor, batch, values), values.weighting
+    robust, weight = weighting.weights(observations)
+    normalised = weighting.normalised(observations)
+    points = LinearisedPoints(
+        record=observations.record,
+        surface=observations.surface,
+        share=observations.share,
+        features=observations.features_at_adjusted(weight),
+        weight=weight,
+        v_m=observations.v_m,
+    )
+    groups = {}
+    for number in np.flatnonzero(np.bincount(observations.group)).tolist():
+        rows = observations.group == number
         w = robust[rows]
         cut = int(np.sum(w == 0))
-        reduced = int(np.sum(w < 1)) - cut
-        counts[GROUPS[number]] = Counts(len(w), float(w.sum()), cut, reduced, histogram(normalised[rows]))
-    return sums, counts
+        groups[GROUPS[number]] = GroupStatistics(
+            count=len(w),
+            weights=float(w.sum()),
+            cut=cut,
+            reduced=int(np.sum(w < 1)) - cut,
+            histogram=histogram(normalised[rows]),
+        )
+    return interval_sums(points), groups
 
 
-def read(
-    streams: Mapping[str, Stream], scene: Scene, state: State, drift: Drift | None, weighting: Weighting
-) -> Reading:
-    """All points of these sensors once."""
-    sums, counts = {}, dict[str, Counts]()
+def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: CurrentValues) -> Accumulation:
+    """Return the sums over all points.
+
+    Parameters
+    ----------
+    streams : mapping of Stream
+        Labelled points by sensor.
+    model : ObservationModel
+        Turns points into observations.
+    values : CurrentValues
+        Parameters, drift and weights at which to linearise.
+    """
+    sums, groups = {}, dict[str, GroupStatistics]()
     for sensor, stream in streams.items():
         pieces = []
-        for piece, found in stream.fold(_read, scene, sensor, state, drift, weighting):
+        for piece, statistics in stream.fold(_accumulate_batch, model, sensor, values):
             pieces.append(piece)
-            for name, one in found.items():
-                counts[name] = counts[name] + one if name in counts else one
+            for name, group in statistics.items():
+                groups[name] = groups[name] + group if name in groups else group
         sums[sensor] = merged(pieces)
-    return Reading(sums, {name: counts[name] for name in GROUPS if name in counts})
+    return Accumulation(sums, {name: groups[name] for name in GROUPS if name in groups})
 
 
-def refactored(reading: Reading, state: State, weighting: Weighting) -> tuple[Reading, Weighting]:
-    """The reading with the variance factors that its own scatter shows; a group too small for one takes the sensor's
-    other."""
-    flat = np.array([surface.level for surface in state.surfaces])
+def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -> tuple[Accumulation, Weighting]:
+    """Return the sums with the variance factors that their own scatter shows, and the weighting with these factors.
+
+    A group too small for a factor of its own takes that of the sensor's second group.
+
+    Parameters
+    ----------
+    accumulation : Accumulation
+        Sums with the weights of ``weighting``.
+    state : State
+        The surfaces, of which the horizontal ones are a group.
+    weighting : Weighting
+        The weights of the sums.
+    """
     factors, sums = dict(weighting.factors), {}
-    for sensor, one in reading.sums.items():
-        names = ["laser"] * len(flat) if sensor == "laser" else [GROUPS[2] if level else GROUPS[1] for level in flat]
-        scatters = {name: scatter(one, np.array(names)[one.surface] == name) for name in dict.fromkeys(names)}
-        enough = {name: max(by.factor, LEAST_SCALE**2) for name, by in scatters.items() if by.free >= LEAST_FREE}
-        of_sensor = next(iter(enough.values()), 1.0)
-        changes = {name: enough.get(name, of_sensor) for name in scatters}
+    for sensor, intervals in accumulation.sums.items():
+        names = [GROUPS[group_of(sensor, surface.level)] for surface in state.surfaces]
+        scatters = {
+            name: scatter(intervals, np.array(names)[intervals.surface] == name) for name in dict.fromkeys(names)
+        }
+        enough = {name: max(part.factor, LEAST_SCALE**2) for name, part in scatters.items() if part.dof >= LEAST_DOF}
+        default = next(iter(enough.values()), 1.0)
+        changes = {name: enough.get(name, default) for name in scatters}
         factors |= {name: factors[name] * change for name, change in changes.items()}
-        sums[sensor] = rescaled(one, {number: changes[name] for number, name in enumerate(names)})
-    return replace(reading, sums=sums), replace(weighting, factors=factors)
-
-
-def scales_of(reading: Reading) -> dict[str, float]:
-    """Robust scales of |v| against what is expected of it, by group."""
-    return {name: scale_of(one.histogram) for name, one in reading.counts.items()}
+        sums[sensor] = rescaled(intervals, {number: changes[name] for number, name in enumerate(names)})
+    return replace(accumulation, sums=sums), replace(weighting, factors=factors)

@@ -1,4 +1,4 @@
-"""Errors that do not average: with which sigma each parameter that is held may be wrong."""
+"""A-priori errors of the fixed parameters: systematic errors, which enter the total covariance."""
 
 from collections.abc import Sequence
 
@@ -8,64 +8,93 @@ from numpy.typing import NDArray
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
 from pipeline.maths.adjustment.observations import SPEED_M_S
-from pipeline.maths.adjustment.parameters import OF_LASER, SIX
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS
+from pipeline.maths.adjustment.solution import ConsiderErrors
+from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 LEAST_SPAN_M = 0.1  # a cast over less depth covers nothing
-Block = tuple[NDArray[np.int64], Array]  # numbers among all unknowns, covariance
+LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
 
 
 def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
-    """Sigma of the change of the sound speed with depth, (m/s)/m, over the water down to ``depth_m`` (the target's
-    lower end; None: as deep as the cast).
+    """Return the sigma of the change of the sound speed with depth, (m/s)/m.
 
     With a cast: its speeds at both ends of the span s that it covers have errors of ``svp_sigma_m_s`` σ of their own
-    (what all share is sound_speed_sigma_m_s), so that the slope between them has √(σ² + σ²) / s = √2 σ / s. In the
-    share of the depth without a cast the speed is held at the last one's, wrong by the gradient that is considered
-    without a cast: both, independent, are added in squares. The default of σ, 0.05 m/s, is of the size that makers
-    state for probes that time a pulse (0.02 to 0.06); those that compute from conductivity and temperature state 0.15.
+    (the error that all share is sound_speed_sigma_m_s), so that the slope between them has √(σ² + σ²) / s = √2 σ / s.
+    In the share of the depth without a cast the speed is fixed at the last one's, wrong by the gradient that is
+    considered without a cast: both, independent, are added in squares. The default of σ, 0.05 m/s, is of the size that
+    makers state for probes that time a pulse (0.02 to 0.06); those that compute from conductivity and temperature state
+    0.15.
+
+    Parameters
+    ----------
+    mbes : Mbes
+        The session's sonar.
+    depth_m : float or None
+        Depth of the target's lower end below the water; None: as deep as the cast.
     """
-    whole = mbes.sound_speed_gradient_sigma_1_s
+    without_cast = mbes.sound_speed_gradient_sigma_1_s
     if mbes.svp is None:
-        return whole
+        return without_cast
     first, last = mbes.svp[0][0], mbes.svp[-1][0]
     depth = last if depth_m is None else max(depth_m, LEAST_SPAN_M)
     span = max(min(last, depth) - first, LEAST_SPAN_M)
-    return float(np.hypot(np.sqrt(2) * mbes.svp_sigma_m_s / span, max(1 - span / depth, 0.0) * whole))
+    return float(np.hypot(np.sqrt(2) * mbes.svp_sigma_m_s / span, max(1 - span / depth, 0.0) * without_cast))
 
 
-def considered_of(
-    names: Sequence[str],
-    laser: Laser,
-    mbes: Mbes | None,
-    as_built: AsBuilt,
-    depth_m: float | None = None,
-) -> Array:
-    """Sigmas (u,) of the unknowns ``names`` where they are held; zero for the mount and the surfaces. ``depth_m``: how
-    far the target's lower end lies below the water."""
-    mount = laser.mount_sigma
-    six = [float(np.radians(mount.angle_deg))] * 3 + [mount.lever_arm_m] * 3
-    if laser.mount_covariance is not None:
-        six = [float(np.sqrt(max(row[k], 0.0))) for k, row in enumerate(laser.mount_covariance)]
-    sigmas = dict(zip(OF_LASER[:SIX], six, strict=True))
+def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> ConsiderErrors:
+    """Return the errors of the laser and of the wet faces, zero for all other parameters.
+
+    The laser's mount has its covariance as one block, where the session states it.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of all parameters.
+    laser : Laser
+        The session's laser.
+    as_built : AsBuilt
+        Sigmas of the wet faces against the dry ones.
+    """
+    mount, covariance = laser.mount_sigma, laser.mount_covariance
+    mount_sigmas = [float(np.radians(mount.angle_deg))] * 3 + [mount.lever_arm_m] * 3
+    if covariance is not None:
+        mount_sigmas = [float(np.sqrt(max(row[k], 0.0))) for k, row in enumerate(covariance)]
+    sigmas = dict(zip(LASER_MOUNT, mount_sigmas, strict=True))
     sigmas |= {"laser_range": laser.range_bias_sigma_m, "laser_latency": laser.latency_sigma_s}
-    if mbes is not None:
-        sigmas |= {
-            "mbes_range": mbes.range_bias_sigma_m,
-            "mbes_latency": mbes.latency_sigma_s,
-            "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
-            "sound_speed_gradient": gradient_sigma(mbes, depth_m),
-        }
     lean = float(np.radians(as_built.angle_sigma_deg))
     for name in names:
         if name.startswith("wet_"):
             sigmas[name] = as_built.offset_sigma_m if name.endswith("_shift") else lean
-    return np.array([sigmas.get(name, 0.0) for name in names])
+    blocks = []
+    if covariance is not None and LASER_MOUNT[0] in names:
+        blocks = [(np.array([names.index(name) for name in LASER_MOUNT]), np.array(covariance))]
+    return ConsiderErrors(np.array([sigmas.get(name, 0.0) for name in names]), blocks)
 
 
-def correlated(names: Sequence[str], laser: Laser) -> tuple[Block, ...]:
-    """Those of the unknowns ``names`` whose errors are not independent: the laser's six, where their covariance is
-    given."""
-    if laser.mount_covariance is None:
-        return ()
-    return ((np.array([names.index(name) for name in OF_LASER[:SIX]]), np.array(laser.mount_covariance)),)
+def sonar_errors(
+    names: Sequence[str], laser: Laser, mbes: Mbes, as_built: AsBuilt, depth_m: float | None = None
+) -> ConsiderErrors:
+    """Return the errors of laser, sonar and wet faces where the sonar is calibrated; zero for mount and surfaces.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of all parameters.
+    laser, mbes : Laser, Mbes
+        The session's sensors.
+    as_built : AsBuilt
+        Sigmas of the wet faces against the dry ones.
+    depth_m : float, optional
+        Depth of the target's lower end below the water.
+    """
+    errors = laser_errors(names, laser, as_built)
+    of_sonar = {
+        "mbes_range": mbes.range_bias_sigma_m,
+        "mbes_latency": mbes.latency_sigma_s,
+        "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
+        "sound_speed_gradient": gradient_sigma(mbes, depth_m),
+    }
+    sigmas = [of_sonar.get(name, sigma) for name, sigma in zip(names, errors.sigmas.tolist(), strict=True)]
+    return ConsiderErrors(np.array(sigmas), errors.blocks)

@@ -1,4 +1,4 @@
-"""What an INS says of its own accuracy (table ins_sigmas), and the drift that the adjustment concedes it by that."""
+"""The INS's noise in the adjustment: drift by the sigmas in its files (table ins_sigmas) or by session.yaml."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,9 +8,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.config.session import Drift, Ins
+from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.geometry.passes import pass_of
 
-AXES = {  # of the session's drift: the columns of which the root mean square counts
+AXES = {  # figures of the session's drift: the columns whose root mean square counts
     "horizontal_m": ["north_m", "east_m"],
     "vertical_m": ["up_m"],
     "roll_pitch_deg": ["roll_deg", "pitch_deg"],
@@ -18,22 +19,55 @@ AXES = {  # of the session's drift: the columns of which the root mean square co
 }
 
 
-def told(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:
-    """Figures of the drift that the files tell: the medians within the passes; none where the session's go first."""
+def sigmas_from_files(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:
+    """Return the drift sigmas from the INS files, medians over the passes; empty if session.yaml takes precedence.
+
+    Parameters
+    ----------
+    ins : Ins
+        The session's INS; ``drift_from`` tells which figures take precedence.
+    ins_sigmas : DataFrame
+        Table ins_sigmas.
+    passes : DataFrame
+        Table passes.
+    """
     if ins.drift_from == "settings":
         return {}
     number = pass_of(*(table.to_numpy() for table in (ins_sigmas["t_ns"], passes["start_ns"], passes["end_ns"])))
     inside = ins_sigmas[number >= 0]
-    return rms({name: inside[name].to_numpy(np.float64) for columns in AXES.values() for name in columns})
+    return median_sigmas({name: inside[name].to_numpy(np.float64) for columns in AXES.values() for name in columns})
 
 
-def rms(sigmas: Mapping[str, NDArray[Any]]) -> dict[str, float]:
-    """The medians of the drift's figures by the sigmas' columns; those that are told."""
-    squares = {name: np.mean([sigmas[one] ** 2 for one in columns], axis=0) for name, columns in AXES.items()}
-    known = {name: values[np.isfinite(values)] for name, values in squares.items()}
-    return {name: float(np.sqrt(np.median(values))) for name, values in known.items() if len(values)}
+def median_sigmas(sigmas: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+    """Return the medians of the drift's figures, from the columns of ins_sigmas; those that have any value."""
+    squares = {name: np.mean([sigmas[axis] ** 2 for axis in columns], axis=0) for name, columns in AXES.items()}
+    finite = {name: values[np.isfinite(values)] for name, values in squares.items()}
+    return {name: float(np.sqrt(np.median(values))) for name, values in finite.items() if len(values)}
 
 
-def drift_of(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Drift:
-    """The drift to be conceded: the files' figures where there are any, else the session's, as the time constant."""
-    return ins.drift.model_copy(update=told(ins, ins_sigmas, passes))
+def drift_model(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Drift:
+    """Return the drift model: sigmas from the files where available, otherwise from session.yaml.
+
+    The time constant is always that of session.yaml.
+
+    Parameters
+    ----------
+    ins : Ins
+        The session's INS.
+    ins_sigmas : DataFrame
+        Table ins_sigmas.
+    passes : DataFrame
+        Table passes.
+    """
+    return ins.drift.model_copy(update=sigmas_from_files(ins, ins_sigmas, passes))
+
+
+def pose_noise(ins: Ins) -> PoseNoise:
+    """Return the INS's noise in the target frame (z up: heading turns about it)."""
+    drift, white = ins.drift, ins.white
+    angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
+    return PoseNoise(
+        white=np.r_[[white.position_m] * 3, [np.radians(white.attitude_deg)] * 3],
+        drift=np.r_[drift.horizontal_m, drift.horizontal_m, drift.vertical_m, angles],
+        time_constant_s=drift.time_constant_s,
+    )

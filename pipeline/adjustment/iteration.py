@@ -1,204 +1,270 @@
-"""The adjustment's iteration: read all points, solve, move; until neither values nor weights change any more."""
+"""The adjustment's iteration: read all points, solve, step; until neither values nor weights change any more."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.accumulation import Reading, read, refactored, scales_of
-from pipeline.adjustment.observation_model import Scene
+from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
+from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.weighting import Weighting
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
-from pipeline.config.session import Ins
-from pipeline.maths.adjustment.design_constraints import Known
-from pipeline.maths.adjustment.design_matrix import of_poses
-from pipeline.maths.adjustment.eliminate_drift import Eliminated
-from pipeline.maths.adjustment.interval_sums import EpochSums
-from pipeline.maths.adjustment.normal_equations import moved, normal_equations, settle
-from pipeline.maths.adjustment.parameters import SIX, State
-from pipeline.maths.adjustment.pose_errors import Drift, PoseNoise, knots_of
+from pipeline.maths.adjustment.design_matrix import pose_design
+from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.estimability import parameters_to_fix
+from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
+from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
+from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
 from pipeline.maths.adjustment.solution import Solution, solve
-from pipeline.maths.adjustment.variance_components import Common, Scatter, common, scatter
+from pipeline.maths.adjustment.variance_components import EpochVarianceFactor, Scatter, epoch_variance_factor, scatter
+from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-NONE = (1e-3, 1e-10, 1e-9)  # a step below this share of its sigma, or below so many rad or m, is none
-SETTLED = (0.05, 1e-6, 1e-5)  # after one as small as this the weights would change too little for another reading
-NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
-SURE, UNLIKELY = 0.1, 100.0  # the white noise's factor is applied if its sigma is below, within these bounds
-LEAST_READINGS = 3  # to see the drift, to see outliers against it, and to know their scale
-CLOSING = 3  # steps, at most, with the last weights
-SETTLING = 10  # steps, at most, to come there
 
 
 @dataclass(frozen=True)
-class Adjusted:
-    """Where the iteration ended; ``shared``: by sensor the variance factor of what an epoch's points have in common,
-    of which the laser's has been applied to the INS's white noise."""
+class StepLimits:
+    """Bounds below which a step of the mount is small: a share of its sigma, or these values in rad and m."""
+
+    sigmas: float
+    rad: float
+    m: float
+
+
+CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # no step worth another
+SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step the weights would change too little for another pass
+NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
+SURE, UNLIKELY = 0.1, 100.0  # the white noise's factor is applied if its sigma is below, within these bounds
+LEAST_PASSES = 3  # over the points: to see the drift, to see outliers against it, and to know their scale
+CLOSING_STEPS = 3  # at most, with the last weights
+INITIAL_STEPS = 10  # at most, from the coarse mount to near enough
+
+
+@dataclass(frozen=True)
+class MountAdjustment:
+    """Where the iteration ended.
+
+    accumulation: sums at the final values; epoch_factors: per sensor, the variance factor of the error common to all
+    points of an interval (the laser's factor has already been applied to the INS's white noise); equations: of all
+    parameters, fixed ones included; fixed_mount: mount parameters that the observations could not give, and the sigma
+    with which each would have come out (rad or m).
+    """
 
     state: State
-    drift: Drift
+    drift: DriftEstimate
     weighting: Weighting
-    reading: Reading
-    shared: Mapping[str, Common]
-    equations: Eliminated
+    accumulation: Accumulation
+    epoch_factors: Mapping[str, EpochVarianceFactor]
+    equations: NormalEquations
     solution: Solution
+    fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
 
     @property
+    def values(self) -> CurrentValues:
+        """The final values, at which residuals are taken."""
+        return CurrentValues(self.state, self.drift, self.weighting)
+
+    @property
     def redundancy(self) -> float:
-        """Observations with their robust weights, less the unknowns; pose errors are no unknowns: they have a prior."""
-        return sum(one.weights for one in self.reading.counts.values()) - len(self.solution.free)
+        """Observations with their robust weights, less the parameters; pose errors count as observed, by a prior."""
+        observations = sum(group.weights for group in self.accumulation.groups.values())
+        return observations - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
-        """What the sums of squares hold beyond the scatter within epochs: how well epochs, passes and sensors agree."""
-        everywhere = [scatter(one, np.ones(len(one), dtype=bool)) for one in self.reading.sums.values()]
-        within = sum(one.squares for one in everywhere), sum(one.free for one in everywhere)
+        """The sum of squares beyond the scatter within intervals: how well intervals, passes and sensors agree."""
+        parts = [scatter(sums, np.ones(len(sums), dtype=bool)) for sums in self.accumulation.sums.values()]
+        within = sum(part.squares for part in parts), sum(part.dof for part in parts)
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
 
-def noise_of(ins: Ins) -> PoseNoise:
-    """The INS's noise as the session states it, target frame (z up: heading turns about it)."""
-    drift, white = ins.drift, ins.white
-    angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
-    return PoseNoise(
-        np.r_[[white.position_m] * 3, [np.radians(white.attitude_deg)] * 3],
-        np.r_[drift.horizontal_m, drift.horizontal_m, drift.vertical_m, angles],
-        drift.time_constant_s,
+def estimated_parameters(state: State, additional: Sequence[str] = ()) -> list[int]:
+    """Return the parameters to estimate: the mount, the surfaces, and those that the config names."""
+    surfaces = range(state.surface_slice.start, state.surface_slice.stop)
+    return sorted({*range(N_MOUNT), *surfaces, *(state.names.index(name) for name in additional)})
+
+
+def adjust_mount(
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+) -> MountAdjustment:
+    """Return the adjustment, from the coarse mount to the solution.
+
+    Parameters
+    ----------
+    problem : CalibrationProblem
+        What is calibrated, and what is known of it.
+    streams : mapping of Stream
+        Labelled points by sensor.
+    settings : Adjust
+        Limits of the iteration, robust weights, additional parameters to estimate.
+    gap_s : float
+        A longer time without observations ends a pass.
+    """
+    noise = problem.prior.noise
+    weighted = _weighted_iteration(problem, streams, settings, gap_s)
+    last, estimated = weighted.last, weighted.estimated
+    factors: dict[str, EpochVarianceFactor] = {}
+    converged = False
+    if not weighted.deficient:
+        # take the INS's white noise from the laser, and close with the weights as they are
+        factors = _epoch_factors(last, noise)
+        noise = _with_factor(noise, factors["laser"])
+        for _ in range(CLOSING_STEPS):
+            last, solution = last.stepped(noise, estimated)
+            converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
+            if converged:
+                break
+    # solve the equations of all parameters, fixed ones included, for the covariance and the tests
+    equations = last.equations(noise)
+    solution = solve(equations.normal, equations.right, estimated.tolist())
+    return MountAdjustment(
+        state=last.linearisation.state,
+        drift=last.drift,
+        weighting=weighted.weighting,
+        accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
+        epoch_factors=factors,
+        equations=equations,
+        solution=solution,
+        fixed_mount=weighted.fixed_mount,
+        converged=converged and not solution.deficiency,
+        iterations=weighted.iterations,
     )
 
 
-def free_unknowns(state: State, further: Sequence[str] = ()) -> list[int]:
-    """The six, the surfaces, and what the config frees besides."""
-    shared = range(state.shared.start, state.shared.stop)
-    return sorted({*range(SIX), *shared, *(state.names.index(name) for name in further)})
-
-
 @dataclass(frozen=True)
-class Given:
-    """What is known beside the observations: noise of the poses, what the surfaces are known to be (at a state), and
-    which of the six are to be held, from the normal equations of all unknowns at the first reading."""
+class _Iterate:
+    """Current values, and the sums taken there."""
 
-    noise: PoseNoise
-    surfaces: Callable[[State], Known] | None = None
-    held: Callable[[Array], Sequence[int]] | None = None
+    linearisation: Linearisation
+    drift: DriftEstimate
+    surfaces: SurfacePrior | None
 
-
-def adjust(
-    streams: Mapping[str, Stream], scene: Scene, given: Given, settings: Adjust, gap_s: float
-) -> Adjusted:
-    """From the coarse mount to the solution."""
-    noise = given.noise
-    state = _near(streams["mbes"], scene) if "mbes" in streams else scene.coarse
-    free = np.array(free_unknowns(state, settings.free))
-    weighting, known, settled = Weighting(), None, False
-    for iteration in range(1, settings.max_iterations + 1):
-        reading, weighting = refactored(read(streams, scene, state, known, weighting), state, weighting)
-        drift = known or _no_drift(reading, scene, noise, gap_s)
-        before = _Point(state, drift, reading.sums, given.surfaces)
-        if iteration == 1 and given.held is not None:
-            held = given.held(before.equations(scene, noise).normal)
-            free = np.setdiff1d(free, np.array(held, dtype=np.int64))
-        now, solution = before.stepped(scene, noise, free)
-        if solution.deficiency:
-            return before.adjusted(scene, noise, free, weighting, reading, {}, False, iteration)
-        state, known = now.state, now.drift
-        settled = weighting.robust is not None and _small(solution, free, *SETTLED)
-        if settled and iteration >= LEAST_READINGS:
-            break
-        known_scales = scales_of(reading) if iteration > 1 else {}  # of the groups that there are
-        scales = {**weighting.scales, **known_scales}
-        weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
-    poses = of_poses(state.surfaces, np.arange(len(state.surfaces)))
-    shared = {sensor: common(one, poses, noise.white) for sensor, one in now.sums.items()}
-    if shared["laser"].sigma < SURE:
-        noise = noise.scaled(min(max(shared["laser"].factor, 1 / UNLIKELY), UNLIKELY), 1.0)
-    converged = False
-    for _ in range(CLOSING):  # the weights as they are
-        now, solution = now.stepped(scene, noise, free)
-        converged = settled and _small(solution, free, *NONE)
-        if converged:
-            break
-    return now.adjusted(scene, noise, free, weighting, reading, shared, converged, iteration)
-
-
-@dataclass(frozen=True)
-class _Point:
-    """Where the iteration stands: values, and the sums taken there."""
-
-    state: State
-    drift: Drift
-    sums: Mapping[str, EpochSums]
-    surfaces: Callable[[State], Known] | None
-
-    def equations(self, scene: Scene, noise: PoseNoise, wanted: Integers | None = None) -> Eliminated:
-        """Normal equations of all unknowns, or of those ``wanted``, with what is known of the surfaces."""
-        found = normal_equations(self.sums, self.state, scene.body, noise, self.drift, wanted)
+    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
+        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
+        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
         if self.surfaces is None:
-            return found
-        more = self.surfaces(self.state)
-        places = np.arange(self.state.size) if wanted is None else wanted
+            return equations
+        prior = self.surfaces.pseudo_observations(state)
+        places = np.arange(state.size) if selected is None else selected
         return replace(
-            found,
-            normal=found.normal + more.normal[np.ix_(places, places)],
-            right=found.right + more.right[places],
-            squares=found.squares + more.squares,
+            equations,
+            normal=equations.normal + prior.normal[np.ix_(places, places)],
+            right=equations.right + prior.right[places],
+            squares=equations.squares + prior.squares,
         )
 
-    def stepped(self, scene: Scene, noise: PoseNoise, free: Integers) -> tuple["_Point", Solution]:
-        """After a step of the free unknowns; and their solution, numbered as in ``free``."""
-        equations = self.equations(scene, noise, free)
-        solution = solve(equations.normal, equations.right, range(len(free)))
-        step, drift_step = np.zeros(self.state.size), equations.knots(solution.step)
-        step[free] = solution.step
-        sums = moved(self.sums, self.state, scene.body, self.drift, step, drift_step)
-        moved_to = replace(self, state=self.state.moved(step), drift=self.drift.moved(drift_step), sums=sums)
-        return moved_to, solution
-
-    def adjusted(
-        self,
-        scene: Scene,
-        noise: PoseNoise,
-        free: Integers,
-        weighting: Weighting,
-        reading: Reading,
-        shared: Mapping[str, Common],
-        converged: bool,
-        iterations: int,
-    ) -> Adjusted:
-        """The end: equations of all unknowns, those held as well."""
-        equations = self.equations(scene, noise)
-        solution = solve(equations.normal, equations.right, free.tolist())
-        reading = replace(reading, sums=self.sums)
-        ended = (self.state, self.drift, weighting, reading, shared, equations, solution)
-        return Adjusted(*ended, converged and not solution.deficiency, iterations)
+    def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
+        """Return the values after a step of the estimated parameters, and the solution, numbered as in these."""
+        state = self.linearisation.state
+        equations = self.equations(noise, estimated)
+        solution = solve(equations.normal, equations.right, range(len(estimated)))
+        step, drift_step = np.zeros(state.size), equations.knots(solution.step)
+        step[estimated] = solution.step
+        sums = updated_sums(self.linearisation, step, DriftEstimate(self.drift.knots, drift_step))
+        drift = self.drift.updated(drift_step)
+        linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
+        return _Iterate(linearisation, drift, self.surfaces), solution
 
 
-def _near(soundings: Stream, scene: Scene) -> State:
-    """The coarse mount brought so far that the soundings lie on the laser's planes."""
-    state = scene.coarse
-    for _ in range(SETTLING):
-        sums = read({"mbes": soundings}, scene, state, None, Weighting()).sums["mbes"]
-        step = settle(sums, state, scene.body)
-        state = state.moved(step)
+@dataclass(frozen=True)
+class _WeightedIteration:
+    """The iteration after its last pass over the points; ``deficient``: the data leave directions open."""
+
+    last: _Iterate
+    estimated: Integers
+    fixed_mount: Mapping[int, float]
+    weighting: Weighting
+    accumulation: Accumulation
+    settled: bool
+    deficient: bool
+    iterations: int
+
+
+def _weighted_iteration(
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+) -> _WeightedIteration:
+    """Read all points, solve and step, until the weights change no more."""
+    model, prior = problem.model, problem.prior
+    state = _initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
+    values = CurrentValues(state)
+    estimated = np.array(estimated_parameters(state, settings.free))
+    fixed: dict[int, float] = {}
+    for iteration in range(1, settings.max_iterations + 1):
+        # read all points, and take the variance factors of the groups from their scatter
+        accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
+        drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
+        start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
+        # fix the mount parameters that these observations cannot give
+        if iteration == 1 and prior.required_sigmas is not None:
+            normal = start.equations(prior.noise).normal
+            fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
+            estimated = np.setdiff1d(estimated, np.array(list(fixed), dtype=np.int64))
+        # solve and step
+        stepped, solution = start.stepped(prior.noise, estimated)
+        deficient = solution.deficiency > 0
+        settled = weighting.robust is not None and _is_small(solution, estimated, SETTLED)
+        if deficient or (settled and iteration >= LEAST_PASSES):
+            break
+        # reduce the weights of outliers from the next pass on, against scales that have seen the drift
+        scales = {**weighting.scales, **(accumulation.robust_scales() if iteration > 1 else {})}
+        weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
+        values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
+    return _WeightedIteration(
+        last=start if deficient else stepped,
+        estimated=estimated,
+        fixed_mount=fixed,
+        weighting=weighting,
+        accumulation=accumulation,
+        settled=settled,
+        deficient=deficient,
+        iterations=iteration,
+    )
+
+
+def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
+    """Return the coarse mount, stepped until the soundings lie near the laser's planes."""
+    state = model.coarse
+    for _ in range(INITIAL_STEPS):
+        sums = accumulate({"mbes": soundings}, model, CurrentValues(state)).sums
+        step = mount_step(Linearisation(sums, state, model.body))
+        state = state.updated(step)
         if np.max(np.abs(step)) < NEAR_RAD_M:
             break
     return state
 
 
-def _no_drift(reading: Reading, scene: Scene, noise: PoseNoise, gap_s: float) -> Drift:
-    record = np.unique(np.concatenate([one.record for one in reading.sums.values()]))
-    knots = knots_of(record, scene.body.seconds, noise.spacing_s, gap_s)
-    return Drift(knots, np.zeros((len(knots.record), SIX)))
+def _zero_drift(
+    accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float
+) -> DriftEstimate:
+    record = np.unique(np.concatenate([sums.record for sums in accumulation.sums.values()]))
+    return DriftEstimate.zero(place_knots(record, model.body.seconds, noise.spacing_s, gap_s))
 
 
-def _small(solution: Solution, free: Integers, sigmas: float, rad: float, m: float) -> bool:
-    """Whether the step of the six, or of those that are free, is below this share of their sigmas, or below these
-    values."""
-    six = np.flatnonzero(free < SIX)
-    sigma = np.sqrt(np.diag(solution.covariance))[six]
-    return bool(np.all(np.abs(solution.step[six]) <= np.maximum(sigmas * sigma, np.repeat([rad, m], 3)[free[six]])))
+def _epoch_factors(last: _Iterate, noise: PoseNoise) -> dict[str, EpochVarianceFactor]:
+    """Return the variance factor of the error common to an interval's points, by sensor."""
+    surfaces = last.linearisation.state.surfaces
+    designs = pose_design(surfaces, np.arange(len(surfaces)))
+    sums_by_sensor = last.linearisation.sums
+    return {sensor: epoch_variance_factor(sums, designs, noise.white) for sensor, sums in sums_by_sensor.items()}
+
+
+def _with_factor(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
+    """Return the noise with its white part as the laser shows it, where the laser shows it well."""
+    if laser.sigma < SURE:
+        return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY), 1.0)
+    return noise
+
+
+def _is_small(solution: Solution, estimated: Integers, limits: StepLimits) -> bool:
+    """Return whether the step of each estimated mount parameter is within the limits."""
+    mount = np.flatnonzero(estimated < N_MOUNT)
+    sigma = np.sqrt(np.diag(solution.covariance))[mount]
+    absolute = np.repeat([limits.rad, limits.m], 3)[estimated[mount]]
+    return bool(np.all(np.abs(solution.step[mount]) <= np.maximum(limits.sigmas * sigma, absolute)))

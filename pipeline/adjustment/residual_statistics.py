@@ -1,6 +1,6 @@
-"""The last reading: what the residuals of every point say, and some of the points to be looked at."""
+"""Final pass over all points: residual statistics by bin, and a thinned sample of the residuals for the report."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,26 +8,26 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.iteration import Adjusted
-from pipeline.adjustment.observation_model import Scene
-from pipeline.adjustment.residual_tables import residuals_table, step_for
-from pipeline.adjustment.weighting import Observations, Weighting
+from pipeline.adjustment.iteration import MountAdjustment
+from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.adjustment.residual_sample import residual_sample, residuals_table, sampling_step
+from pipeline.adjustment.weighting import Observations
 from pipeline.artefacts.catalogue.results import PATTERNS
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.drift_test import against_other_passes
-from pipeline.maths.adjustment.mean_tests import standardised
-from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.pose_errors import Drift, PoseNoise
+from pipeline.maths.adjustment.drift_test import drift_between_passes
+from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.residual_means import (
-    Cell,
-    Moments,
-    against_others,
-    cells_of,
-    merged_moments,
-    moments_of,
-    steps_of,
+    BinMean,
+    BinnedResiduals,
+    ResidualSums,
+    bin_means,
+    differences_from_rest,
+    merged_residual_sums,
+    residual_sums,
+    step_differences,
 )
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.sonar.soundings import receive_angle
@@ -37,128 +37,112 @@ Integers = NDArray[np.int64]
 WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # degrees, m, s
 CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may take its modes in turn, from ping to ping
 REACH = 4  # bins on either side of a step
-FEWEST, FEWEST_MOMENTS, FEWEST_FREE = 30, 5, 8.0  # points, moments and degrees of freedom of a mean that is judged
+FEWEST, FEWEST_SLOTS, FEWEST_DOF = 30, 5, 8.0  # points, slots and degrees of freedom of a mean that is tested
 TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # columns of the drift
-KNOWN = 1e9  # degrees of freedom of a sigma that is given
+KNOWN = 1e9  # degrees of freedom of a sigma that is not estimated
 Row = dict[str, Any]
-Cells = Mapping[tuple[str, int, int], Cell]  # by sensor, surface, pass
+PassMeans = Mapping[tuple[str, int, int], BinMean]  # by sensor, surface, pass
 
 
 @dataclass(frozen=True)
-class Look:
-    """By sensor, surface and pass; by all the bins of the table ``patterns``; the table ``residuals``."""
+class ResidualStatistics:
+    """Means by sensor, surface and pass; the table ``patterns``, means by all bins; the table ``residuals``."""
 
-    cells: Cells
+    pass_means: PassMeans
     patterns: pd.DataFrame
     residuals: pd.DataFrame
 
+    def passes_of(self, sensor: str) -> list[int]:
+        """Return the numbers of the passes in which a sensor has points."""
+        return sorted({number for name, _, number in self.pass_means if name == sensor})
 
-def look(
+    def count(self, sensor: str, surface: int) -> int:
+        """Return the number of a sensor's points on one surface, over all passes."""
+        return sum(mean.count for key, mean in self.pass_means.items() if key[:2] == (sensor, surface))
+
+
+@dataclass(frozen=True)
+class _Thinning:
+    """Length of a slot of time, and every how many points to take into the sample."""
+
+    slot_ns: int
+    step: int
+
+
+def residual_statistics(
+    problem: CalibrationProblem,
+    adjustment: MountAdjustment,
     streams: Mapping[str, Stream],
-    scene: Scene,
-    adjusted: Adjusted,
+    passes: pd.DataFrame,
     settings: Adjust,
-    of_drift: Iterable[Row],
-    at_most: int,
-) -> Look:
-    """``of_drift``: further rows of ``patterns``; ``at_most`` points of a sensor in the table."""
-    cells: dict[tuple[str, int, int], Cell] = {}
+) -> ResidualStatistics:
+    """Return statistics and a sample of the residuals at the adjusted values.
+
+    Parameters
+    ----------
+    problem : CalibrationProblem
+        What is calibrated, and what is known of it.
+    adjustment : MountAdjustment
+        The adjusted values.
+    streams : mapping of Stream
+        Labelled points by sensor.
+    passes : DataFrame
+        Table passes.
+    settings : Adjust
+        Slot of time, tolerance.
+    """
+    pass_means: dict[tuple[str, int, int], BinMean] = {}
     patterns: list[Row] = []
-    taken: list[Batch] = []
-    families = [surface.family for surface in adjusted.state.surfaces]
+    samples: list[Batch] = []
+    families = [surface.family for surface in adjustment.state.surfaces]
     for sensor, stream in streams.items():
-        step = step_for(adjusted.reading.observations(sensor), at_most)
-        slot_ns = round(settings.moment_s * NS)
-        arguments = (scene, sensor, adjusted.state, adjusted.drift, adjusted.weighting, slot_ns, step)
-        found: dict[str, list[Moments]] = {}
-        for moments, points in stream.fold(_look, *arguments):
-            taken.append(points)
-            for name, one in moments.items():
-                found.setdefault(name, []).append(one)
-        for name, pieces in found.items():
-            whole = merged_moments(pieces)
-            if name == "pass":
-                cells |= {(sensor, *cell.key): cell for cell in cells_of(whole)}
-            means = _means(name, whole)
-            patterns += [_row(name, sensor, families[cell.key[0]], cell) for cell in means if _judged(cell)]
-    return Look(cells, _table([*patterns, *of_drift], settings.test_tolerance_m), residuals_table(taken))
+        step = sampling_step(adjustment.accumulation.observations(sensor))
+        thinning = _Thinning(round(settings.moment_s * NS), step)
+        pieces: dict[str, list[ResidualSums]] = {}
+        for sums_by_variable, sample in stream.fold(_batch, problem.model, sensor, adjustment.values, thinning):
+            samples.append(sample)
+            for variable, sums in sums_by_variable.items():
+                pieces.setdefault(variable, []).append(sums)
+        for variable, parts in pieces.items():
+            sums = merged_residual_sums(parts)
+            if variable == "pass":
+                pass_means |= {(sensor, *mean.key): mean for mean in bin_means(sums)}
+            means = [mean for mean in _means(variable, sums) if _is_tested(mean)]
+            patterns += [_row(variable, sensor, families[mean.key[0]], mean) for mean in means]
+    patterns += _drift_rows(problem, adjustment, passes)
+    return ResidualStatistics(
+        pass_means, _patterns_table(patterns, settings.test_tolerance_m), residuals_table(samples)
+    )
 
 
-def _means(name: str, moments: Moments) -> list[Cell]:
-    if name == "pass" or name in CYCLES:
-        return against_others(moments)
-    return steps_of(moments, REACH) if name == "step" else cells_of(moments)
+def _batch(
+    batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues, thinning: _Thinning
+) -> tuple[dict[str, ResidualSums], Batch]:
+    """Return the sums of one batch by variable, and a sample of its residuals."""
+    observations, weighting = model.linearise(sensor, batch, values), values.weighting
+    robust, _ = weighting.weights(observations)
+    # plain weights: a whole bin that is off must show, not be rejected
+    plain = observations.sigma_m * np.sqrt(weighting.factors_of(observations.group))
+    normalised = np.where(robust > 0, np.abs(weighting.normalised(observations)), 0.0)
+    slot = observations.points["t_ns"] // thinning.slot_ns
+    sums = {}
+    for variable, column in _variables(sensor, observations):
+        residuals = BinnedResiduals(
+            first=observations.surface,
+            second=np.floor(column / WIDTHS.get(variable, 1.0)).astype(np.int64),
+            slot=slot,
+            weight=1 / plain**2,
+            v_m=observations.v_m,
+            normalised=normalised,
+        )
+        sums[variable] = residual_sums(residuals)
+    thinned = {name: column[:: thinning.step] for name, column in batch.items()}
+    return sums, residual_sample(model, sensor, thinned, values)
 
 
-def _judged(cell: Cell) -> bool:
-    return cell.count >= FEWEST and cell.moments >= FEWEST_MOMENTS and cell.dof >= FEWEST_FREE
-
-
-def _row(name: str, sensor: str, family: str, cell: Cell) -> Row:
-    width = WIDTHS.get(name, 1.0)
-    return {
-        "by": name,
-        "sensor": sensor,
-        "family": family,
-        "low": cell.key[1] * width,
-        "width": width,
-        "count": cell.count,
-        "mean_m": cell.mean_m,
-        "sigma_mean_m": cell.sigma_mean_m,
-        "dof": cell.dof,
-    }
-
-
-def _table(rows: list[Row], tolerance_m: float) -> pd.DataFrame:
-    columns = [column.name for column in PATTERNS.columns]
-    table = pd.DataFrame(rows, columns=columns)
-    mean, sigma, dof = (table[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
-    tolerated = np.where(table["by"] == "drift", 0.0, tolerance_m)
-    return table.assign(normalised=standardised(mean, sigma, dof, tolerated))
-
-
-def drift_rows(drift: Drift, noise: PoseNoise, poses: pd.DataFrame, passes: pd.DataFrame) -> list[Row]:
-    """How the drift found in each pass turns the boat against the others, as rows of ``patterns``; rad. (How it moves
-    the boat tells of the INS alone: both sensors move alike.)"""
-    t_ns = poses["t_ns"].to_numpy()[drift.knots.record]
-    number = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()).astype(np.int64)
-    places, values, sigmas = against_other_passes(drift, noise, number)
-    return [
-        {"by": "drift", "sensor": "ins", "family": name, "low": float(place), "width": 1.0}
-        | {"count": int(np.sum(number == place)), "mean_m": value[k], "sigma_mean_m": sigma[k], "dof": KNOWN}
-        for place, value, sigma in zip(places, values, sigmas, strict=True)
-        for name, k in TURNS.items()
-        if sigma[k] > 0
-    ]
-
-
-def _look(
-    batch: Batch,
-    scene: Scene,
-    sensor: str,
-    state: State,
-    drift: Drift,
-    weighting: Weighting,
-    slot_ns: int,
-    step: int,
-) -> tuple[dict[str, Moments], Batch]:
-    seen = scene.observe(sensor, batch, state, drift, weighting)
-    robust, _ = weighting.weights(seen)
-    plain = seen.sigma_m * np.sqrt(weighting.factor(seen.group))
-    size = np.where(robust > 0, np.abs(weighting.normalised(seen)), 0.0)
-    slot = seen.points["t_ns"] // slot_ns
-    # a whole cell off must show, not be cut away: plain weights
-    moments = {}
-    for name, values in _variables(sensor, seen):
-        place = np.floor(values / WIDTHS.get(name, 1.0)).astype(np.int64)
-        moments[name] = moments_of(seen.surface, place, slot, 1 / plain**2, seen.v_m, size)
-    some = {name: values[::step] for name, values in batch.items()}
-    return moments, scene.sample(sensor, some, state, drift, weighting)
-
-
-def _variables(sensor: str, seen: Observations) -> Iterator[tuple[str, Array | Integers]]:
-    """What residuals are sorted by, and its value of each point (n,)."""
-    batch = seen.points
+def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, Array | Integers]]:
+    """Yield each variable by which residuals are sorted, and its value (n,) of each point."""
+    batch = observations.points
     own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
@@ -171,3 +155,55 @@ def _variables(sensor: str, seen: Observations) -> Iterator[tuple[str, Array | I
         yield "step", angle
         for name, pings in CYCLES.items():
             yield name, batch["ping"] % pings
+
+
+def _means(variable: str, sums: ResidualSums) -> list[BinMean]:
+    """Return the means of a variable's bins, or the differences that are tested in their stead."""
+    if variable == "pass" or variable in CYCLES:
+        return differences_from_rest(sums)
+    return step_differences(sums, REACH) if variable == "step" else bin_means(sums)
+
+
+def _is_tested(mean: BinMean) -> bool:
+    return mean.count >= FEWEST and mean.slots >= FEWEST_SLOTS and mean.dof >= FEWEST_DOF
+
+
+def _row(variable: str, sensor: str, family: str, mean: BinMean) -> Row:
+    width = WIDTHS.get(variable, 1.0)
+    return {
+        "by": variable,
+        "sensor": sensor,
+        "family": family,
+        "low": mean.key[1] * width,
+        "width": width,
+        "count": mean.count,
+        "mean_m": mean.mean_m,
+        "sigma_mean_m": mean.sigma_mean_m,
+        "dof": mean.dof,
+    }
+
+
+def _drift_rows(problem: CalibrationProblem, adjustment: MountAdjustment, passes: pd.DataFrame) -> list[Row]:
+    """Return how the drift in each pass turns the boat against the others, as rows of ``patterns``; rad.
+
+    (How it moves the boat tells of the INS alone: both sensors move alike.)
+    """
+    drift = adjustment.drift
+    t_ns = problem.model.body.trajectory.t_ns[drift.knots.record]
+    pass_of_knot = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()).astype(np.int64)
+    by_pass = drift_between_passes(drift, problem.prior.noise, pass_of_knot)
+    return [
+        {"by": "drift", "sensor": "ins", "family": name, "low": float(number), "width": 1.0}
+        | {"count": int(np.sum(pass_of_knot == number))}
+        | {"mean_m": difference[k], "sigma_mean_m": sigma[k], "dof": KNOWN}
+        for number, difference, sigma in zip(by_pass.passes, by_pass.difference, by_pass.sigma, strict=True)
+        for name, k in TURNS.items()
+        if sigma[k] > 0
+    ]
+
+
+def _patterns_table(rows: list[Row], tolerance_m: float) -> pd.DataFrame:
+    table = pd.DataFrame(rows, columns=[column.name for column in PATTERNS.columns])
+    mean, sigma, dof = (table[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
+    tolerated = np.where(table["by"] == "drift", 0.0, tolerance_m)
+    return table.assign(normalised=normal_deviates(mean, sigma, dof, tolerated))

@@ -1,92 +1,111 @@
-"""What the adjustment found, as tables."""
+"""The results of the adjustment as tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.consider import Block
-from pipeline.adjustment.iteration import Adjusted
+from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.pattern_tests import passes_test
-from pipeline.adjustment.residual_statistics import Cells
+from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.adjustment.residual_statistics import ResidualStatistics
 from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.artefacts.to_tables import normal_columns
-from pipeline.config.pool import Adjust
 from pipeline.console import plural
-from pipeline.maths.adjustment.parameters import NAMES, SIX
-from pipeline.maths.adjustment.solution import Freed, Solution, freed, weakest_direction
+from pipeline.maths.adjustment.estimability import weakest_direction
+from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.solution import ConsiderErrors, ParameterTest, Solution, single_parameter_tests
 from pipeline.maths.adjustment.variance_components import scatter
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.geometry.rotations import log_so3
-from pipeline.mount import Mounted
+from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
 
 Array = NDArray[np.float64]
-COMMON_TO = {"laser": "ins_white", "mbes": "ping"}  # what the points of an epoch have in common
+COMMON_ERROR = {"laser": "ins_white", "mbes": "ping"}  # name of the error that an interval's points have in common
 
 
-def tables(
-    found: Adjusted,
-    cells: Cells,
-    patterns: pd.DataFrame,
-    considered: Array,
-    together: Sequence[Block],
-    coarse: Mounted,
-    settings: Adjust,
-    poses: pd.DataFrame,
+def result_tables(
+    problem: CalibrationProblem,
+    adjustment: MountAdjustment,
+    statistics: ResidualStatistics,
     passes: pd.DataFrame,
+    test_level: float,
 ) -> dict[str, pd.DataFrame]:
-    """By name; ``considered``: sigmas of all unknowns where they are held; ``together``: which of them correlate."""
-    state, solution = found.state, found.solution
-    six = np.concatenate(
-        [
-            log_so3(state.R_body_from_sensor @ coarse.R_body_from_sensor.T),
-            state.lever_arm_m - coarse.lever_arm_body_m,
-        ]
-    )
-    shared = [value for surface in state.surfaces for value in (0.0, 0.0, surface.shift_m)]
-    values = state.values_of_other()
-    values[:SIX], values[state.shared] = six, shared
-    named = np.union1d(np.arange(SIX), solution.free)  # the six, held or not
-    nothing = np.zeros(state.size)
-    random, total = solution.covariance_of(named, nothing), solution.covariance_of(named, considered, *together)
-    values = values[named]
+    """Return the tables of the parameters, by name, and of all that goes with them.
+
+    Parameters
+    ----------
+    problem : CalibrationProblem
+        What is calibrated, with the coarse state and the errors of the fixed parameters.
+    adjustment : MountAdjustment
+        The adjusted values.
+    statistics : ResidualStatistics
+        Means of the residuals.
+    passes : DataFrame
+        Table passes.
+    test_level : float
+        Level of the test of the passes.
+    """
+    t_ns = problem.model.body.trajectory.t_ns
+    estimate, random, total = _estimate(problem, adjustment)
+    return {
+        "estimate": estimate,
+        "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
+        "freed": _single_parameter_table(adjustment, problem.consider.sigmas, estimate),
+        "groups": _groups_table(adjustment),
+        "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
+        "drift": _drift_table(adjustment, t_ns),
+        "cells": _pass_means_table(adjustment, statistics, t_ns, passes),
+        "surfaces": _surfaces_table(adjustment, statistics),
+    }
+
+
+def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple[pd.DataFrame, Array, Array]:
+    """Return the table of mount and estimated parameters, and their random and total covariance.
+
+    They are not numbers where the data leave a direction open.
+    """
+    state, solution = adjustment.state, adjustment.solution
+    numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, also where it is fixed
+    random = solution.total_covariance(ConsiderErrors(np.zeros(state.size)), numbers)
+    total = solution.total_covariance(problem.consider, numbers)
+    values = _values(state, problem.model.coarse)[numbers]
     if solution.deficiency:
-        values[:SIX], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
-    estimate = pd.DataFrame(
+        values[:N_MOUNT], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
+    table = pd.DataFrame(
         {
-            "unknown": [state.names[k] for k in named],
+            "unknown": [state.names[k] for k in numbers],
             "value": values,
             "sigma": np.sqrt(np.diag(random)),
             "sigma_total": np.sqrt(np.diag(total)),
         }
     )
-    return {
-        "estimate": estimate,
-        "covariance": _covariance_table(random[:SIX, :SIX], total[:SIX, :SIX]),
-        "freed": _freed_table(found, considered, estimate),
-        "groups": _groups_table(found),
-        "summary": _summary_table(found, passes_test(patterns, settings.test_level)),
-        "drift": _drift_table(found, poses),
-        "cells": _cells_table(found, cells, patterns, poses, passes),
-        "surfaces": _surfaces_table(found, cells),
-    }
+    return table, random, total
 
 
-def _summary_table(found: Adjusted, test: Mapping[str, Any]) -> pd.DataFrame:
-    solution = found.solution
+def _values(state: State, coarse: State) -> Array:
+    """Return the value (u,) of each parameter: corrections of the mount, shifts of the surfaces, additional ones."""
+    values = state.additional_values()
+    correction = log_so3(state.R_body_from_sensor @ coarse.R_body_from_sensor.T)
+    values[:N_MOUNT] = np.concatenate([correction, state.lever_arm_m - coarse.lever_arm_m])
+    values[state.surface_slice] = [value for surface in state.surfaces for value in (0.0, 0.0, surface.shift_m)]
+    return values
+
+
+def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.DataFrame:
+    solution, between = adjustment.solution, adjustment.between
     left_open = plural(solution.deficiency, "direction")
     reason = f"the data leave {left_open} of the unknowns open" if solution.deficiency else ""
-    counts = found.reading.counts.values()
     summary = {
-        "converged": found.converged,
-        "iterations": found.iterations,
-        "observations": sum(one.count for one in counts),
-        "redundancy": found.redundancy,
-        "sigma0": float(np.sqrt(found.equations.squares / max(found.redundancy, 1.0))),
-        "between": found.between.factor,
-        "between_dof": found.between.free,
+        "converged": adjustment.converged,
+        "iterations": adjustment.iterations,
+        "observations": sum(group.count for group in adjustment.accumulation.groups.values()),
+        "redundancy": adjustment.redundancy,
+        "sigma0": float(np.sqrt(adjustment.equations.squares / max(adjustment.redundancy, 1.0))),
+        "between": between.factor,
+        "between_dof": between.dof,
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
         "weakest": "" if solution.deficiency else _weakest(solution),
@@ -97,18 +116,20 @@ def _summary_table(found: Adjusted, test: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def _weakest(solution: Solution) -> str:
-    """Of the six, where all are free."""
-    return weakest_direction(solution.covariance[:SIX, :SIX]) if np.all(solution.free[:SIX] == np.arange(SIX)) else ""
+    """Return the weakest direction of the mount in words; empty where a mount parameter is fixed."""
+    is_whole = np.all(solution.estimated[:N_MOUNT] == np.arange(N_MOUNT))
+    return weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]) if is_whole else ""
 
 
 def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
     sigma = np.sqrt(np.diag(random))
     product = np.outer(sigma, sigma)
-    correlation = np.divide(random, product, out=np.where(np.isnan(product), np.nan, np.eye(SIX)), where=product > 0)
+    unknown = np.where(np.isnan(product), np.nan, np.eye(N_MOUNT))
+    correlation = np.divide(random, product, out=unknown, where=product > 0)
     return pd.DataFrame(
         {
-            "row": np.repeat(NAMES, SIX),
-            "column": np.tile(NAMES, SIX),
+            "row": np.repeat(MOUNT_NAMES, N_MOUNT),
+            "column": np.tile(MOUNT_NAMES, N_MOUNT),
             "covariance": random.ravel(),
             "correlation": correlation.ravel(),
             "covariance_total": total.ravel(),
@@ -116,89 +137,98 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
     )
 
 
-def _freed_table(found: Adjusted, considered: Array, estimate: pd.DataFrame) -> pd.DataFrame:
-    """What is held, and what each of the six owes to it; and what is free beside the mount and the surfaces."""
-    tests = {one.unknown: one for one in freed(found.equations.normal, found.equations.right, found.solution)}
-    owed = found.solution.depends(np.arange(SIX))
+def _single_parameter_table(
+    adjustment: MountAdjustment, consider_sigmas: Array, estimate: pd.DataFrame
+) -> pd.DataFrame:
+    """Return one row per fixed parameter (its test, and its effect on the mount) and per additional estimated one."""
+    state, solution, equations = adjustment.state, adjustment.solution, adjustment.equations
+    tests = {test.parameter: test for test in single_parameter_tests(equations.normal, equations.right, solution)}
+    sensitivity = solution.sensitivity_of(np.arange(N_MOUNT))
     rows = []
-    for place, number in enumerate(found.solution.held.tolist()):
-        test = tests.get(number, Freed(number, np.nan, np.nan))
-        effect = owed[:, place] * considered[number]
-        row: dict[str, Any] = {"unknown": found.state.names[number], "considered": considered[number]}
+    for place, number in enumerate(solution.fixed.tolist()):
+        test = tests.get(number, ParameterTest(number, np.nan, np.nan))
+        effect = sensitivity[:, place] * consider_sigmas[number]
+        row: dict[str, Any] = {"unknown": state.names[number], "considered": consider_sigmas[number]}
         row |= {"estimated": False, "value": test.value, "sigma": test.sigma}
-        rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(NAMES)})
-    shared = range(found.state.shared.start, found.state.shared.stop)
+        rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(MOUNT_NAMES)})
+    on_surfaces = range(state.surface_slice.start, state.surface_slice.stop)
     by_name = estimate.set_index("unknown", drop=False)
-    for number in found.solution.free.tolist():
-        if number >= SIX and number not in shared:
-            one = by_name.loc[found.state.names[number]]
-            row = {"unknown": one["unknown"], "estimated": True, "considered": considered[number]}
-            row |= {"value": one["value"], "sigma": one["sigma_total"]}
-            rows.append(row | {f"effect_{name}": 0.0 for name in NAMES})
+    for number in solution.estimated.tolist():
+        if number >= N_MOUNT and number not in on_surfaces:
+            parameter = by_name.loc[state.names[number]]
+            row = {"unknown": parameter["unknown"], "estimated": True, "considered": consider_sigmas[number]}
+            row |= {"value": parameter["value"], "sigma": parameter["sigma_total"]}
+            rows.append(row | {f"effect_{name}": 0.0 for name in MOUNT_NAMES})
     return pd.DataFrame(rows)
 
 
-def _surfaces_table(found: Adjusted, cells: Cells) -> pd.DataFrame:
+def _surfaces_table(adjustment: MountAdjustment, statistics: ResidualStatistics) -> pd.DataFrame:
     rows = []
-    for k, surface in enumerate(found.state.surfaces):
+    for k, surface in enumerate(adjustment.state.surfaces):
         row = normal_columns(surface.normal)
         row |= {"family": surface.family, "distance_m": surface.distance_m}
-        for sensor, name in (("laser", "laser_points"), ("mbes", "soundings")):
-            row[name] = sum(cell.count for (s, number, _), cell in cells.items() if s == sensor and number == k)
+        for sensor, column in (("laser", "laser_points"), ("mbes", "soundings")):
+            row[column] = statistics.count(sensor, k)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _drift_table(found: Adjusted, poses: pd.DataFrame) -> pd.DataFrame:
-    knots, values = found.drift.knots, found.drift.values
-    columns: dict[str, Any] = {"t_ns": poses["t_ns"].to_numpy()[knots.record]}
+def _drift_table(adjustment: MountAdjustment, t_ns: NDArray[np.int64]) -> pd.DataFrame:
+    """Return the drift at its knots; ``t_ns`` (n,): times of the INS records."""
+    knots, values = adjustment.drift.knots, adjustment.drift.values
+    columns: dict[str, Any] = {"t_ns": t_ns[knots.record]}
     columns |= {f"{axis}_target_m": values[:, k] for k, axis in enumerate("xyz")}
     turns = np.degrees(values[:, 3:])
     return pd.DataFrame(columns | {f"turn_{axis}_target_deg": turns[:, k] for k, axis in enumerate("xyz")})
 
 
-def _groups_table(found: Adjusted) -> pd.DataFrame:
+def _groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
     rows: list[dict[str, Any]] = [
         {
             "group": name,
-            "count": one.count,
-            "variance_factor": found.weighting.factors[name],
-            "scale": found.weighting.scales[name],
-            "cut": one.cut,
-            "reduced": one.reduced,
+            "count": group.count,
+            "variance_factor": adjustment.weighting.factors[name],
+            "scale": adjustment.weighting.scales[name],
+            "cut": group.cut,
+            "reduced": group.reduced,
         }
-        for name, one in found.reading.counts.items()
+        for name, group in adjustment.accumulation.groups.items()
     ]
-    for sensor, one in found.shared.items():
-        row = {"group": COMMON_TO[sensor], "count": len(found.reading.sums[sensor])}
-        rows.append(row | {"variance_factor": one.factor, "scale": np.nan, "cut": 0, "reduced": 0})
+    for sensor, common in adjustment.epoch_factors.items():
+        row = {"group": COMMON_ERROR[sensor], "count": len(adjustment.accumulation.sums[sensor])}
+        rows.append(row | {"variance_factor": common.factor, "scale": np.nan, "cut": 0, "reduced": 0})
     return pd.DataFrame(rows)
 
 
-def _cells_table(
-    found: Adjusted, cells: Cells, patterns: pd.DataFrame, poses: pd.DataFrame, passes: pd.DataFrame
+def _pass_means_table(
+    adjustment: MountAdjustment, statistics: ResidualStatistics, t_ns: NDArray[np.int64], passes: pd.DataFrame
 ) -> pd.DataFrame:
-    """Every cell, with the scatter of its epochs about planes of their own, and how far it lies off other passes."""
-    of_pass = patterns[patterns["by"] == "pass"].set_index(["sensor", "family", "low"])["normalised"].to_dict()
-    t_ns, starts, ends = poses["t_ns"].to_numpy(), passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
+    """Return the mean of each sensor, surface and pass.
+
+    Each row also has the scatter of its intervals about planes of their own, and how far it lies off other passes.
+    """
+    patterns = statistics.patterns
+    normalised = patterns[patterns["by"] == "pass"].set_index(["sensor", "family", "low"])["normalised"].to_dict()
+    starts, ends = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
     rows = []
-    for (sensor, surface, number), cell in sorted(cells.items()):
-        sums = found.reading.sums[sensor]
+    for (sensor, surface, number), mean in sorted(statistics.pass_means.items()):
+        sums = adjustment.accumulation.sums[sensor]
+        family = adjustment.state.surfaces[surface].family
         beside = sums.record, np.minimum(sums.record + 1, len(t_ns) - 1)  # one of them may lie outside the pass
-        place = np.maximum(*(pass_of(t_ns[record], starts, ends) for record in beside))
-        within = scatter(sums, (place == number) & (sums.surface == surface))
+        pass_of_interval = np.maximum(*(pass_of(t_ns[record], starts, ends) for record in beside))
+        within = scatter(sums, (pass_of_interval == number) & (sums.surface == surface))
         rows.append(
             {
                 "sensor": sensor,
-                "family": found.state.surfaces[surface].family,
+                "family": family,
                 "pass": number,
-                "count": cell.count,
-                "mean_m": cell.mean_m,
-                "rms_m": cell.rms_m,
-                "sigma_mean_m": cell.sigma_mean_m,
-                "normalised": of_pass.get((sensor, found.state.surfaces[surface].family, float(number)), np.nan),
-                "largest": cell.largest,
-                "redundancy": within.free,
+                "count": mean.count,
+                "mean_m": mean.mean_m,
+                "rms_m": mean.rms_m,
+                "sigma_mean_m": mean.sigma_mean_m,
+                "normalised": normalised.get((sensor, family, float(number)), np.nan),
+                "largest": mean.largest,
+                "redundancy": within.dof,
                 "variance_factor": within.factor,
             }
         )

@@ -8,49 +8,58 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Batch
 from pipeline.maths.adjustment.interval_sums import Runs
-from pipeline.maths.adjustment.observations import sensor_part
+from pipeline.maths.adjustment.observations import sensor_noise
 from pipeline.maths.adjustment.robust import igg3_weights
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-GROUPS = ("laser", "mbes_vertical", "mbes_horizontal")
+GROUPS = ("laser", "mbes_vertical", "mbes_horizontal")  # of observations: one variance factor each
+
+
+def group_of(sensor: str, level: bool) -> int:
+    """Return the number among GROUPS of a sensor's observations of a surface that is horizontal or not."""
+    return 0 if sensor == "laser" else 2 if level else 1
 
 
 @dataclass(frozen=True)
 class Weighting:
-    """Variance factors f and robust scales by group, and IGG III's bounds (None: nothing is reduced).
+    """Variance factors f and robust scales by group, and the bounds of IGG III (None: no weight is reduced).
 
-    A residual is large or small against all that it is expected to have in it, f σ² and what its epoch shares: on a
-    face that the laser grazes σ is 1 mm, and the INS's 2 mm are no outliers. (Held against σ alone they were cut, and
-    the sigmas of the result came out 3 % too small.)
+    Residuals are normalised by sqrt(f σ² + c²), c being the INS's white noise common to the points of an interval.
+    Without c, points at grazing incidence (σ = 1 mm) would be rejected for the INS's 2 mm; they were, and the sigmas of
+    the result came out 3 % too small.
     """
 
     factors: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 1.0))
     scales: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 1.0))
     robust: tuple[float, float] | None = None
 
-    def weights(self, seen: "Observations") -> tuple[Array, Array]:
-        """Robust weights w (n,) and full weights w / (σ² f) (n,)."""
-        scales = np.array([self.scales[name] for name in GROUPS])[seen.group]
-        size = self.normalised(seen) / scales
+    def weights(self, observations: "Observations") -> tuple[Array, Array]:
+        """Return the robust weights w (n,) and the full weights w / (σ² f) (n,)."""
+        scales = np.array([self.scales[name] for name in GROUPS])[observations.group]
+        size = self.normalised(observations) / scales
         robust = np.ones(len(size)) if self.robust is None else igg3_weights(size, *self.robust)
-        return robust, robust / (seen.sigma_m**2 * self.factor(seen.group))
+        return robust, robust / (observations.sigma_m**2 * self.factors_of(observations.group))
 
-    def normalised(self, seen: "Observations") -> Array:
-        """v / root(f σ² + what the epoch shares) (n,)."""
-        return seen.v_m / np.sqrt(self.factor(seen.group) * seen.sigma_m**2 + seen.common_m**2)
+    def normalised(self, observations: "Observations") -> Array:
+        """Return v / sqrt(f σ² + c²) (n,)."""
+        factor = self.factors_of(observations.group)
+        return observations.v_m / np.sqrt(factor * observations.sigma_m**2 + observations.common_m**2)
 
-    def factor(self, group: Integers) -> Array:
-        """Variance factors (n,) by group."""
+    def factors_of(self, group: Integers) -> Array:
+        """Return the variance factors (n,) of these groups (n,)."""
         return np.array([self.factors[name] for name in GROUPS])[group]
 
 
 @dataclass(frozen=True)
 class Observations:
-    """Of a batch (n,) by surface and time, so that epochs lie together: its points; the record of the INS before each,
-    the share of the step to the next, surface, group of observations, v (m) less the mean of its noise, that mean (m),
-    sigma (m), what its epoch shares of the INS's white noise (m), features (F, n) and slopes (F - 1, n) of
-    :mod:`pipeline.maths.adjustment.observations`."""
+    """Observations of one batch (n,), ordered by surface and time, so that the points of an interval lie together.
+
+    points: their columns; record: INS record before each; share: place between that record and the next; surface,
+    group: numbers; v_m: distance from the surface less mean_m, the mean of its noise; sigma_m; common_m: the INS's
+    white noise common to the interval; features (F, n) and slopes (F - 1, n): see
+    :mod:`pipeline.maths.adjustment.observations`.
+    """
 
     points: Batch
     record: Integers
@@ -64,7 +73,7 @@ class Observations:
     features: Array
     slopes: Array
 
-    def adjusted(self, weight: Array) -> Array:
-        """Features at the adjusted points: free of the noise that is in v."""
-        own = sensor_part(self.v_m, weight, Runs.of(self.record, self.surface), self.common_m)
-        return np.concatenate([self.features[:1], self.features[1:] - self.slopes * own])
+    def features_at_adjusted(self, weight: Array) -> Array:
+        """Return the features (F, n) at the adjusted points: uncorrelated with the noise in v."""
+        noise = sensor_noise(self.v_m, weight, Runs.of(self.record, self.surface), self.common_m)
+        return np.concatenate([self.features[:1], self.features[1:] - self.slopes * noise])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.ins_drift import rms
+from pipeline.adjustment.ins_drift import median_sigmas
 from pipeline.checking.file_survey import SurveyedFile
 from pipeline.checking.findings import Finding
 from pipeline.checking.track import Leg
@@ -70,7 +70,7 @@ def assess_ins_quality(files: Sequence[SurveyedFile], legs: Sequence[Leg]) -> In
             file.name: {kind: _counted(kind, numbers) for kind, numbers in file.states.items()} for file in ins_files
         },
         together=together,
-        sigmas=rms(sigmas) if stated else {},
+        sigmas=median_sigmas(sigmas) if stated else {},
         of_passes=bool(legs),
     )
 

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 from pydantic import BaseModel
 
 from pipeline.config.mount import Mount
-from pipeline.config.pool import PoolConfig
+from pipeline.config.pool import LaserFit, PoolConfig
 from pipeline.config.quantities import Model
 from pipeline.config.session import SessionConfig
 
@@ -50,20 +50,39 @@ class SonarBeams(Model):
     angle_sigma_deg: float
 
 
+class LaserCalibration(LaserFit):
+    """How a laser is calibrated by itself: ``laser_fit`` with the verdict's limits of the sigmas."""
+
+    max_sigma_deg: float
+    max_sigma_m: float
+
+
 def narrow(model: type[M], block: BaseModel) -> M:
     """Return the fields that ``model`` has, taken from a block of settings that has more."""
     return model.model_validate({name: getattr(block, name) for name in model.model_fields})
 
 
 def settings_by_name(pool: PoolConfig, session: SessionConfig) -> dict[str, Any]:
-    """Return every setting by the name under which a stage's Config asks for it."""
+    """Return every setting by the name under which a stage's Config asks for it.
+
+    ``mbes`` is None where the laser is calibrated, ``laser_fit`` where the sonar is.
+    """
     blocks: tuple[BaseModel, ...] = (pool, session)
     settings = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
     return settings | {
         "target_place": pool.target_place,
         "recordings": session.recordings,
         "calibrated": session.calibrated,
+        "laser_fit": laser_calibration(pool) if session.calibrated == "laser" else None,
     }
+
+
+def laser_calibration(pool: PoolConfig) -> LaserCalibration:
+    """Return how the pool's settings have a laser calibrated by itself."""
+    limits = pool.verdict
+    return LaserCalibration(
+        **pool.laser_fit.model_dump(), max_sigma_deg=limits.max_sigma_deg, max_sigma_m=limits.max_sigma_m
+    )
 
 
 def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:

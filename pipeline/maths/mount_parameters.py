@@ -1,7 +1,10 @@
-"""The six mount parameters: as people list them, and their order in every vector and covariance."""
+"""The six mount parameters: their order in every vector and covariance, their names, and their words for people."""
 
+MOUNT_NAMES = ("rotation_x", "rotation_y", "rotation_z", "lever_arm_x", "lever_arm_y", "lever_arm_z")  # body axes
+MOUNT_WORDS = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # in the same order
+N_MOUNT = len(MOUNT_NAMES)
 
-PARAMETERS = (  # as people list them: name, place among the six (rotation about body x, y, z, lever arm), setting, unit
+PARAMETERS = (  # as people list them: name, place among the six, setting, unit
     ("roll", 1, "roll_deg", "deg"),
     ("pitch", 0, "pitch_deg", "deg"),
     ("yaw", 2, "yaw_deg", "deg"),

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.consider import considered_of, correlated
-from pipeline.adjustment.iteration import free_unknowns
+from pipeline.adjustment.consider import sonar_errors
+from pipeline.adjustment.iteration import estimated_parameters
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
 from pipeline.config.pool import PoolConfig, Verdict
@@ -17,9 +17,9 @@ from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from pipeline.maths.adjustment.parameters import SIX
-from pipeline.maths.adjustment.solution import Solution, solve, weakest_direction
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.adjustment.estimability import weakest_direction
+from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve
+from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
 from pipeline.planning.observability import VAGUE, Coverage, geometry_advice
 from pipeline.planning.prediction import PredictedPasses, PredictionSetting, predict, setting_of
@@ -95,13 +95,13 @@ class PlanAssessment:
 class _Adjustment:
     """What the adjustment of predicted passes takes besides their normal equations.
 
-    ``turn_s``: time of a turn; ``considered``: sigmas of all parameters by which fixed ones are off; ``free``: indices
+    ``turn_s``: time of a turn; ``considered``: errors of the fixed parameters; ``free``: indices
     of the estimated parameters.
     """
 
     setting: PredictionSetting
     turn_s: float
-    considered: Array
+    considered: ConsiderErrors
     free: list[int]
 
     def accuracy(self, passes: Sequence[Pass]) -> Accuracy:
@@ -109,10 +109,10 @@ class _Adjustment:
         predicted = predict(self.setting, passes, self.turn_s)
         normal = predicted.normal
         solution = solve(normal, np.zeros(len(normal)), self.free)
-        together = correlated(self.setting.state.names, self.setting.laser)
-        random, total = solution.covariance[:SIX, :SIX], solution.total(self.considered, *together)[:SIX, :SIX]
+        random = solution.covariance[:N_MOUNT, :N_MOUNT]
+        total = solution.total_covariance(self.considered)[:N_MOUNT, :N_MOUNT]
         if solution.deficiency:
-            random, total = np.full((SIX, SIX), np.nan), np.full((SIX, SIX), np.nan)
+            random, total = np.full((N_MOUNT, N_MOUNT), np.nan), np.full((N_MOUNT, N_MOUNT), np.nan)
         return Accuracy(tuple(passes), predicted, random, total, solution)
 
 
@@ -157,9 +157,9 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     """
     setting = setting_of(plan, pool, session)
     depth = setting.model.depth_m
-    considered = considered_of(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
+    considered = sonar_errors(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
-    free = free_unknowns(setting.state, pool.adjust.free)
+    free = estimated_parameters(setting.state, pool.adjust.free)
     adjustment = _Adjustment(setting, turn_s, considered, free)
     given = adjustment.accuracy(plan.passes)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
@@ -211,7 +211,7 @@ def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], sec
     vague[free, free] = VAGUE**-2
 
     def cost(normal: Array) -> float:
-        covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:SIX, :SIX]
+        covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:N_MOUNT, :N_MOUNT]
         return float(np.mean(np.diag(covariance) / bounds**2))
 
     chosen: list[int] = []

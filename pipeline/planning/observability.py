@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.plan import Pass
-from pipeline.maths.adjustment.parameters import SIX
-from pipeline.maths.adjustment.solution import WORDS, Solution, solve, together
+from pipeline.maths.adjustment.estimability import correlated_pair
+from pipeline.maths.adjustment.solution import Solution, solve
+from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 from pipeline.planning.prediction import PredictionSetting, predict
 
 Array = NDArray[np.float64]
@@ -72,12 +73,12 @@ def geometry_advice(
     solution : Solution
         Of these equations.
     """
-    determined = _Determined(normal, solution.free.tolist())
+    determined = _Determined(normal, solution.estimated.tolist())
     gaps, sigma = _gaps(coverage), determined.sigmas()
-    pair = None if solution.deficiency else together(solution.covariance[:SIX, :SIX])
+    pair = None if solution.deficiency else correlated_pair(solution.covariance[:N_MOUNT, :N_MOUNT])
     if not (gaps or np.any(sigma > WANTED)):
         return GeometryAdvice([], "")  # where all are sure enough, two that move together do no harm
-    choice = range(SIX) if pair is None else pair[:2]
+    choice = range(N_MOUNT) if pair is None else pair[:2]
     parameter = max(choice, key=lambda k: sigma[k] / WANTED[k])
     return GeometryAdvice(gaps, _remedy(setting, coverage, determined, parameter))
 
@@ -98,7 +99,7 @@ class _Determined:
         prior = np.zeros(len(self.normal))
         prior[self.free] = VAGUE**-2
         known = solve(self.normal + np.diag(prior), np.zeros(len(self.normal)), self.free)
-        return np.asarray(np.sqrt(np.diag(known.covariance))[:SIX])
+        return np.asarray(np.sqrt(np.diag(known.covariance))[:N_MOUNT])
 
     def with_passes(self, further: Array) -> Solution:
         """Return the solution with the normal equations of further passes."""
@@ -143,7 +144,7 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
         after = determined.with_passes(TWICE * predict(setting, [planned], phases=1).normal)
         if after.deficiency:
             continue
-        sigma = np.sqrt(np.diag(after.covariance))[:SIX]
+        sigma = np.sqrt(np.diag(after.covariance))[:N_MOUNT]
         worst = float(np.max(sigma / WANTED))
         if best is None or worst < best[0]:
             best = worst, distance, float(sigma[parameter])
@@ -151,7 +152,7 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
         return ""
     was = "open" if before > VAGUE / 2 else _sized(before, parameter)
     now = _sized(best[2], parameter)
-    return f"two more passes at {best[1]:.0f} m would bring sigma {WORDS[parameter]} from {was} to {now}"
+    return f"two more passes at {best[1]:.0f} m would bring sigma {MOUNT_WORDS[parameter]} from {was} to {now}"
 
 
 def _sized(sigma: float, which: int) -> str:

@@ -11,17 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.iteration import noise_of
-from pipeline.adjustment.observation_model import Scene, by_design
+from pipeline.adjustment.ins_drift import pose_noise
+from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.problem import design_surface, sensor_sigmas
 from pipeline.config.plan import Pass, Plan
 from pipeline.config.pool import PoolConfig, Segment
 from pipeline.config.session import Ins, Laser, Mbes, SessionConfig
 from pipeline.config.stage_settings import SonarBeams, narrow
-from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
-from pipeline.maths.adjustment.normal_equations import Body, normal_equations
+from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
+from pipeline.maths.adjustment.normal_equations import BodyMotion, Linearisation, normal_equations
 from pipeline.maths.adjustment.observations import SPEED_M_S
-from pipeline.maths.adjustment.parameters import SIX, State
-from pipeline.maths.adjustment.pose_errors import Drift, knots_of
+from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.pose_errors import DriftEstimate, place_knots
 from pipeline.maths.geometry.rotations import rotation_from_attitude
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.sonar.soundings import points_in_mbes
@@ -65,7 +66,7 @@ class PredictionSetting:
 class PassSums:
     """What both sensors see in one pass: sums by interval, the body's track, points by sensor on each face (f,)."""
 
-    sums: dict[str, EpochSums]
+    sums: dict[str, IntervalSums]
     trajectory: Trajectory
     points: dict[str, Array]
     seconds: float
@@ -96,10 +97,7 @@ def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Predicti
 
 def state_by_design(model: TargetModel, mbes: Mbes) -> State:
     """Return the mount as configured, and the surfaces as designed, their centres among the faces' corners."""
-    surfaces = [
-        by_design(family, np.concatenate([model.faces[number].vertices_m for number in family.faces]))
-        for family in model.families
-    ]
+    surfaces = [design_surface(model, family) for family in model.families]
     mount = mount_of(mbes.mount)
     return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces)
 
@@ -142,33 +140,39 @@ def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSu
     trajectory = _trajectory(setting, planned, seconds, number)
     families = {surface.family: k for k, surface in enumerate(setting.state.surfaces)}
     faces = setting.model.faces
-    scene = Scene(
-        _body(setting, trajectory),
-        np.array([families[face.family] for face in faces]),
-        np.array([face.offset_m for face in faces]),
-        setting.state,
-        setting.ins.white.position_m,
-        setting.laser,
-        setting.mbes,
+    observation_model = ObservationModel(
+        body=_body(setting, trajectory),
+        surface_of_face=np.array([families[face.family] for face in faces]),
+        height_of_face=np.array([face.offset_m for face in faces]),
+        coarse=setting.state,
+        white_m=setting.ins.white.position_m,
+        sigmas={"laser": sensor_sigmas(setting.laser), "mbes": sensor_sigmas(setting.mbes)},
     )
     caster = ClosestSurface(setting.model)
-    sums: dict[str, EpochSums] = {}
+    sums: dict[str, IntervalSums] = {}
     counts: dict[str, Array] = {}
     for sensor, (t_ns, rays, each) in {
         "laser": _laser_rays(setting, seconds),
         "mbes": _beams(setting, seconds),
     }.items():
         batch = label_rays(setting, caster, trajectory, Rays(sensor, t_ns, rays))
-        seen = scene.observe(sensor, batch, setting.state)
-        weight, v = each / seen.sigma_m**2, np.zeros(len(seen.v_m))
-        sums[sensor] = epoch_sums(seen.record, seen.share, seen.surface, seen.features, weight, v)
+        observations = observation_model.linearise(sensor, batch, CurrentValues(setting.state))
+        points = LinearisedPoints(
+            record=observations.record,
+            surface=observations.surface,
+            share=observations.share,
+            features=observations.features,
+            weight=each / observations.sigma_m**2,
+            v_m=np.zeros(len(observations.v_m)),
+        )
+        sums[sensor] = interval_sums(points)
         on_face = np.bincount(batch["face"].astype(np.int64), minlength=len(faces))
         counts[sensor] = each * on_face.astype(np.float64)
     return PassSums(sums, trajectory, counts, seconds)
 
 
-def _body(setting: PredictionSetting, trajectory: Trajectory) -> Body:
-    return Body.of(trajectory, mount_of(setting.laser.mount).lever_arm_body_m)
+def _body(setting: PredictionSetting, trajectory: Trajectory) -> BodyMotion:
+    return BodyMotion.of(trajectory, mount_of(setting.laser.mount).lever_arm_body_m)
 
 
 def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: float) -> Array:
@@ -190,10 +194,9 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
     record = np.unique(np.concatenate([of_sensor.record for of_sensor in sums.values()]))
     if not len(record):
         return np.zeros((setting.state.size, setting.state.size))
-    noise = noise_of(setting.ins)
-    knots = knots_of(record, body.seconds, noise.spacing_s, PAUSE_S)
-    drift = Drift(knots, np.zeros((len(knots.record), SIX)))
-    return normal_equations(sums, setting.state, body, noise, drift).normal
+    noise = pose_noise(setting.ins)
+    drift = DriftEstimate.zero(place_knots(record, body.seconds, noise.spacing_s, PAUSE_S))
+    return normal_equations(Linearisation(sums, setting.state, body, drift), drift, noise).normal
 
 
 def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from pipeline.config.session import Calibrated
-from pipeline.maths.adjustment.solution import WORDS
+from pipeline.maths.mount_parameters import MOUNT_WORDS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 
@@ -103,6 +103,6 @@ def _best_fit(mount: pd.Series, search: MountSearch) -> str:
     """List the components of the best mount that lie beyond the limits; empty if none does."""
     angles = [(float(mount[f"rotation_{axis}_deg"]), "°", search.max_angle_deg) for axis in "xyz"]
     arms = [(float(mount[f"lever_arm_{axis}_m"]), " m", search.max_lever_arm_m) for axis in "xyz"]
-    components = zip(WORDS, angles + arms, strict=True)
+    components = zip(MOUNT_WORDS, angles + arms, strict=True)
     excess = [f"{value:+.2f}{unit} in {name}" for name, (value, unit, limit) in components if abs(value) > limit]
     return f"; best fits {', '.join(excess)}" if excess else ""

@@ -12,7 +12,7 @@ from pipeline.adjustment.pattern_tests import pattern_tests
 from pipeline.artefacts.from_tables import vector_of
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.gps_time import utc_text
-from pipeline.maths.adjustment.parameters import SIX
+from pipeline.maths.mount_parameters import N_MOUNT
 from pipeline.report.evidence import Evidence
 from pipeline.report.reason_codes import Statement
 from pipeline.report.suspected_causes import estimated_parameters
@@ -90,7 +90,7 @@ def geometry_block(evidence: Evidence, advice: str, test_level: float) -> dict[s
 
 def correlation_matrix(covariance: pd.DataFrame) -> list[list[float]] | None:
     """Return the correlations of the mount parameters (6, 6) from the table ``covariance``; None without a result."""
-    values = covariance["correlation"].to_numpy().reshape(SIX, SIX)
+    values = covariance["correlation"].to_numpy().reshape(N_MOUNT, N_MOUNT)
     return values.tolist() if np.all(np.isfinite(values)) else None
 
 

@@ -4,8 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from pipeline.config.pool import Verdict
-from pipeline.maths.adjustment.solution import WORDS
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 
@@ -26,7 +25,7 @@ def sigmas_above_limit(
     return [
         Statement(
             ReasonCode.SIGMA_ABOVE_LIMIT,
-            f"total sigma of {WORDS[place]} is {sigmas[key]:.4g}{bounds[unit][1]}, above the limit of "
+            f"total sigma of {MOUNT_WORDS[place]} is {sigmas[key]:.4g}{bounds[unit][1]}, above the limit of "
             f"{bounds[unit][0]:g}{bounds[unit][1]}",
         )
         for name, place, key, unit in PARAMETERS
@@ -61,6 +60,6 @@ def patent_reasons(
             if abs(value - reference) > limit:
                 yield Statement(
                     ReasonCode.PATENT_OFF_ADJUSTMENT,
-                    f"{method} differs from the adjustment by {value - reference:+.4f}{unit} in {WORDS[place]}, more "
-                    f"than {limit:g}{unit}",
+                    f"{method} differs from the adjustment by {value - reference:+.4f}{unit} in {MOUNT_WORDS[place]}, "
+                    f"more than {limit:g}{unit}",
                 )

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.from_tables import rotation_vector_deg, vector_of
 from pipeline.config.session import Calibrated
-from pipeline.maths.adjustment.parameters import NAMES, SIX
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
+from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT, PARAMETERS, SETTINGS
 from pipeline.mount import WITHIN_95, Mounted, parameters_of, setting_change
 
 Array = NDArray[np.float64]
@@ -101,13 +100,13 @@ def adjustment_block(
     coarse : the mount that it corrects
     sensor : the sensor that is calibrated
     """
-    values = estimate.set_index("unknown").loc[list(NAMES), "value"].to_numpy()
+    values = estimate.set_index("unknown").loc[list(MOUNT_NAMES), "value"].to_numpy()
     result = MethodResult(
         rotation_vector_rad=values[:3],
         lever_arm_m=values[3:],
         outcome=summary.to_dict("records")[0],
-        covariance=covariance["covariance"].to_numpy().reshape(SIX, SIX),
-        covariance_total=covariance["covariance_total"].to_numpy().reshape(SIX, SIX),
+        covariance=covariance["covariance"].to_numpy().reshape(N_MOUNT, N_MOUNT),
+        covariance_total=covariance["covariance_total"].to_numpy().reshape(N_MOUNT, N_MOUNT),
     )
     return method_block(result, coarse, sensor)
 

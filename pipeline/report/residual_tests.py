@@ -1,6 +1,6 @@
 """Mean residuals that deviate by more than noise and a tolerance: which, by how much, and what the cause may be.
 
-Every row of the table ``patterns`` is one mean, or the difference of two, with its standardised excess over the
+Every row of the table ``patterns`` is one mean, or the difference of two, with its normal_deviates excess over the
 tolerance (``maths/adjustment/mean_tests.py``). All rows together have one limit: where nothing is beyond the tolerance,
 the chance that any row exceeds it is at most the test's level. The rows that exceed it deviate. The farthest of each
 variable is named, and the farthest of all comes first.

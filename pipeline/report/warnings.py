@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.console import plural
-from pipeline.maths.adjustment.solution import WORDS
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 MAX_VARIANCE_FACTOR = 2.0  # of a group of observations: above this, or below its inverse, its sigmas are wrong
@@ -48,7 +47,8 @@ def geometry_gaps(geometry: pd.DataFrame, sigmas: Mapping[str, float] | None) ->
 def _sigma_suffix(sigmas: Mapping[str, float]) -> str:
     """Name the largest sigma of the angles and of the lever arm."""
     angle, arm = (
-        max((sigmas[key], WORDS[place]) for _, place, key, unit in PARAMETERS if unit == kind) for kind in ("deg", "m")
+        max((sigmas[key], MOUNT_WORDS[place]) for _, place, key, unit in PARAMETERS if unit == kind)
+        for kind in ("deg", "m")
     )
     return f"; total sigmas are up to {angle[0]:.3f}° ({angle[1]}) and {1000 * arm[0]:.1f} mm ({arm[1]})"
 

@@ -18,9 +18,8 @@ import pandas as pd
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
-from pipeline.maths.adjustment.solution import WORDS
 from pipeline.maths.comparison import MountEstimate, compare_estimates
-from pipeline.maths.mount_parameters import SETTINGS
+from pipeline.maths.mount_parameters import MOUNT_WORDS, SETTINGS
 from pipeline.results.finished_run import estimate_of
 from pipeline.results.mount_difference import SIGNIFICANCE
 from pipeline.run.results import calibration
@@ -167,7 +166,7 @@ def _with_jumps(sessions: list[tuple[dict[str, Any], MountEstimate | None]]) -> 
         if row["verdict"] == "accepted" and now is not None:
             if before is not None:
                 comparison = compare_estimates(before, now)
-                moved = ", ".join(WORDS[k] for k in comparison.significant(SIGNIFICANCE))
+                moved = ", ".join(MOUNT_WORDS[k] for k in comparison.significant(SIGNIFICANCE))
                 row = row | {"probability": comparison.probability, "moved": moved}
             before = now
         yield row

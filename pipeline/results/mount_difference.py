@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.maths.adjustment.solution import WORDS
 from pipeline.maths.comparison import compare_estimates
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.results.finished_run import FinishedRun, estimate_of
 
 SIGNIFICANCE = 0.01  # level of the joint test: the share of false alarms where nothing has moved
@@ -59,10 +58,10 @@ def mount_difference(
     for _, k, *_ in PARAMETERS:
         difference, limit = float(comparison.difference[k] * scale[k]), limits[k]
         if limit is not None and abs(difference) > limit:
-            beyond.append(WORDS[k])
+            beyond.append(MOUNT_WORDS[k])
         rows.append(
             {
-                "parameter": WORDS[k],
+                "parameter": MOUNT_WORDS[k],
                 "unit": UNITS[k],
                 "difference": difference,
                 "sigma": float(comparison.sigma[k] * scale[k]),
@@ -126,7 +125,7 @@ def answer_sentence(difference: Mapping[str, Any]) -> str:
     chance = f"p = {difference['joint']['probability']:.2g}"
     if moved:
         each = [_with_sigma(row) for row in moved]
-        rest = "" if len(moved) == len(WORDS) else "; the rest within noise"
+        rest = "" if len(moved) == len(MOUNT_WORDS) else "; the rest within noise"
         sentence = f"the sonar has moved, {_listed(each)}: significant ({chance}){rest}"
     elif is_same_result(difference):
         sentence = "the same result in both"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.adjustment.consider import considered_of, gradient_sigma
+from pipeline.adjustment.consider import gradient_sigma, sonar_errors
 from pipeline.config.mount import Mount
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
@@ -42,5 +42,5 @@ def test_it_is_never_nothing_unless_it_is_said_to_be() -> None:
     laser = Laser(files=["a"], format="las", mount=MOUNT)
     cast = [[0.0, 1480.0], [4.0, 1480.0]]
     names = ["sound_speed_gradient"]
-    assert considered_of(names, laser, sonar(cast), AsBuilt(), 4.0)[0] > 0
-    assert considered_of(names, laser, sonar(cast, svp_sigma_m_s=0.0), AsBuilt(), 4.0)[0] == 0.0
+    assert sonar_errors(names, laser, sonar(cast), AsBuilt(), 4.0).sigmas[0] > 0
+    assert sonar_errors(names, laser, sonar(cast, svp_sigma_m_s=0.0), AsBuilt(), 4.0).sigmas[0] == 0.0

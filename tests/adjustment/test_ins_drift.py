@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.adjustment.ins_drift import drift_of, told
+from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.config.session import Drift, Ins
 from pipeline.config.yaml_models import parse
 from pipeline.readers.file_summaries import thin_sigmas
@@ -54,7 +54,7 @@ def test_whose_figures_go_first(keys: dict[str, Any], source: str) -> None:
 
 def test_medians_within_the_passes() -> None:
     """Of a plane position and of roll and pitch: the root mean square of the two."""
-    found = drift_of(ins(), ROWS, PASSES)
+    found = drift_model(ins(), ROWS, PASSES)
     half = np.sqrt(0.5)
     assert found.horizontal_m == pytest.approx(0.05 * half)
     assert found.vertical_m == pytest.approx(0.05)
@@ -64,26 +64,26 @@ def test_medians_within_the_passes() -> None:
 
 
 def test_the_time_constant_is_the_sessions() -> None:
-    found = drift_of(ins(drift={"time_constant_s": 77.0}, drift_from="files"), ROWS, PASSES)
+    found = drift_model(ins(drift={"time_constant_s": 77.0}, drift_from="files"), ROWS, PASSES)
     assert (found.time_constant_s, found.vertical_m) == (77.0, pytest.approx(0.05))
 
 
 def test_explicit_figures_stand() -> None:
     one = ins(drift=GIVEN)
-    assert drift_of(one, ROWS, PASSES) == one.drift == Drift(**GIVEN)
-    assert told(one, ROWS, PASSES) == {}
+    assert drift_model(one, ROWS, PASSES) == one.drift == Drift(**GIVEN)
+    assert sigmas_from_files(one, ROWS, PASSES) == {}
 
 
 @pytest.mark.parametrize("rows", [ROWS.iloc[:0], ROWS.iloc[[0, 3]], pd.DataFrame(columns=ROWS.columns)])
 def test_without_any_in_the_passes_the_sessions_stand(rows: pd.DataFrame) -> None:
-    assert drift_of(ins(drift=GIVEN, drift_from="files"), rows, PASSES) == Drift(**GIVEN)
-    assert drift_of(ins(), rows, PASSES) == Drift()
+    assert drift_model(ins(drift=GIVEN, drift_from="files"), rows, PASSES) == Drift(**GIVEN)
+    assert drift_model(ins(), rows, PASSES) == Drift()
 
 
 def test_what_is_not_told_is_the_sessions() -> None:
     some = sigmas((100.0, NAN, NAN, 0.07, 0.003, 0.004, NAN))
-    assert sorted(told(ins(), some, PASSES)) == ["roll_pitch_deg", "vertical_m"]
-    found = drift_of(ins(drift=GIVEN, drift_from="files"), some, PASSES)
+    assert sorted(sigmas_from_files(ins(), some, PASSES)) == ["roll_pitch_deg", "vertical_m"]
+    found = drift_model(ins(drift=GIVEN, drift_from="files"), some, PASSES)
     assert (found.horizontal_m, found.heading_deg) == (0.1, 0.5)
     assert (found.vertical_m, found.roll_pitch_deg) == (0.07, pytest.approx(np.sqrt(12.5) * 1e-3))
 

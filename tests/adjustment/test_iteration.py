@@ -7,16 +7,18 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 from scipy.stats import chi2
 
-from pipeline.adjustment.consider import considered_of, correlated
-from pipeline.adjustment.iteration import Adjusted, Given, adjust, free_unknowns, noise_of
-from pipeline.adjustment.observation_model import Scene
+from pipeline.adjustment.consider import sonar_errors
+from pipeline.adjustment.ins_drift import pose_noise
+from pipeline.adjustment.iteration import MountAdjustment, adjust_mount, estimated_parameters
+from pipeline.adjustment.observation_model import ObservationModel
+from pipeline.adjustment.problem import CalibrationProblem, PriorInformation, sensor_sigmas
 from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.mount import Mount, MountSigma
 from pipeline.config.pool import Adjust, AsBuilt
 from pipeline.config.session import Drift, Ins, Laser, Mbes, White
-from pipeline.maths.adjustment.normal_equations import Body
-from pipeline.maths.adjustment.parameters import State, Surface
-from pipeline.maths.adjustment.solution import freed, solve
+from pipeline.maths.adjustment.normal_equations import BodyMotion
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.solution import ConsiderErrors, single_parameter_tests, solve
 from pipeline.maths.geometry.trajectory import Trajectory
 from tests.support.effort import often
 from tests.support.mount_errors import rotation_error
@@ -69,7 +71,7 @@ def drift_of(rng: np.random.Generator, t: np.ndarray, drift: Drift) -> np.ndarra
 
 def made(
     seed: int, ins: Ins = QUIET, sensors: float = 1.0, latency_s: float = 0.0, faster: float = 0.0
-) -> tuple[dict[str, Stream], Scene]:
+) -> tuple[dict[str, Stream], ObservationModel]:
     """Points of both sensors; the sonar's clock late by ``latency_s``, the sound faster than recorded by a share."""
     rng = np.random.default_rng(seed)
     t = np.r_[np.arange(0, SECONDS, 1 / RATE), SECONDS + GAP + np.arange(0, SECONDS, 1 / RATE)]
@@ -122,34 +124,38 @@ def made(
     mbes = columns(((moment + latency_s) * NS).round().astype(np.int64), face, x, "mbes_m")
 
     numbers = {"P1": 0, "P2": 1, "P3": 2, "H": 3}
-    surfaces = [Surface.at(FACES[k][0], np.array(FACES[k][1]), np.array(FACES[k][2]), 0.0) for k in range(3)]
-    surfaces.append(Surface.at("H", np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.0]), 0.0))
+    surfaces = [ObservedSurface.at(FACES[k][0], np.array(FACES[k][1]), np.array(FACES[k][2]), 0.0) for k in range(3)]
+    surfaces.append(ObservedSurface.at("H", np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.0]), 0.0))
     coarse = Rotation.from_rotvec(np.radians([2.5, -2.0, 2.2])).as_matrix()
-    scene = Scene(
-        Body.of(trajectory, LASER_LEVER),
+    model = ObservationModel(
+        BodyMotion.of(trajectory, LASER_LEVER),
         np.array([numbers[family] for family, *_ in FACES]),
         np.array([height for *_, height in FACES]),
         State.at(coarse @ R_TRUE, LEVER_TRUE + np.array([0.2, -0.25, 0.22]), surfaces),
         ins.white.position_m,
-        LASER,
-        MBES,
+        {"laser": sensor_sigmas(LASER), "mbes": sensor_sigmas(MBES)},
     )
-    return {"laser": Stream((MemoryPart("l", laser),)), "mbes": Stream((MemoryPart("m", mbes),))}, scene
+    return {"laser": Stream((MemoryPart("l", laser),)), "mbes": Stream((MemoryPart("m", mbes),))}, model
 
 
 def columns(t_ns: np.ndarray, face: np.ndarray, x: np.ndarray, suffix: str) -> dict[str, np.ndarray]:
     return {"t_ns": t_ns, "face": face.astype(np.int16)} | {f"{axis}_{suffix}": x[:, k] for k, axis in enumerate("xyz")}
 
 
-def error_of(found: Adjusted) -> np.ndarray:
+def error_of(found: MountAdjustment) -> np.ndarray:
     """ε of R_true = Exp(ε) R, and of the lever arm."""
     rotation = rotation_error(R_TRUE, found.state.R_body_from_sensor)
     return np.concatenate([rotation, LEVER_TRUE - found.state.lever_arm_m])
 
 
-def solved(seed: int, ins: Ins = QUIET, settings: Any = None, **options: Any) -> Adjusted:
-    streams, scene = made(seed, ins, **options)
-    return adjust(streams, scene, Given(noise_of(ins)), settings or Adjust(), 5.0)
+def solved(seed: int, ins: Ins = QUIET, settings: Any = None, **options: Any) -> MountAdjustment:
+    streams, model = made(seed, ins, **options)
+    return adjust_mount(problem(model, ins), streams, settings or Adjust(), 5.0)
+
+
+def problem(model: ObservationModel, ins: Ins) -> CalibrationProblem:
+    """The noise of this INS, and nothing else known."""
+    return CalibrationProblem(model, PriorInformation(pose_noise(ins)), ConsiderErrors(np.zeros(model.coarse.size)))
 
 
 def test_without_noise_the_truth_comes_back() -> None:
@@ -181,8 +187,8 @@ def test_errors_are_as_large_as_the_covariance_says(ins: Ins) -> None:
 
 def test_drift_taken_for_granted_would_be_seen() -> None:
     """The same data with an INS said to be perfect: errors of many sigmas, and a sum of squares that is too large."""
-    streams, scene = made(7, NOISY)
-    trusting = adjust(streams, scene, Given(noise_of(QUIET)), Adjust(), 5.0)
+    streams, model = made(7, NOISY)
+    trusting = adjust_mount(problem(model, QUIET), streams, Adjust(), 5.0)
     e = error_of(trusting)
     assert e @ np.linalg.solve(trusting.solution.covariance[:6, :6], e) > 100
     assert trusting.equations.squares / trusting.redundancy > 1.2
@@ -196,11 +202,12 @@ def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str
     """Tested while held, far beyond its sigma; estimated when the config frees it, and the six are right again."""
     held = solved(3, NOISY, **options)
     equations, names = held.equations, held.state.names
-    tests = {names[one.unknown]: one for one in freed(equations.normal, equations.right, held.solution)}
+    found_tests = single_parameter_tests(equations.normal, equations.right, held.solution)
+    tests = {names[one.parameter]: one for one in found_tests}
     assert abs(tests[name].value) > 10 * tests[name].sigma
     found = solved(3, NOISY, Adjust(free=(name,)), **options)
-    values = dict(zip(found.state.names, found.state.values_of_other(), strict=True))
-    place = found.solution.free.tolist().index(found.state.names.index(name))
+    values = dict(zip(found.state.names, found.state.additional_values(), strict=True))
+    place = found.solution.estimated.tolist().index(found.state.names.index(name))
     assert abs(values[name] - value) < 4 * np.sqrt(found.solution.covariance[place, place])
     e = error_of(found)
     assert e @ np.linalg.solve(found.solution.covariance[:6, :6], e) < chi2.ppf(0.999, 6)
@@ -212,41 +219,43 @@ def test_what_is_considered_adds_what_it_would_move() -> None:
     """The sensitivity is the change of the answer when a held value is moved; the total adds its square."""
     found = solved(5, NOISY)
     normal, right, names = found.equations.normal, found.equations.right, found.state.names
-    free = free_unknowns(found.state)
+    free = estimated_parameters(found.state)
     for name in ("laser_rotation_y", "sound_speed_gradient", "wet_P2_shift"):
         number = names.index(name)
-        place = found.solution.held.tolist().index(number)
+        place = found.solution.fixed.tolist().index(number)
         moved = solve(normal, right + 1e-3 * normal[:, number], free)
         change = (moved.step - solve(normal, right, free).step)[free] / 1e-3
         np.testing.assert_allclose(found.solution.sensitivity[:, place], change, rtol=1e-6, atol=1e-9)
         sigmas = np.zeros(found.state.size)
         sigmas[number] = 0.002
-        extra = found.solution.total(sigmas) - found.solution.covariance
+        extra = found.solution.total_covariance(ConsiderErrors(sigmas)) - found.solution.covariance
         np.testing.assert_allclose(extra, 0.002**2 * np.outer(change, change), rtol=1e-6, atol=1e-14)
     together = np.array([[1e-6, 4e-7], [4e-7, 1e-6]])
     pair = np.array([names.index("laser_range"), names.index("mbes_range")])
-    S = found.solution.sensitivity[:, [found.solution.held.tolist().index(k) for k in pair]]
-    total = found.solution.total(np.zeros(found.state.size), (pair, together))
+    S = found.solution.sensitivity[:, [found.solution.fixed.tolist().index(k) for k in pair]]
+    total = found.solution.total_covariance(ConsiderErrors(np.zeros(found.state.size), [(pair, together)]))
     np.testing.assert_allclose(total - found.solution.covariance, S @ together @ S.T, rtol=1e-6, atol=1e-14)
 
 
 def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None:
     """C + S Q Sᵀ, Q the six by six of session.yaml, in its order: rotation x, y, z, lever arm x, y, z."""
     found = solved(5, NOISY)
-    names, held = found.state.names, found.solution.held.tolist()
+    names, held = found.state.names, found.solution.fixed.tolist()
     root = np.tril(np.random.default_rng(1).normal(size=(6, 6))) * np.repeat([1e-4, 2e-3], 3)[:, None]
     Q = root @ root.T
     block = tuple(map(tuple, Q.tolist()))
     laser = LASER.model_copy(update={"mount_covariance": block, "mount_sigma": MountSigma(angle_deg=40.0)})
-    sigmas = considered_of(names, laser, MBES, AsBuilt())
+    errors = sonar_errors(names, laser, MBES, AsBuilt())
+    sigmas = errors.sigmas
     six = [names.index(f"laser_{kind}_{axis}") for kind in ("rotation", "lever_arm") for axis in "xyz"]
     np.testing.assert_allclose(sigmas[six], np.sqrt(np.diag(Q)), rtol=1e-12)
     others = sigmas.copy()
     others[six] = 0.0
     S = found.solution.sensitivity[:, [held.index(k) for k in six]]
-    extra = found.solution.total(sigmas, *correlated(names, laser)) - found.solution.total(others)
+    without = found.solution.total_covariance(ConsiderErrors(others))
+    extra = found.solution.total_covariance(errors) - without
     np.testing.assert_allclose(extra, S @ Q @ S.T, rtol=1e-6, atol=1e-14)
-    assert correlated(names, LASER) == ()
+    assert not sonar_errors(names, LASER, MBES, AsBuilt()).blocks
 
 
 def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:
@@ -257,7 +266,7 @@ def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:
         drift=Drift(horizontal_m=0.5, vertical_m=0.5, roll_pitch_deg=3.0, heading_deg=3.0),
     )
     found = solved(6, loose)
-    names, held = found.state.names, found.solution.held.tolist()
+    names, held = found.state.names, found.solution.fixed.tolist()
     for axis in range(3):
         turn = np.eye(3)[axis]
         mine = [f"laser_rotation_{'xyz'[axis]}", *(f"laser_lever_arm_{one}" for one in "xyz")]
@@ -268,13 +277,13 @@ def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:
 
 
 def test_the_wall_alone_leaves_directions_open() -> None:
-    streams, scene = made(8)
+    streams, model = made(8)
     (laser,), (mbes,) = (stream.parts for stream in streams.values())
     walls = [
         Stream((MemoryPart(part.name, {k: v[part.columns["face"] == 1] for k, v in part.columns.items()}),))
         for part in (laser, mbes)
     ]
-    found = adjust(dict(zip(streams, walls, strict=True)), scene, Given(noise_of(QUIET)), Adjust(), 5.0)
+    found = adjust_mount(problem(model, QUIET), dict(zip(streams, walls, strict=True)), Adjust(), 5.0)
     assert found.solution.deficiency > 0
     assert not found.converged
     assert np.all(np.isfinite(found.solution.step))

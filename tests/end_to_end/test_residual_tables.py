@@ -8,7 +8,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation, Slerp
 
-from pipeline.adjustment.residual_tables import step_for
+from pipeline.adjustment.residual_sample import sampling_step
 from tests.support.places import Told, result_of
 
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
@@ -117,7 +117,7 @@ def test_planes_close(undisturbed: tuple[Path, Told]) -> None:
 
 
 def test_steps_are_odd_and_keep_to_the_limit() -> None:
-    assert [step_for(total, 100) for total in (0, 1, 100, 101, 200, 300, 301)] == [0, 1, 1, 3, 3, 3, 5]
+    assert [sampling_step(total, 100) for total in (0, 1, 100, 101, 200, 300, 301)] == [0, 1, 1, 3, 3, 3, 5]
 
 
 def test_intervals_are_those_of_the_sigmas(undisturbed: tuple[Path, Told]) -> None:

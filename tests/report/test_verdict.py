@@ -9,7 +9,7 @@ import pytest
 from pipeline.adjustment.pattern_tests import passes_test, pattern_tests
 from pipeline.config.pool import Verdict
 from pipeline.config.session import Drift
-from pipeline.maths.adjustment.mean_tests import limit_of
+from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.reason_codes import ReasonCode
@@ -140,7 +140,7 @@ def table(*rows):
 
 def test_all_variables_have_one_limit():
     """Šidák over all three rows, not over those of a variable."""
-    limit = limit_of(3, LEVEL)
+    limit = joint_limit(3, LEVEL)
     assert limit == pytest.approx(3.588, abs=0.001)
     just, beyond = 0.999 * limit, -1.001 * limit
     angle, face = pattern_tests(table(("angle", just), ("angle", 0.0), ("face", beyond)), LEVEL)
@@ -151,7 +151,7 @@ def test_all_variables_have_one_limit():
 def test_the_consistency_of_passes_is_of_residuals_and_of_drift():
     agreed = passes_test(table(("pass", 1.0), ("drift", -3.0), ("face", 9.0)), LEVEL)
     assert (agreed["statistic"], agreed["dof"], agreed["passed"]) == (3.0, 2, True)
-    assert agreed["limit"] == limit_of(3, LEVEL)
+    assert agreed["limit"] == joint_limit(3, LEVEL)
     assert not passes_test(table(("pass", 1.0), ("drift", -3.7)), LEVEL)["passed"]
     alone = passes_test(table(("face", 9.0)), LEVEL)
     assert (alone["statistic"], alone["dof"], alone["passed"]) == (0.0, 0, True)

@@ -1,8 +1,8 @@
-"""Drift of the INS, eliminated knot by knot: what is left are the normal equations of the unknowns alone.
+"""Drift of the INS, eliminated knot by knot: what is left are the normal equations of the parameters alone.
 
-With the records' white noise gone, the normal equations are an arrow: knots banded, the unknowns x its border. Banded
-Cholesky (LAPACK pbtrf) eliminates the knots; the Schur complement on x is its inverse covariance with all pose errors
-unknown, and the knots follow from x. See :mod:`pipeline.maths.adjustment.pose_errors` for the prior.
+With the records' white noise eliminated, the normal equations are an arrow: knots banded, the parameters x its border.
+Banded Cholesky (LAPACK pbtrf) eliminates the knots; the Schur complement on x is its inverse covariance with all pose
+errors unknown, and the knots follow from x. See :mod:`pipeline.maths.adjustment.pose_errors` for the prior.
 """
 
 from dataclasses import dataclass
@@ -11,50 +11,62 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from pipeline.maths.adjustment.eliminate_white_noise import Reduced
-from pipeline.maths.adjustment.parameters import SIX
-from pipeline.maths.adjustment.pose_errors import Drift, PoseNoise
+from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
+from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate, PoseNoise
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Eliminated:
-    """Normal equations N x + b = 0 of all unknowns: normal (u, u), right (u,), squares = Σ p v² left of the
-    observations (and of the drift's prior) at x = 0; log det of all that went; and what gives the knots back: step =
-    free - tied · x, (k, 6)."""
+class NormalEquations:
+    """Normal equations N x + b = 0 of the parameters, all pose errors eliminated.
+
+    normal N (u, u), right b (u,); squares = Σ p v² left of the observations and of the drift's prior at x = 0;
+    log_determinant of all eliminated blocks. The knots' step follows from x: knots_at_zero - knots_by_parameter · x,
+    (k, 6) and (k, 6, u).
+    """
 
     normal: Array
     right: Array
     squares: float
     log_determinant: float
-    tied: Array
-    free: Array
+    knots_by_parameter: Array
+    knots_at_zero: Array
 
     def knots(self, step: Array) -> Array:
-        """The step of the knots that goes with a step of x; (k, 6)."""
-        return np.asarray(self.free - self.tied @ step)
+        """Return the step (k, 6) of the knots that goes with a step (u,) of the parameters."""
+        return np.asarray(self.knots_at_zero - self.knots_by_parameter @ step)
 
 
-def eliminate_drift(reduced: Reduced, noise: PoseNoise, drift: Drift) -> Eliminated:
-    """The knots eliminated under their prior; ``drift``: that at which the equations were made.
+def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEstimate) -> NormalEquations:
+    """Return the normal equations with the knots eliminated under their prior.
 
-    In units of σ: Σ_j |ξ_{j+1} - φ ξ_j|² / (1 - φ²) + |ξ_0|². Components without drift (σ = 0) stay as they are.
+    In units of σ the prior is Σ_j |ξ_{j+1} - φ ξ_j|² / (1 - φ²) + |ξ_0|². Components without drift (σ = 0) stay as they
+    are.
+
+    Parameters
+    ----------
+    reduced : ReducedIntervals
+        Normal equations by span between two knots.
+    noise : PoseNoise
+        Standard deviations and time constant of the drift.
+    drift : DriftEstimate
+        The drift at which the observations were linearised.
     """
     knots, current = drift.knots, drift.values
-    u, count = reduced.unknowns, len(knots.record)
+    u, count = reduced.n_parameters, len(knots.record)
     scale = noise.drift
-    before, after = slice(u, u + SIX), slice(u + SIX, u + 2 * SIX)
-    sides = [*range(u), u + 2 * SIX]  # x and v
-    own, ahead = np.zeros((count, SIX, SIX)), reduced.normal[:, before, after] * scale[:, None] * scale
-    border = np.zeros((count, SIX, u + 1))
+    before, after = slice(u, u + N_POSE), slice(u + N_POSE, u + 2 * N_POSE)
+    sides = [*range(u), u + 2 * N_POSE]  # x and v
+    own, ahead = np.zeros((count, N_POSE, N_POSE)), reduced.normal[:, before, after] * scale[:, None] * scale
+    border = np.zeros((count, N_POSE, u + 1))
     for place, of in ((slice(0, -1), before), (slice(1, None), after)):
         own[place] += reduced.normal[:, of, of]
         border[place] += reduced.normal[:, of][:, :, sides]
     own, border = own * scale[:, None] * scale, border * scale[:, None]
     phi = np.exp(-np.diff(knots.seconds) / noise.time_constant_s)
     variance = 1 - phi**2
-    unit = np.eye(SIX)
+    unit = np.eye(N_POSE)
     own[0] += unit
     own[:-1] += (phi**2 / variance)[:, None, None] * unit
     own[1:] += (1 / variance)[:, None, None] * unit
@@ -71,25 +83,25 @@ def eliminate_drift(reduced: Reduced, noise: PoseNoise, drift: Drift) -> Elimina
     total = reduced.normal[:, sides][:, :, sides].sum(axis=0)
     total[u, u] += float(np.sum(value[0] ** 2) + np.sum(change * shock))
     total -= flat.T @ solved
-    log_determinant = 2 * float(np.sum(np.log(factor[0]))) + SIX * float(np.sum(np.log(variance)))
-    back = solved.reshape(count, SIX, u + 1) * scale[:, None]
-    return Eliminated(
-        total[:u, :u],
-        total[:u, u],
-        float(total[u, u]),
-        reduced.log_determinant + log_determinant,
-        back[:, :, :u],
-        -back[:, :, u],
+    log_determinant = 2 * float(np.sum(np.log(factor[0]))) + N_POSE * float(np.sum(np.log(variance)))
+    back = solved.reshape(count, N_POSE, u + 1) * scale[:, None]
+    return NormalEquations(
+        normal=total[:u, :u],
+        right=total[:u, u],
+        squares=float(total[u, u]),
+        log_determinant=reduced.log_determinant + log_determinant,
+        knots_by_parameter=back[:, :, :u],
+        knots_at_zero=-back[:, :, u],
     )
 
 
 def _banded(own: Array, ahead: Array) -> Array:
-    """Lower band (12, 6k) of the matrix with these blocks on and right above its diagonal."""
+    """Return the lower band (12, 6k) of the matrix with these blocks on and right above its diagonal."""
     count = len(own)
-    band = np.zeros((2 * SIX, SIX * count))
-    for row in range(SIX):
-        for column in range(SIX):
+    band = np.zeros((2 * N_POSE, N_POSE * count))
+    for row in range(N_POSE):
+        for column in range(N_POSE):
             if row >= column:
-                band[row - column, column::SIX] = own[:, row, column]
-            band[SIX + row - column, column : SIX * (count - 1) : SIX] = ahead[:, column, row]
+                band[row - column, column::N_POSE] = own[:, row, column]
+            band[N_POSE + row - column, column : N_POSE * (count - 1) : N_POSE] = ahead[:, column, row]
     return band

@@ -1,22 +1,24 @@
-"""Sums over what one sensor sees of one surface between two records of the INS (an *epoch*): all that a solution needs.
+"""Sums over what one sensor sees of one surface between two INS records (an *interval*): all that a solution needs.
 
-Between two records the body moves along one straight step, and all points of an epoch (a ping's beams on the wall, some
-hundred laser points on a block) are seen from one pose p, T = R_target_from_body. With r = X - p the vector from the
-body to a point and α = t1 · r, β = t2 · r along the surface's tangents, the observation v = n · (X - c) - shift changes
+Between two records the body moves along one straight step, and all points of an interval (a ping's beams on the wall,
+some hundred laser points on a block) are seen from one pose p, T = R_target_from_body. With r = X - p the vector from
+the body to a point and α = t1 · r, β = t2 · r along the surface's tangents, the observation v = n · (X - c) - shift
+changes
 
     with a pose error (δ, ω), X -> X + δ + ω × r:    n · δ + ω · (r × n),        r × n = β t1 - α t2
     with the mount (ε, λ), body axes:                ε · Tᵀ((r - T l) × n) + λ · Tᵀ n
     with the surface's turns and shift:              (α + t1 · (p - c), β + t2 · (p - c), -1)
 
-all linear in q = (1, α, β) with coefficients that are the same for the whole epoch (t1 × t2 = n; a part of r along n
+all linear in q = (1, α, β) with coefficients that are the same for the whole interval (t1 × t2 = n; a part of r along n
 does not count). What does not follow from these (an error of the ranges, of the sound speed) brings a feature of its
-own: q = (1, α, β, …), F in all. So Σ w q qᵀ (F, F), Σ w q v (F,) and Σ w v² hold the normal equations of every unknown,
-whatever the number of points: a stream is read once for each linearisation.
+own: q = (1, α, β, …), F in all. So Σ w q qᵀ (F, F), Σ w q v (F,) and Σ w v² hold the normal equations of every
+parameter, whatever the number of points: a stream is read once for each linearisation.
 
 Within the step the error of the pose goes from that of one record to that of the next, (1 - s) e_k + s e_{k+1}. A
 scanner's line meets a wall from top to bottom in that time, so that s goes with β, and 2 mm of white noise between two
-records turn the wall by 0.02° in this epoch: sums with s and s² are needed as well, of the three features that a pose
-error moves. (With the mean of s in their stead the mean normalised squared error of the six rose from 6-7 to 8.3.)
+records turn the wall by 0.02° in this interval: sums with s and s² are needed as well, for the three features that a
+pose error moves. (With the mean of s in their stead the mean normalised squared error of the mount parameters rose from
+6-7 to 8.3.)
 """
 
 from collections.abc import Iterable
@@ -27,18 +29,18 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-MOVING = 3  # 1, α, β: the features that a pose error moves
+N_MOVED = 3  # 1, α, β: the features that a pose error moves
 
 
 @dataclass(frozen=True)
-class EpochSums:
-    """Epochs of one sensor, ascending by record and surface.
+class IntervalSums:
+    """Intervals of one sensor, ascending by record and surface.
 
-    record (g,): the last record of the INS before them; surface (g,); with q₃ the first three features, s the place
-    between two records:
+    record (g,): the last INS record before the interval's points; surface (g,). With q₃ the first three features and s
+    the place of a point between the two records:
 
     normal (g, F, F) = Σ w q qᵀ, swept (g, 3, F) = Σ w s q₃ qᵀ, swept_twice (g, 3, 3) = Σ w s² q₃ q₃ᵀ,
-    right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,): those with a weight.
+    right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,): points with a weight.
     """
 
     record: Integers
@@ -56,30 +58,31 @@ class EpochSums:
 
     @property
     def share(self) -> Array:
-        """The weighted mean of s of each epoch (g,)."""
+        """Weighted mean of s of each interval (g,)."""
         return np.asarray(self.swept[:, 0, 0] / self.normal[:, 0, 0])
 
-    def taken(self, rows: Integers) -> "EpochSums":
-        """Some of the epochs."""
-        return EpochSums(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+    def selected(self, rows: Integers) -> "IntervalSums":
+        """Return the intervals of these rows."""
+        return IntervalSums(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
 
-    def moved(self, change: Array) -> "EpochSums":
-        """The same observations after v has changed by q · ``change`` (g, F): no need to read the points again.
+    def shifted(self, change: Array) -> "IntervalSums":
+        """Return the sums of the same observations after v has changed by q · ``change`` (g, F).
 
-        Exact but for the turn of q itself, which is of second order: 1e-3 rad of 10 m are 5 µm.
+        The points need not be read again. This is exact but for the turn of q itself, which is of second order: 1e-3
+        rad of 10 m are 5 µm.
         """
-        pulled = np.einsum("gij,gj->gi", self.normal, change)
+        shift = np.einsum("gij,gj->gi", self.normal, change)
         return replace(
             self,
-            right=self.right + pulled,
+            right=self.right + shift,
             right_swept=self.right_swept + np.einsum("gij,gj->gi", self.swept, change),
-            squares=self.squares + np.einsum("gi,gi->g", change, 2 * self.right + pulled),
+            squares=self.squares + np.einsum("gi,gi->g", change, 2 * self.right + shift),
         )
 
 
 @dataclass(frozen=True)
 class Runs:
-    """Points that follow one another and belong together: first of each run (g,), how many (g,).
+    """Points that follow one another and belong together: place of the first of each run (g,), and their number (g,).
 
     Sums over neighbours cost a quarter of sums by number (bincount), and what a run shares is spread, not looked up.
     """
@@ -89,7 +92,7 @@ class Runs:
 
     @classmethod
     def of(cls, *keys: Integers) -> "Runs":
-        """Of equal keys, (n,) each."""
+        """Return the runs of equal keys, (n,) each."""
         n = len(keys[0])
         new = np.ones(n, dtype=bool)
         if n:
@@ -98,51 +101,77 @@ class Runs:
         return cls(starts, np.diff(starts, append=n))
 
     def total(self, values: Array) -> Array:
-        """Sums over each run of values (…, n): (…, g)."""
+        """Return the sums (…, g) over each run of values (…, n)."""
         return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
 
     def spread(self, values: Array) -> Array:
-        """What belongs to each run (…, g), for each of its points (…, n)."""
+        """Return for each point (…, n) the value (…, g) of its run."""
         return np.asarray(np.repeat(values, self.lengths, axis=-1))
 
 
-def epoch_sums(record: Integers, share: Array, surface: Integers, q: Array, weight: Array, v_m: Array) -> EpochSums:
-    """Of one batch: record, share s, surface, weight and v (n,), q (F, n); quickest where epochs lie together."""
-    runs = Runs.of(record, surface)
-    features, epochs, total = len(q), len(runs.starts), runs.total
-    normal, swept = np.empty((epochs, features, features)), np.empty((epochs, MOVING, features))
-    twice, right = np.empty((epochs, MOVING, MOVING)), np.empty((epochs, features))
-    right_swept = np.empty((epochs, MOVING))
+@dataclass(frozen=True)
+class LinearisedPoints:
+    """Points of one batch for :func:`interval_sums`.
+
+    record, surface (n,): the INS record before each point, and its surface; share (n,): its place s between that record
+    and the next; features (F, n): q; weight (n,): w; v_m (n,): distance from the surface.
+    """
+
+    record: Integers
+    surface: Integers
+    share: Array
+    features: Array
+    weight: Array
+    v_m: Array
+
+
+def interval_sums(points: LinearisedPoints) -> IntervalSums:
+    """Return the sums of one batch; this is quickest where the points of an interval lie together."""
+    q, weight, v_m = points.features, points.weight, points.v_m
+    runs = Runs.of(points.record, points.surface)
+    features, intervals, total = len(q), len(runs.starts), runs.total
+    normal, swept = np.empty((intervals, features, features)), np.empty((intervals, N_MOVED, features))
+    swept_twice, right = np.empty((intervals, N_MOVED, N_MOVED)), np.empty((intervals, features))
+    right_swept = np.empty((intervals, N_MOVED))
     for row in range(features):
         weighted = weight * q[row] if row else weight
         right[:, row] = total(weighted * v_m)
         for column in range(row + 1):
             normal[:, row, column] = normal[:, column, row] = total(weighted * q[column] if column else weighted)
-    weighted = weight * share
-    for row in range(MOVING):
+    weighted = weight * points.share
+    for row in range(N_MOVED):
         once = weighted * q[row] if row else weighted
         right_swept[:, row] = total(once * v_m)
-        again = once * share
+        twice = once * points.share
         for column in range(row, features):
             swept[:, row, column] = total(once * q[column] if column else once)
-            if column < MOVING:
+            if column < N_MOVED:
                 swept[:, column, row] = swept[:, row, column]
-                twice[:, row, column] = twice[:, column, row] = total(again * q[column] if column else again)
-    count, squares = total((weight > 0).astype(np.float64)), total(weight * v_m**2)
-    first = runs.starts
-    sums = EpochSums(record[first], surface[first], normal, swept, twice, right, right_swept, squares, count)
-    return merged([sums.taken(np.flatnonzero(normal[:, 0, 0] > 0))])
+                swept_twice[:, row, column] = total(twice * q[column] if column else twice)
+                swept_twice[:, column, row] = swept_twice[:, row, column]
+    sums = IntervalSums(
+        record=points.record[runs.starts],
+        surface=points.surface[runs.starts],
+        normal=normal,
+        swept=swept,
+        swept_twice=swept_twice,
+        right=right,
+        right_swept=right_swept,
+        squares=total(weight * v_m**2),
+        count=total((weight > 0).astype(np.float64)),
+    )
+    return merged([sums.selected(np.flatnonzero(normal[:, 0, 0] > 0))])
 
 
-def merged(pieces: Iterable[EpochSums]) -> EpochSums:
-    """All batches together, in order; an epoch may be spread over several."""
+def merged(pieces: Iterable[IntervalSums]) -> IntervalSums:
+    """Return the sums of all batches together, in order; an interval may be spread over several batches."""
     parts = list(pieces)
-    record, surface = (np.concatenate([getattr(one, name) for one in parts]) for name in ("record", "surface"))
+    record, surface = (np.concatenate([getattr(part, name) for part in parts]) for name in ("record", "surface"))
     order = np.lexsort((surface, record))
     first = Runs.of(record[order], surface[order]).starts
 
     def added(name: str) -> Array:
-        return np.asarray(np.add.reduceat(np.concatenate([getattr(one, name) for one in parts])[order], first))
+        return np.asarray(np.add.reduceat(np.concatenate([getattr(part, name) for part in parts])[order], first))
 
-    sums = (added(name) for name in list(EpochSums.__dataclass_fields__)[2:])
-    return EpochSums(record[order[first]], surface[order[first]], *sums)
+    sums = {name: added(name) for name in list(IntervalSums.__dataclass_fields__)[2:]}
+    return IntervalSums(record=record[order[first]], surface=surface[order[first]], **sums)

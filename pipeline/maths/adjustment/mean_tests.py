@@ -1,7 +1,7 @@
-"""Whether means of residuals lie farther from zero than is tolerated, at a level that holds for all of them together.
+"""Tests whether means of residuals exceed a tolerance, at a level that holds for all of them together.
 
 No residual is free of systematic errors: of a target as it was built, of detection, of angles. With a million points
-they are significant long before they matter, so that a mean is held against what is *tolerated*, τ. The hypothesis for
+they are significant long before they matter, so that a mean is compared with what is *tolerated*, τ. The hypothesis for
 a bin is |μ| ≤ τ of its true mean μ. With the mean M, its sigma s and ν degrees of freedom
 
     t = max(0, |M| - τ) / s
@@ -15,12 +15,12 @@ approximations to Student's and the chi-square distributions"; from ν = 8 on to
 
     u = (8 ν + 1) / (8 ν + 3) · root(ν ln(1 + t² / ν))
 
-so that bins can be ranked, and one limit serves them all. With m bins in all, looked at one by one, each must have the
+so that bins can be ranked, and one limit serves them all. With m bins in all, tested one by one, each must have the
 level p with 1 - (1 - p)^m = α (Šidák 1967, "Rectangular confidence regions for the means of multivariate normal
-distributions"): exact if they are independent, and an upper bound of the chance of a false alarm if they are not, which
-they are not: the same points are sorted by face, by angle, by distance.
+distributions"): exact if they are independent, and an upper bound of the chance of a false alarm if they are not. They
+are not: the same points are sorted by face, by angle, by distance.
 
-The residuals are those of adjusted surfaces and mounts, and so drawn towards zero: the chance is less for that as well.
+The residuals are those of adjusted surfaces and mounts, and so drawn towards zero: this, too, lowers the chance.
 """
 
 import numpy as np
@@ -30,17 +30,27 @@ from scipy.special import ndtri
 Array = NDArray[np.float64]
 
 
-def standardised(mean: Array, sigma: Array, dof: Array, tolerated: Array | float) -> Array:
-    """The normal deviate u (n,) of what lies beyond ``tolerated``, with the mean's sign; zero within it."""
+def normal_deviates(mean: Array, sigma: Array, dof: Array, tolerated: Array | float) -> Array:
+    """Return the normal deviate u (n,) of a mean's excess over the tolerance, with the mean's sign; zero within it.
+
+    Parameters
+    ----------
+    mean, sigma : (n,) arrays
+        Means and their standard deviations, in one unit.
+    dof : (n,) array
+        Degrees of freedom ν of the standard deviations.
+    tolerated : (n,) array or float
+        Tolerance τ, in the same unit.
+    """
     t = np.maximum(0.0, np.abs(mean) - tolerated) / sigma
     u = (8 * dof + 1) / (8 * dof + 3) * np.sqrt(dof * np.log1p(t**2 / np.maximum(dof, np.finfo(float).tiny)))
     return np.asarray(np.copysign(u, mean))
 
 
-def limit_of(number: int, level: float) -> float:
-    """|u| that none of so many means exceeds, but with a chance of ``level``, where all are within what is tolerated.
+def joint_limit(number: int, level: float) -> float:
+    """Return the |u| that one of so many means exceeds with a chance of ``level``, if all are within their tolerance.
 
-    >>> round(limit_of(1, 0.05), 2), round(limit_of(500, 0.001), 2)
+    >>> round(joint_limit(1, 0.05), 2), round(joint_limit(500, 0.001), 2)
     (1.96, 4.75)
     """
     each = -np.expm1(np.log1p(-level) / max(number, 1))

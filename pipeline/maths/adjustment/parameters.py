@@ -1,15 +1,17 @@
-"""What the adjustment can determine, in one order: the six, the sensors' other parameters, the surfaces, wet faces.
+"""The parameters of the adjustment, in one order: mount, instruments, surfaces, and the surfaces' parts under water.
 
-* the sonar's: rotation ε and lever arm λ (body axes: the six of the contract), latency τ (s, added to the recorded
-  one), range (m, added to every range), sound speed (share by which it is higher), its gradient ((m/s)/m, downward);
-* the laser's: ε, λ, latency, range, alike;
-* of each surface family two turns of the normal (rad) and a shift (m), shared by both sensors;
-* of each family's wet faces a further two turns and a shift: how they stand off from the dry ones, as built.
+* the sonar's: rotation ε and lever arm λ (the six mount parameters, body axes), latency τ (s, added to the recorded
+  one), range (m, added to every range), sound speed (the share by which it is higher), and its gradient ((m/s)/m,
+  downward);
+* the laser's: ε, λ, latency and range, with the same meaning;
+* each surface's: two turns of the normal (rad) and a shift (m), shared by both sensors;
+* each surface's part under water: a further two turns and a shift, by which the wet faces stand off the dry ones as
+  built.
 
-Where the laser itself is calibrated there is no sonar: the six are the laser's, and nothing is wet.
+A run that calibrates the laser has no sonar: the mount parameters are the laser's, and no face is wet.
 
-The six and the surfaces are estimated. The others are held at zero, estimated where the config frees them, and in any
-case *considered*: an error of theirs within its sigma is carried into the total covariance.
+The mount parameters and the surfaces are estimated. The others are fixed at zero, or estimated where the config names
+them. All fixed parameters are *consider* parameters: an error of theirs within its sigma enters the total covariance.
 """
 
 from collections.abc import Sequence
@@ -21,25 +23,26 @@ from numpy.typing import NDArray
 
 from pipeline.maths.geometry.planes import tangents_of
 from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
 from pipeline.maths.target.face import HORIZONTAL_COSINE
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Sensor = Literal["mbes", "laser"]
 
-NAMES = ("rotation_x", "rotation_y", "rotation_z", "lever_arm_x", "lever_arm_y", "lever_arm_z")
-SIX = len(NAMES)
-OF_MBES = (*NAMES, "mbes_latency", "mbes_range", "sound_speed", "sound_speed_gradient")
-OF_LASER = (*(f"laser_{name}" for name in NAMES), "laser_latency", "laser_range")
-LASER_ALONE = (*NAMES, "laser_latency", "laser_range")
-OF_SURFACE = ("turn_1", "turn_2", "shift")
+MBES_PARAMETERS = (*MOUNT_NAMES, "mbes_latency", "mbes_range", "sound_speed", "sound_speed_gradient")
+LASER_PARAMETERS = (*(f"laser_{name}" for name in MOUNT_NAMES), "laser_latency", "laser_range")
+CALIBRATED_LASER_PARAMETERS = (*MOUNT_NAMES, "laser_latency", "laser_range")
+SURFACE_PARAMETERS = ("turn_1", "turn_2", "shift")
+N_SURFACE = len(SURFACE_PARAMETERS)
 
 
 @dataclass(frozen=True)
-class Surface:
-    """normal (3,), centre c (3,), shift: normal · (X - c) = shift on it; tangents t1, t2 (2, 3) with t1 x t2 = normal.
+class ObservedSurface:
+    """The plane of one family of faces: normal · (X - centre) = shift, target frame.
 
-    The tangents are carried along as the surface turns: sums are kept in them, and a fresh choice may be another.
+    The tangents (2, 3) satisfy t1 × t2 = normal. They are carried along as the surface turns, because sums are kept in
+    them and a fresh choice may be another one.
     """
 
     family: str
@@ -49,20 +52,42 @@ class Surface:
     shift_m: float
 
     @classmethod
-    def at(cls, family: str, normal: Array, centre_m: Array, shift_m: float = 0.0) -> "Surface":
+    def at(cls, family: str, normal: Array, centre_m: Array, shift_m: float = 0.0) -> "ObservedSurface":
+        """Return the surface with tangents of its own choice.
+
+        Parameters
+        ----------
+        family : str
+            Name of the family of faces.
+        normal : (3,) array
+            Unit normal, target frame.
+        centre_m : (3,) array
+            Fixed point near the surface, target frame.
+        shift_m : float
+            Distance of the surface from the centre, along the normal.
+        """
         return cls(family, normal, tangents_of(normal), centre_m, shift_m)
 
     @property
     def level(self) -> bool:
-        """Whether it is horizontal."""
+        """Whether the surface is horizontal."""
         return bool(abs(self.normal[2]) > HORIZONTAL_COSINE)
 
     @property
     def distance_m(self) -> float:
-        """normal · X on it."""
+        """Value of normal · X on the surface."""
         return float(self.normal @ self.centre_m + self.shift_m)
 
-    def moved(self, turn_1: float, turn_2: float, shift_m: float) -> "Surface":
+    def updated(self, turn_1: float, turn_2: float, shift_m: float) -> "ObservedSurface":
+        """Return the surface after a step of its three parameters.
+
+        Parameters
+        ----------
+        turn_1, turn_2 : float
+            Changes of the normal along the tangents, rad.
+        shift_m : float
+            Change of the shift.
+        """
         normal = self.normal + turn_1 * self.tangents[0] + turn_2 * self.tangents[1]
         normal /= np.linalg.norm(normal)
         first = self.tangents[0] - (self.tangents[0] @ normal) * normal
@@ -73,73 +98,98 @@ class Surface:
 
 @dataclass(frozen=True)
 class State:
-    """Current values: the mount of the sensor that is calibrated, the surfaces, and ``other`` (u - 6 - 3 s,), the rest
-    of :meth:`names`, in order."""
+    """Current values of all parameters.
+
+    R_body_from_sensor (3, 3) and lever_arm_m (3,) are the mount of the calibrated sensor; ``additional``
+    (u - 6 - 3 s,) are the values of all parameters of :attr:`names` beside the mount and the surfaces, in order.
+    """
 
     R_body_from_sensor: Array
     lever_arm_m: Array
-    surfaces: tuple[Surface, ...]
-    other: Array
+    surfaces: tuple[ObservedSurface, ...]
+    additional: Array
     calibrated: Sensor = "mbes"
 
     @classmethod
     def at(
-        cls, R_body_from_sensor: Array, lever_arm_m: Array, surfaces: Sequence[Surface], calibrated: Sensor = "mbes"
+        cls,
+        R_body_from_sensor: Array,
+        lever_arm_m: Array,
+        surfaces: Sequence[ObservedSurface],
+        calibrated: Sensor = "mbes",
     ) -> "State":
-        first = cls(R_body_from_sensor, lever_arm_m, tuple(surfaces), np.empty(0), calibrated)
-        return replace(first, other=np.zeros(first.size - SIX - len(OF_SURFACE) * len(surfaces)))
+        """Return the state with zero for every additional parameter.
+
+        Parameters
+        ----------
+        R_body_from_sensor : (3, 3) array
+            Mount of the calibrated sensor.
+        lever_arm_m : (3,) array
+            Lever arm of the calibrated sensor, body axes.
+        surfaces : sequence of ObservedSurface
+            The surfaces that the sensors observe.
+        calibrated : {"mbes", "laser"}
+            The sensor that is calibrated.
+        """
+        mounted = cls(R_body_from_sensor, lever_arm_m, tuple(surfaces), np.empty(0), calibrated)
+        return replace(mounted, additional=np.zeros(mounted.size - N_MOUNT - N_SURFACE * len(surfaces)))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all unknowns, in their order."""
+        """Names of all parameters, in their order."""
         families = [surface.family for surface in self.surfaces]
-        shared = [f"{family}_{name}" for family in families for name in OF_SURFACE]
+        of_surfaces = [f"{family}_{name}" for family in families for name in SURFACE_PARAMETERS]
         if self.calibrated == "laser":
-            return (*LASER_ALONE, *shared)
-        return (*OF_MBES, *OF_LASER, *shared, *(f"wet_{name}" for name in shared))
+            return (*CALIBRATED_LASER_PARAMETERS, *of_surfaces)
+        return (*MBES_PARAMETERS, *LASER_PARAMETERS, *of_surfaces, *(f"wet_{name}" for name in of_surfaces))
 
     @property
-    def _of_sensors(self) -> tuple[int, int]:
-        """How many unknowns are those of the calibrated sensor, and of it and the other."""
-        own = len(LASER_ALONE if self.calibrated == "laser" else OF_MBES)
-        return own, own + (0 if self.calibrated == "laser" else len(OF_LASER))
+    def _n_sensor_parameters(self) -> tuple[int, int]:
+        """Number of parameters of the calibrated sensor, and of both sensors."""
+        if self.calibrated == "laser":
+            return len(CALIBRATED_LASER_PARAMETERS), len(CALIBRATED_LASER_PARAMETERS)
+        return len(MBES_PARAMETERS), len(MBES_PARAMETERS) + len(LASER_PARAMETERS)
 
     @property
     def size(self) -> int:
+        """Number of parameters u."""
         return len(self.names)
 
     @property
-    def shared(self) -> slice:
-        """Where the surfaces shared by both sensors stand."""
-        _, first = self._of_sensors
-        return slice(first, first + len(OF_SURFACE) * len(self.surfaces))
+    def surface_slice(self) -> slice:
+        """Places of the surfaces' parameters among all."""
+        _, first = self._n_sensor_parameters
+        return slice(first, first + N_SURFACE * len(self.surfaces))
+
+    def surface_columns(self, surface: int) -> Integers:
+        """Return the places (3,) of one surface's parameters among all."""
+        return np.asarray(self.surface_slice.start + N_SURFACE * surface + np.arange(N_SURFACE))
 
     def columns(self, sensor: str, surface: int) -> Integers:
-        """The unknowns that one sensor's observations of one surface depend on, in the order of the design."""
-        own, both = self._of_sensors
-        first = both + len(OF_SURFACE) * surface
-        shared = np.arange(first, first + len(OF_SURFACE))
+        """Return the parameters that a sensor's observations of one surface depend on, in the order of the design."""
+        own, both = self._n_sensor_parameters
+        on_surface = self.surface_columns(surface)
         if sensor != self.calibrated:
-            return np.concatenate([shared, np.arange(own, both)])
-        wet = shared + len(OF_SURFACE) * len(self.surfaces) if sensor == "mbes" else shared[:0]
-        return np.concatenate([shared, np.arange(own), wet])
+            return np.concatenate([on_surface, np.arange(own, both)])
+        wet = on_surface + N_SURFACE * len(self.surfaces) if sensor == "mbes" else on_surface[:0]
+        return np.concatenate([on_surface, np.arange(own), wet])
 
-    def values_of_other(self) -> Array:
-        """``other`` in the places of all unknowns (u,), zero elsewhere."""
-        return np.concatenate([np.zeros(SIX), self.other[: self.shared.start - SIX], np.zeros(self._shared_size),
-                               self.other[self.shared.start - SIX :]])
+    def additional_values(self) -> Array:
+        """Return ``additional`` in the places of all parameters (u,), zero for the mount and the surfaces."""
+        values = np.zeros(self.size)
+        split = self.surface_slice.start - N_MOUNT
+        values[N_MOUNT : self.surface_slice.start] = self.additional[:split]
+        values[self.surface_slice.stop :] = self.additional[split:]
+        return values
 
-    @property
-    def _shared_size(self) -> int:
-        return len(OF_SURFACE) * len(self.surfaces)
-
-    def moved(self, step: Array) -> "State":
-        """By a step of all unknowns (u,)."""
-        shared = step[self.shared].reshape(-1, len(OF_SURFACE))
+    def updated(self, step: Array) -> "State":
+        """Return the state after a step (u,) of all parameters; rotations are composed, Exp(step) · R."""
+        on_surfaces = step[self.surface_slice].reshape(-1, N_SURFACE)
+        others = np.concatenate([step[N_MOUNT : self.surface_slice.start], step[self.surface_slice.stop :]])
         return replace(
             self,
             R_body_from_sensor=exp_so3(step[:3]) @ self.R_body_from_sensor,
-            lever_arm_m=self.lever_arm_m + step[3:SIX],
-            surfaces=tuple(surface.moved(*turns) for surface, turns in zip(self.surfaces, shared, strict=True)),
-            other=self.other + np.concatenate([step[SIX : self.shared.start], step[self.shared.stop :]]),
+            lever_arm_m=self.lever_arm_m + step[3:N_MOUNT],
+            surfaces=tuple(surface.updated(*part) for surface, part in zip(self.surfaces, on_surfaces, strict=True)),
+            additional=self.additional + others,
         )

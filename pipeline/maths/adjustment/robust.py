@@ -5,14 +5,25 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-BINS = np.linspace(0.0, 50.0, 2001)  # |residual| / sigma; what lies above counts into the last bin
+BINS = np.linspace(0.0, 50.0, 2001)  # |residual| / sigma; larger ones count into the last bin
 NORMAL_MEDIAN = 0.6744897501960817  # median of |standard normal|
-LEAST_SCALE = 0.01  # nobody's noise is a hundred times smaller than its stated sigma: what is, is rounding
+LEAST_SCALE = 0.01  # no sensor's noise is a hundred times smaller than its stated sigma: less is rounding
 
 
 def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
-    """IGG III (Yang 1999): 1 up to k0, k0 / |v| · ((k1 - |v|) / (k1 - k0))² up to k1, 0 above; (n,).
+    """Return the weights (n,) of IGG III (Yang 1999).
 
+    They are 1 up to k0, k0 / |v| · ((k1 - |v|) / (k1 - k0))² up to k1, and 0 above.
+
+    Parameters
+    ----------
+    normalised : (n,) array
+        Residuals in units of their sigma.
+    k0, k1 : float
+        Bounds of full weight and of any weight.
+
+    Examples
+    --------
     >>> igg3_weights(np.array([0.0, 2.0, 7.0]), 3.0, 6.0)
     array([1., 1., 0.])
     """
@@ -22,16 +33,16 @@ def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
 
 
 def histogram(normalised: Array) -> Array:
-    """Counts of |v| in :data:`BINS`: adds over chunks, and its median is the scale."""
+    """Return the counts of |v| in :data:`BINS`; they add up over chunks, and their median gives the scale."""
     last = len(BINS) - 2
     width = BINS[-1] / (last + 1)
     return np.bincount(np.minimum(np.abs(normalised) / width, last).astype(np.int64), minlength=last + 1).astype(float)
 
 
-def scale_of(counts: Array) -> float:
-    """Median of |v| from the histogram divided by that of the standard normal; 1 without data.
+def robust_scale(counts: Array) -> float:
+    """Return the median of |v|, from the histogram, divided by that of the standard normal; 1 without data.
 
-    >>> round(scale_of(histogram(np.random.default_rng(0).normal(scale=2.0, size=100_000))), 1)
+    >>> round(robust_scale(histogram(np.random.default_rng(0).normal(scale=2.0, size=100_000))), 1)
     2.0
     """
     total = counts.sum()

@@ -17,6 +17,7 @@ from pipeline.maths.geometry.rotations import (
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
+NS_PER_S = 1e9
 BLOCK = 16_384  # points turned at a time: fits the cache
 
 
@@ -95,12 +96,12 @@ class Trajectory:
         Each is the mean from ``reach_s`` before the record to ``reach_s`` after it, or as far as records go without an
         interval longer than that.
         """
-        reach = round(reach_s * 1e9)
+        reach = round(reach_s * NS_PER_S)
         holes = np.r_[-1, np.flatnonzero(np.diff(self.t_ns) > reach), len(self.t_ns) - 1]
         run = np.searchsorted(holes, np.arange(len(self.t_ns))) - 1
         first = np.maximum(np.searchsorted(self.t_ns, self.t_ns - reach), holes[run] + 1)
         last = np.minimum(np.searchsorted(self.t_ns, self.t_ns + reach, side="right") - 1, holes[run + 1])
-        seconds = np.maximum(self.t_ns[last] - self.t_ns[first], 1)[:, None] / 1e9
+        seconds = np.maximum(self.t_ns[last] - self.t_ns[first], 1)[:, None] / NS_PER_S
         turned = log_so3(np.swapaxes(self.R_frame_from_body[first], -1, -2) @ self.R_frame_from_body[last])
         turning = np.einsum("nij,nj->ni", self.R_frame_from_body, turned)
         way = self.positions_m[last] - self.positions_m[first]

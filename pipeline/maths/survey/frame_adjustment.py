@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import NotConvergedError
-from pipeline.maths.adjustment.parameters import SIX
 from pipeline.maths.geometry.rotations import exp_so3, rotation_x, rotation_y, skew
+from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -193,7 +193,7 @@ def adjust_frames(survey: Survey, frames: Sequence[Frame]) -> FrameAdjustment:
         system = _system(near, frames, poses)
         whiten = np.linalg.inv(np.linalg.cholesky(system.covariance))
         step = -np.linalg.lstsq(whiten @ system.design, whiten @ system.residuals, rcond=None)[0]
-        poses = [pose.updated(np.asarray(part)) for pose, part in zip(poses, step.reshape(-1, SIX), strict=True)]
+        poses = [pose.updated(np.asarray(part)) for pose, part in zip(poses, step.reshape(-1, N_MOUNT), strict=True)]
         if np.abs(step).max() < STEP_TOLERANCE:
             break
     else:
@@ -233,11 +233,11 @@ def relative_mount(adjusted: FrameAdjustment, body: int, sensor: int) -> tuple[A
     body_pose, sensor_pose = adjusted.poses[body], adjusted.poses[sensor]
     to_body = body_pose.R_survey_from_frame.T
     between = sensor_pose.origin_m - body_pose.origin_m
-    jacobian = np.zeros((SIX, len(adjusted.covariance)))
+    jacobian = np.zeros((N_MOUNT, len(adjusted.covariance)))
     for frame, sign in ((body, -1.0), (sensor, 1.0)):
-        jacobian[:3, SIX * frame : SIX * frame + 3] += sign * to_body
-        jacobian[3:, SIX * frame + 3 : SIX * frame + SIX] += sign * to_body
-    jacobian[3:, SIX * body : SIX * body + 3] += to_body @ skew(between)
+        jacobian[:3, N_MOUNT * frame : N_MOUNT * frame + 3] += sign * to_body
+        jacobian[3:, N_MOUNT * frame + 3 : N_MOUNT * frame + N_MOUNT] += sign * to_body
+    jacobian[3:, N_MOUNT * body : N_MOUNT * body + 3] += to_body @ skew(between)
     covariance = jacobian @ adjusted.covariance @ jacobian.T
     return to_body @ sensor_pose.R_survey_from_frame, to_body @ between, (covariance + covariance.T) / 2
 
@@ -257,11 +257,11 @@ def _system(survey: Survey, frames: Sequence[Frame], poses: Sequence[Pose]) -> _
     parts = [_rows_of(survey, frame, pose) for frame, pose in zip(frames, poses, strict=True)]
     ends = np.cumsum([len(part[0]) for part in parts]).tolist()
     rows = tuple(slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True))
-    design, by_survey = np.zeros((ends[-1], SIX * len(frames))), np.zeros((ends[-1], len(survey.at_m), 3))
+    design, by_survey = np.zeros((ends[-1], N_MOUNT * len(frames))), np.zeros((ends[-1], len(survey.at_m), 3))
     own = np.zeros((ends[-1], ends[-1]))
     for number, (frame, pose, place) in enumerate(zip(frames, poses, rows, strict=True)):
         _, J, B, level = parts[number]
-        design[place, SIX * number : SIX * (number + 1)] = J
+        design[place, N_MOUNT * number : N_MOUNT * (number + 1)] = J
         by_survey[place, frame.marks] = B
         R = pose.R_survey_from_frame
         own[place, place] = _through(B, R @ frame.covariance @ R.T) + np.diag(level)
@@ -281,7 +281,7 @@ def _rows_of(survey: Survey, frame: Frame, pose: Pose) -> tuple[Array, Array, Ar
     at = survey.at_m[frame.marks]
     turned = frame.drawing_m[:k] @ R.T
     r = (at[:k] - turned - pose.origin_m).ravel()
-    J = np.concatenate([skew(turned), np.broadcast_to(-np.eye(3), (k, 3, 3))], axis=2).reshape(-1, SIX)
+    J = np.concatenate([skew(turned), np.broadcast_to(-np.eye(3), (k, 3, 3))], axis=2).reshape(-1, N_MOUNT)
     B = np.eye(3 * len(at))[: 3 * k].reshape(-1, len(at), 3)
     if frame.axes is None:
         return r, J, B, np.zeros(len(r))
@@ -292,7 +292,7 @@ def _rows_of(survey: Survey, frame: Frame, pose: Pose) -> tuple[Array, Array, Ar
     B_axes[:2, axes.second] += R.T[across]
     B_axes[:2, axes.first] -= R.T[across]
     angle, by_turn = _level(R, axes.along)
-    J_axes = np.zeros((3, SIX))
+    J_axes = np.zeros((3, N_MOUNT))
     J_axes[:2, :3], J_axes[2, :3] = (R.T @ skew(d))[across], by_turn
     residuals = np.append((R.T @ d)[across], angle - axes.angle_rad)
     variances = np.append(np.zeros(len(r) + 2), axes.sigma_rad**2)

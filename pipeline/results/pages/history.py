@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from pipeline.atomic_files import write_bytes, write_text, writing
 from pipeline.console import plural
-from pipeline.maths.adjustment.solution import WORDS
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.mount import WITHIN_95
 from pipeline.results.history import TEXT_COLUMNS, History, SessionFilter
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
@@ -107,7 +106,7 @@ def _control_chart(axis: Axes, table: pd.DataFrame, parameter: tuple[str, int, s
     for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
         bars = WITHIN_95 * np.nan_to_num(sigma[use])
         axis.errorbar(place[use], values[use], bars, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
-    moved = np.array([WORDS[index] in words.split(", ") for words in table["moved"]], dtype=bool)
+    moved = np.array([MOUNT_WORDS[index] in words.split(", ") for words in table["moved"]], dtype=bool)
     ring: dict[str, Any] = {"color": ALARM, "markersize": 9, "fillstyle": "none", "markeredgewidth": 1.4}
     axis.plot(place[moved], values[moved], "o", **ring)
     axis.set_title(f"{name}, {word}")

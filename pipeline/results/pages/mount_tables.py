@@ -14,9 +14,8 @@ from pipeline.artefacts.catalogue.target import FACES
 from pipeline.artefacts.from_tables import family_names
 from pipeline.config.pool import Verdict
 from pipeline.config.session import SessionConfig
-from pipeline.maths.adjustment.parameters import NAMES
-from pipeline.maths.adjustment.solution import TOGETHER
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.adjustment.estimability import CORRELATION_LIMIT
+from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 from pipeline.report.as_built import family_title, reference_family
 from pipeline.run.results import Tables, calibration
 
@@ -36,7 +35,7 @@ SOURCES = (  # first part of the unknowns' names
     ("rotation", "angles that are held"),  # of a laser that is calibrated
     ("lever_arm", "lever arm that is held"),
 )
-STRONG = TOGETHER  # correlation that is set in bold
+STRONG = CORRELATION_LIMIT  # correlation that is set in bold
 POSITIVE = {
     "roll": "starboard down", "pitch": "bow up", "yaw": "to port",
     "x": "to starboard", "y": "forward", "z": "up",
@@ -131,9 +130,9 @@ def shares(freed: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) 
     of the rotations about the body's axes. A laser's mount whose six correlate is one source: what the total has left
     over.
     """
-    by_name = estimate.set_index("unknown").reindex(NAMES)
+    by_name = estimate.set_index("unknown").reindex(MOUNT_NAMES)
     noise, total = (by_name[name].to_numpy(np.float64) for name in ("sigma", "sigma_total"))
-    effects = freed[[f"effect_{name}" for name in NAMES]].to_numpy(np.float64)
+    effects = freed[[f"effect_{name}" for name in MOUNT_NAMES]].to_numpy(np.float64)
     source = freed["unknown"].map(lambda name: next((words for start, words in SOURCES if name.startswith(start)), ""))
     there = [words for _, words in SOURCES if (source == words).any()]
     squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for words in there}

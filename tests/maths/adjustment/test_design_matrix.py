@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment.design_matrix import Poses, of_poses, of_unknowns
-from pipeline.maths.adjustment.parameters import OF_LASER, OF_MBES, State, Surface
+from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, ObservedSurface, State
 from pipeline.maths.geometry.rotations import exp_so3
 
 STEP = 1e-6
 ROOT = np.sqrt(0.5)
 NORMALS = np.array([[-ROOT, -ROOT, 0.05], [-1.0, 0.02, -0.03], [-ROOT, ROOT, 0.0], [0.01, -0.02, 1.0]])
 SURFACES = tuple(
-    Surface.at(name, normal / np.linalg.norm(normal), np.array([0.3, -2.0 + k, 1.0]), 0.01 * k)
+    ObservedSurface.at(name, normal / np.linalg.norm(normal), np.array([0.3, -2.0 + k, 1.0]), 0.01 * k)
     for k, (name, normal) in enumerate(zip(("P1", "P2", "P3", "H"), NORMALS, strict=True))
 )
 P, VELOCITY, TURNING = np.array([-5.0, 1.0, 0.2]), np.array([0.1, 0.5, -0.05]), np.array([0.02, -0.01, 0.03])
@@ -25,7 +25,7 @@ LASER_LEVER = np.array([0.2, 0.5, 1.1])
 
 def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.ndarray) -> Any:
     """v of points x (n, 3) in the sensor's frame, seen from a pose in error; nothing linear here but the pose error."""
-    other = dict(zip(state.names, state.values_of_other(), strict=True))
+    other = dict(zip(state.names, state.additional_values(), strict=True))
     R, lever, prefix = state.R_body_from_sensor, state.lever_arm_m, ""
     if sensor == "laser":
         prefix = "laser_"
@@ -38,7 +38,7 @@ def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.nd
     X = P - VELOCITY * latency + pose[:3] + r + np.cross(pose[3:], r)
     one = state.surfaces[surface]
     if sensor == "mbes":
-        one = one.moved(*(other[f"wet_{one.family}_{name}"] for name in ("turn_1", "turn_2", "shift")))
+        one = one.updated(*(other[f"wet_{one.family}_{name}"] for name in ("turn_1", "turn_2", "shift")))
     return (X - one.centre_m) @ one.normal - one.shift_m
 
 
@@ -56,9 +56,9 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     q = np.vstack([np.ones(7), one.tangents @ r.T, ray @ one.normal])
     features = 4 if sensor == "laser" else 6
     q = np.vstack([q, np.zeros((features - 4, 7))])  # sound speed is tested where its features are made
-    poses = Poses(P[None], T[None], np.concatenate([VELOCITY, TURNING])[None])
-    C = of_unknowns(state, sensor, lever, surface, poses, features)[0]
-    K = of_poses(SURFACES, np.array([surface]))[0]
+    poses = BodyPoses(P[None], T[None], np.concatenate([VELOCITY, TURNING])[None])
+    C = parameter_design(state, SensorOnSurface(sensor, lever, surface, features), poses)[0]
+    K = pose_design(SURFACES, np.array([surface]))[0]
     columns = state.columns(sensor, surface)
 
     def slope(change: Any) -> np.ndarray:
@@ -70,7 +70,7 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     whole[:, columns] = q.T @ C
     for k in range(state.size):
         unit = np.eye(state.size)[k]
-        numeric = slope(lambda h, unit=unit: (state.moved(h * unit), still))
+        numeric = slope(lambda h, unit=unit: (state.updated(h * unit), still))
         np.testing.assert_allclose(whole[:, k], numeric, atol=3e-8, err_msg=state.names[k])
     for k in range(6):
         unit = np.eye(6)[k]
@@ -79,13 +79,13 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
 
 def test_a_state_moves_each_unknown_by_its_name() -> None:
     state = State.at(np.eye(3), np.zeros(3), SURFACES)
-    assert len(set(state.names)) == state.size == len(OF_MBES) + len(OF_LASER) + 6 * len(SURFACES)
+    assert len(set(state.names)) == state.size == len(MBES_PARAMETERS) + len(LASER_PARAMETERS) + 6 * len(SURFACES)
     step = np.arange(1, state.size + 1) * 1e-4
-    moved = state.moved(step)
-    values = dict(zip(state.names, moved.values_of_other(), strict=True))
+    moved = state.updated(step)
+    values = dict(zip(state.names, moved.additional_values(), strict=True))
     for k, name in enumerate(state.names):
         own = name in ("rotation_x", "rotation_y", "rotation_z") or name.startswith("lever_arm") or name[0] in "PH"
         assert values[name] == pytest.approx(0.0 if own else step[k])
     np.testing.assert_allclose(moved.lever_arm_m, step[3:6])
     assert moved.surfaces[3].shift_m - SURFACES[3].shift_m == pytest.approx(step[state.names.index("H_shift")])
-    assert replace(moved, other=state.other).values_of_other().any() == np.False_
+    assert replace(moved, additional=state.additional).additional_values().any() == np.False_

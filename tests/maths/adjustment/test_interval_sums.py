@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
-from pipeline.maths.adjustment.variance_components import common, rescaled, scatter
+from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
+from pipeline.maths.adjustment.variance_components import epoch_variance_factor, rescaled, scatter
 
 FEATURES = 5
 
@@ -19,8 +19,12 @@ def points(seed: int, n: int = 500) -> tuple[np.ndarray, ...]:
     return record, share, surface, q, weight, v
 
 
-def summed(rows: Any, record: Any, share: Any, surface: Any, q: Any, weight: Any, v: Any) -> EpochSums:
-    return epoch_sums(record[rows], share[rows], surface[rows], q[:, rows], weight[rows], v[rows])
+def summed(rows: Any, record: Any, share: Any, surface: Any, q: Any, weight: Any, v: Any) -> IntervalSums:
+    return sums_of(record[rows], share[rows], surface[rows], q[:, rows], weight[rows], v[rows])
+
+
+def sums_of(record: Any, share: Any, surface: Any, q: Any, weight: Any, v: Any) -> IntervalSums:
+    return interval_sums(LinearisedPoints(record, surface, share, q, weight, v))
 
 
 def test_sums_are_those_of_the_points() -> None:
@@ -46,7 +50,7 @@ def test_sums_of_batches_are_the_sums() -> None:
     given = points(6)
     whole = summed(slice(None), *given)
     parts = merged(summed(c, *given) for c in (slice(0, 123), slice(123, 124), slice(124, 124), slice(124, None)))
-    for name in EpochSums.__dataclass_fields__:
+    for name in IntervalSums.__dataclass_fields__:
         np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-12, atol=1e-13)
 
 
@@ -57,8 +61,8 @@ def test_sums_moved_are_those_of_moved_observations() -> None:
     by_epoch = {key: change[k] for k, key in enumerate(zip(sums.record, sums.surface, strict=True))}
     shift = np.array([q[:, k] @ by_epoch.get((record[k], surface[k]), np.zeros(FEATURES)) for k in range(len(v))])
     again = summed(slice(None), record, share, surface, q, weight, v + shift)
-    moved = sums.moved(change)
-    for name in EpochSums.__dataclass_fields__:
+    moved = sums.shifted(change)
+    for name in IntervalSums.__dataclass_fields__:
         np.testing.assert_allclose(getattr(moved, name), getattr(again, name), rtol=1e-9, atol=1e-10)
 
 
@@ -78,19 +82,19 @@ def test_the_scatter_is_the_sensors_noise_alone(on_a_line: bool, aside: float) -
     noise = np.sqrt(factor) * sigma * rng.normal(size=n)
     v = np.einsum("ni,in->n", turns[record], q) + noise
     q[2] += aside * noise
-    sums = epoch_sums(record, rng.uniform(size=n), np.zeros(n, dtype=int), q, sigma**-2, v)
+    sums = sums_of(record, rng.uniform(size=n), np.zeros(n, dtype=int), q, sigma**-2, v)
     found = scatter(sums, np.ones(len(sums), dtype=bool))
-    assert found.free == epochs * (each - (2 if on_a_line else 3))
-    assert abs(found.factor / factor - 1) < 4 * np.sqrt(2 / found.free)
+    assert found.dof == epochs * (each - (2 if on_a_line else 3))
+    assert abs(found.factor / factor - 1) < 4 * np.sqrt(2 / found.dof)
     again = scatter(rescaled(sums, {0: found.factor}), np.ones(len(sums), dtype=bool))
     assert again.factor == pytest.approx(1.0)
 
 
 def test_epochs_of_few_points_tell_no_scatter() -> None:
     q = np.vstack([np.ones(10), np.arange(10.0), np.arange(10.0) ** 2])
-    sums = epoch_sums(np.repeat([3, 4], 5), np.zeros(10), np.zeros(10, dtype=int), q, np.ones(10), np.arange(10.0))
+    sums = sums_of(np.repeat([3, 4], 5), np.zeros(10), np.zeros(10, dtype=int), q, np.ones(10), np.arange(10.0))
     found = scatter(sums, np.ones(2, dtype=bool))
-    assert (found.free, found.factor) == (0.0, 1.0)
+    assert (found.dof, found.factor) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("factor", [0.0, 1.0, 4.0])
@@ -109,8 +113,8 @@ def test_what_an_epoch_has_in_common_is_found(factor: float) -> None:
     at = record // 2
     e = (1 - share)[:, None] * errors[0][at] + share[:, None] * errors[1][at]
     v = np.einsum("in,nij,nj->n", q, poses[surface], e) + 3.0 * rng.normal(size=n)
-    sums = epoch_sums(record, share, surface, q, np.full(n, 1 / 9), v)
-    found = common(sums, poses, white)
+    sums = sums_of(record, share, surface, q, np.full(n, 1 / 9), v)
+    found = epoch_variance_factor(sums, poses, white)
     assert abs(found.factor - factor) < 4 * found.sigma
     assert found.sigma < 0.03 + 0.1 * factor
-    assert common(sums, poses, np.zeros(6)) == common(sums, 0 * poses, white)
+    assert epoch_variance_factor(sums, poses, np.zeros(6)) == epoch_variance_factor(sums, 0 * poses, white)

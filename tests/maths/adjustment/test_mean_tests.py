@@ -4,18 +4,25 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.maths.adjustment.drift_test import against_other_passes
-from pipeline.maths.adjustment.mean_tests import limit_of, standardised
-from pipeline.maths.adjustment.pose_errors import Drift, Knots, PoseNoise
-from pipeline.maths.adjustment.residual_means import against_others, cells_of, merged_moments, moments_of, steps_of
+from pipeline.maths.adjustment.drift_test import drift_between_passes
+from pipeline.maths.adjustment.mean_tests import joint_limit, normal_deviates
+from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise
+from pipeline.maths.adjustment.residual_means import (
+    BinnedResiduals,
+    bin_means,
+    differences_from_rest,
+    merged_residual_sums,
+    residual_sums,
+    step_differences,
+)
 
 TOLERATED = 0.003
 
 
-def moments(bins, slots, v_m, sigma_m=0.01, surface=0):
+def sums_of(bins, slots, v_m, sigma_m=0.01, surface=0):
     number = len(v_m)
     first, weight, size = np.full(number, surface), np.full(number, sigma_m**-2), np.zeros(number)
-    return moments_of(first, np.asarray(bins), np.asarray(slots), weight, np.asarray(v_m), size)
+    return residual_sums(BinnedResiduals(first, np.asarray(bins), np.asarray(slots), weight, np.asarray(v_m), size))
 
 
 def session(rng, bins=40, slots=15, points=4, common_m=0.005, sigma_m=0.01):
@@ -31,10 +38,10 @@ def alarms(rng, sessions, offset_m, tolerated, level, **figures):
     for _ in range(sessions):
         bins, slots, v = session(rng, **figures)
         sign = np.where(bins % 2, 1.0, -1.0)
-        cells = cells_of(moments(bins, slots, v + sign * offset_m))
+        cells = bin_means(sums_of(bins, slots, v + sign * offset_m))
         figures_of = (np.array([getattr(one, name) for one in cells]) for name in ("mean_m", "sigma_mean_m", "dof"))
-        u = standardised(*figures_of, tolerated)
-        found += bool(np.max(np.abs(u)) > limit_of(len(cells), level))
+        u = normal_deviates(*figures_of, tolerated)
+        found += bool(np.max(np.abs(u)) > joint_limit(len(cells), level))
     return found
 
 
@@ -56,7 +63,7 @@ def test_moments_that_share_noise_count_as_one_each():
     assert alarms(rng, 60, 0.0, 0.0, 0.01, points=50, common_m=0.01) <= stats.binom.ppf(0.999, 60, 0.01)
     bins, slots, v = session(rng, points=50, common_m=0.01)
     pointwise = v[bins == 0].std() / np.sqrt(np.sum(bins == 0))
-    assert cells_of(moments(bins, slots, v))[0].sigma_mean_m > 3 * pointwise
+    assert bin_means(sums_of(bins, slots, v))[0].sigma_mean_m > 3 * pointwise
 
 
 @pytest.mark.parametrize(("beyond_m", "rejected"), [(-0.0005, False), (0.004, True)])
@@ -66,7 +73,7 @@ def test_both_sides_of_the_tolerance(beyond_m, rejected):
 
 
 def test_within_the_tolerance_nothing_is_left_over():
-    u = standardised(np.array([0.0029, -0.0031, -0.004]), np.full(3, 1e-6), np.full(3, 50.0), TOLERATED)
+    u = normal_deviates(np.array([0.0029, -0.0031, -0.004]), np.full(3, 1e-6), np.full(3, 50.0), TOLERATED)
     assert u[0] == 0.0
     assert u[2] < u[1] < 0
 
@@ -76,7 +83,7 @@ def test_within_the_tolerance_nothing_is_left_over():
 def test_few_moments_are_held_to_students_quantile(dof, chance):
     """The normal deviate of Student's quantile, and never more."""
     t = stats.t.isf(chance / 2, dof)
-    u = float(standardised(np.array(t), np.array(1.0), np.array(dof), 0.0))
+    u = float(normal_deviates(np.array(t), np.array(1.0), np.array(dof), 0.0))
     exact = stats.norm.isf(chance / 2)
     assert u == pytest.approx(exact, rel=0.01)
     assert u <= exact * (1 + 1e-6)
@@ -84,7 +91,7 @@ def test_few_moments_are_held_to_students_quantile(dof, chance):
 
 def test_the_limit_over_many_bins_leaves_the_level_to_all_of_them_together():
     for number, level in ((1, 0.001), (7, 0.05), (500, 0.001), (500, 0.2)):
-        each = 2 * stats.norm.sf(limit_of(number, level))
+        each = 2 * stats.norm.sf(joint_limit(number, level))
         assert 1 - (1 - each) ** number == pytest.approx(level, rel=1e-6)
 
 
@@ -92,7 +99,7 @@ def test_a_mean_of_unequal_moments():
     """Against its definition, by hand: three moments of 1, 2 and 4 points."""
     v = np.array([0.010, 0.02, 0.04, 0.00, 0.02, 0.00, 0.02])
     slots = np.array([0, 1, 1, 2, 2, 2, 2])
-    (cell,) = cells_of(moments(np.zeros(7, dtype=int), slots, v, sigma_m=0.001))
+    (cell,) = bin_means(sums_of(np.zeros(7, dtype=int), slots, v, sigma_m=0.001))
     counts, means = np.array([1, 2, 4]), np.array([0.010, 0.03, 0.01])
     equal = 49 / 21
     mean = counts @ means / 7
@@ -100,12 +107,12 @@ def test_a_mean_of_unequal_moments():
     own = scatter / 49 * equal / (equal - 1)
     usual = 0.001**2 / 7 + (scatter - 7 * 0.001**2) / 21 / equal
     sigma = np.sqrt((8 * usual + (equal - 1) * own) / (8 + equal - 1))
-    assert (cell.count, cell.moments, cell.dof) == (7, 3, pytest.approx(8 + equal - 1))
+    assert (cell.count, cell.slots, cell.dof) == (7, 3, pytest.approx(8 + equal - 1))
     assert (cell.mean_m, cell.sigma_mean_m) == (pytest.approx(mean), pytest.approx(sigma))
 
 
 def test_moments_that_agree_by_chance_are_no_surer_than_their_points():
-    (cell,) = cells_of(moments(np.zeros(16, dtype=int), np.arange(16), np.full(16, 0.004), sigma_m=0.01))
+    (cell,) = bin_means(sums_of(np.zeros(16, dtype=int), np.arange(16), np.full(16, 0.004), sigma_m=0.01))
     assert cell.sigma_mean_m == pytest.approx(0.01 / 4)
 
 
@@ -115,19 +122,19 @@ def test_a_face_seen_for_half_a_second_is_held_against_what_the_others_scatter()
     bins, slots, v = session(rng, bins=10, slots=80, points=15, common_m=0.001, sigma_m=0.005)
     few = (bins < 9) | (slots < 9006)
     v[bins == 9] += -0.033 + 0.006 * np.resize([1, -1, 0.5], 80)[slots[bins == 9] - 9000]
-    cells = cells_of(moments(bins[few], slots[few], v[few], sigma_m=0.005))
+    cells = bin_means(sums_of(bins[few], slots[few], v[few], sigma_m=0.005))
     figures = (np.array([getattr(one, name) for one in cells]) for name in ("mean_m", "sigma_mean_m", "dof"))
-    u = standardised(*figures, TOLERATED)
-    assert cells[9].moments == 6
-    assert -u[9] > limit_of(500, 0.001)
+    u = normal_deviates(*figures, TOLERATED)
+    assert cells[9].slots == 6
+    assert -u[9] > joint_limit(500, 0.001)
     assert np.all(u[:9] == 0)
 
 
 def test_a_batch_of_few_points_in_a_long_time_is_counted_alike():
     rng = np.random.default_rng(3)
     bins, slots, v = rng.integers(0, 5, 50), rng.integers(0, 10**6, 50), rng.normal(size=50)
-    sparse = moments(bins, slots, v)
-    pieces = merged_moments([moments(bins[:20], slots[:20], v[:20]), moments(bins[20:], slots[20:], v[20:])])
+    sparse = sums_of(bins, slots, v)
+    pieces = merged_residual_sums([sums_of(bins[:20], slots[:20], v[:20]), sums_of(bins[20:], slots[20:], v[20:])])
     np.testing.assert_array_equal(sparse.key, pieces.key)
     np.testing.assert_allclose(sparse.sums, pieces.sums)
     order = np.lexsort((slots, bins))
@@ -139,7 +146,7 @@ def test_a_step_is_found_where_it_is():
     rng = np.random.default_rng(4)
     angle, slot = (one.ravel() for one in np.meshgrid(np.arange(-5, 30), np.arange(80)))
     v = 0.010 * (angle >= 12) - 0.004 + rng.normal(0, 0.004, len(angle))
-    cells = steps_of(moments(angle, slot, v, sigma_m=0.004), 4)
+    cells = step_differences(sums_of(angle, slot, v, sigma_m=0.004), 4)
     assert [cell.key for cell in cells] == [(0, border) for border in range(-4, 30)]
     largest = max(cells, key=lambda cell: abs(cell.mean_m) / cell.sigma_mean_m)
     assert largest.key == (0, 12)
@@ -153,15 +160,15 @@ def test_noise_that_a_moment_shares_does_not_hide_a_step():
     rng = np.random.default_rng(5)
     angle, slot = (one.ravel() for one in np.meshgrid(np.arange(0, 16), np.arange(60)))
     v = rng.normal(0, 0.02, 60)[slot] + rng.normal(0, 0.002, len(slot))
-    cells = steps_of(moments(angle, slot, v, sigma_m=0.002), 4)
+    cells = step_differences(sums_of(angle, slot, v, sigma_m=0.002), 4)
     assert max(cell.sigma_mean_m for cell in cells if 4 <= cell.key[1] <= 12) < 0.0005
-    assert min(cell.sigma_mean_m for cell in cells_of(moments(angle, slot, v, sigma_m=0.002))) > 0.002
+    assert min(cell.sigma_mean_m for cell in bin_means(sums_of(angle, slot, v, sigma_m=0.002))) > 0.002
 
 
 def test_surfaces_do_not_step_into_each_other():
     first, bins = np.repeat([0, 1], 4), np.concatenate([[1, 1, 2, 2], [3, 3, 4, 4]])
-    one = moments_of(first, bins, np.tile([0, 1], 4), np.ones(8), np.arange(8.0), np.zeros(8))
-    assert [cell.key for cell in steps_of(one, 4)] == [(0, 2), (1, 4)]
+    one = residual_sums(BinnedResiduals(first, bins, np.tile([0, 1], 4), np.ones(8), np.arange(8.0), np.zeros(8)))
+    assert [cell.key for cell in step_differences(one, 4)] == [(0, 2), (1, 4)]
 
 
 def test_a_pass_that_differs_is_told_from_the_others():
@@ -169,13 +176,13 @@ def test_a_pass_that_differs_is_told_from_the_others():
     rng = np.random.default_rng(6)
     number, slot = np.repeat(np.arange(4), 200), np.arange(800)
     v = np.where(number == 2, 0.0035, -0.0015) + rng.normal(0, 0.002, 800)
-    cells = against_others(moments(number, slot, v, sigma_m=0.002))
+    cells = differences_from_rest(sums_of(number, slot, v, sigma_m=0.002))
     assert [cell.key[1] for cell in cells] == [0, 1, 2, 3]
     assert cells[2].mean_m == pytest.approx(0.005, abs=4 * cells[2].sigma_mean_m)
     assert max(cells, key=lambda cell: abs(cell.mean_m)).key == (0, 2)
     others = 0.002 * np.sqrt(1 / 200 + 1 / 600)
     assert cells[2].sigma_mean_m == pytest.approx(others, rel=0.15)
-    assert against_others(moments(np.zeros(200, dtype=int), np.arange(200), v[:200])) == []
+    assert differences_from_rest(sums_of(np.zeros(200, dtype=int), np.arange(200), v[:200])) == []
 
 
 def drifted(rng, noise, seconds):
@@ -193,19 +200,19 @@ def test_drift_of_a_pass_against_the_others_has_the_sigma_conceded():
     rng = np.random.default_rng(10)
     u = []
     for _ in range(400):
-        passes, values, sigmas = against_other_passes(Drift(knots, drifted(rng, noise, seconds)), noise, number)
-        assert passes.tolist() == [0, 1, 2, 3]
-        u.append(values / sigmas)
+        found = drift_between_passes(DriftEstimate(knots, drifted(rng, noise, seconds)), noise, number)
+        assert found.passes.tolist() == [0, 1, 2, 3]
+        u.append(found.difference / found.sigma)
     np.testing.assert_allclose(np.sqrt(np.mean(np.square(u), axis=0)), 1.0, atol=0.14)
     step = np.zeros((40, 6))
     step[number == 1, 5] = 0.003
-    _, values, _ = against_other_passes(Drift(knots, step), noise, number)
+    values = drift_between_passes(DriftEstimate(knots, step), noise, number).difference
     np.testing.assert_allclose(values[:, 5], [-0.003 * 10 / 29, 0.003, -0.003 * 10 / 29, -0.003 * 10 / 30])
 
 
 def test_drift_of_a_single_pass_is_held_against_zero():
     noise = PoseNoise(np.zeros(6), np.full(6, 0.01), 200.0)
     knots = Knots(np.arange(3), np.array([0.0, 1.0, 2.0]), np.ones(2, dtype=bool))
-    _, values, sigmas = against_other_passes(Drift(knots, np.full((3, 6), 0.02)), noise, np.zeros(3, dtype=int))
-    np.testing.assert_allclose(values, 0.02)
-    np.testing.assert_allclose(sigmas, 0.01, rtol=0.01)
+    found = drift_between_passes(DriftEstimate(knots, np.full((3, 6), 0.02)), noise, np.zeros(3, dtype=int))
+    np.testing.assert_allclose(found.difference, 0.02)
+    np.testing.assert_allclose(found.sigma, 0.01, rtol=0.01)

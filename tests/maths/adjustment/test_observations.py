@@ -6,7 +6,14 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.interval_sums import Runs
-from pipeline.maths.adjustment.observations import Seen, Sigmas, laser_observations, sensor_part, sonar_observations
+from pipeline.maths.adjustment.observations import (
+    PointDesign,
+    SensorSigmas,
+    SoundingsOnSurface,
+    laser_point_design,
+    sensor_noise,
+    sonar_point_design,
+)
 from pipeline.maths.geometry.planes import tangents_of
 from pipeline.maths.sonar.soundings import points_in_mbes
 
@@ -14,7 +21,7 @@ NORMAL = np.array([-np.sqrt(0.5), -np.sqrt(0.4), np.sqrt(0.1)])
 AXES = np.vstack([tangents_of(NORMAL), NORMAL])
 R_TARGET_FROM_MBES = Rotation.from_euler("ZXY", np.radians([12.0, 2.0, -48.0])).as_matrix()
 LEVER = np.array([0.4, -0.3, -1.9])
-SIGMAS = Sigmas(0.02, 0.002)
+SIGMAS = SensorSigmas(0.02, 0.002)
 
 
 def beams(angles: np.ndarray, ranges: np.ndarray, tilts: np.ndarray | float = 0.0) -> np.ndarray:
@@ -23,13 +30,13 @@ def beams(angles: np.ndarray, ranges: np.ndarray, tilts: np.ndarray | float = 0.
     return ranges * np.array([np.sin(angles), np.cos(angles) * np.sin(about_x), -np.cos(angles) * np.cos(about_x)])
 
 
-def seen(points: np.ndarray) -> Seen:
+def seen(points: np.ndarray) -> PointDesign:
     """Of points on the surface."""
     n = points.shape[1]
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
     r = AXES @ (R_TARGET_FROM_MBES @ points + LEVER[:, None])
-    return sonar_observations(points, in_mbes, up, r, np.zeros(n), SIGMAS)
+    return sonar_point_design(SoundingsOnSurface(points, in_mbes, up, r, np.zeros(n)), SIGMAS)
 
 
 ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0, 4.0, 6.0, 9.0])
@@ -54,7 +61,7 @@ def test_laser_sigma_is_the_scatter_of_noisy_rays() -> None:
     noise = 0.02 * rng.normal(size=(40_000, 1)) * ray + 6.0 * 0.002 * rng.normal(size=(40_000, 2)) @ sides
     lever = AXES @ LEVER
     point = (AXES @ (ray * range_m) + lever)[:, None]
-    _, sigma, q, _ = laser_observations(point, lever[:, None], np.array([range_m]), SIGMAS)
+    _, sigma, q, _ = laser_point_design(point, lever[:, None], np.array([range_m]), SIGMAS)
     assert sigma[0] == pytest.approx(np.std(noise @ NORMAL), rel=0.02)
     assert q[3, 0] == pytest.approx(NORMAL @ ray)  # a longer range
 
@@ -73,8 +80,8 @@ def test_beams_that_look_up_have_the_features_of_those_that_look_down() -> None:
     axes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], 5, axis=2)
     turned = np.einsum("kin,ij->kjn", axes, flip)
     up, r = np.repeat([[0.0], [0.0], [1.0]], 5, axis=1), np.zeros((3, 5))
-    found = sonar_observations(points, axes, up, r, np.zeros(5), SIGMAS)
-    expected = sonar_observations(flip @ points, turned, flip @ up, r, np.zeros(5), SIGMAS)
+    found = sonar_point_design(SoundingsOnSurface(points, axes, up, r, np.zeros(5)), SIGMAS)
+    expected = sonar_point_design(SoundingsOnSurface(flip @ points, turned, flip @ up, r, np.zeros(5)), SIGMAS)
     np.testing.assert_allclose(found.features, expected.features, atol=1e-12)
     np.testing.assert_allclose(found.mean_m, expected.mean_m, rtol=1e-9)
     np.testing.assert_allclose(found.sigma_m, expected.sigma_m, rtol=1e-12)
@@ -138,7 +145,8 @@ def test_beams_that_stray_from_their_recorded_angle_do_not_turn_a_grazed_face() 
     points = beams(angles, ranges)
     axes = np.repeat(np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])[:, :, None], points.shape[1], axis=2)
     v = points[2] + depth
-    _, sigma, q, slopes = sonar_observations(points, axes, axes[2], points, v, Sigmas(0.01, 0.002))
+    soundings = SoundingsOnSurface(points, axes, axes[2], points, v)
+    _, sigma, q, slopes = sonar_point_design(soundings, SensorSigmas(0.01, 0.002))
     assert sigma == pytest.approx(np.full(len(v), np.std(v)), rel=0.25)
 
     def slope(along: np.ndarray) -> float:
@@ -169,7 +177,8 @@ def test_a_stray_axis_meets_the_surface_further_away_on_average(tilts: np.ndarra
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
     v = 0.05 * NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES, np.ones(5), tilts)
-    again = sonar_observations(points, in_mbes, up, AXES @ (R_TARGET_FROM_MBES @ points), v, SIGMAS)
+    soundings = SoundingsOnSurface(points, in_mbes, up, AXES @ (R_TARGET_FROM_MBES @ points), v)
+    again = sonar_point_design(soundings, SIGMAS)
     np.testing.assert_allclose(again.sigma_m, sigma, rtol=1e-12)
 
 
@@ -186,8 +195,8 @@ def test_at_the_adjusted_point_noise_does_not_turn_the_surface(common_m: float) 
     r = true + rays * 0.05 * rng.normal(size=n)[:, None]
     v = r @ NORMAL + 3.0 + common_m * rng.normal(size=n // each)[epoch]
     ranges = np.linalg.norm(r, axis=1)
-    _, sigma, q, slopes = laser_observations(AXES @ r.T, np.zeros((3, n)), ranges, Sigmas(0.05, 0.0))
-    own = sensor_part(v, sigma**-2, Runs.of(epoch), np.full(n, common_m))
+    _, sigma, q, slopes = laser_point_design(AXES @ r.T, np.zeros((3, n)), ranges, SensorSigmas(0.05, 0.0))
+    own = sensor_noise(v, sigma**-2, Runs.of(epoch), np.full(n, common_m))
     shrink = (common_m**2 / (common_m**2 + sigma**2 / each)).reshape(-1, each)
 
     def white(values: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pipeline.maths.adjustment.eliminate_drift import eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import Observed, reduce_white
-from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
-from pipeline.maths.adjustment.pose_errors import Drift, Knots, PoseNoise, knots_of
+from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
+from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
+from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise, place_knots
 
 RATE_HZ = 10.0
 UNKNOWNS, SIX, FEATURES, POINTS = 7, 6, 4, 9
@@ -19,7 +19,7 @@ UNKNOWNS, SIX, FEATURES, POINTS = 7, 6, 4, 9
 class Source:
     """Random epochs of one sensor on one surface, on some of the unknowns."""
 
-    sums: EpochSums
+    sums: IntervalSums
     design: np.ndarray
     columns: np.ndarray
     pose: np.ndarray
@@ -28,9 +28,9 @@ class Source:
     def record(self) -> np.ndarray:
         return self.sums.record
 
-    def observed(self, rows: slice) -> Observed:
+    def linearised(self, rows: slice) -> LinearisedIntervals:
         some = np.arange(len(self.record))[rows]
-        return Observed(self.sums.taken(some), self.design[some], self.columns, self.pose)
+        return LinearisedIntervals(self.sums.selected(some), self.design[some], self.columns, self.pose)
 
 
 def sources(rng: np.random.Generator, records: np.ndarray) -> tuple[list[Source], list[Any]]:
@@ -42,7 +42,8 @@ def sources(rng: np.random.Generator, records: np.ndarray) -> tuple[list[Source]
         for k, one in enumerate(record):
             q, s = np.vstack([np.ones(POINTS), rng.normal(size=(FEATURES - 1, POINTS))]), rng.uniform(0, 1, POINTS)
             v, w = rng.normal(size=POINTS), rng.uniform(0.5, 2, POINTS)
-            pieces.append(epoch_sums(np.full(POINTS, one), s, np.zeros(POINTS, dtype=int), q, w, v))
+            points = LinearisedPoints(np.full(POINTS, one), np.zeros(POINTS, dtype=int), s, q, w, v)
+            pieces.append(interval_sums(points))
             whole = np.zeros((FEATURES, UNKNOWNS))
             whole[:, columns] = design[k]
             rows.append((one, whole, np.vstack([pose, np.zeros((FEATURES - 3, SIX))]), q, s, v, w))
@@ -98,10 +99,11 @@ def test_elimination_is_the_dense_solution(white: float) -> None:
     seconds = np.r_[np.arange(31), 90 + np.arange(31)] / RATE_HZ
     records = np.r_[np.arange(30), 31 + np.arange(30)]
     found, rows = sources(rng, records)
-    knots = knots_of(np.unique(np.concatenate([one.record for one in found])), seconds, 1.0, 2.0)
+    knots = place_knots(np.unique(np.concatenate([one.record for one in found])), seconds, 1.0, 2.0)
     noise = PoseNoise(white * np.array([1, 1, 1, 0.5, 0.5, 0]), np.array([0.3, 0.3, 0.2, 0.1, 0.1, 0]), 4.0)
     current = rng.normal(size=(len(knots.record), SIX)) * noise.drift
-    ours = eliminate_drift(reduce_white(found, UNKNOWNS, knots, seconds, noise.white), noise, Drift(knots, current))
+    reduced = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), noise.white)
+    ours = eliminate_drift(reduced, noise, DriftEstimate(knots, current))
     step = -np.linalg.solve(ours.normal, ours.right)
 
     A, v, white0 = dense(rows, knots, seconds, noise, current)
@@ -128,11 +130,11 @@ def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.Mon
     rng = np.random.default_rng(4)
     seconds = np.arange(200) / RATE_HZ
     found, _ = sources(rng, np.arange(199))
-    knots = knots_of(np.unique(np.concatenate([one.record for one in found])), seconds, 0.5, 2.0)
+    knots = place_knots(np.unique(np.concatenate([one.record for one in found])), seconds, 0.5, 2.0)
     white = np.full(SIX, 0.4)
-    whole = reduce_white(found, UNKNOWNS, knots, seconds, white)
+    whole = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), white)
     monkeypatch.setattr("pipeline.maths.adjustment.eliminate_white_noise.SIDE_BY_SIDE", 3)
-    parts = reduce_white(found, UNKNOWNS, knots, seconds, white)
+    parts = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), white)
     np.testing.assert_allclose(parts.normal, whole.normal, rtol=1e-12, atol=1e-12)
     assert parts.log_determinant == pytest.approx(whole.log_determinant)
 
@@ -140,7 +142,7 @@ def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.Mon
 def test_knots_keep_to_the_passes() -> None:
     seconds = np.r_[np.arange(0, 10, 0.1), np.arange(60, 65.25, 0.1)]
     used = np.r_[np.arange(5, 80), np.arange(100, 140)]
-    knots = knots_of(used, seconds, 1.0, 5.0)
+    knots = place_knots(used, seconds, 1.0, 5.0)
     np.testing.assert_array_equal(np.flatnonzero(~knots.inner), [8])
     assert knots.record[0] == 5
     assert knots.record[8] == 80  # the step from record 79 on ends there
@@ -150,8 +152,8 @@ def test_knots_keep_to_the_passes() -> None:
     assert knots.inner[interval].all()
     assert (knots.record[interval] <= used).all()
     assert (knots.record[interval + 1] > used).all()
-    drift = Drift(knots, np.ones((len(knots.record), SIX)))
-    assert np.allclose(drift.moved(drift.values).at(np.array([0.0, 30.0, 99.0])), 2.0)
+    drift = DriftEstimate(knots, np.ones((len(knots.record), SIX)))
+    assert np.allclose(drift.updated(drift.values).at(np.array([0.0, 30.0, 99.0])), 2.0)
 
 
 def test_scaled_noise_has_scaled_variances() -> None:

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment.design_constraints import Design, of_design
-from pipeline.maths.adjustment.parallel_constraints import of_ties
-from pipeline.maths.adjustment.parameters import State, Surface
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.pseudo_observations import DesignPrior, ParallelPrior
 
 RANDOM = np.random.default_rng(5)
 PLANES = {
@@ -23,11 +22,11 @@ def state(turn: float = 0.002, shift: float = 0.004) -> State:
         normal = Rotation.from_rotvec(turn * RANDOM.standard_normal(3)).apply(n)
         centre = q + 0.3 * RANDOM.standard_normal(3)
         centre -= normal * (normal @ (centre - q))
-        surfaces.append(Surface.at(name, normal, centre, shift * RANDOM.standard_normal()))
+        surfaces.append(ObservedSurface.at(name, normal, centre, shift * RANDOM.standard_normal()))
     return State.at(np.eye(3), np.zeros(3), surfaces, "laser")
 
 
-def least(at: State, design: Design) -> float:
+def least(at: State, design: DesignPrior) -> float:
     """The smallest sum of squares over all displacements of the design, by brute least squares."""
     rows, right = [], []
     for surface in at.surfaces:
@@ -51,15 +50,15 @@ def least(at: State, design: Design) -> float:
 def test_the_design_is_what_least_squares_over_its_displacement_leave(surveyed: bool) -> None:
     sigma = np.array([0.01, 0.01, 0.02, 3e-4, 3e-4, 1e-3])
     sigma = sigma if surveyed else np.where(sigma == 3e-4, sigma, np.inf)  # plumb is known
-    design = Design(PLANES, 4e-4, 0.002, np.array([0.01, -0.02, 0.005, 0.0, 0.0, 0.001]), sigma)
+    design = DesignPrior(PLANES, 4e-4, 0.002, np.array([0.01, -0.02, 0.005, 0.0, 0.0, 0.001]), sigma)
     at = state()
-    known = of_design(design, at)
+    known = design.pseudo_observations(at)
     assert known.squares == pytest.approx(least(at, design), rel=1e-9)
     step = np.zeros(at.size)
-    place = np.arange(at.size)[at.shared]
+    place = np.arange(at.size)[at.surface_slice]
     for k in place:
         step[k] = 1e-6
-        up, down = least(at.moved(step), design), least(at.moved(-step), design)
+        up, down = least(at.updated(step), design), least(at.updated(-step), design)
         slope = (up - down) / 2e-6
         assert 2 * known.right[k] == pytest.approx(slope, rel=2e-3, abs=0.05 * np.sqrt(known.normal[k, k]))
         curvature = (up + down - 2 * known.squares) / 1e-12
@@ -70,23 +69,25 @@ def test_the_design_is_what_least_squares_over_its_displacement_leave(surveyed: 
 
 def test_a_design_displaced_as_a_whole_is_no_misclosure() -> None:
     shift, turn = np.array([0.1, -0.2, 0.05]), Rotation.from_rotvec([0.0, 0.0, 1e-4])
-    surfaces = [Surface.at(name, turn.apply(n), turn.apply(q) + shift) for name, (n, q) in PLANES.items()]
+    surfaces = [ObservedSurface.at(name, turn.apply(n), turn.apply(q) + shift) for name, (n, q) in PLANES.items()]
     at = State.at(np.eye(3), np.zeros(3), surfaces, "laser")
     free = np.array([np.inf] * 3 + [1e-4] * 2 + [np.inf])
-    assert of_design(Design(PLANES, 4e-4, 0.002, np.zeros(6), free), at).squares < 1e-4
+    assert DesignPrior(PLANES, 4e-4, 0.002, np.zeros(6), free).pseudo_observations(at).squares < 1e-4
     fixed = np.array([0.01] * 3 + [1e-4] * 2 + [np.inf])
     expected = np.sum((shift / 0.01) ** 2)  # minus what the faces concede
-    assert of_design(Design(PLANES, 4e-4, 1e-5, np.zeros(6), fixed), at).squares == pytest.approx(expected, rel=0.02)
+    design = DesignPrior(PLANES, 4e-4, 1e-5, np.zeros(6), fixed)
+    assert design.pseudo_observations(at).squares == pytest.approx(expected, rel=0.02)
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_ties_draw_two_normals_together(sense: float) -> None:
     turned = Rotation.from_rotvec([0.0, 0.002, 0.001]).apply(PLANES["b"][0])
-    surfaces = [Surface.at("b", PLANES["b"][0], PLANES["b"][1]), Surface.at("e", sense * turned, np.ones(3))]
+    first = ObservedSurface.at("b", PLANES["b"][0], PLANES["b"][1])
+    surfaces = [first, ObservedSurface.at("e", sense * turned, np.ones(3))]
     at = State.at(np.eye(3), np.zeros(3), surfaces)
-    known = of_ties([("b", "e")], 1e-4, at)
+    known = ParallelPrior([("b", "e")], 1e-4).pseudo_observations(at)
     angle = np.linalg.norm(np.cross(turned, PLANES["b"][0]))
     assert known.squares == pytest.approx((angle / 1e-4) ** 2, rel=1e-3)
     step = -np.linalg.lstsq(known.normal, known.right, rcond=1e-9)[0]
-    one, other = at.moved(step).surfaces
+    one, other = at.updated(step).surfaces
     assert np.linalg.norm(np.cross(one.normal, other.normal)) < 1e-5

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment.solution import TOGETHER, together, weakest_direction
+from pipeline.maths.adjustment.estimability import CORRELATION_LIMIT, correlated_pair, weakest_direction
 
 YAW, ARM_Y = 2, 4
 
@@ -19,13 +19,13 @@ def covariance_of(rho: float) -> np.ndarray:
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_two_move_together_from_where_it_doubles_their_sigma(sign: float) -> None:
-    below, above = covariance_of(sign * (TOGETHER - 0.001)), covariance_of(sign * (TOGETHER + 0.001))
-    assert together(below) is None
+    below, above = covariance_of(sign * (CORRELATION_LIMIT - 0.001)), covariance_of(sign * (CORRELATION_LIMIT + 0.001))
+    assert correlated_pair(below) is None
     assert weakest_direction(below) == "no two are hard to tell apart; least sure are yaw and lever arm y"
-    found = together(above)
+    found = correlated_pair(above)
     assert found is not None
     assert found[:2] == (YAW, ARM_Y)
-    assert found[2] == pytest.approx(sign * (TOGETHER + 0.001))
+    assert found[2] == pytest.approx(sign * (CORRELATION_LIMIT + 0.001))
     assert "yaw and lever arm y move together" in weakest_direction(above)
 
 

@@ -1,0 +1,139 @@
+"""Prior information about the surfaces, as pseudo-observations: the target as designed, or families that are parallel.
+
+**The target as designed.** It calibrates a laser that nothing else has calibrated. The design is a rigid body that
+stands where it was set up, but for a displacement g = (d, ω) (m and rad, target frame; X -> X + d + ω × X). The survey
+knows each component of g with some sigma, or not at all. Each family of faces stands off that body by errors of its
+own: its direction by σ_turn about either axis in it, its place by σ_shift. With n, c, s the surface as it is now
+(n · (X - c) = s), t1, t2 its tangents, n0 the design's normal and q a point of the design's plane amid its faces,
+
+    turn k:   t_k · (n - n0) - ω · (n0 × t_k)                                   = 0 ± σ_turn
+    place:    n · (q - c) - s + n · d + ω · (q × n)                             = 0 ± σ_shift
+    set-up:   g - g0                                                            = 0 ± σ_g
+
+(the design's plane goes through q + d + ω × q with normal n0 + ω × n0). The step of a surface's parameters (turns a_k,
+shift b) changes the first by a_k, the second by a_k t_k · (q - c) - b. g is eliminated: where σ_g is infinite its
+component comes from the faces alone, and a component that no face determines drops out.
+
+**Parallel families**, at distances that nobody knows. For two such families with normals n, m (m turned over where it
+points the opposite way) and the first's tangents t1, t2
+
+    t_k · (n - m) = 0 ± σ,      k = 1, 2,
+
+and a step of their turns changes it by a_k - Σ_j t_k · t'_j b_j. So a wall above the water, which the laser sees, tells
+the direction of the wall's foot, which the sonar alone sees.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
+
+Array = NDArray[np.float64]
+N_DISPLACEMENT = 6  # d and ω
+OPEN = 1e-12  # an eigenvalue of the scaled normal matrix of g below this leaves a direction open
+
+
+@dataclass(frozen=True)
+class PseudoObservations:
+    """Contribution of prior information to the normal equations N x + b = 0 of all parameters.
+
+    normal N (u, u); right b (u,); squares: contribution to the sum of squares at x = 0.
+    """
+
+    normal: Array
+    right: Array
+    squares: float
+
+
+class SurfacePrior(Protocol):
+    """Prior information about the surfaces."""
+
+    def pseudo_observations(self, state: State) -> PseudoObservations:
+        """Return its pseudo-observations, linearised at the surfaces as they are."""
+        ...
+
+
+@dataclass(frozen=True)
+class DesignPrior:
+    """The target as designed, target frame.
+
+    planes: for each family the normal n0 (3,) and a point q (3,) of its plane; turn_rad, shift_m: sigmas of a family
+    against the body; set_up (6,): g0, where the body was set up (m, rad); set_up_sigma (6,): its sigmas, infinite where
+    nobody surveyed.
+    """
+
+    planes: Mapping[str, tuple[Array, Array]]
+    turn_rad: float
+    shift_m: float
+    set_up: Array
+    set_up_sigma: Array
+
+    def pseudo_observations(self, state: State) -> PseudoObservations:
+        """Return the design's pseudo-observations, linearised at the surfaces as they are."""
+        size = state.size
+        N, b = np.zeros((size, size)), np.zeros(size)
+        information = np.where(np.isfinite(self.set_up_sigma), self.set_up_sigma, np.inf) ** -2.0
+        # normal equations of g, and what ties it to the surfaces
+        N_g, N_xg, b_g = np.diag(information), np.zeros((size, N_DISPLACEMENT)), -information * self.set_up
+        squares = float(np.sum(information * self.set_up**2))
+        weight = np.array([self.turn_rad, self.turn_rad, self.shift_m]) ** -2.0
+        for number, surface in enumerate(state.surfaces):
+            r, J, G = _misclosures(surface, *self.planes[surface.family])
+            place = state.surface_columns(number)
+            N[np.ix_(place, place)] += J.T @ (weight[:, None] * J)
+            b[place] += J.T @ (weight * r)
+            N_xg[place] += J.T @ (weight[:, None] * G)
+            N_g += G.T @ (weight[:, None] * G)
+            b_g += G.T @ (weight * r)
+            squares += float(np.sum(weight * r**2))
+        inverse = _inverse(N_g)
+        return PseudoObservations(
+            N - N_xg @ inverse @ N_xg.T, b - N_xg @ inverse @ b_g, squares - float(b_g @ inverse @ b_g)
+        )
+
+
+@dataclass(frozen=True)
+class ParallelPrior:
+    """Pairs of families that are parallel, within ``sigma_rad``."""
+
+    pairs: Sequence[tuple[str, str]]
+    sigma_rad: float
+
+    def pseudo_observations(self, state: State) -> PseudoObservations:
+        """Return the pairs' pseudo-observations, linearised at the surfaces as they are."""
+        number = {surface.family: k for k, surface in enumerate(state.surfaces)}
+        N, b, squares = np.zeros((state.size, state.size)), np.zeros(state.size), 0.0
+        for pair in self.pairs:
+            first, second = (state.surfaces[number[family]] for family in pair)
+            sense = 1.0 if first.normal @ second.normal > 0 else -1.0
+            r = first.tangents @ (first.normal - sense * second.normal)
+            J = np.hstack([np.eye(2), -sense * first.tangents @ second.tangents.T])
+            place = np.concatenate([state.surface_columns(number[family])[:2] for family in pair])
+            N[np.ix_(place, place)] += J.T @ J / self.sigma_rad**2
+            b[place] += J.T @ r / self.sigma_rad**2
+            squares += float(r @ r) / self.sigma_rad**2
+        return PseudoObservations(N, b, squares)
+
+
+def _misclosures(surface: ObservedSurface, n0: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Return misclosures (3,), their design by the surface's parameters (3, 3), and by g (3, 6)."""
+    n, from_centre = surface.normal, q - surface.centre_m
+    r = np.r_[surface.tangents @ (n - n0), n @ from_centre - surface.shift_m]
+    J = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [*(surface.tangents @ from_centre), -1.0]])
+    G = np.zeros((3, N_DISPLACEMENT))
+    G[:2, 3:] = -np.cross(n0, surface.tangents)
+    G[2, :3], G[2, 3:] = n, np.cross(q, n)
+    return r, J, G
+
+
+def _inverse(matrix: Array) -> Array:
+    """Return the inverse of a positive semidefinite matrix, within what it determines."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    kept = values > OPEN * max(float(values[-1]), 1e-300)
+    half = vectors[:, kept] / np.sqrt(values[kept]) * scale[:, None]
+    return np.asarray(half @ half.T)

@@ -1,0 +1,70 @@
+"""The geometry of a session's passes: what they lack, and which further passes would help."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline.config.plan import LaserFigures, MbesFigures, Pass, Plan
+from pipeline.maths.adjustment.solution import Solution
+from pipeline.planning.observability import Coverage, geometry_advice
+from pipeline.planning.prediction import PredictionSetting
+
+Array = NDArray[np.float64]
+
+
+def sailed_plan(files: pd.DataFrame) -> Plan:
+    """Return a plan with the rates of a session's files (table ``files``), by which further passes are predicted."""
+    rates = files.groupby("sensor")["rate_hz"].median()
+    usual = Plan(passes=(Pass(distance_m=1.0),))
+    return usual.model_copy(
+        update={
+            "ins_rate_hz": max(10.0, _measured(rates["ins"], usual.ins_rate_hz)),
+            "laser": LaserFigures(point_rate_hz=_measured(rates["laser"], usual.laser.point_rate_hz)),
+            "mbes": MbesFigures(
+                ping_rate_hz=float(np.clip(_measured(rates["mbes"], usual.mbes.ping_rate_hz), 0.1, 200.0))
+            ),
+        }
+    )
+
+
+def geometry_table(
+    setting: PredictionSetting,
+    passes: pd.DataFrame,
+    soundings: Mapping[str, int],
+    normal: Array,
+    solution: Solution,
+) -> pd.DataFrame:
+    """Return table ``geometry``: what the passes lack, and what would cure it.
+
+    Parameters
+    ----------
+    setting : PredictionSetting
+        Target and instruments.
+    passes : DataFrame
+        Rows of table passes, of the passes that have soundings.
+    soundings : mapping of int
+        Number of soundings by family.
+    normal : (u, u) array
+        Normal matrix of all parameters.
+    solution : Solution
+        The session's solution.
+    """
+    usual = setting.plan.passes[0]
+    coverage = Coverage(
+        distances_m=[float(distance) for distance in passes["distance_m"] if np.isfinite(distance)],
+        soundings=soundings,
+        level={family.name for family in setting.model.families if family.level},
+        speed_m_s=_measured(passes["speed_m_s"].abs().median(), usual.speed_m_s),
+        # of a wave: its amplitude
+        heading_swing_deg=_measured(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg),
+    )
+    advice = geometry_advice(setting, coverage, normal, solution)
+    rows = [("gap", words) for words in advice.gaps] + ([("remedy", advice.remedy)] if advice.remedy else [])
+    return pd.DataFrame(rows, columns=["kind", "words"]).assign(sigma=np.nan)
+
+
+def _measured(value: float, usual: float) -> float:
+    """Return the session's value within the limits of a plan's figures, or the usual one where there is none."""
+    return float(np.clip(value, 0.05, 1e7)) if np.isfinite(value) else usual
