@@ -43,7 +43,7 @@ from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.target.model import TargetModel
 from pipeline.mount import mount_of
 from pipeline.planning.observability import Coverage, geometry_advice
-from pipeline.planning.prediction import PredictionSetting
+from pipeline.planning.setting import PredictionSetting
 from pipeline.target.design import target_of
 
 SHOWN = 100_000  # points of a sensor in the table residuals, at most

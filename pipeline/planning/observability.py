@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from pipeline.config.plan import Pass
 from pipeline.maths.adjustment.parameters import SIX
 from pipeline.maths.adjustment.solution import WORDS, Solution, solve, together
-from pipeline.planning.prediction import PredictionSetting, predict
+from pipeline.planning.prediction import predict
+from pipeline.planning.setting import PredictionSetting
 
 Array = NDArray[np.float64]
 NEAR_M = 1.5  # passes whose distances differ by less are at one distance
