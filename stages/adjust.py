@@ -37,8 +37,8 @@ from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.config.stage_settings import LaserCalibration
 from pipeline.config.target import Target
-from pipeline.planning.prediction import PredictionSetting
 from pipeline.planning.session_geometry import geometry_table, sailed_plan
+from pipeline.planning.setting import PredictionSetting
 from pipeline.target.design import target_of
 
 

@@ -13,7 +13,7 @@ from pipeline.checking.findings import Finding
 from pipeline.checking.ins_quality import InsQuality, assess_ins_quality, quality_findings
 from pipeline.checking.latency import latency_findings
 from pipeline.checking.point_samples import rows_with_pose, sample_points, sampled_rows
-from pipeline.checking.track import Leg, Track, frame_of, joined, track_of
+from pipeline.checking.track import InsTrack, Leg, frame_of, joined, track_of
 from pipeline.checking.trial_calibration import Calibrate, TrialCalibration
 from pipeline.checking.trial_findings import pose_findings, sign_findings
 from pipeline.config.pool import Ingest, PoolConfig
@@ -137,7 +137,7 @@ def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[
 
 
 def _point_findings(
-    session: _Session, track: Track, sensors: Sequence[str]
+    session: _Session, track: InsTrack, sensors: Sequence[str]
 ) -> tuple[list[Finding], SoundingCounts | None]:
     """Return where the points fall; of sensors whose points miss the target nothing finer is asked."""
     files, settings, pool, model = session.files, session.settings, session.pool, session.model
@@ -161,7 +161,7 @@ def _point_findings(
     return findings, counts
 
 
-def _trial_findings(session: _Session, track: Track, trial: TrialCalibration) -> Iterator[Finding]:
+def _trial_findings(session: _Session, track: InsTrack, trial: TrialCalibration) -> Iterator[Finding]:
     """Yield what speaks against the target's pose and the sonar's mount in the settings."""
     laser = sample_points(session.files, session.settings, "laser", track, SAMPLED)
     if laser is not None and trial.target_pose is not None:

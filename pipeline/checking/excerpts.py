@@ -31,7 +31,7 @@ TEXTS = ("inertial_explorer",)
 
 
 @dataclass(frozen=True)
-class SensorFiles:
+class SurveyedSensor:
     """What the survey of one sensor's files has in common.
 
     Attributes
@@ -95,7 +95,7 @@ class Excerpt:
     places: int = 1
 
 
-def excerpt(path: Path, name: str, sharing: SensorFiles) -> Excerpt:
+def excerpt(path: Path, name: str, sharing: SurveyedSensor) -> Excerpt:
     """Return a short copy of a file; the file itself where it is short, or cannot be cut.
 
     Parameters
@@ -104,7 +104,7 @@ def excerpt(path: Path, name: str, sharing: SensorFiles) -> Excerpt:
         The file.
     name : str
         What messages call it.
-    sharing : SensorFiles
+    sharing : SurveyedSensor
         The sensor's files, and where the copy goes.
     """
     sensor, settings = sharing.sensor, sharing.settings

@@ -15,7 +15,7 @@ from pipeline.artefacts.streams import Stream
 from pipeline.checking.file_survey import Columns, SurveyedFile, Times
 from pipeline.checking.findings import Finding
 from pipeline.checking.point_samples import PointSample, place_points, sampled_rows
-from pipeline.checking.track import Track
+from pipeline.checking.track import InsTrack
 from pipeline.config.plan import MbesFigures, Pass, Plan
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
@@ -24,7 +24,8 @@ from pipeline.gps_time import NS
 from pipeline.maths.adjustment.observations import SPEED_M_S
 from pipeline.maths.sonar.soundings import points_in_mbes
 from pipeline.maths.target.model import TargetModel
-from pipeline.planning.prediction import Rays, label_rays, setting_of
+from pipeline.planning.planned_rays import Rays, label_rays
+from pipeline.planning.setting import setting_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
@@ -48,7 +49,7 @@ class SoundingCounts:
 class PingsOnTarget:
     """A session's pings, and where boat and target are."""
 
-    track: Track
+    track: InsTrack
     files: Sequence[SurveyedFile]
     model: TargetModel
     pool: PoolConfig
@@ -129,7 +130,7 @@ def _fan(rows: Columns) -> Array:
     return points_in_mbes(2 / speed, angle, tilt, speed)[0]
 
 
-def _nearest_faces(track: Track, sample: PointSample, model: TargetModel) -> NDArray[np.int64]:
+def _nearest_faces(track: InsTrack, sample: PointSample, model: TargetModel) -> NDArray[np.int64]:
     """Return the nearest face of each sounding that is near one."""
     points = place_points(track, sample.in_good_legs(track))
     points = points[np.isfinite(points[:, 0])]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Part
 from pipeline.atomic_files import temporary_folder
-from pipeline.checking.excerpts import SensorFiles, excerpt, stretches
+from pipeline.checking.excerpts import SurveyedSensor, excerpt, stretches
 from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, SessionConfig
 from pipeline.errors import ConfigError, RawDataError
@@ -107,7 +107,7 @@ def survey_files(session: SessionConfig, folder: Path) -> tuple[list[SurveyedFil
                 continue
             names, complaints = _listed(settings, folder)
             list_faults += complaints
-            sharing = SensorFiles(sensor=sensor, settings=settings, folder=folder, number=len(names), copies=copies)
+            sharing = SurveyedSensor(sensor=sensor, settings=settings, folder=folder, number=len(names), copies=copies)
             for name, parts in _parts(sensor, settings, folder, names):
                 files.append(_survey_file(sharing, name, parts))
     if session.ins.accuracy:
@@ -185,7 +185,7 @@ def _escaped(name: str) -> str:
     return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
 
 
-def _survey_file(sharing: SensorFiles, name: str, parts: Sequence[Part] | RawDataError) -> SurveyedFile:
+def _survey_file(sharing: SurveyedSensor, name: str, parts: Sequence[Part] | RawDataError) -> SurveyedFile:
     """Read a file, in pieces where it is long; ``parts``: those of its reader, or its refusal."""
     path = sharing.folder / name
     try:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.checking.findings import Finding
 from pipeline.checking.point_samples import NAMES, PointSample, place_points
-from pipeline.checking.track import Track
+from pipeline.checking.track import InsTrack
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
@@ -77,13 +77,13 @@ class Fit:
 
 
 def height_findings(
-    track: Track, samples: Sequence[PointSample], closest: ClosestSurface, water_m: float, height_m: float
+    track: InsTrack, samples: Sequence[PointSample], closest: ClosestSurface, water_m: float, height_m: float
 ) -> Iterator[Finding]:
     """Yield the height that is wrong, where points miss the target by one.
 
     Parameters
     ----------
-    track : Track
+    track : InsTrack
         Of the INS.
     samples : Sequence[PointSample]
         Points of each sensor.
@@ -194,7 +194,7 @@ def profile(
     return np.array(scores)
 
 
-def _fit(track: Track, sample: PointSample, closest: ClosestSurface, water_m: float) -> Fit | None:
+def _fit(track: InsTrack, sample: PointSample, closest: ClosestSurface, water_m: float) -> Fit | None:
     """Return the fit of a sensor's points; None where they are few, or hit nothing at any height."""
     points = place_points(track, sample.in_good_legs(track))
     points = points[np.isfinite(points[:, 0])]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import point_array
 from pipeline.checking.file_survey import Columns, SurveyedFile, Times
-from pipeline.checking.track import Track
+from pipeline.checking.track import InsTrack
 from pipeline.config.mount import Mount
 from pipeline.config.session import SessionConfig
 from pipeline.gps_time import NS
@@ -44,11 +44,11 @@ class PointSample:
     mount: Mount
     georeferenced: bool = False
 
-    def with_pose(self, track: Track) -> "PointSample":
+    def with_pose(self, track: InsTrack) -> "PointSample":
         """Return the points for which the INS, which may have been read in part, has a pose."""
         return self._rows(track.trajectory.covers(self.t_ns, NS))
 
-    def in_good_legs(self, track: Track) -> "PointSample":
+    def in_good_legs(self, track: InsTrack) -> "PointSample":
         """Return the points of the legs on which the target is to starboard, and in front of it."""
         rows = np.zeros(len(self.t_ns), dtype=bool)
         for leg in track.legs:
@@ -61,7 +61,7 @@ class PointSample:
 
 
 @dataclass(frozen=True)
-class Placing:
+class TrialPlacement:
     """How a sensor's points are placed, where not as the settings say.
 
     Attributes
@@ -79,7 +79,7 @@ class Placing:
     scale: float = 1.0
 
 
-AS_GIVEN = Placing()
+AS_GIVEN = TrialPlacement()
 
 
 def sampled_rows(files: Sequence[SurveyedFile], sensor: str, rows: int) -> Columns:
@@ -106,14 +106,14 @@ def sampled_rows(files: Sequence[SurveyedFile], sensor: str, rows: int) -> Colum
     return dict(sample_rows(columns, max(1.0, len(columns["t_ns"]) / rows)))
 
 
-def rows_with_pose(columns: Columns, track: Track) -> Columns:
+def rows_with_pose(columns: Columns, track: InsTrack) -> Columns:
     """Return the rows, as they were read, for which the INS has a pose."""
     rows = track.trajectory.covers(columns["t_ns"], NS) if columns else slice(None)
     return {name: values[rows] for name, values in columns.items()}
 
 
 def sample_points(
-    files: Sequence[SurveyedFile], session: SessionConfig, sensor: str, track: Track, rows: int
+    files: Sequence[SurveyedFile], session: SessionConfig, sensor: str, track: InsTrack, rows: int
 ) -> PointSample | None:
     """Return points of a sensor, evenly over its files; None where it has none.
 
@@ -125,7 +125,7 @@ def sample_points(
         The session's settings.
     sensor : str
         ``laser`` or ``mbes``.
-    track : Track
+    track : InsTrack
         Of the INS; its frame is that of georeferenced points.
     rows : int
         About how many.
@@ -152,7 +152,7 @@ def sample_points(
     return PointSample(sensor, columns["t_ns"][valid], points[valid], mbes.mount)
 
 
-def place_points(track: Track, sample: PointSample, placing: Placing = AS_GIVEN) -> Array:
+def place_points(track: InsTrack, sample: PointSample, placing: TrialPlacement = AS_GIVEN) -> Array:
     """Return a sample's points (n, 3) m in the pool frame; NaN where the INS has no pose.
 
     Another placing changes nothing of points that others have placed.

@@ -10,8 +10,8 @@ from pipeline.checking.clocks import offset_name
 from pipeline.checking.file_checks import FAR_ARM_M
 from pipeline.checking.findings import Finding
 from pipeline.checking.heights import height_findings
-from pipeline.checking.point_samples import AS_GIVEN, NAMES, Placing, PointSample, place_points
-from pipeline.checking.track import Track
+from pipeline.checking.point_samples import AS_GIVEN, NAMES, PointSample, TrialPlacement, place_points
+from pipeline.checking.track import InsTrack
 from pipeline.checking.track_checks import azimuth_remedy
 from pipeline.config.pool import PoolConfig
 from pipeline.target.surface import ClosestSurface
@@ -55,12 +55,12 @@ def agreement(closest: ClosestSurface, points: Array) -> float:
     return float(np.sum(np.maximum(0.0, 1.0 - squares)) / len(points))
 
 
-def hypotheses(track: Track, sample: PointSample, closest: ClosestSurface) -> list[Hypothesis]:
+def hypotheses(track: InsTrack, sample: PointSample, closest: ClosestSurface) -> list[Hypothesis]:
     """Return how well a sensor's points fit as they are, first; then with other units, signs and clocks.
 
     Parameters
     ----------
-    track : Track
+    track : InsTrack
         Of the INS.
     sample : PointSample
         The sensor's points.
@@ -68,7 +68,7 @@ def hypotheses(track: Track, sample: PointSample, closest: ClosestSurface) -> li
         The target's surface.
     """
 
-    def score(placing: Placing = AS_GIVEN) -> float:
+    def score(placing: TrialPlacement = AS_GIVEN) -> float:
         return agreement(closest, place_points(track, sample, placing))
 
     tried = [Hypothesis(score())]
@@ -76,23 +76,23 @@ def hypotheses(track: Track, sample: PointSample, closest: ClosestSurface) -> li
         return tried
     if sample.sensor == "laser":
         tried += [
-            Hypothesis(score(Placing(scale=scale)), words=f"if they are in {unit}: export them in metres")
+            Hypothesis(score(TrialPlacement(scale=scale)), words=f"if they are in {unit}: export them in metres")
             for unit, scale in UNITS.items()
         ]
     for key in SIGNS:
         value = getattr(sample.mount, key)
         reversed_mount = sample.mount.model_copy(update={key: -value})
         words = f"with {sample.sensor}.mount.{key} = {-value:g} in place of {value:g}: reverse its sign"
-        tried.append(Hypothesis(score(Placing(mount=reversed_mount)), words=words))
+        tried.append(Hypothesis(score(TrialPlacement(mount=reversed_mount)), words=words))
     for key in ("x_m", "y_m", "z_m"):
         value = getattr(sample.mount, key)
         if abs(value) > FAR_ARM_M:
             words = f"with {sample.sensor}.mount.{key} = {value / 100:g} in place of {value:g}: write metres"
             in_metres = sample.mount.model_copy(update={key: value / 100})
-            tried.append(Hypothesis(score(Placing(mount=in_metres)), words=words))
+            tried.append(Hypothesis(score(TrialPlacement(mount=in_metres)), words=words))
 
     def clock_score(ahead_s: float) -> float:
-        return score(Placing(clock_ahead_s=ahead_s))
+        return score(TrialPlacement(clock_ahead_s=ahead_s))
 
     coarse = np.arange(-FARTHEST_S, FARTHEST_S + STEP_S / 2, STEP_S)
     best = float(max(coarse, key=clock_score))
@@ -102,7 +102,7 @@ def hypotheses(track: Track, sample: PointSample, closest: ClosestSurface) -> li
 
 
 def points_off_target(
-    track: Track, samples: Sequence[PointSample], closest: ClosestSurface, pool: PoolConfig
+    track: InsTrack, samples: Sequence[PointSample], closest: ClosestSurface, pool: PoolConfig
 ) -> Iterator[Finding]:
     """Yield what is wrong with each sensor whose points miss the target.
 
@@ -111,7 +111,7 @@ def points_off_target(
 
     Parameters
     ----------
-    track : Track
+    track : InsTrack
         Of the INS.
     samples : Sequence[PointSample]
         Points of each sensor.
@@ -152,7 +152,7 @@ def points_off_target(
     yield from _clocks(clocks, len(samples))
 
 
-def _misses(track: Track, sample: PointSample, closest: ClosestSurface) -> bool:
+def _misses(track: InsTrack, sample: PointSample, closest: ClosestSurface) -> bool:
     near = sample.in_good_legs(track)
     return len(near.t_ns) > FEW and agreement(closest, place_points(track, near)) < NOTHING
 

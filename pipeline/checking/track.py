@@ -64,7 +64,7 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Track:
+class InsTrack:
     """The INS's poses in the pool frame, and the legs past the target."""
 
     frame: PoolFrame
@@ -93,7 +93,7 @@ def frame_of(ins: Columns, place: TargetPlace) -> PoolFrame | None:
 
 def track_of(
     ins: Columns, frame: PoolFrame, model: TargetModel, files: Sequence[SurveyedFile], settings: Ingest
-) -> Track:
+) -> InsTrack:
     """Return the INS's track and its legs past the target.
 
     Parameters
@@ -121,7 +121,7 @@ def track_of(
         rows = np.flatnonzero((t_ns >= start) & (t_ns <= end) & (np.abs(y) <= reach) & (np.abs(x) <= NEAR_M))
         if len(rows) > 1 and np.ptp(y[rows]) >= min(SHORTEST_M, reach):
             legs.append(_leg(t_ns[rows], positions[rows], R[rows], files))
-    return Track(frame, Trajectory.build(t_ns, positions, R), tuple(legs))
+    return InsTrack(frame, Trajectory.build(t_ns, positions, R), tuple(legs))
 
 
 def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile]) -> Leg:
@@ -145,7 +145,7 @@ def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile])
     )
 
 
-def askew_deg(track: Track) -> float | None:
+def askew_deg(track: InsTrack) -> float | None:
     """Return by how much the boat sailed to the right of the target's +y, within ±180 degrees.
 
     It is taken while the boat had target.origin to starboard and near: the lesser of what it headed and what it made

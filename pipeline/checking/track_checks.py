@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.checking.file_survey import Columns, SurveyedFile
 from pipeline.checking.findings import Finding
-from pipeline.checking.track import Track, askew_deg
+from pipeline.checking.track import InsTrack, askew_deg
 from pipeline.config.pool import PoolConfig, TargetPlace
 from pipeline.config.target import Origin
 from pipeline.console import plural
@@ -81,7 +81,7 @@ def _why_astray(ins: Columns, origin: Origin) -> str:
     return "check target.origin, and that these are this pool's files"
 
 
-def sailing_findings(track: Track, place: TargetPlace) -> Iterator[Finding]:
+def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
     """Yield passes on the wrong side, none at all, all at one distance; ``place`` has the azimuth as configured."""
     sounded = [leg for leg in track.legs if max(leg.ran.values()) > NOT]
     legs = f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')}"
@@ -112,7 +112,7 @@ def sailing_findings(track: Track, place: TargetPlace) -> Iterator[Finding]:
         )
 
 
-def azimuth_remedy(track: Track, place: TargetPlace) -> str:
+def azimuth_remedy(track: InsTrack, place: TargetPlace) -> str:
     """Return what to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
     turn = askew_deg(track)
     if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:
@@ -124,7 +124,7 @@ def azimuth_remedy(track: Track, place: TargetPlace) -> str:
     )
 
 
-def missing_pass_findings(track: Track, files: Sequence[SurveyedFile]) -> Iterator[Finding]:
+def missing_pass_findings(track: InsTrack, files: Sequence[SurveyedFile]) -> Iterator[Finding]:
     """Yield passes of which one sensor has nothing, or not all."""
     there = {file.sensor for file in files if file.records} - {file.sensor for file in files if not file.ended}
     for leg in track.legs:
@@ -142,13 +142,13 @@ def missing_pass_findings(track: Track, files: Sequence[SurveyedFile]) -> Iterat
 
 
 def ins_hole_findings(
-    track: Track, epochs: dict[str, Times], max_interval_s: float, coarse_ns: float
+    track: InsTrack, epochs: dict[str, Times], max_interval_s: float, coarse_ns: float
 ) -> Iterator[Finding]:
     """Yield holes in the INS's log while the boat was by the target and a sensor ran.
 
     Parameters
     ----------
-    track : Track
+    track : InsTrack
         Of the INS.
     epochs : dict[str, Times]
         Times at which each sensor ran.

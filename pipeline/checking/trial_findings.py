@@ -11,7 +11,7 @@ from pipeline.artefacts.from_tables import rotation_vector_deg, target_frame
 from pipeline.checking.findings import Finding
 from pipeline.checking.heights import SideOfWater, profile, way
 from pipeline.checking.point_samples import PointSample, place_points
-from pipeline.checking.track import Track
+from pipeline.checking.track import InsTrack
 from pipeline.config.mount import Mount
 from pipeline.config.pool import PoolConfig
 from pipeline.config.target import Letters, Target
@@ -33,7 +33,7 @@ HALF = 0.5  # of its error, which a reversed sign must leave at most
 
 
 def pose_findings(
-    track: Track, laser: PointSample, pose: pd.DataFrame, model: TargetModel, pool: PoolConfig
+    track: InsTrack, laser: PointSample, pose: pd.DataFrame, model: TargetModel, pool: PoolConfig
 ) -> Iterator[Finding]:
     """Yield where the laser's points lie better on the target than in the pose of the trial calibration.
 
@@ -41,7 +41,7 @@ def pose_findings(
 
     Parameters
     ----------
-    track : Track
+    track : InsTrack
         Of the INS.
     laser : PointSample
         The laser's points.

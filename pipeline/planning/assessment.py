@@ -22,7 +22,8 @@ from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
 from pipeline.planning.observability import VAGUE, Coverage, geometry_advice
-from pipeline.planning.prediction import PredictedPasses, PredictionSetting, predict, setting_of
+from pipeline.planning.prediction import PredictedPasses, predict
+from pipeline.planning.setting import PredictionSetting, setting_of
 
 Array = NDArray[np.float64]
 MOST_PASSES = 100

@@ -10,7 +10,8 @@ from pipeline.config.plan import Pass
 from pipeline.maths.adjustment.estimability import correlated_pair
 from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
-from pipeline.planning.prediction import PredictionSetting, predict
+from pipeline.planning.prediction import predict
+from pipeline.planning.setting import PredictionSetting
 
 Array = NDArray[np.float64]
 NEAR_M = 1.5  # passes whose distances differ by less are at one distance

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.mount import mount_of
 from pipeline.planning.assessment import Accuracy, PlanAssessment
-from pipeline.planning.prediction import PredictionSetting
+from pipeline.planning.setting import PredictionSetting
 
 Array = NDArray[np.float64]
 

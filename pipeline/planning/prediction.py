@@ -13,53 +13,22 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.ins_drift import pose_noise
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
-from pipeline.adjustment.problem import design_surface, sensor_sigmas
-from pipeline.config.plan import Pass, Plan
-from pipeline.config.pool import PoolConfig, Segment
-from pipeline.config.session import Ins, Laser, Mbes, SessionConfig
-from pipeline.config.stage_settings import SonarBeams, narrow
+from pipeline.adjustment.problem import sensor_sigmas
+from pipeline.config.plan import Pass
+from pipeline.gps_time import NS
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
 from pipeline.maths.adjustment.normal_equations import BodyMotion, Linearisation, normal_equations
-from pipeline.maths.adjustment.observations import SPEED_M_S
-from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, place_knots
 from pipeline.maths.geometry.rotations import rotation_from_attitude
 from pipeline.maths.geometry.trajectory import Trajectory
-from pipeline.maths.sonar.soundings import points_in_mbes
-from pipeline.maths.target.beams import Beams
-from pipeline.maths.target.labelling import LabelSettings, label_points
-from pipeline.maths.target.model import TargetModel
 from pipeline.mount import mount_of
-from pipeline.target.design import target_of
-from pipeline.target.sonar_beams import beams_in_target
+from pipeline.planning.planned_rays import label_rays, laser_rays, sonar_rays
+from pipeline.planning.setting import PredictionSetting
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-NS = 1_000_000_000
-RAYS = 24  # of the laser between two records of the INS: stand for all
 PHASES, APART = 4, 1000  # of the boat's unrest, over which a prediction is averaged; numbers of passes in between
 PAUSE_S = 5.0  # without points, from which on nothing is interpolated
-BEYOND_M = 2.0  # a pass runs on beyond the last block
-
-
-@dataclass(frozen=True)
-class PredictionSetting:
-    """Target and instruments: the same for all passes of a plan."""
-
-    model: TargetModel
-    state: State
-    plan: Plan
-    segment: Segment
-    ins: Ins
-    laser: Laser
-    mbes: Mbes
-
-    @property
-    def half_length_m(self) -> float:
-        """How far a pass runs to either side of the target's centre."""
-        low, high = self.model.bounds()
-        return float(max(-low[1], high[1])) + BEYOND_M
 
 
 @dataclass(frozen=True)
@@ -79,27 +48,6 @@ class PredictedPasses:
     normal: Array
     points: list[dict[str, Array]]
     seconds: list[float]
-
-
-def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PredictionSetting:
-    """Return what a plan is predicted for: target and instruments of these settings."""
-    model, mbes = target_of(pool.target), session.sonar
-    return PredictionSetting(
-        model=model,
-        state=state_by_design(model, mbes),
-        plan=plan,
-        segment=pool.segment,
-        ins=session.ins,
-        laser=session.laser,
-        mbes=mbes,
-    )
-
-
-def state_by_design(model: TargetModel, mbes: Mbes) -> State:
-    """Return the mount as configured, and the surfaces as designed, their centres among the faces' corners."""
-    surfaces = [design_surface(model, family) for family in model.families]
-    mount = mount_of(mbes.mount)
-    return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces)
 
 
 def predict(
@@ -151,12 +99,9 @@ def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSu
     caster = ClosestSurface(setting.model)
     sums: dict[str, IntervalSums] = {}
     counts: dict[str, Array] = {}
-    for sensor, (t_ns, rays, each) in {
-        "laser": _laser_rays(setting, seconds),
-        "mbes": _beams(setting, seconds),
-    }.items():
-        batch = label_rays(setting, caster, trajectory, Rays(sensor, t_ns, rays))
-        observations = observation_model.linearise(sensor, batch, CurrentValues(setting.state))
+    for rays, each in (laser_rays(setting, seconds), sonar_rays(setting, seconds)):
+        batch = label_rays(setting, caster, trajectory, rays)
+        observations = observation_model.linearise(rays.sensor, batch, CurrentValues(setting.state))
         points = LinearisedPoints(
             record=observations.record,
             surface=observations.surface,
@@ -165,9 +110,9 @@ def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSu
             weight=each / observations.sigma_m**2,
             v_m=np.zeros(len(observations.v_m)),
         )
-        sums[sensor] = interval_sums(points)
+        sums[rays.sensor] = interval_sums(points)
         on_face = np.bincount(batch["face"].astype(np.int64), minlength=len(faces))
-        counts[sensor] = each * on_face.astype(np.float64)
+        counts[rays.sensor] = each * on_face.astype(np.float64)
     return PassSums(sums, trajectory, counts, seconds)
 
 
@@ -225,89 +170,3 @@ def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, numbe
     return Trajectory.build(np.round(t * NS).astype(np.int64), np.column_stack([x, y, z]), attitude)
 
 
-def _laser_rays(setting: PredictionSetting, seconds: float) -> tuple[Integers, Array, float]:
-    """Return times (n,), unit rays (n, 3) in the scanner's frame, and how many points each stands for."""
-    figures = setting.plan.laser
-    each = max(1, int(figures.point_rate_hz / (setting.plan.ins_rate_hz * RAYS)))
-    number = np.arange(0, int(seconds * figures.point_rate_hz), each)
-    low, high = np.radians(figures.field_deg)
-    angle = low + (high - low) * (number * figures.line_rate_hz / figures.point_rate_hz % 1.0)
-    rays = np.column_stack([np.sin(angle), np.zeros(len(angle)), np.cos(angle)])
-    return np.round(number / figures.point_rate_hz * NS).astype(np.int64), rays, float(each)
-
-
-def _beams(setting: PredictionSetting, seconds: float) -> tuple[Integers, Array, float]:
-    """Return the same of the sonar: every beam of every ping."""
-    figures = setting.plan.mbes
-    half = np.radians(figures.sector_deg) / 2
-    angle = np.linspace(-half, half, figures.beams)
-    pings = np.arange(0.5 / figures.ping_rate_hz, seconds, 1 / figures.ping_rate_hz)
-    edges_deg, tilts_deg = np.array([(sector.to_deg, sector.tilt_deg) for sector in figures.sectors] or [(90.0, 0.0)]).T
-    tilt = np.radians(tilts_deg[np.searchsorted(edges_deg, np.degrees(angle))])
-    speed = np.full(len(angle), SPEED_M_S)
-    fan, there = points_in_mbes(2 / speed, angle, tilt, speed)
-    fan = fan[there]
-    return np.repeat(np.round(pings * NS).astype(np.int64), len(fan)), np.tile(fan, (len(pings), 1)), 1.0
-
-
-@dataclass(frozen=True)
-class Rays:
-    """Rays of a sensor: times (n,), and unit directions (n, 3) in the sensor's frame."""
-
-    sensor: str
-    t_ns: Integers
-    directions: Array
-
-
-def label_rays(
-    setting: PredictionSetting, caster: ClosestSurface, trajectory: Trajectory, sensor_rays: Rays
-) -> dict[str, Array]:
-    """Return where rays meet the target, with the labels that stage segment would give.
-
-    Parameters
-    ----------
-    setting : PredictionSetting
-        Target and instruments.
-    caster : ClosestSurface
-        The target's surface.
-    trajectory : Trajectory
-        Poses of the body in the target frame.
-    sensor_rays : Rays
-        The rays.
-
-    Returns
-    -------
-    dict[str, Array]
-        Columns as of a labelled stream.
-    """
-    sensor, t_ns, rays = sensor_rays.sensor, sensor_rays.t_ns, sensor_rays.directions
-    mount = mount_of(setting.laser.mount) if sensor == "laser" else None
-    R = setting.state.R_body_from_sensor if mount is None else mount.R_body_from_sensor
-    lever = setting.state.lever_arm_m if mount is None else mount.lever_arm_body_m
-    figures = setting.plan.laser if sensor == "laser" else setting.plan.mbes
-    origins = trajectory.points_from_body(t_ns, np.broadcast_to(lever, rays.shape))
-    directions = trajectory.points_from_body(t_ns, rays @ R.T + lever) - origins
-    range_m = caster.ranges(origins, directions)
-    met = np.flatnonzero(range_m < figures.max_range_m)
-    own, range_m, directions = rays[met] * range_m[met, None], range_m[met], directions[met]
-    points = origins[met] + directions * range_m[:, None]
-    segment, level = setting.segment, setting.model.water_level_m
-    if sensor == "mbes":
-        _, R_target_from_body = trajectory.poses_at(t_ns[met])
-        beams = beams_in_target(R_target_from_body, R, own, narrow(SonarBeams, setting.mbes))
-        heights = (-np.inf, level - segment.water_margin_m)
-    else:
-        beams, heights = Beams(directions, range_m), (level + segment.water_margin_m, np.inf)
-    limits = LabelSettings(
-        gate_m=segment.gate_m,
-        margin_m=segment.margin_m,
-        min_grazing_rad=float(np.radians(segment.min_grazing_deg)),
-        lowest_m=heights[0],
-        highest_m=heights[1],
-        seen="wet" if sensor == "mbes" else "dry",
-    )
-    labels = label_points(setting.model, points, beams, limits)
-    on = np.flatnonzero(labels.face >= 0)
-    columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}
-    columns |= {f"{axis}_target_m": points[on, k] for k, axis in enumerate("xyz")}
-    return columns | {"t_ns": t_ns[met][on], "face": labels.face[on]}

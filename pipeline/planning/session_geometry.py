@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipeline.config.plan import LaserFigures, MbesFigures, Pass, Plan
 from pipeline.maths.adjustment.solution import Solution
 from pipeline.planning.observability import Coverage, geometry_advice
-from pipeline.planning.prediction import PredictionSetting
+from pipeline.planning.setting import PredictionSetting
 
 Array = NDArray[np.float64]
 

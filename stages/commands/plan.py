@@ -14,7 +14,7 @@ from pipeline.mount import mount_of
 from pipeline.planning import assessment
 from pipeline.planning.assessment import Accuracy, PlanAssessment, shares_of_limits
 from pipeline.planning.plan_document import plan_document
-from pipeline.planning.prediction import PredictionSetting
+from pipeline.planning.setting import PredictionSetting
 from pipeline.run.output_files import refuse_output
 from pipeline.run.settings import load_settings
 from pipeline.text_table import text_table

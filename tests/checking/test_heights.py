@@ -16,7 +16,7 @@ from pipeline.checking import target_hits, track_checks, trial_findings
 from pipeline.checking.file_survey import SurveyedFile, survey_files
 from pipeline.checking.findings import Finding
 from pipeline.checking.point_samples import PointSample, place_points, sample_points
-from pipeline.checking.track import Track, frame_of, joined, track_of
+from pipeline.checking.track import InsTrack, frame_of, joined, track_of
 from pipeline.checking.trial_calibration import TrialCalibration
 from pipeline.config.load import load_pool, load_session
 from pipeline.config.mount import Mount
@@ -45,7 +45,7 @@ class Looked:
     model: TargetModel
     closest: ClosestSurface
 
-    def samples(self, track: Track, **mounts: dict[str, float]) -> list[PointSample]:
+    def samples(self, track: InsTrack, **mounts: dict[str, float]) -> list[PointSample]:
         found = []
         for sensor in ("laser", "mbes"):
             settings = getattr(self.session, sensor)
@@ -55,7 +55,7 @@ class Looked:
             found.append(some)
         return found
 
-    def track(self, pool: PoolConfig) -> Track:
+    def track(self, pool: PoolConfig) -> InsTrack:
         ins = joined(self.files)
         frame = frame_of(ins, pool.target_place)
         assert frame is not None

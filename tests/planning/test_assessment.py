@@ -14,10 +14,12 @@ from pipeline.config.plan import Plan
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Drift, SessionConfig
 from pipeline.config.yaml_models import parse
-from pipeline.planning import assessment, prediction
+from pipeline.planning import assessment
 from pipeline.planning.assessment import shares_of_limits
 from pipeline.planning.plan_document import plan_document
-from pipeline.planning.prediction import _beams, predict
+from pipeline.planning.planned_rays import sonar_rays
+from pipeline.planning.prediction import predict
+from pipeline.planning.setting import setting_of
 from pipeline.simulation.beams import directions_in_mbes, swing_rad
 from stages.commands.plan import table
 from tests.support.effort import often
@@ -62,12 +64,12 @@ def test_the_beams_of_a_plan_are_those_of_its_sectors(configs: tuple[PoolConfig,
     figures = {
         "sectors": [{"to_deg": to, "tilt_deg": tilt} for to, tilt in edges], "beams": 131, "ping_rate_hz": 10.0,
     }  # fmt: skip
-    _, rays, _ = _beams(prediction.setting_of(plan_of(4.0, mbes=figures), *configs), 0.15)
+    rays, _ = sonar_rays(setting_of(plan_of(4.0, mbes=figures), *configs), 0.15)
     angles_deg = np.arange(-65.0, 66.0)
     tilts = np.radians(np.select([angles_deg <= -30, angles_deg <= 20], [8.0, -0.75], -29.5))
     swing, there = swing_rad(np.sin(np.radians(angles_deg)), tilts)
     assert there.sum() == 131 - 5  # 61° and 29.5° are more than 90°
-    np.testing.assert_allclose(rays, directions_in_mbes(swing, tilts)[there], atol=1e-9)
+    np.testing.assert_allclose(rays.directions, directions_in_mbes(swing, tilts)[there], atol=1e-9)
 
 
 def test_the_lasers_mount_covariance_is_carried_into_the_total(configs: tuple[PoolConfig, SessionConfig]) -> None:
@@ -103,7 +105,7 @@ def test_without_drift_passes_add_up_and_with_it_two_tell_more(configs: tuple[Po
     pool, still = configs
     drifting = still.model_copy(update={"ins": still.ins.model_copy(update={"drift": Drift()})})
     for session in (still, drifting):
-        setting = prediction.setting_of(plan_of(4.0, 8.0), pool, session)
+        setting = setting_of(plan_of(4.0, 8.0), pool, session)
         both = predict(setting, setting.plan.passes, 10.0, phases=1).normal
         first = predict(setting, setting.plan.passes[:1], phases=1).normal
         second = both - first  # the phases of the second pass are its own
