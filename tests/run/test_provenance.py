@@ -63,7 +63,7 @@ def is_stale(copy: Path, monkeypatch: pytest.MonkeyPatch, stage: str, changed: s
         ("ingest", "pipeline/readers/e57_worker.py"),
         ("ingest", "pipeline/readers/las.py"),
         ("ingest", "pipeline/artefacts/parquet.py"),
-        ("ingest", "pipeline/run/runner.py"),
+        ("ingest", "pipeline/run/stage_files.py"),
         ("ingest", "pipeline/__init__.py"),  # BLAS's threads
         ("segment", "pipeline/maths/target/registration.py"),
         ("adjust", "pipeline/maths/adjustment/eliminate_white_noise.py"),
@@ -89,6 +89,7 @@ def test_what_a_stage_can_reach_makes_it_stale(
         ("ingest", "pipeline/readers/casts.py"),  # the cast's depths are in the settings
         ("ingest", "pipeline/config/load.py"),  # as are all that it loads
         ("ingest", "pipeline/run/manifest.py"),
+        ("ingest", "pipeline/run/runner.py"),
         ("report", "pipeline/run/results.py"),
         ("report", "pipeline/run/progress.py"),
         ("georeference", "pipeline/readers/las.py"),  # its inputs tell whether that made a difference
@@ -117,7 +118,7 @@ ROOMS = {  # packages of pipeline/ of which a stage reaches some file, beside BA
     "laser.report": REPORT,
 }
 FILES = {  # of these packages, these files alone
-    "run": {"__init__.py", "runner.py", "stage_protocol.py", "workers.py"},
+    "run": {"__init__.py", "execute.py", "stage_files.py", "stage_protocol.py", "workers.py"},
     "results": {"__init__.py", "screen.py"},  # the verdict in words
 }
 NEVER = (
