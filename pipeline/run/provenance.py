@@ -23,7 +23,8 @@ LIBRARIES = (  # that can change a digit: they compute, or decode raw files, mes
 ROOT = Path(pipeline.__file__).parent.parent
 CALLS = ("pipeline.run.stage_protocol",)  # calls every stage, and writes its streams
 READS = ("pipeline.readers.dispatch",)  # makes the parts of raw files that a stage is given
-CARRIES = ("pipeline/run/runner.py", "pipeline/run/workers.py")  # carry data in and out; what else they import does not
+# These carry data in and out; what else they import does not.
+CARRIES = ("pipeline/run/execute.py", "pipeline/run/stage_files.py", "pipeline/run/workers.py")
 
 
 @functools.cache

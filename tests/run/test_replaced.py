@@ -139,7 +139,7 @@ def test_killed_at_any_step_the_accepted_result_is_there(
     with monkeypatch.context():
         for name in ("rename", "replace", "mkdir"):
             counted(name)
-        monkeypatch.setattr("pipeline.run.runner._remove_quietly", lambda _: None)
+        monkeypatch.setattr("pipeline.run.execute._remove_quietly", lambda _: None)
         done = True
         try:
             judged.run()
