@@ -11,7 +11,7 @@ from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.trajectory import Trajectory
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.labelling import Labels, LabelSettings, hidden_in_part, label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.near_planes import near_planes
@@ -85,7 +85,7 @@ def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: Label
     rays = points - context.trajectory.track_of_point(t_ns, lever_arm_m)
     ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
     rays /= ranges[:, None]
-    labels = label_points(model, points, Beams(rays, ranges), settings, planes)
+    labels = label_points(model, points, TargetBeams(rays, ranges), settings, planes)
     on = np.flatnonzero(labels.face >= 0)
     rows = near[on]
     columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}

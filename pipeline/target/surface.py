@@ -38,6 +38,7 @@ class ClosestSurface:
         return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=1))
 
     def __call__(self, points_m: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Return the nearest points (n, 3) m on the surface, and the numbers of their faces (n,)."""
         answer = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=THREADS)
         triangles = answer["primitive_ids"].numpy().astype(np.int64)
         return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]
