@@ -63,13 +63,33 @@ class LabellingContext:
 
 
 def label_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
-    """Label laser points that stage georeference has placed; ``laser`` is the coarse mount."""
+    """Label laser points that stage georeference has placed.
+
+    Parameters
+    ----------
+    batch
+        Laser points in the pool frame.
+    context
+        The target.
+    laser
+        Coarse mount of the laser.
+    """
     points = context.target.frame.points_from_pool(point_array(batch, "pool_m"))
     return _label_laser(batch, points, laser.lever_arm_body_m, context)
 
 
 def label_calibrated_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
-    """Place laser points with the provisional mount, and label them; ``laser`` is the coarse mount."""
+    """Place laser points with the provisional mount, and label them.
+
+    Parameters
+    ----------
+    batch
+        Laser points in the scanner's frame.
+    context
+        The target and the provisional mount.
+    laser
+        Coarse mount of the laser.
+    """
     mount = context.mount.total(laser)
     body = point_array(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
     points = context.trajectory.points_from_body(batch["t_ns"], body)

@@ -17,9 +17,20 @@ def beams_in_target(
     points_mbes_m: Array,
     mbes: SonarBeams,
 ) -> TargetBeams:
-    """Rays and half widths of soundings (n, 3) with attitudes (n, 3, 3); beams stray by three sigmas of their angle.
+    """Return the rays and half widths of soundings; beams stray by three sigmas of their angle.
 
     A beam at its margin that strays over an edge gives the mean of what its parts meet.
+
+    Parameters
+    ----------
+    R_target_from_body
+        Attitudes (n, 3, 3).
+    R_body_from_mbes
+        Rotation of the sonar (3, 3).
+    points_mbes_m
+        Soundings (n, 3), mbes frame.
+    mbes
+        Widths of the beams, and the sigma of their angle.
     """
     ranges = np.linalg.norm(points_mbes_m, axis=1)
     unit = points_mbes_m / ranges[:, None]

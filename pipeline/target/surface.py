@@ -56,7 +56,17 @@ class ClosestSurface:
         return np.where(missed, -1, self._face_of_triangle[np.where(missed, 0, triangle)])
 
     def hides(self, origins_m: Array, points_m: Array, spare_m: float) -> NDArray[np.bool_]:
-        """Return which points (n, 3) m lie more than ``spare_m`` behind the surface, seen from origins (n, 3) m."""
+        """Return which points (n,) lie behind the surface.
+
+        Parameters
+        ----------
+        origins_m
+            Where each point is seen from (n, 3), target frame.
+        points_m
+            Points (n, 3), target frame.
+        spare_m
+            A point counts that lies farther than this behind the surface, along its ray.
+        """
         away = points_m - origins_m
         rays = np.hstack([origins_m, away]).astype(np.float32)
         share = self._cast(rays)["t_hit"].numpy().astype(np.float64)

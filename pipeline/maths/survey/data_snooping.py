@@ -151,7 +151,7 @@ def snoop(survey: MarkSurvey, frames: Sequence[RigidFrame]) -> SnoopingResult:
         tests = mark_tests(now, left)
     if not agrees and suspects:
         worst_ratio = {test.frame: test.ratio for test in reversed(tests)}
-        suspects = [one for one in suspects if worst_ratio.get(one.test.frame, 0.0) < UNEXPLAINED_RATIO]
+        suspects = [each for each in suspects if worst_ratio.get(each.test.frame, 0.0) < UNEXPLAINED_RATIO]
         left = tuple(frames)
         for suspect in suspects:
             left = _without(left, suspect.test)

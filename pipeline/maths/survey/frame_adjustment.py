@@ -205,7 +205,7 @@ def _through(by_mark: Array, covariance: Array) -> Array:
 
 
 def _rows_of(survey: MarkSurvey, frame: RigidFrame, pose: FramePose) -> tuple[Array, Array, Array, Array]:
-    """Return of one frame r (n,), J (n, 6), B (n, k, 3) by its own marks, and variances (n,) that are no mark's."""
+    """Return r (n,), J (n, 6), B (n, k, 3) by its own marks, and variances (n,) that are no mark's, of one frame."""
     R, k = pose.R_survey_from_frame, frame.points
     at = survey.at_m[frame.marks]
     turned = frame.drawing_m[:k] @ R.T
