@@ -13,12 +13,12 @@ LASER = ("ingest", "georeference", "segment", "fit_planes", "laser.adjust", "las
 
 
 def load(calibrated: "Calibrated" = "mbes") -> tuple[ModuleType, ...]:
-    """The modules of ORDER, or of LASER; late, for they import numpy and pandas."""
+    """Import and return the modules of ORDER, or of LASER; not before, for they import numpy and pandas."""
     return tuple(import_module(f"stages.{name}") for name in (ORDER if calibrated == "mbes" else LASER))
 
 
 def names_in(run: Path) -> tuple[str, ...]:
-    """The stages of what a run folder calibrates, by their folders' names; of no run folder the sonar's."""
+    """Return the names of a run folder's stages; those of ORDER if it is no run folder."""
     from pipeline.run.settings import calibrated_in, holds_run
 
     of_laser = holds_run(run) and calibrated_in(run) == "laser"

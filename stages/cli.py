@@ -183,7 +183,7 @@ def _diff(
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="write it as a page as well")] = None,
     rrd: Annotated[Path | None, typer.Option(metavar="FILE", help="write both runs as one recording as well")] = None,
 ) -> int:
-    """Compare two runs: has the sonar moved?
+    """Compare two runs, to see whether the sonar has moved.
 
     Status 1 if the mounts differ significantly, or by more than a tolerance, or cannot be compared.
     """

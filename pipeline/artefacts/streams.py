@@ -108,9 +108,11 @@ class MemoryPart:
 
 
 class Mapper(Protocol):
-    """Applies a function to each item; results come back in order. ``run/workers.py`` has the parallel one."""
+    """The way in which a function is applied to many items; ``run/workers.py`` has the parallel one."""
 
-    def __call__(self, function: Callable[..., _T], /, *items: Iterable[object]) -> Iterable[_T]: ...
+    def __call__(self, function: Callable[..., _T], /, *items: Iterable[object]) -> Iterable[_T]:
+        """Apply a function to each item; results come back in order."""
+        ...
 
 
 def serial(function: Callable[..., _T], *items: Iterable[object]) -> Iterable[_T]:

@@ -9,30 +9,26 @@ here. Coordinates are metres, Cartesian or spherical (range, azimuth from x to y
 scan's pose brings them into the frame of the file, which ``laser.frame`` names. Points and times that are marked as
 invalid are left out.
 
-The library opens a file only after :mod:`pipeline.readers.e57_xml` has checked its header and its XML part. Integers of
-one constant value take no bits, so that a damaged count of points would have no limit: see
+Integers of one constant value take no bits, so that a damaged count of points would have no limit: see
 :mod:`pipeline.readers.claimed_counts`.
 """
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import BATCH_ROWS, Chunk
+from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, WEEK_NS
-from pipeline.maths.geometry.rotations import rotation_from_quaternion
-from pipeline.readers import e57_xml
 from pipeline.readers.claimed_counts import refuse_claim
-from pipeline.readers.crs import COORDINATES, Array, LaserFrame, transform_to_ecef
+from pipeline.readers.crs import COORDINATES, LaserFrame, transform_to_ecef
 from pipeline.readers.declared_crs import refuse_other_crs
-from pipeline.readers.decoder_process import REMEDY, DecodedColumns, decoded_batches, decoded_text
+from pipeline.readers.decoder_process import REMEDY, DecodedColumns
+from pipeline.readers.e57_scans import E57Scan, file_coordinates, read_scans, stored_points
 from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.row_checks import (
@@ -45,25 +41,9 @@ from pipeline.readers.row_checks import (
     possible_ns,
 )
 
-E57_WORKER = Path(__file__).with_name("e57_worker.py")
-MAX_TEXT = 1 << 24
 _MAX_SECONDS = 1e8  # of a time stamp: three years
 _COARSEST_M = 0.001  # of coordinates in single precision
 RETIME = "export it again with a time stamp for each point, or as LAS or LAZ with GPS time"
-
-
-@dataclass(frozen=True)
-class E57Scan:
-    """One scan as the file describes it: the fields of the worker's JSON."""
-
-    points: int
-    timed: bool  # points have time stamps
-    axes: str  # cartesian, spherical; "" where neither is there
-    single: bool  # coordinates in single precision
-    start_s: float  # acquisitionStart, seconds since the GPS epoch
-    atomic: bool  # its clock was set by GPS
-    rotation: list[float]  # quaternion w, x, y, z of the scan's pose
-    translation: list[float]  # m
 
 
 @dataclass(frozen=True)
@@ -180,48 +160,3 @@ def _possible_pose(scan: E57Scan) -> bool:
     return bool(np.all(np.isfinite(scan.translation)) and 0.5 < length < 2)
 
 
-def read_scans(path: Path, name: str) -> tuple[list[E57Scan], str]:
-    """Return the scans, and the CRS that the file declares (WKT, or empty)."""
-    e57_xml.check_header_and_xml(path, name)
-    try:
-        description: dict[str, Any] = json.loads(decoded_text(E57_WORKER, [str(path)], name, MAX_TEXT))
-    except ValueError as error:
-        raise RawDataError(f"{name}: is damaged ({error}); {REMEDY}") from error
-    scans = [E57Scan(**scan) for scan in description["scans"]]
-    if not scans:
-        raise RawDataError(f"{name}: has no scans; {REMEDY}")
-    return scans, description["crs"]
-
-
-def stored_points(path: Path, name: str, number: int) -> Iterator[DecodedColumns]:
-    """Return an iterator over a scan's points as stored, in batches of at most BATCH_ROWS.
-
-    Parameters
-    ----------
-    path : Path
-        The E57 file.
-    name : str
-        Its path in the session folder, for messages.
-    number : int
-        Number of the scan, from 0.
-
-    Returns
-    -------
-    iterator over tuples of six (n,) arrays
-        Seconds, three coordinates, marks of invalid points and of invalid times (not 0: invalid).
-    """
-    e57_xml.check_header_and_xml(path, name)  # again: the file may be another by now
-    return decoded_batches(E57_WORKER, [str(path), str(number), str(BATCH_ROWS)], name, 6, BATCH_ROWS)
-
-
-@np.errstate(all="ignore")
-def file_coordinates(decoded: DecodedColumns, scan: E57Scan) -> tuple[Array, Array, Array]:
-    """Return Cartesian coordinates x, y, z (m) in the file's frame from a scan's points as stored, by its pose."""
-    x, y, z = decoded[1:4]
-    if scan.axes == "spherical":
-        distance, azimuth, elevation = x, y, z
-        horizontal = distance * np.cos(elevation)
-        x, y, z = horizontal * np.cos(azimuth), horizontal * np.sin(azimuth), distance * np.sin(elevation)
-    quaternion = np.array(scan.rotation) / np.linalg.norm(scan.rotation)
-    x, y, z = rotation_from_quaternion(quaternion) @ np.array([x, y, z]) + np.array(scan.translation)[:, None]
-    return x, y, z

@@ -29,8 +29,8 @@ from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import (
     INS_COLUMNS,
     Columns,
-    Order,
     RowFilter,
+    TimeOrder,
     chunk,
     keep_possible_poses,
     latency_ns,
@@ -55,7 +55,7 @@ class InertialExplorerPart:
         """Yield the INS records in canonical columns, with their sigmas, block by block."""
         layout = read_layout(self.path, self.name)
         dropped: Counter[str] = Counter()
-        order, week, last, first = Order(self.name), self.gps_week or 0, -np.inf, True
+        order, week, last, first = TimeOrder(self.name), self.gps_week or 0, -np.inf, True
         with opened(self.path, self.name) as file:
             for columns in read_blocks(file, layout, self.name, dropped):
                 if first:
@@ -89,7 +89,7 @@ def _refuse_float32(columns: Columns, layout: ExportLayout, name: str) -> None:
 
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-def _chunk(columns: Columns, layout: ExportLayout, order: Order, latency_s: float, dropped: Counter[str]) -> Chunk:
+def _chunk(columns: Columns, layout: ExportLayout, order: TimeOrder, latency_s: float, dropped: Counter[str]) -> Chunk:
     """Return the possible rows of a block as poses, with their sigmas; others are counted in ``dropped``."""
     angles = {f"{name}_rad": np.radians(columns[name]) for name in (*POSITION, "roll", "pitch")}
     height = columns["h-ell"] if "h-ell" in columns else columns["h-msl"] + columns["undulation"]

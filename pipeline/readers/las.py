@@ -1,10 +1,6 @@
 """LAS 1.0 to 1.5 and LAZ, by laspy and lazrs (ASPRS, "LAS Specification 1.4 R15").
 
-The header is checked here before laspy sees it: a damaged one may claim billions of points or of variable-length
-records, which must cost neither memory nor time. A file is read in *stretches* of at most 4,000,000 points, so that
-workers can share it. Header (little-endian): 6 u16 global encoding (bit 0: adjusted standard GPS time, else seconds of
-week), 24 u8 x 2 version, 94 u16 header size, 96 u32 offset to points, 100 u32 number of VLRs, 104 u8 point format
-(bit 7: LAZ), 105 u16 record length, 107 u32 points, 131 f64 x 3 scales, 155 f64 x 3 offsets, 247 u64 points (1.4).
+A file is read in *stretches* of at most 4,000,000 points, so that workers can share it.
 
 Seconds of week need ``laser.gps_week``, the week of the first point; points more than half a week before that belong
 to the next one. Adjusted standard time is GPS seconds since the epoch - 1e9 (:mod:`pipeline.readers.las_times`).
@@ -28,32 +24,16 @@ from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_S, gps_ns_fro
 from pipeline.readers.crs import LaserFrame, frame_transform, transform_to_ecef
 from pipeline.readers.declared_crs import refuse_other_crs
 from pipeline.readers.decoder_process import DecodedColumns
+from pipeline.readers.las_header import LasHeader
 from pipeline.readers.las_times import refuse_unusable_times
-from pipeline.readers.laz import LazTables, decompressed_points, max_point_count
-from pipeline.readers.raw_file import opened, read_at, size_of
+from pipeline.readers.laz import decompressed_points
+from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import LASER_COLUMNS, RowFilter, chunk, latency_ns, no_rows, possible_ns
 
 STRETCH_POINTS = 4_000_000
-MAX_OFFSET = 1 << 26
 _COARSEST_M = 0.01  # scale of coordinates; 1e-7 degrees are 11 mm
-TIMED_FORMATS = frozenset({1, 3, 4, 5, 6, 7, 8, 9, 10})
-_RECORD_LENGTHS = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # bytes at least, by point format
 _MAX_SECONDS = 1e10  # of adjusted time, which int64 nanoseconds must hold
 logging.getLogger("laspy").addHandler(logging.NullHandler())  # its exceptions say the same as its log
-
-
-@dataclass(frozen=True)
-class LasHeader:
-    """A LAS header, checked against the file's size."""
-
-    adjusted_time: bool
-    declared_time: LasTime  # laser.time of session.yaml, which takes precedence over the flag
-    compressed: bool
-    size: int  # of the file, bytes
-    claimed: int  # points by the header
-    present: int  # points that the file can hold
-    first_s: float  # GPS time of the first point
-    scales: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -117,63 +97,6 @@ class LasPart:
         rows.keep((rows["seconds"] >= 0) & (rows["seconds"] < 2 * WEEK_S), "impossible time")
         week = self.gps_week + (rows["seconds"] < self.first_s - WEEK_S / 2)
         return gps_ns_from_week_seconds(week, rows["seconds"])
-
-
-def read_header(path: Path, name: str, declared_time: LasTime = None) -> LasHeader:
-    """Read and check a file's header.
-
-    Parameters
-    ----------
-    path : Path
-        The LAS or LAZ file.
-    name : str
-        Its path in the session folder, for messages.
-    declared_time : LasTime
-        ``laser.time`` of session.yaml; None: the header's flag decides.
-
-    Raises
-    ------
-    RawDataError
-        The header contradicts itself or the file, or its point format has no time.
-    """
-    with opened(path, name) as file:
-        size = size_of(file)
-        head = file.read(375).ljust(375, b"\0")
-        encoding, major, minor = struct.unpack_from("<H16x2B", head, 6)
-        header_size, offset, records, point_format, length, claimed = struct.unpack_from("<HIIBHI", head, 94)
-        scales = struct.unpack_from("<3d", head, 131)
-        if minor >= 4:
-            (claimed,) = struct.unpack_from("<Q", head, 247)
-        compressed, point_format = bool(point_format & 0x80), point_format & 0x3F
-        sound = major == 1 and minor <= 5 and 227 <= header_size <= offset <= min(size, MAX_OFFSET)
-        sound = sound and point_format < len(_RECORD_LENGTHS) and length >= _RECORD_LENGTHS[point_format]
-        sound = sound and 54 * records <= offset - header_size
-        if not sound or not all(np.isfinite(scale) and scale > 0 for scale in scales):
-            raise RawDataError(f"{name}: its LAS header is damaged, or cut off; copy or export it again")
-        if point_format not in TIMED_FORMATS:
-            raise RawDataError(
-                f"{name}: its point format {point_format} has no GPS time; export it again in point format 1, 3 or 6 "
-                "to 10"
-            )
-        present = (size - offset) // length
-        first = offset
-        if compressed:
-            present = max_point_count(file, name, LazTables(records, header_size, offset, size))
-            first = offset + 8
-        time_at = first + (22 if point_format >= 6 else 20)
-        (first_s,) = struct.unpack("<d", read_at(file, time_at, 8).ljust(8, b"\0"))
-        present = min(claimed, present)
-        adjusted = declared_time == "adjusted_standard" if declared_time else bool(encoding & 1)
-        return LasHeader(
-            adjusted_time=adjusted,
-            declared_time=declared_time,
-            compressed=compressed,
-            size=size,
-            claimed=claimed,
-            present=present,
-            first_s=first_s if present and np.isfinite(first_s) else 0.0,
-            scales=scales,
-        )
 
 
 def las_parts(

@@ -24,8 +24,8 @@ from pipeline.readers.row_checks import (
     INS_COLUMNS,
     SIGMA_COLUMNS,
     Columns,
-    Order,
     RowFilter,
+    TimeOrder,
     chunk,
     keep_possible_poses,
     latency_ns,
@@ -68,7 +68,7 @@ class NovatelPart:
         dropped: Counter[str] = Counter()
         with opened(self.path, self.name) as file:
             kinds = choose_records(file, dropped)
-            order = Order(self.name)
+            order = TimeOrder(self.name)
             if kinds.poses is not None:
                 for records in read_records(file, kinds.poses):
                     sigmas = _sigmas(records, self.latency_s, dropped) if kinds.sigmas == kinds.poses else {}
@@ -84,7 +84,7 @@ class NovatelPart:
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
 def _chunk(
-    records: Records, order: Order, latency_s: float, dropped: Counter[str], sigmas: Columns
+    records: Records, order: TimeOrder, latency_s: float, dropped: Counter[str], sigmas: Columns
 ) -> Chunk:
     """Return the usable poses of some records, with their ``sigmas``; others are counted in ``dropped``."""
     usable = np.isin(records["status"], USABLE)

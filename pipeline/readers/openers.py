@@ -1,6 +1,5 @@
 """How the files of each format become parts: one function a format, listed in :mod:`pipeline.readers.dispatch`."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -9,11 +8,11 @@ import numpy as np
 from pipeline.artefacts.streams import Part
 from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, Laser, Mbes
-from pipeline.errors import ConfigError, RawDataError
-from pipeline.gps_time import NS, WEEK_NS
-from pipeline.readers import detect, e57, file_kind, las, sbet
+from pipeline.errors import RawDataError
+from pipeline.readers import detect, e57, file_kind, las, las_header, sbet
 from pipeline.readers.claimed_counts import refuse_claim
 from pipeline.readers.crs import LaserFrame
+from pipeline.readers.gps_weeks import gps_weeks
 from pipeline.readers.gsf import GsfPart
 from pipeline.readers.inertial_explorer import InertialExplorerPart
 from pipeline.readers.inertial_explorer_layout import read_layout
@@ -43,35 +42,6 @@ class SensorFiles(Generic[BlockOfSensor]):
 def laser_frame(settings: Laser) -> LaserFrame:
     """Return the frame, or the coordinate reference system, in which the laser's points are stored."""
     return LaserFrame(settings.frame, settings.heights)
-
-
-def gps_weeks(first_s: Mapping[str, float], gps_week: int | None, sensor: Sensor) -> dict[str, int]:
-    """Return the GPS week in which each file starts, by the file's name; nothing for no files.
-
-    Parameters
-    ----------
-    first_s
-        Seconds of week of each file's first record, by the file's name.
-    gps_week
-        The week of the first file, from session.yaml. The other files get the week that puts them nearest to it.
-    sensor
-        The sensor, for the message.
-
-    Raises
-    ------
-    ConfigError
-        session.yaml gives no week, and there are files.
-    """
-    if not first_s:
-        return {}
-    first_name, reference_s = next(iter(first_s.items()))
-    if gps_week is None:
-        raise ConfigError(
-            f"session.yaml: {sensor}.gps_week is missing: {first_name} has seconds of week alone; "
-            f"give {sensor}.gps_week, the GPS week in which the file begins"
-        )
-    steps = {name: (reference_s - seconds) / (WEEK_NS / NS) for name, seconds in first_s.items()}
-    return {name: gps_week + (round(step) if abs(step) <= 1 else 0) for name, step in steps.items()}
 
 
 # --- all sensors -----------------------------------------------------------------------------------------------------
@@ -130,7 +100,7 @@ def open_sbet(request: SensorFiles[Ins]) -> Parts:
 def open_las(request: SensorFiles[Laser]) -> Parts:
     """Return the parts of LAS and LAZ files: stretches of points; files with seconds of week need ``gps_week``."""
     settings = request.settings
-    headers = [las.read_header(file.path, file.name, settings.time) for file in request.files]
+    headers = [las_header.read_header(file.path, file.name, settings.time) for file in request.files]
     for file, header in zip(request.files, headers, strict=True):
         refuse_claim(header.present, header.size, settings.max_records, "laser", file.name)
     without_week = {

@@ -150,7 +150,7 @@ def _chunk(pings: list[R2sonicPing], latency_s: float, dropped: Counter[str]) ->
     t_ns = gps_ns_from_unix_utc(seconds, nanoseconds)
     scale_s = per_sounding([ping.range_scale_s for ping in pings], counts, np.float64)
     angle_rad = np.concatenate([ping.angles_rad for ping in pings])
-    sieve = RowFilter(
+    rows = RowFilter(
         {
             "t_ns": per_sounding(t_ns, counts, np.int64),
             "ping": per_sounding([ping.number for ping in pings], counts, np.int64),
@@ -162,4 +162,4 @@ def _chunk(pings: list[R2sonicPing], latency_s: float, dropped: Counter[str]) ->
         },
         dropped,
     )
-    return checked_chunk(sieve, latency_s)
+    return checked_chunk(rows, latency_s)

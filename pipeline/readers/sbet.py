@@ -24,8 +24,8 @@ from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.row_checks import (
     INS_COLUMNS,
-    Order,
     RowFilter,
+    TimeOrder,
     chunk,
     keep_possible_poses,
     latency_ns,
@@ -49,7 +49,7 @@ class SbetPart:
     def chunks(self) -> Iterator[Chunk]:
         """Yield the INS records in canonical columns, batch by batch."""
         dropped: Counter[str] = Counter()
-        order, week, last = Order(self.name), self.gps_week, -np.inf
+        order, week, last = TimeOrder(self.name), self.gps_week, -np.inf
         with opened(self.path, self.name) as file:
             dropped["stray bytes at the end"] += stray_bytes(size_of(file), self.name)
             first = True
@@ -124,7 +124,7 @@ def running_weeks(seconds: NDArray[np.float64], week: int, last: float) -> tuple
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
 def _chunk(
-    records: NDArray[np.float64], weeks: NDArray[np.int64], order: Order, latency_s: float, dropped: Counter[str]
+    records: NDArray[np.float64], weeks: NDArray[np.int64], order: TimeOrder, latency_s: float, dropped: Counter[str]
 ) -> Chunk:
     names = ("seconds", "latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "heading", "wander")
     columns = dict(zip(names, records[:, [0, 1, 2, 3, 7, 8, 9, 10]].T, strict=True))

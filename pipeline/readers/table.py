@@ -36,8 +36,8 @@ from pipeline.readers.row_checks import (
     INS_COLUMNS,
     LASER_COLUMNS,
     MBES_COLUMNS,
-    Order,
     RowFilter,
+    TimeOrder,
     chunk,
     keep_possible_poses,
     keep_possible_soundings,
@@ -66,7 +66,7 @@ class TablePart:
     def chunks(self) -> Iterator[Chunk]:
         """Yield the rows in canonical columns, batch by batch."""
         dropped: Counter[str] = Counter()
-        order = Order(self.name)
+        order = TimeOrder(self.name)
         canonical = _CANONICAL[self.sensor]
         first = True
         with opened(self.path, self.name) as file:
@@ -81,7 +81,7 @@ class TablePart:
         order.check()
 
     @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-    def _chunk(self, columns: dict[str, NDArray[Any]], order: Order, dropped: Counter[str]) -> Chunk:
+    def _chunk(self, columns: dict[str, NDArray[Any]], order: TimeOrder, dropped: Counter[str]) -> Chunk:
         rows = RowFilter(columns, dropped)
         _keep_possible_times(rows, self.latency_s)
         if self.sensor == "ins":

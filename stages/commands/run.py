@@ -1,4 +1,4 @@
-"""``poolcal run``: all stages, the answer, the drawings. (``poolcal laser`` does the same for the laser.)"""
+"""``poolcal run``: all stages, the answer, the drawings."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,7 +37,7 @@ def command(session: Path, config: Path, run: Path, calibrated: Calibrated, opti
     calibrated
         The sensor that is calibrated.
     options
-        How.
+        How the run is worked on.
 
     Returns
     -------

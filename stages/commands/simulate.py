@@ -19,7 +19,7 @@ def command(out: Path, scenario: Path | None, seed: int) -> int:
     scenario
         A YAML file, or the name of one of ours; None: the demo's pool.
     seed
-        Of all random numbers.
+        The seed of all random numbers.
     """
     if seed < 0:
         raise ConfigError(f"--seed {seed}: must not be negative")

@@ -25,7 +25,7 @@ def command(name: str, run: Path, session: Path | None, config: Path | None, opt
     session, config
         Both, or neither: those in run.yaml.
     options
-        How; nothing of another session is replaced, whatever they say.
+        How it is worked on; another session's results are never replaced.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""``poolcal verify``: is everything that a run read and wrote as it was recorded?"""
+"""``poolcal verify``: whether everything that a run read and wrote is as it was recorded."""
 
 import sys
 from pathlib import Path

@@ -24,7 +24,7 @@ def command(first: Path, second: Path | None, stage: str | None) -> int:
     second
         Another, to be shown beside it.
     stage
-        Of one run, that stage's recording alone.
+        Show only that stage's recording; None: all. Not with two runs.
 
     Returns
     -------

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.readers import e57, las, table_columns
+from pipeline.readers import e57_scans, las, table_columns
 from pipeline.readers.claimed_counts import RECORDS_PER_BYTE, refuse_claim
 from pipeline.readers.dispatch import raw_parts
 from tests.readers.test_e57 import POINTS, START_S, TIMES
@@ -80,7 +80,7 @@ def test_all_scans_of_an_e57_count_together(tmp_path: Path) -> None:
     with pytest.raises(RawDataError, match=r"a\.e57: claims 6 records in \d+ bytes, laser\.max_records is 5"):
         read("laser", path, "e57", max_records=5)
     assert rows(read("laser", path, "e57", max_records=6)[0]) == 6
-    assert len(e57.read_scans(path, "a.e57")[0]) == 2
+    assert len(e57_scans.read_scans(path, "a.e57")[0]) == 2
 
 
 @pytest.mark.parametrize("sensor", ["ins", "mbes"])
