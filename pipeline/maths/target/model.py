@@ -71,7 +71,7 @@ class TargetModel:
 
     @property
     def half_period_m(self) -> float:
-        """Return half of the height after which the shape repeats; 0.5 m if it does not, the scale on which poses differ."""
+        """Return half of the height after which the shape repeats; 0.5 m if it does not: poses differ on that scale."""
         return 0.5 if self.repeats_m is None else self.repeats_m / 2
 
     @property
