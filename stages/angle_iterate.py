@@ -19,6 +19,8 @@ from pipeline.mount import mount_of
 
 @dataclass(frozen=True)
 class Config:
+    """Settings that the stage uses."""
+
     fit_planes: FitPlanes
     angle_iterate: AngleIterate
     mbes: SensorMount
@@ -26,6 +28,8 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    """Tables and streams that the stage reads."""
+
     faces: Annotated[pd.DataFrame, FACES]
     planes: Annotated[pd.DataFrame, PLANES]
     sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
@@ -33,6 +37,8 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
+    """Tables and streams that the stage writes."""
+
     iterations: Annotated[pd.DataFrame, ITERATIONS]
     pass_iterations: Annotated[pd.DataFrame, PASS_ITERATIONS]
     angles: Annotated[pd.DataFrame, ANGLES]

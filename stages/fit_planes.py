@@ -37,12 +37,16 @@ NamedKey = tuple[int, str]  # pass, name of a face or a family
 
 @dataclass(frozen=True)
 class Config:
+    """Settings that the stage uses."""
+
     fit_planes: FitPlanes
     mbes: SensorMount | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)
 class Inputs:
+    """Tables and streams that the stage reads."""
+
     faces: Annotated[pd.DataFrame, FACES]
     poses: Annotated[pd.DataFrame, POSES]
     target_pose: Annotated[pd.DataFrame, TARGET_POSE]
@@ -52,6 +56,8 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
+    """Tables and streams that the stage writes."""
+
     planes: Annotated[pd.DataFrame, PLANES]
     sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
 

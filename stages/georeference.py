@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Config:
+    """Settings that the stage uses."""
+
     target: Target
     georeference: Georeference
     laser: LaserPlacement
@@ -47,6 +49,8 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    """Tables and streams that the stage reads."""
+
     trajectory: Annotated[pd.DataFrame, TRAJECTORY]
     passes: Annotated[pd.DataFrame, PASSES]
     pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
@@ -56,6 +60,8 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
+    """Tables and streams that the stage writes."""
+
     poses: Annotated[pd.DataFrame, POSES]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
     laser_pool: Annotated[Stream, LASER_POOL] = EMPTY_STREAM
@@ -63,7 +69,7 @@ class Outputs:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PoolContext:
     """The pool frame, the trajectory in it, the passes, and the box round the target (pool frame)."""
 
     frame: PoolFrame
@@ -74,7 +80,7 @@ class Prepared:
     box_high_m: Array
 
 
-def prepare(inputs: Inputs, config: Config) -> Prepared:
+def prepare(inputs: Inputs, config: Config) -> PoolContext:
     """Turn the INS records into poses in the pool frame."""
     origin = inputs.pool_frame.iloc[0]
     frame = PoolFrame.at(
@@ -88,7 +94,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     positions, R_pool_from_body = poses_in_pool(frame, ins)
     low, high = target_of(config.target).bounds()
     margin = config.georeference.box_margin_m
-    return Prepared(
+    return PoolContext(
         frame=frame,
         trajectory=Trajectory.build(inputs.trajectory["t_ns"].to_numpy(), positions, R_pool_from_body),
         starts_ns=inputs.passes["start_ns"].to_numpy(),
@@ -98,7 +104,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     )
 
 
-def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> BatchResult:
+def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) -> BatchResult:
     """Place the points of one chunk in the pool frame, and keep those within the box round the target."""
     columns = chunk.columns
     t_ns = columns["t_ns"]
@@ -130,7 +136,7 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
     return BatchResult({stream: kept}, counts)
 
 
-def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: Config) -> tuple[Array, Array]:
+def _laser(t_ns: NDArray[np.int64], points: Array, prepared: PoolContext, config: Config) -> tuple[Array, Array]:
     """Return points in the scanner's frame and in the pool frame, whichever of the two the files hold."""
     mount = mount_of(config.laser.mount)
     if config.laser.frame == "laser":
@@ -143,7 +149,7 @@ def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: C
 
 
 def _soundings(
-    columns: Batch, prepared: Prepared, mbes: SonarPlacement, water_level_m: float
+    columns: Batch, prepared: PoolContext, mbes: SonarPlacement, water_level_m: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return soundings in the mbes frame and in the pool frame, and which of them are possible."""
     t_ns, recorded_m_s = columns["t_ns"], columns["sound_speed_m_s"]
@@ -171,7 +177,7 @@ def _soundings(
     return sensor, prepared.trajectory.points_from_body(t_ns, body), possible
 
 
-def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
+def combine(prepared: PoolContext, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
     """Sum the counts, and write the poses.
 
     Raises

@@ -31,6 +31,8 @@ SEQUENTIAL, ALTERNATING = "patent_sequential", "patent_alternating"
 
 @dataclass(frozen=True)
 class Config:
+    """Settings that the stage uses."""
+
     fit_planes: FitPlanes
     offsets: Offsets
     mbes: SensorMount
@@ -38,6 +40,8 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    """Tables and streams that the stage reads."""
+
     faces: Annotated[pd.DataFrame, FACES]
     planes: Annotated[pd.DataFrame, PLANES]
     sounding_moments: Annotated[pd.DataFrame, SOUNDING_MOMENTS]
@@ -46,6 +50,8 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
+    """Tables and streams that the stage writes."""
+
     offset_pairs: Annotated[pd.DataFrame, OFFSET_PAIRS]
     alternation: Annotated[pd.DataFrame, ALTERNATION]
     corrections: Annotated[pd.DataFrame, CORRECTIONS]

@@ -37,6 +37,8 @@ FEWEST_VOXELS = 50  # of dry laser points
 
 @dataclass(frozen=True)
 class Config:
+    """Settings that the stage uses."""
+
     target: Target
     segment: Segment
     laser: SensorMount
@@ -45,6 +47,8 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
+    """Tables and streams that the stage reads."""
+
     pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
     poses: Annotated[pd.DataFrame, POSES]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
@@ -54,6 +58,8 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
+    """Tables and streams that the stage writes."""
+
     faces: Annotated[pd.DataFrame, FACES]
     target_pose: Annotated[pd.DataFrame, TARGET_POSE]
     provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]

@@ -16,7 +16,8 @@ from pipeline.coarse.mirror_images import MIRRORED, axis_hint, is_flat, mirrored
 from pipeline.console import plural
 from pipeline.errors import ConfigError, DegenerateGeometryError
 from pipeline.maths.survey.data_snooping import LINE_RAD, SNOOPING_LEVEL, fit_of_frame, global_limit, sigma_about_line
-from pipeline.maths.survey.frame_adjustment import Frame, Survey, closed_form
+from pipeline.maths.survey.frame_adjustment import closed_form
+from pipeline.maths.survey.frames import MarkSurvey, RigidFrame
 
 UNITS = {"mm": 1000.0, "cm": 100.0, "inches": 1 / 0.0254, "feet": 1 / 0.3048}  # how many of them are a metre
 NEAR_UNIT, NEAR_ONE = 0.05, 0.4  # natural logarithms: a drawing's size may be wrong by these
@@ -66,7 +67,7 @@ def check_frames(frames: MarkFrames, where: str, R_present: Mapping[str, Array])
             _refuse_misfit(frames, name, f"{where}: {name}.marks", R_present)
 
 
-def _refuse_axes(frames: MarkFrames, frame: Frame, key: str) -> None:
+def _refuse_axes(frames: MarkFrames, frame: RigidFrame, key: str) -> None:
     axes = frame.axes
     assert axes is not None
     pair = frame.marks[[axes.first, axes.second]]
@@ -86,7 +87,7 @@ def _refuse_axes(frames: MarkFrames, frame: Frame, key: str) -> None:
         )
 
 
-def _refuse_units(survey: Survey, frame: Frame, key: str) -> None:
+def _refuse_units(survey: MarkSurvey, frame: RigidFrame, key: str) -> None:
     """Refuse a drawing of another size than the survey says.
 
     The size is the root mean square of the marks' distances from their centre: no rotation changes it, nor do names.
@@ -138,14 +139,14 @@ def _refuse_misfit(frames: MarkFrames, name: str, key: str, R_present: Mapping[s
     raise ConfigError(f"{key}: {'; or '.join(words)}; so all fit far better than as they stand")
 
 
-def _fits_without_one(survey: Survey, frame: Frame) -> bool:
+def _fits_without_one(survey: MarkSurvey, frame: RigidFrame) -> bool:
     """Whether all marks but one fit."""
     count = len(frame.marks)
     limit = global_limit(3 * count - 9)
     return count > 3 and any(fit_of_frame(survey, frame.without(k))[0] <= limit for k in range(count))
 
 
-def _likely_pairs(survey: Survey, frame: Frame) -> Sequence[tuple[int, ...]]:
+def _likely_pairs(survey: MarkSurvey, frame: RigidFrame) -> Sequence[tuple[int, ...]]:
     """Return the pairs of marks that, interchanged, leave the smallest residuals to the closed form."""
     at, weight = survey.at_m[frame.marks], np.ones(len(frame.marks))
 
@@ -157,7 +158,7 @@ def _likely_pairs(survey: Survey, frame: Frame) -> Sequence[tuple[int, ...]]:
     return sorted(combinations(range(len(frame.marks)), 2), key=left)[:LIKELY]
 
 
-def interchanged(frame: Frame, first: int, second: int) -> Frame:
+def interchanged(frame: RigidFrame, first: int, second: int) -> RigidFrame:
     """Return the frame with two marks interchanged in its drawing; ``first``, ``second``: their numbers there."""
     order = np.arange(len(frame.marks))
     order[[first, second]] = second, first

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.marks import Mark, Marks, Sigmas
-from pipeline.maths.survey.frame_adjustment import FORWARD, STARBOARD, Axes, Frame, Survey
+from pipeline.maths.survey.frames import FORWARD, STARBOARD, FrameAxis, MarkSurvey, RigidFrame
 
 Array = NDArray[np.float64]
 NEAR_DEG = 30.0  # a mount that is nearer to the session's is right
@@ -28,8 +28,8 @@ class MarkFrames:
     """
 
     mark_names: tuple[str, ...]
-    survey: Survey
-    by_name: Mapping[str, Frame]
+    survey: MarkSurvey
+    by_name: Mapping[str, RigidFrame]
 
 
 def frames_of_marks(marks: Marks) -> MarkFrames:
@@ -38,7 +38,7 @@ def frames_of_marks(marks: Marks) -> MarkFrames:
     names = tuple(name for name in marks.survey.marks if name in wanted)
     surveyed = [marks.survey.marks[name] for name in names]
     sigmas = np.array([mark.sigma_m or marks.survey.sigma_m for mark in surveyed]).reshape(-1, 3)
-    survey = Survey(np.array([mark.at for mark in surveyed]).reshape(-1, 3), _diagonal(sigmas))
+    survey = MarkSurvey(np.array([mark.at for mark in surveyed]).reshape(-1, 3), _diagonal(sigmas))
     number = {name: k for k, name in enumerate(names)}
     body = marks.body
     frames = {"body": _by_axes(marks, number) if body.marks is None else _by_marks(body.marks, body.sigma_m, number)}
@@ -46,14 +46,14 @@ def frames_of_marks(marks: Marks) -> MarkFrames:
     return MarkFrames(names, survey, frames)
 
 
-def _by_marks(marks: Mapping[str, Mark], sigma_m: Sigmas, number: Mapping[str, int]) -> Frame:
+def _by_marks(marks: Mapping[str, Mark], sigma_m: Sigmas, number: Mapping[str, int]) -> RigidFrame:
     used = {name: mark for name, mark in marks.items() if name in number}
     sigmas = np.array([mark.sigma_m or sigma_m for mark in used.values()]).reshape(-1, 3)
     at = np.array([mark.at for mark in used.values()]).reshape(-1, 3)
-    return Frame(np.array([number[name] for name in used], dtype=np.int64), at, _diagonal(sigmas))
+    return RigidFrame(np.array([number[name] for name in used], dtype=np.int64), at, _diagonal(sigmas))
 
 
-def _by_axes(marks: Marks, number: Mapping[str, int]) -> Frame:
+def _by_axes(marks: Marks, number: Mapping[str, int]) -> RigidFrame:
     axes = marks.body.axes
     assert axes is not None
     pair = axes.forward or axes.starboard or ()
@@ -62,9 +62,9 @@ def _by_axes(marks: Marks, number: Mapping[str, int]) -> Frame:
     along, angle, sigma = FORWARD, axes.roll_deg, axes.roll_sigma_deg
     if axes.forward is None:
         along, angle, sigma = STARBOARD, axes.pitch_deg, axes.pitch_sigma_deg
-    level = Axes(along, first, second, float(np.radians(angle or 0.0)), float(np.radians(sigma)))
+    level = FrameAxis(along, first, second, float(np.radians(angle or 0.0)), float(np.radians(sigma)))
     sigmas = np.tile(marks.body.sigma_m, (len(used), 1))
-    return Frame(np.array([number[name] for name in used]), np.zeros((len(used), 3)), _diagonal(sigmas), level)
+    return RigidFrame(np.array([number[name] for name in used]), np.zeros((len(used), 3)), _diagonal(sigmas), level)
 
 
 def _diagonal(sigmas_m: Array) -> Array:

@@ -9,7 +9,8 @@ from pipeline.coarse.frames import NEAR_DEG, Array, MarkFrames
 from pipeline.errors import ConfigError
 from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.survey.data_snooping import global_limit
-from pipeline.maths.survey.frame_adjustment import Frame, Survey, adjust_frames
+from pipeline.maths.survey.frame_adjustment import adjust_frames
+from pipeline.maths.survey.frames import MarkSurvey, RigidFrame
 
 AXES = "xyz"
 FAR_DEG = 90.0  # a mount that is farther from the session's is turned over
@@ -40,12 +41,12 @@ class AxisFlip:
         return self.reversed_deg < NEAR_DEG
 
 
-def mirrored(frame: Frame, axis: int) -> Frame:
+def mirrored(frame: RigidFrame, axis: int) -> RigidFrame:
     """Return the frame with the sign of one of its drawing's axes changed."""
     return replace(frame, drawing_m=frame.drawing_m * np.where(np.arange(3) == axis, -1.0, 1.0))
 
 
-def is_flat(survey: Survey, frame: Frame) -> bool:
+def is_flat(survey: MarkSurvey, frame: RigidFrame) -> bool:
     """Whether all marks lie so nearly in one plane that a mirror image would not show.
 
     The mirror image is the drawing with its distances h from that plane changed in sign. It raises Ω by no more than
@@ -72,7 +73,7 @@ def nearest_flip(frames: MarkFrames, name: str, R_present: Mapping[str, Array]) 
     if not sensors:
         return None
 
-    def R_survey_from(frame: Frame) -> Array:
+    def R_survey_from(frame: RigidFrame) -> Array:
         return adjust_frames(frames.survey, [frame]).poses[0].R_survey_from_frame
 
     as_drawn = {frame: R_survey_from(frames.by_name[frame]) for frame in ("body", *sensors)}

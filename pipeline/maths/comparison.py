@@ -1,4 +1,4 @@
-"""Two estimates of one mount, and an estimate against the truth: is the difference more than noise?
+"""Two estimates of one mount, and an estimate against the truth: the difference, tested against its noise.
 
 With R_true = Exp(ε_A) R_A = Exp(ε_B) R_B, and d = Log(R_B R_Aᵀ), to first order d = ε_A - ε_B; likewise the lever arms,
 l_B - l_A = ε_A - ε_B. So where the mount has not moved, the six differences have mean zero and, the two sessions being

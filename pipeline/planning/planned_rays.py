@@ -10,7 +10,7 @@ from pipeline.gps_time import NS
 from pipeline.maths.adjustment.observations import SPEED_M_S
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.sonar.soundings import points_in_mbes
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.labelling import LabelSettings, label_points
 from pipeline.mount import mount_of
 from pipeline.planning.setting import PredictionSetting
@@ -96,7 +96,7 @@ def label_rays(
         beams = beams_in_target(R_target_from_body, R, own, narrow(SonarBeams, setting.mbes))
         heights = (-np.inf, level - segment.water_margin_m)
     else:
-        beams, heights = Beams(directions, range_m), (level + segment.water_margin_m, np.inf)
+        beams, heights = TargetBeams(directions, range_m), (level + segment.water_margin_m, np.inf)
     limits = LabelSettings(
         gate_m=segment.gate_m,
         margin_m=segment.margin_m,

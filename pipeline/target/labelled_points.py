@@ -11,7 +11,7 @@ from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.trajectory import Trajectory
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.labelling import Labels, LabelSettings, hidden_in_part, label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.near_planes import near_planes
@@ -63,13 +63,33 @@ class LabellingContext:
 
 
 def label_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
-    """Label laser points that stage georeference has placed; ``laser`` is the coarse mount."""
+    """Label laser points that stage georeference has placed.
+
+    Parameters
+    ----------
+    batch
+        Laser points in the pool frame.
+    context
+        The target.
+    laser
+        Coarse mount of the laser.
+    """
     points = context.target.frame.points_from_pool(point_array(batch, "pool_m"))
     return _label_laser(batch, points, laser.lever_arm_body_m, context)
 
 
 def label_calibrated_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
-    """Place laser points with the provisional mount, and label them; ``laser`` is the coarse mount."""
+    """Place laser points with the provisional mount, and label them.
+
+    Parameters
+    ----------
+    batch
+        Laser points in the scanner's frame.
+    context
+        The target and the provisional mount.
+    laser
+        Coarse mount of the laser.
+    """
     mount = context.mount.total(laser)
     body = point_array(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
     points = context.trajectory.points_from_body(batch["t_ns"], body)
@@ -85,7 +105,7 @@ def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: Label
     rays = points - context.trajectory.track_of_point(t_ns, lever_arm_m)
     ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
     rays /= ranges[:, None]
-    labels = label_points(model, points, Beams(rays, ranges), settings, planes)
+    labels = label_points(model, points, TargetBeams(rays, ranges), settings, planes)
     on = np.flatnonzero(labels.face >= 0)
     rows = near[on]
     columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}

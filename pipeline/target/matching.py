@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.pool import Segment
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.labelling import LabelSettings, label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.registration import FacePlanes, Labeller, Refinement
@@ -27,7 +27,7 @@ def dry_labeller(model: TargetModel, settings: Segment) -> Labeller:
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
         above = points[:, 2] > model.water_level_m + settings.water_margin_m
-        labels = label_points(model, points, Beams.head_on(len(points)), limits)
+        labels = label_points(model, points, TargetBeams.head_on(len(points)), limits)
         return np.where(above, labels.face, -1).astype(np.int16)
 
     return label

@@ -9,7 +9,7 @@ from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.target.labelling import LabelSettings, label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.placements import MountCorrection
-from pipeline.maths.target.registration import Labeller, SearchCriteria, Surface, refine, score, search
+from pipeline.maths.target.registration import Labeller, SearchCriteria, TargetSurface, refine, search, surface_score
 from pipeline.mount import Mounted
 from pipeline.target.matching import REFINEMENT_GATE_M, SCORE_REACH_M, gate_of, planes_of_faces
 from pipeline.target.samples import SoundingSample
@@ -54,7 +54,7 @@ def search_mount(
         prior_sigmas=np.array([angle, angle, angle, arm, arm, arm]),
     )
     closest = ClosestSurface(model)
-    surface = Surface(closest, planes_of_faces(model))
+    surface = TargetSurface(closest, planes_of_faces(model))
     criteria = _criteria(placement, model, closest, settings)
     result = search(placement, _starts(placement, model, settings), surface, criteria)
     label = _wet_labeller(sample, model, coarse, mbes, settings)
@@ -96,9 +96,12 @@ def _criteria(
         return bool(np.max(np.abs(p[3:] - q[3:])) < model.half_period_m / 2)
 
     def quality(p: Array) -> float:
-        """A sounding behind a face cannot be: a stack shifted onto the floor or the next block explains as many."""
+        """Return the score less the share of soundings behind a face.
+
+        No sounding can lie there: a stack shifted onto the floor or the next block explains as many.
+        """
         behind = closest.hides(placement.origins(p), placement.points(p), BEHIND_M)
-        return score(placement, p, closest, SCORE_REACH_M) - float(np.mean(behind))
+        return surface_score(placement, p, closest, SCORE_REACH_M) - float(np.mean(behind))
 
     limits = np.repeat(settings.farthest_mount, 3) * np.repeat([np.pi / 180, 1.0], 3)
     return SearchCriteria(same, quality, limits)

@@ -11,11 +11,11 @@ from pipeline.maths.target.placements import TargetPose, TiltedTarget
 from pipeline.maths.target.registration import (
     SearchCriteria,
     SearchResult,
-    Surface,
+    TargetSurface,
     converge,
     refine,
-    score,
     search,
+    surface_score,
 )
 from pipeline.target.matching import SCORE_REACH_M, dry_labeller, gate_of, planes_of_faces
 from pipeline.target.samples import VOXEL_M, LaserSample
@@ -49,7 +49,7 @@ def search_target_pose(
     """
     sigmas = _pose_sigmas(model, settings, azimuth_known)
     placement = TargetPose(dry.voxel_means_m, sigmas)
-    surface = Surface(ClosestSurface(model), planes_of_faces(model))
+    surface = TargetSurface(ClosestSurface(model), planes_of_faces(model))
     coarse = _best_start(placement, surface, model.half_period_m, azimuth_known)
     label = dry_labeller(model, settings)
     points = TargetPose(dry.points_m, sigmas)
@@ -82,7 +82,7 @@ def _pose_sigmas(model: TargetModel, settings: Segment, azimuth_known: bool) -> 
 
 
 def _best_start(
-    placement: TargetPose, surface: Surface, half_period_m: float, azimuth_known: bool
+    placement: TargetPose, surface: TargetSurface, half_period_m: float, azimuth_known: bool
 ) -> SearchResult:
     """Return the best pose of a search over azimuths, places and heights."""
     azimuth, reach_xy, _, reach_z = placement.prior_sigmas
@@ -97,13 +97,13 @@ def _best_start(
         return bool(np.max(np.abs(p[1:] - q[1:])) < half_period_m / 2)
 
     def quality(p: Array) -> float:
-        return score(placement, p, surface.closest, SCORE_REACH_M)
+        return surface_score(placement, p, surface.closest, SCORE_REACH_M)
 
     limits = 1.3 * placement.prior_sigmas + np.array([0.02, 0.05, 0.05, 0.02])
     return search(placement, starts, surface, SearchCriteria(same, quality, limits, starts_per_group=2))
 
 
-def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, surface: Surface) -> float:
+def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, surface: TargetSurface) -> float:
     """Return the area of laser points explained by the model, plus that of its dry upright faces with points, in m².
 
     Both ways, because a model that reaches beyond the end of the stack explains every point as well.
@@ -111,7 +111,7 @@ def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, sur
     from scipy.spatial import cKDTree  # half a second: only where needed
 
     points = placement.points(parameters)
-    explained = score(placement, parameters, surface.closest, SCORE_REACH_M) * len(points)
+    explained = surface_score(placement, parameters, surface.closest, SCORE_REACH_M) * len(points)
     grid = model.upright_grid(VOXEL_M, model.water_level_m + VOXEL_M)
     distance, _ = cKDTree(points).query(grid)
     covered = np.maximum(0.0, 1.0 - (distance / (2 * VOXEL_M)) ** 2).sum()
@@ -119,8 +119,7 @@ def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, sur
 
 
 def _best_rival(placement: TargetPose, best: Array, model: TargetModel) -> tuple[str, float]:
-    """Return the name of the best rival and its agreement (m²); "none" where the target neither repeats nor has sides.
-    """
+    """Return the name of the best rival and its agreement (m²); "none" if the target neither repeats nor has sides."""
     shifts: list[tuple[TargetModel, str, float]] = []
     period_m = model.repeats_m
     if period_m is not None:
@@ -135,7 +134,7 @@ def _best_rival(placement: TargetPose, best: Array, model: TargetModel) -> tuple
     # No prior here: the rival may converge where it fits best.
     free = TargetPose(placement.points_pool_m, np.full(4, 1e3))
     for rival, name, shift_m in shifts:
-        surface = Surface(ClosestSurface(rival), planes_of_faces(rival))
+        surface = TargetSurface(ClosestSurface(rival), planes_of_faces(rival))
         start = best + np.array([0.0, 0.0, 0.0, shift_m])
         parameters = converge(free, start, surface, RIVAL_REACHES_M)
         rivals.append((name, _agreement(free, parameters, rival, surface)))

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.sonar.soundings import beam_half_widths
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 
 Array = NDArray[np.float64]
 STRAY_SIGMAS = 3.0
@@ -16,14 +16,25 @@ def beams_in_target(
     R_body_from_mbes: Array,
     points_mbes_m: Array,
     mbes: SonarBeams,
-) -> Beams:
-    """Rays and half widths of soundings (n, 3) with attitudes (n, 3, 3); beams stray by three sigmas of their angle.
+) -> TargetBeams:
+    """Return the rays and half widths of soundings; beams stray by three sigmas of their angle.
 
     A beam at its margin that strays over an edge gives the mean of what its parts meet.
+
+    Parameters
+    ----------
+    R_target_from_body
+        Attitudes (n, 3, 3).
+    R_body_from_mbes
+        Rotation of the sonar (3, 3).
+    points_mbes_m
+        Soundings (n, 3), mbes frame.
+    mbes
+        Widths of the beams, and the sigma of their angle.
     """
     ranges = np.linalg.norm(points_mbes_m, axis=1)
     unit = points_mbes_m / ranges[:, None]
     vectors = (unit, *beam_half_widths(unit, *np.radians(mbes.beam_deg)))
     turned = [np.einsum("nij,nj->ni", R_target_from_body, v @ R_body_from_mbes.T) for v in vectors]
     stray = STRAY_SIGMAS * mbes.angle_sigma_deg / (mbes.beam_deg[0] / 2)
-    return Beams(turned[0], ranges, (turned[1], turned[2]), stray)
+    return TargetBeams(turned[0], ranges, (turned[1], turned[2]), stray)

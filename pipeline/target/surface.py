@@ -38,6 +38,7 @@ class ClosestSurface:
         return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=1))
 
     def __call__(self, points_m: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Return the nearest points (n, 3) m on the surface, and the numbers of their faces (n,)."""
         answer = self._scene.compute_closest_points(self._tensor(points_m.astype(np.float32)), nthreads=THREADS)
         triangles = answer["primitive_ids"].numpy().astype(np.int64)
         return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]
@@ -55,7 +56,17 @@ class ClosestSurface:
         return np.where(missed, -1, self._face_of_triangle[np.where(missed, 0, triangle)])
 
     def hides(self, origins_m: Array, points_m: Array, spare_m: float) -> NDArray[np.bool_]:
-        """Return which points (n, 3) m lie more than ``spare_m`` behind the surface, seen from origins (n, 3) m."""
+        """Return which points (n,) lie behind the surface.
+
+        Parameters
+        ----------
+        origins_m
+            Where each point is seen from (n, 3), target frame.
+        points_m
+            Points (n, 3), target frame.
+        spare_m
+            A point counts that lies farther than this behind the surface, along its ray.
+        """
         away = points_m - origins_m
         rays = np.hstack([origins_m, away]).astype(np.float32)
         share = self._cast(rays)["t_hit"].numpy().astype(np.float64)

@@ -92,7 +92,6 @@ def test_what_a_stage_can_reach_makes_it_stale(
         ("report", "pipeline/run/results.py"),
         ("report", "pipeline/run/progress.py"),
         ("georeference", "pipeline/readers/las.py"),  # its inputs tell whether that made a difference
-        ("adjust", "stages/laser/report.py"),
         ("report", "pipeline/results/pages/report.html"),
         ("report", "pipeline/simulation/laser.py"),
     ],

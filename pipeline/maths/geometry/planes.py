@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline.errors import DegenerateGeometryError
 
 Array = NDArray[np.float64]
-ACROSS = 1e-3  # variance of points across their rays in any one direction, of that along them, at least
+ACROSS = 1e-3  # smallest variance of points across their rays, in any direction, as a share of that along them
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,16 @@ def fit_plane(moments: PlaneMoments, toward: Array) -> Plane:
     variance = square * n / (n - 3)
     covariance = np.diag([variance / (n * more), variance / (n * less), variance / n])
     values = np.array([square, less, more])
-    return Plane(normal, float(normal @ mean), mean, n, float(np.sqrt(square)), values, tangents, covariance)
+    return Plane(
+        normal=normal,
+        distance_m=float(normal @ mean),
+        centroid_m=mean,
+        count=n,
+        rms_m=float(np.sqrt(square)),
+        eigenvalues_m2=values,
+        tangents=tangents,
+        covariance=covariance,
+    )
 
 
 def angle_between(first: Array, second: Array) -> float:

@@ -121,7 +121,15 @@ def rotation_from_quaternion(quaternion: Array) -> Array:
 
 
 def rotation_from_mount(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Array:
-    """Return ``R_body_from_sensor`` = Rz(yaw) · Rx(pitch) · Ry(roll): yaw counter-clockwise seen from above."""
+    """Return ``R_body_from_sensor`` (3, 3) = Rz(yaw) · Rx(pitch) · Ry(roll).
+
+    Parameters
+    ----------
+    roll_rad, pitch_rad
+        Roll (starboard down positive) and pitch (bow up positive).
+    yaw_rad
+        Yaw, counter-clockwise seen from above.
+    """
     return rotation_z(yaw_rad) @ rotation_x(pitch_rad) @ rotation_y(roll_rad)
 
 
@@ -152,7 +160,14 @@ def mount_partials(R_body_from_sensor: Array) -> Array:
 def rotation_from_attitude(roll_rad: Array, pitch_rad: Array, azimuth_rad: Array) -> Array:
     """Return ``R_level_from_body`` = Rz(-azimuth) · Rx(pitch) · Ry(roll), (n,) each -> (n, 3, 3).
 
-    Level is east, north, up; body starboard, forward, up; azimuth clockwise from north (NovAtel SPAN, APN-037).
+    Level is east, north, up; body starboard, forward, up (NovAtel SPAN, APN-037).
+
+    Parameters
+    ----------
+    roll_rad, pitch_rad
+        Roll (starboard down positive) and pitch (bow up positive), (n,) each.
+    azimuth_rad
+        Azimuth (n,), clockwise from true north.
 
     >>> rotation_from_attitude(np.zeros(1), np.zeros(1), np.array([np.pi / 2]))[0].round(12) @ [0, 1, 0]  # heading east
     array([1., 0., 0.])

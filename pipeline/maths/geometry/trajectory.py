@@ -47,7 +47,17 @@ class Trajectory:
 
     @classmethod
     def build(cls, t_ns: Times, positions_m: Array, R_frame_from_body: Array) -> "Trajectory":
-        """Return the trajectory of records at ``t_ns`` (n,): positions (n, 3) m and rotations (n, 3, 3)."""
+        """Return the trajectory of records.
+
+        Parameters
+        ----------
+        t_ns
+            Times (n,), ascending.
+        positions_m
+            Positions (n, 3) in F.
+        R_frame_from_body
+            Rotations (n, 3, 3).
+        """
         steps = log_so3(np.swapaxes(R_frame_from_body[:-1], -1, -2) @ R_frame_from_body[1:])
         return cls(t_ns, positions_m, R_frame_from_body, np.concatenate([steps, np.zeros((1, 3))]))
 

@@ -61,7 +61,7 @@ def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[
         g = gradients[k]
         straight = np.abs(g) < LEAST_GRADIENT
         g = np.where(straight, LEAST_GRADIENT, g)
-        out, down = _exit(t0, c0, d0, np.where(straight, 0.0, g), bounds[k], bounds[k + 1])
+        out, down = _exit(t0, c0, d0, np.where(straight, 0.0, g), (bounds[k], bounds[k + 1]))
         t = np.minimum(out, left[going])
         tangent = np.tan(t0 / 2)
         # half the turn, and the mean angle: no difference of nearly equal numbers
@@ -81,10 +81,11 @@ def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[
 
 
 def _exit(
-    theta: Array, speed: Array, depth: Array, gradient: Array, upper: Array, lower: Array
+    theta: Array, speed: Array, depth: Array, gradient: Array, layer: tuple[Array, Array]
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return the time until a ray leaves its layer, and whether downward; infinite if it never does."""
     exit_time, downward = np.full(len(theta), np.inf), np.zeros(len(theta), dtype=bool)
+    upper, lower = layer
     for edge, down in ((lower, True), (upper, False)):
         with np.errstate(invalid="ignore"):
             there = speed + gradient * (edge - depth)

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from pipeline.errors import NotConvergedError
-from pipeline.maths.survey.frame_adjustment import Frame, FrameAdjustment, Survey, adjust_frames
+from pipeline.maths.survey.frame_adjustment import FrameAdjustment, adjust_frames
+from pipeline.maths.survey.frames import MarkSurvey, RigidFrame
 
 Array = NDArray[np.float64]
 SNOOPING_LEVEL = 0.001  # level of the global test; and of all the marks' tests together
@@ -83,7 +84,7 @@ def global_limit(redundancy: int) -> float:
     return float(chdtri(max(redundancy, 1), SNOOPING_LEVEL))
 
 
-def mark_tests(adjusted: FrameAdjustment, frames: Sequence[Frame]) -> tuple[MarkTest, ...]:
+def mark_tests(adjusted: FrameAdjustment, frames: Sequence[RigidFrame]) -> tuple[MarkTest, ...]:
     """Return the test of every mark whose error would show, the worst first.
 
     All limits together have the level SNOOPING_LEVEL (Bonferroni).
@@ -128,7 +129,7 @@ def _statistic(G: Array, W: Array, P: Array, weighted: Array) -> tuple[float, in
     return float(np.sum(along[shown] ** 2 / shares[shown])), int(shown.sum())
 
 
-def snoop(survey: Survey, frames: Sequence[Frame]) -> SnoopingResult:
+def snoop(survey: MarkSurvey, frames: Sequence[RigidFrame]) -> SnoopingResult:
     """Adjust; while a test fails, leave out the worst mark and adjust again.
 
     At most (k - 2) // 2 of the k marks of a frame go, so that most of them agree on what is left: with three none does.
@@ -150,7 +151,7 @@ def snoop(survey: Survey, frames: Sequence[Frame]) -> SnoopingResult:
         tests = mark_tests(now, left)
     if not agrees and suspects:
         worst_ratio = {test.frame: test.ratio for test in reversed(tests)}
-        suspects = [one for one in suspects if worst_ratio.get(one.test.frame, 0.0) < UNEXPLAINED_RATIO]
+        suspects = [each for each in suspects if worst_ratio.get(each.test.frame, 0.0) < UNEXPLAINED_RATIO]
         left = tuple(frames)
         for suspect in suspects:
             left = _without(left, suspect.test)
@@ -161,7 +162,7 @@ def snoop(survey: Survey, frames: Sequence[Frame]) -> SnoopingResult:
     )
 
 
-def _without(frames: tuple[Frame, ...], test: MarkTest) -> tuple[Frame, ...]:
+def _without(frames: tuple[RigidFrame, ...], test: MarkTest) -> tuple[RigidFrame, ...]:
     """Return the frames without the mark of a test, left out of the frame of the test or of all."""
     fewer = []
     for number, frame in enumerate(frames):
@@ -171,7 +172,7 @@ def _without(frames: tuple[Frame, ...], test: MarkTest) -> tuple[Frame, ...]:
     return tuple(fewer)
 
 
-def _may_go(survey: Survey, frames: Sequence[Frame], fewer: Sequence[Frame]) -> bool:
+def _may_go(survey: MarkSurvey, frames: Sequence[RigidFrame], fewer: Sequence[RigidFrame]) -> bool:
     """Return whether each frame keeps enough marks, and not all of them on a line."""
     for before, after in zip(frames, fewer, strict=True):
         if after.axes is None and len(before.marks) - len(after.marks) > (len(before.marks) - 2) // 2:
@@ -181,7 +182,7 @@ def _may_go(survey: Survey, frames: Sequence[Frame], fewer: Sequence[Frame]) -> 
     return True
 
 
-def sigma_about_line(survey: Survey, frame: Frame) -> float:
+def sigma_about_line(survey: MarkSurvey, frame: RigidFrame) -> float:
     """Return the sigma (rad) of a frame's turn about the line nearest to its marks; infinite if they lie on a line.
 
     By the drawing. With each mark's mean variance, the information of the turn is Σ |x|² / σ² about the weighted
@@ -195,7 +196,7 @@ def sigma_about_line(survey: Survey, frame: Frame) -> float:
     return float(1 / np.sqrt(information)) if information > 1e-12 * float(values[2]) else np.inf
 
 
-def fit_of_frame(survey: Survey, frame: Frame) -> tuple[float, int]:
+def fit_of_frame(survey: MarkSurvey, frame: RigidFrame) -> tuple[float, int]:
     """Return Ω and redundancy of one frame by itself; infinite if it fits so badly that nothing converges."""
     try:
         adjusted = adjust_frames(survey, [frame])

@@ -1,4 +1,4 @@
-"""Frames placed in one survey of marks by rigid transformations: weighted least squares with the full covariance.
+"""Adjustment of frames in one survey of marks by rigid transformations: least squares with the full covariance.
 
 A mark i stands at s_i in the survey and, by the drawing of frame f, at x_i in that frame; with R_f = R_survey_from_f
 and t_f the frame's origin in the survey,
@@ -27,85 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import NotConvergedError
-from pipeline.maths.geometry.rotations import exp_so3, rotation_x, rotation_y, skew
+from pipeline.maths.geometry.rotations import rotation_x, rotation_y, skew
 from pipeline.maths.mount_parameters import N_MOUNT
+from pipeline.maths.survey.frames import FORWARD, FramePose, MarkSurvey, RigidFrame
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-STARBOARD, FORWARD = 0, 1  # axes of the body that two marks may give
 MOST_ITERATIONS = 50
 STEP_TOLERANCE = 1e-9  # largest step, rad and m, that ends the iteration
-
-
-@dataclass(frozen=True)
-class Survey:
-    """Marks in survey axes, z up: at_m (m, 3), covariance (m, 3, 3) m²; the marks are independent of each other."""
-
-    at_m: Array
-    covariance: Array
-
-
-@dataclass(frozen=True)
-class Axes:
-    """One axis of a frame through two of its marks, and the attitude about it as the INS read it.
-
-    Parameters
-    ----------
-    along
-        STARBOARD or FORWARD.
-    first, second
-        Numbers of the marks within the frame; the axis runs from the first to the second.
-    angle_rad, sigma_rad
-        The attitude and its sigma: roll for FORWARD, pitch for STARBOARD.
-    """
-
-    along: int
-    first: int
-    second: int
-    angle_rad: float
-    sigma_rad: float
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A rigid frame and its marks.
-
-    Parameters
-    ----------
-    marks
-        Numbers (k,) of the marks in the survey.
-    drawing_m, covariance
-        Their places (k, 3) and covariance (k, 3, 3) m² by the drawing, in the frame's own axes.
-    axes
-        With it only the first mark, the origin, has a place in the drawing: zero.
-    """
-
-    marks: Integers
-    drawing_m: Array
-    covariance: Array
-    axes: Axes | None = None
-
-    @property
-    def points(self) -> int:
-        """Return the number of marks with a residual of their own."""
-        return len(self.marks) if self.axes is None else 1
-
-    def without(self, place: int) -> "Frame":
-        """Return the frame without one of its marks, the one at ``place``."""
-        kept = np.delete(np.arange(len(self.marks)), place)
-        return replace(self, marks=self.marks[kept], drawing_m=self.drawing_m[kept], covariance=self.covariance[kept])
-
-
-@dataclass(frozen=True)
-class Pose:
-    """R_survey_from_frame (3, 3), and the frame's origin in the survey (3,) m."""
-
-    R_survey_from_frame: Array
-    origin_m: Array
-
-    def updated(self, step: Array) -> "Pose":
-        """Return the pose after a step (6,): rotation vector η in survey axes, shift of the origin (m)."""
-        return Pose(exp_so3(step[:3]) @ self.R_survey_from_frame, self.origin_m + step[3:])
 
 
 @dataclass(frozen=True)
@@ -128,7 +57,7 @@ class FrameAdjustment:
         J (n, 6 f).
     """
 
-    poses: tuple[Pose, ...]
+    poses: tuple[FramePose, ...]
     covariance: Array
     residuals: Array
     rows: tuple[slice, ...]
@@ -178,7 +107,7 @@ def closed_form(drawing_m: Array, survey_m: Array, weight: Array, mirrored: bool
     return R, centre - R @ middle
 
 
-def adjust_frames(survey: Survey, frames: Sequence[Frame]) -> FrameAdjustment:
+def adjust_frames(survey: MarkSurvey, frames: Sequence[RigidFrame]) -> FrameAdjustment:
     """Adjust all frames at once, to the end of the iteration.
 
     Raises
@@ -187,7 +116,7 @@ def adjust_frames(survey: Survey, frames: Sequence[Frame]) -> FrameAdjustment:
         The marks do not fit their drawings even roughly.
     """
     centre = survey.at_m.mean(axis=0)  # national grids have coordinates of millions of metres
-    near = Survey(survey.at_m - centre, survey.covariance)
+    near = MarkSurvey(survey.at_m - centre, survey.covariance)
     poses = [_start(near, frame) for frame in frames]
     for _ in range(MOST_ITERATIONS):
         system = _system(near, frames, poses)
@@ -252,7 +181,7 @@ class _System:
     rows: tuple[slice, ...]
 
 
-def _system(survey: Survey, frames: Sequence[Frame], poses: Sequence[Pose]) -> _System:
+def _system(survey: MarkSurvey, frames: Sequence[RigidFrame], poses: Sequence[FramePose]) -> _System:
     """Return residuals, J, B and Σ of all frames at these poses."""
     parts = [_rows_of(survey, frame, pose) for frame, pose in zip(frames, poses, strict=True)]
     ends = np.cumsum([len(part[0]) for part in parts]).tolist()
@@ -275,8 +204,8 @@ def _through(by_mark: Array, covariance: Array) -> Array:
     return np.asarray(np.tensordot(B @ covariance, B, axes=([0, 2], [0, 2])))
 
 
-def _rows_of(survey: Survey, frame: Frame, pose: Pose) -> tuple[Array, Array, Array, Array]:
-    """Return of one frame r (n,), J (n, 6), B (n, k, 3) by its own marks, and variances (n,) that are no mark's."""
+def _rows_of(survey: MarkSurvey, frame: RigidFrame, pose: FramePose) -> tuple[Array, Array, Array, Array]:
+    """Return r (n,), J (n, 6), B (n, k, 3) by its own marks, and variances (n,) that are no mark's, of one frame."""
     R, k = pose.R_survey_from_frame, frame.points
     at = survey.at_m[frame.marks]
     turned = frame.drawing_m[:k] @ R.T
@@ -313,15 +242,15 @@ def _level(R: Array, along: int) -> tuple[float, Array]:
     return float(np.arctan2(rho[1], level)), by_turn[1] / level
 
 
-def _start(survey: Survey, frame: Frame) -> Pose:
+def _start(survey: MarkSurvey, frame: RigidFrame) -> FramePose:
     """Return the closed form, weighted by the mean variance of each mark; with axes, the vertical made orthogonal."""
     at, axes = survey.at_m[frame.marks], frame.axes
     if axes is None:
         variance = np.trace(survey.covariance[frame.marks] + frame.covariance, axis1=1, axis2=2)
-        return Pose(*closed_form(frame.drawing_m, at, 1 / variance))
+        return FramePose(*closed_form(frame.drawing_m, at, 1 / variance))
     axis = (at[axes.second] - at[axes.first]) / np.linalg.norm(at[axes.second] - at[axes.first])
     up = np.array([0.0, 0.0, 1.0]) - axis[2] * axis
     up /= np.linalg.norm(up)
     if axes.along == FORWARD:
-        return Pose(np.column_stack([np.cross(axis, up), axis, up]) @ rotation_y(axes.angle_rad), at[0])
-    return Pose(np.column_stack([axis, np.cross(up, axis), up]) @ rotation_x(axes.angle_rad), at[0])
+        return FramePose(np.column_stack([np.cross(axis, up), axis, up]) @ rotation_y(axes.angle_rad), at[0])
+    return FramePose(np.column_stack([axis, np.cross(up, axis), up]) @ rotation_x(axes.angle_rad), at[0])

@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Beams:
+class TargetBeams:
     """Rays in the target frame.
 
     Parameters
@@ -32,7 +32,7 @@ class Beams:
     stray: float = 0.0
 
     @classmethod
-    def head_on(cls, count: int) -> "Beams":
+    def head_on(cls, count: int) -> "TargetBeams":
         """Return unknown rays (of averaged points): every face is taken to be seen from its front."""
         return cls(np.zeros((count, 3)), np.zeros(count))
 

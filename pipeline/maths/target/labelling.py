@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.face import Face
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.near_planes import NearPlane, planes_with_points
@@ -90,7 +90,7 @@ def hidden_in_part(
 class _Candidates:
     """The best face of each point so far, while face after face is tried."""
 
-    def __init__(self, points_m: Array, beams: Beams, settings: LabelSettings) -> None:
+    def __init__(self, points_m: Array, beams: TargetBeams, settings: LabelSettings) -> None:
         count = len(points_m)
         self.points_m, self.beams, self.settings = points_m, beams, settings
         self.sine = np.sin(settings.min_grazing_rad) if beams.directions.any() else 0.0
@@ -146,7 +146,7 @@ class _Candidates:
 def label_points(
     model: TargetModel,
     points_m: Array,
-    beams: Beams,
+    beams: TargetBeams,
     settings: LabelSettings,
     planes: Iterable[NearPlane] | None = None,
 ) -> Labels:

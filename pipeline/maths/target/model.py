@@ -1,8 +1,8 @@
-"""The target: named planar polygons, and what is known of how their planes lie to each other.
+"""The target: named planar polygons, and the relations between their planes.
 
 Faces that are known to be parallel, at known distances, form a *family*: one plane of unknown place and direction, from
 which each of its faces stands off by a known *offset* along the family's normal (zero for all that lie in one plane).
-A dry face and a wet one of a family see the same plane; that is what a calibration lives on. A family is *level* if its
+A dry face and a wet one of a family lie on the same plane: a calibration rests on that. A family is *level* if its
 plane is horizontal: then its normal points up and offsets are heights.
 
 Nothing downstream knows what the target is called or made of: it sees faces with a family, a plane and corners.
@@ -71,7 +71,7 @@ class TargetModel:
 
     @property
     def half_period_m(self) -> float:
-        """Return half of the height after which the shape repeats; without one half a metre, on which poses differ."""
+        """Return half of the height after which the shape repeats; 0.5 m if it does not: poses differ on that scale."""
         return 0.5 if self.repeats_m is None else self.repeats_m / 2
 
     @property

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ class NearPlane:
     rows: NDArray[np.int64]
     distance_m: Array
 
-    def intersections(self, points_m: Array, beams: Beams, sine: float) -> tuple[Array, Array]:
+    def intersections(self, points_m: Array, beams: TargetBeams, sine: float) -> tuple[Array, Array]:
         """Return where the rays of the points meet the plane (m, 3), and at what range (m,).
 
         For rays that meet the plane at less than the angle of ``sine`` these are the feet of the points.

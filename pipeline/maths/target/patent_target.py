@@ -1,11 +1,11 @@
-"""The patent's target from its letters a, b, c, e: outlines of the faces, and what is known of their planes.
+r"""The patent's target from its letters a, b, c, e: outlines of the faces, and relations between their planes.
 
 Seen from above (the boat passes on the left, x < 0, y upward)::
 
         pool wall x = c
      .------------------.   y =  b/2 + c
-      \\   P3 blocks      |
-       \\                 |
+      \   P3 blocks      |
+       \                 |
         |  P2            |   y in [-b/2, b/2], x = 0: the centre wall's front face
        /                 |
       /   P1 blocks      |

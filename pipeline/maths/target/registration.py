@@ -26,14 +26,14 @@ class FacePlanes:
 
 
 @dataclass(frozen=True)
-class Surface:
+class TargetSurface:
     """The surface of a target: the function that finds its nearest points, and the planes of its faces."""
 
     closest: Closest
     planes: FacePlanes
 
 
-def score(placement: Placement, parameters: Array, closest: Closest, reach_m: float) -> float:
+def surface_score(placement: Placement, parameters: Array, closest: Closest, reach_m: float) -> float:
     """Return the share of points that the model explains: mean of max(0, 1 - (distance / reach)²), in [0, 1].
 
     Parameters
@@ -52,7 +52,7 @@ def score(placement: Placement, parameters: Array, closest: Closest, reach_m: fl
 
 
 def converge(
-    placement: Placement, start: Array, surface: Surface, reaches_m: Sequence[float], steps: int = 4
+    placement: Placement, start: Array, surface: TargetSurface, reaches_m: Sequence[float], steps: int = 4
 ) -> Array:
     """Return the parameters (k,) after Gauss-Newton steps onto the nearest surface, within a shrinking reach.
 
@@ -133,7 +133,7 @@ class SearchResult:
 
 
 def search(
-    placement: SubsetPlacement, starts: Sequence[Sequence[Array]], surface: Surface, criteria: SearchCriteria
+    placement: SubsetPlacement, starts: Sequence[Sequence[Array]], surface: TargetSurface, criteria: SearchCriteria
 ) -> SearchResult:
     """Return the best pose from many starts: all are scored with a wide reach, the best converge and are compared.
 
@@ -154,7 +154,7 @@ def search(
     rough = placement.subset(ROUGH)
 
     def start_score(parameters: Array) -> float:
-        return score(rough, parameters, surface.closest, START_REACH_M)
+        return surface_score(rough, parameters, surface.closest, START_REACH_M)
 
     chosen = [
         start

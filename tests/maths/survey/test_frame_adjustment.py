@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import binom, chi2
 
 from pipeline.maths.survey import data_snooping, frame_adjustment
-from pipeline.maths.survey.frame_adjustment import FORWARD, STARBOARD, Axes, Frame, Survey
+from pipeline.maths.survey.frames import FORWARD, STARBOARD, FrameAxis, FramePose, MarkSurvey, RigidFrame
 from tests.support.effort import often
 from tests.support.surveys import ALONG, ON_BODY, PLACE, World, attitude_rotation, error
 
@@ -38,7 +38,7 @@ class Case:
         level = attitude_rotation(*world.attitude)
         self.level_from = {name: (level * world.rotation(name)).as_matrix() for name in self.frames}
 
-    def drawn(self, rng: np.random.Generator) -> tuple[Survey, list[Frame]]:
+    def drawn(self, rng: np.random.Generator) -> tuple[MarkSurvey, list[RigidFrame]]:
         """Survey and frames with errors."""
         at = self.at + np.einsum("kij,kj->ki", self.root, rng.normal(size=self.at.shape))
         frames, moved = [], np.zeros_like(at)
@@ -50,11 +50,11 @@ class Case:
                 numbers = self.numbers[name]
                 exact = self.exact[name] + moved[numbers] @ self.level_from[name]
                 drawing = exact + self.drawing_sigma * rng.normal(size=exact.shape)
-                frame = Frame(numbers, drawing, np.tile(np.diag(self.drawing_sigma**2), (len(exact), 1, 1)))
+                frame = RigidFrame(numbers, drawing, np.tile(np.diag(self.drawing_sigma**2), (len(exact), 1, 1)))
             frames.append(frame)
-        return Survey(at, self.covariance), frames
+        return MarkSurvey(at, self.covariance), frames
 
-    def _by_axes(self, rng: np.random.Generator) -> tuple[Frame, Any]:
+    def _by_axes(self, rng: np.random.Generator) -> tuple[RigidFrame, Any]:
         """Marks meant to lie on an axis lie off it by the drawing's sigma; the INS reads its attitude wrongly."""
         along, origin, first, second, sigma_deg = self.axes
         used = list(dict.fromkeys([origin, first, second]))
@@ -63,9 +63,9 @@ class Case:
         moved = np.zeros_like(self.at)
         moved[numbers] += off
         read = self.world.attitude[0 if along == FORWARD else 1] + sigma_deg * rng.normal()
-        axes = Axes(along, used.index(first), used.index(second), np.radians(read), np.radians(sigma_deg))
+        axes = FrameAxis(along, used.index(first), used.index(second), np.radians(read), np.radians(sigma_deg))
         covariance = np.tile(np.diag(self.drawing_sigma**2), (len(used), 1, 1))
-        return Frame(numbers, np.zeros((len(used), 3)), covariance, axes), moved
+        return RigidFrame(numbers, np.zeros((len(used), 3)), covariance, axes), moved
 
 
 EVERY = World()
@@ -111,7 +111,7 @@ def test_errors_are_as_the_covariance_says(name: str) -> None:
 
 
 # --- signs and derivatives -------------------------------------------------------------------------------------------
-def exact(case: Case) -> tuple[Survey, list[Frame]]:
+def exact(case: Case) -> tuple[MarkSurvey, list[RigidFrame]]:
     """Without errors, sigmas as they are."""
     without = Case(case.world, axes=case.axes and (*case.axes[:4], 0.0))
     without.root, without.drawing_sigma = np.zeros_like(without.root), np.zeros(3)
@@ -121,7 +121,7 @@ def exact(case: Case) -> tuple[Survey, list[Frame]]:
         replace(one, drawing_m=other.drawing_m, axes=one.axes and replace(one.axes, angle_rad=other.axes.angle_rad))
         for one, other in zip(frames, bare, strict=True)
     ]
-    return Survey(survey.at_m, case.covariance), frames
+    return MarkSurvey(survey.at_m, case.covariance), frames
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -149,7 +149,7 @@ def test_the_design_is_the_derivative_of_the_residuals(name: str) -> None:
         ends = []
         for h in (1e-5, -1e-5):
             turn = Rotation.from_rotvec(h * np.eye(6)[place, :3]).as_matrix()
-            moved = frame_adjustment.Pose(
+            moved = FramePose(
                 turn @ poses[number].R_survey_from_frame, poses[number].origin_m + h * np.eye(6)[place, 3:]
             )
             changed = [*poses[:number], moved, *poses[number + 1 :]]
@@ -193,14 +193,16 @@ def test_origin_and_heading_of_the_survey_do_not_matter() -> None:
     survey, frames = CASES["shared marks"].drawn(np.random.default_rng(2))
     one = frame_adjustment.relative_mount(frame_adjustment.adjust_frames(survey, frames), 0, 2)
     turn = Rotation.from_euler("z", 77.0, degrees=True).as_matrix()
-    moved = Survey(survey.at_m @ turn.T + [5e5, 4e6, -3], survey.covariance)
+    moved = MarkSurvey(survey.at_m @ turn.T + [5e5, 4e6, -3], survey.covariance)
     other = frame_adjustment.relative_mount(frame_adjustment.adjust_frames(moved, frames), 0, 2)
     for a, b, atol in zip(one, other, (1e-8, 1e-8, 1e-12), strict=True):
         np.testing.assert_allclose(a, b, atol=atol)
 
 
 # --- which mark is wrong ---------------------------------------------------------------------------------------------
-def spoilt(case: Case, rng: np.random.Generator, frame: int, place: int, of_survey: bool) -> tuple[Survey, list[Frame]]:
+def spoilt(
+    case: Case, rng: np.random.Generator, frame: int, place: int, of_survey: bool
+) -> tuple[MarkSurvey, list[RigidFrame]]:
     """One mark wrong by 5 cm, in any direction."""
     survey, frames = case.drawn(rng)
     wrong = rng.normal(size=3)
@@ -287,8 +289,8 @@ def test_two_wrong_marks_of_six_are_both_named() -> None:
 def test_on_a_line_nothing_tells_the_turn_about_it() -> None:
     def sigma(across: float) -> float:
         at = np.array([[0.0, 0, 0], [0.5, 0, 0], [1.0, across, 0]])
-        frame = Frame(np.arange(3), at, np.tile(np.eye(3) * 1e-6, (3, 1, 1)))
-        return data_snooping.sigma_about_line(Survey(at, np.tile(np.eye(3) * 3e-6, (3, 1, 1))), frame)
+        frame = RigidFrame(np.arange(3), at, np.tile(np.eye(3) * 1e-6, (3, 1, 1)))
+        return data_snooping.sigma_about_line(MarkSurvey(at, np.tile(np.eye(3) * 3e-6, (3, 1, 1))), frame)
 
     assert sigma(0.0) == np.inf
     h = 0.1  # residuals from the nearest line h (1/6, -1/3, 1/6): information Σ d² / σ²

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.labelling import LabelSettings, label_points
 from tests.support.targets import by_letters, members
 
@@ -80,7 +80,7 @@ def beams_from(origin, points, half_width=0.0):
     ranges = np.linalg.norm(rays, axis=1, keepdims=True)
     unit = rays / ranges
     side = np.cross(unit, [0, 1.0, 0])
-    return Beams(unit, ranges[:, 0], (side / np.linalg.norm(side, axis=1, keepdims=True) * half_width,))
+    return TargetBeams(unit, ranges[:, 0], (side / np.linalg.norm(side, axis=1, keepdims=True) * half_width,))
 
 
 def test_points_are_labelled_by_polygon_gate_and_margin(target):
@@ -159,7 +159,7 @@ def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
     model = by_letters(a=12 * e, b=3.0, c=1.0, e=e)
     for number, face in enumerate(model.faces):
         middle = face.vertices_m.mean(axis=0)[None, :]
-        ahead = Beams(-face.normal[None, :], np.ones(1))  # a ray from straight in front
+        ahead = TargetBeams(-face.normal[None, :], np.ones(1))  # a ray from straight in front
         assert label_points(model, middle, ahead, LabelSettings(0.05, 0.01, 0.1)).face[0] == number, face.name
 
 
