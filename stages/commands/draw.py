@@ -22,7 +22,7 @@ from typing import Any
 from pipeline.artefacts.streams import Mapper, serial
 from pipeline.atomic_files import write_bytes
 from pipeline.errors import PoolcalError
-from pipeline.results.pages.currency import page_to_draw
+from pipeline.results.pages.currency import is_page_outdated
 from pipeline.run import folder, manifest
 from pipeline.run.results import PAGE, agreeing, recording_path
 from pipeline.run.settings import read_settings
@@ -104,7 +104,7 @@ class Painters:
     def _missing(self, run: Path) -> list[str]:
         """Names of what is not drawn yet: the page, or stages; of stages that agree with each other alone."""
         stages = names_in(run)
-        page = [PAGE] if PAGE in self._wanted and page_to_draw(run, stages) else []
+        page = [PAGE] if PAGE in self._wanted and is_page_outdated(run, stages) else []
         if RECORDINGS not in self._wanted:
             return page
         done = agreeing(run, stages)
@@ -215,15 +215,15 @@ def _noting(failed: list[Failure], what: str) -> Iterator[None]:
 
 
 def _pictures(run: Path, mapper: Mapper) -> Iterable[Any]:
-    from pipeline.results.pages.plots import draw, pictures_of
+    from pipeline.results.pages.plots import draw_picture, picture_names
 
-    return mapper(partial(draw, run), pictures_of(run))
+    return mapper(partial(draw_picture, run), picture_names(run))
 
 
 def _write_page(run: Path, pictures: Iterable[Any]) -> None:
-    from pipeline.results.pages.report import write_page
+    from pipeline.results.pages.report import write_report_page
 
-    write_page(run, names_in(run), pictures)
+    write_report_page(run, names_in(run), pictures)
 
 
 def _write_recording(run: Path, stage: str, ready: Prepared | None) -> None:

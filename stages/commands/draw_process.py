@@ -95,11 +95,11 @@ def _made(future: "Future[T] | None", function: Callable[..., T], work: Sequence
 
 def _ready(parent: int) -> None:
     """A copy: ends with the process that it was made from, and does not keep its answer open."""
-    from pipeline.results.pages.rendering import prepare
+    from pipeline.results.pages.rendering import prepare_drawing
 
     _end_with(parent)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    prepare()
+    prepare_drawing()
 
 
 def _end_with(parent: int) -> None:
