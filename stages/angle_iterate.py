@@ -10,7 +10,7 @@ from pipeline.artefacts.catalogue.patent import ANGLES, ITERATIONS, PASS_ITERATI
 from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
 from pipeline.artefacts.from_tables import angle_passes
 from pipeline.config.pool import AngleIterate, FitPlanes
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.patent.angles import AngleResult, iterate_angles
 from pipeline.mount import mount_of
@@ -20,7 +20,7 @@ from pipeline.mount import mount_of
 class Config:
     fit_planes: FitPlanes
     angle_iterate: AngleIterate
-    mbes: Mbes
+    mbes: SensorMount
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from pipeline.artefacts.catalogue.target import (
 from pipeline.artefacts.poses import trajectory_in_target
 from pipeline.artefacts.streams import Batch, Stream, xyz
 from pipeline.config.pool import FitPlanes
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.planes import Moments, Plane, fit_plane
 from pipeline.maths.geometry.trajectory import Trajectory
@@ -36,7 +36,7 @@ ALL_PASSES = -1
 @dataclass(frozen=True)
 class Config:
     fit_planes: FitPlanes
-    mbes: Mbes | None
+    mbes: SensorMount | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)

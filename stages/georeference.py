@@ -21,7 +21,7 @@ from pipeline.artefacts.catalogue.points import (
 from pipeline.artefacts.counts import counts_table
 from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream, xyz
 from pipeline.config.pool import Georeference
-from pipeline.config.session import Laser, Mbes
+from pipeline.config.stage_settings import LaserPlacement, SonarPlacement
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS
@@ -41,8 +41,8 @@ Array = NDArray[np.float64]
 class Config:
     target: Target
     georeference: Georeference
-    laser: Laser
-    mbes: Mbes | None
+    laser: LaserPlacement
+    mbes: SonarPlacement | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def _traced(
     points: Array,
     recorded_m_s: Array,
     prepared: Prepared,
-    mbes: Mbes,
+    mbes: SonarPlacement,
     water_level_m: float,
 ) -> Array:
     """Soundings in the mbes frame, their rays bent by the cast; its depths are below the water's surface."""

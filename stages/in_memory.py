@@ -1,8 +1,6 @@
 """Simulated sessions through the stages in memory: for tests and ``make montecarlo``, without any file."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -11,6 +9,7 @@ from pipeline.artefacts.schema import Artefact, Document, Raw
 from pipeline.artefacts.streams import EMPTY, MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
+from pipeline.config.stage_settings import settings_by_name, stage_config
 from pipeline.run.stage_protocol import declared, name_of, run_in_memory
 from stages import load
 
@@ -34,9 +33,10 @@ def calibrate_in_memory(
             return found[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}
 
-    for stage in load("mbes" if session.mbes is not None else "laser"):
+    settings = settings_by_name(pool, session)
+    for stage in load(session.calibrated):
         inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
-        outputs = run_in_memory(stage, inputs, config_of(stage, session, pool))
+        outputs = run_in_memory(stage, inputs, stage_config(stage.Config, settings))
         for name, marker in declared(stage.Outputs).items():
             if isinstance(marker, (Artefact, Document)):
                 key = f"{marker.owner}/{marker.name}"
@@ -44,9 +44,3 @@ def calibrate_in_memory(
         if name_of(stage) == until:
             break
     return found
-
-
-def config_of(stage: ModuleType, session: SessionConfig, pool: PoolConfig) -> Any:
-    """The stage's Config from the two models, field by field."""
-    names = [field.name for field in fields(stage.Config)]
-    return stage.Config(**{name: getattr(pool if hasattr(pool, name) else session, name) for name in names})

@@ -21,7 +21,7 @@ from pipeline.artefacts.catalogue.points import (
 from pipeline.artefacts.schema import Raw
 from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream
 from pipeline.config.pool import Ingest, TargetPlace
-from pipeline.config.session import Recordings
+from pipeline.config.recording import Recordings
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, utc_text
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic

@@ -10,7 +10,7 @@ from pipeline.artefacts.catalogue.patent import ALTERNATION, ANGLES, CORRECTIONS
 from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
 from pipeline.artefacts.from_tables import angle_passes, horizontal_faces, offset_passes
 from pipeline.config.pool import FitPlanes, Offsets
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.patent.offsets import alternate, offsets
@@ -23,7 +23,7 @@ METHODS = ("patent_sequential", "patent_alternating")
 class Config:
     fit_planes: FitPlanes
     offsets: Offsets
-    mbes: Mbes
+    mbes: SensorMount
 
 
 @dataclass(frozen=True)

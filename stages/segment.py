@@ -23,7 +23,7 @@ from pipeline.artefacts.poses import trajectory_in_pool
 from pipeline.artefacts.sampling import Voxels, every_nth, points_above, voxel_means, voxel_sums
 from pipeline.artefacts.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
 from pipeline.config.pool import Segment
-from pipeline.config.session import Laser, Mbes
+from pipeline.config.stage_settings import SensorMount, SonarBeams
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
 from pipeline.maths.geometry.trajectory import Trajectory
@@ -47,8 +47,8 @@ RAW_SAMPLE = 50_000  # of these taken singly
 class Config:
     target: Target
     segment: Segment
-    laser: Laser
-    mbes: Mbes | None  # none: the laser is calibrated
+    laser: SensorMount
+    mbes: SonarBeams | None  # none: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def _label_laser(batch: Batch, prepared: Prepared, config: Config) -> Piece:
     return Piece({"laser_labelled": columns}, counts)
 
 
-def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: Mbes) -> Piece:
+def _label_soundings(batch: Batch, prepared: Prepared, config: Config, mbes: SonarBeams) -> Piece:
     model, segment, mount = prepared.model, config.segment, prepared.mount
     R_body_from_mbes, lever = mount.on(mount_of(mbes.mount))
     sensor = xyz(batch, "mbes_m")

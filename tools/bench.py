@@ -41,8 +41,8 @@ DECODE = """
 import sys, time
 from pathlib import Path
 import laspy
-from pipeline.config import load_session
-from pipeline.readers import raw_parts
+from pipeline.config.load import load_session
+from pipeline.readers.dispatch import raw_parts
 folder = Path(sys.argv[1]); session = load_session(folder)
 start = time.perf_counter()
 points = 0

@@ -14,11 +14,12 @@ from pipeline.artefacts.sampling import every_nth
 from pipeline.artefacts.streams import Part
 from pipeline.atomic_files import temporary_folder
 from pipeline.checking.excerpts import excerpt, stretches
+from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, SessionConfig
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.gps_time import NS
 from pipeline.readers import detect
-from pipeline.readers.dispatch import Sensor, Settings, raw_files, raw_parts
+from pipeline.readers.dispatch import SensorSettings, raw_files, raw_parts
 from pipeline.readers.file_summaries import thinned
 from pipeline.readers.las import LasPart
 from pipeline.readers.rates import rate_hz
@@ -77,7 +78,7 @@ def survey(session: SessionConfig, folder: Path) -> tuple[list[Seen], list[str]]
     wrong: list[str] = []
     with temporary_folder() as place:
         for sensor in SENSORS:
-            settings: Settings | None = getattr(session, sensor)
+            settings: SensorSettings | None = getattr(session, sensor)
             if settings is None:
                 continue
             names, complaints = _listed(settings, folder)
@@ -106,7 +107,7 @@ def _with_accuracy(
     return [replace(seen, sigmas=sigmas) if k == good else seen for k, seen in enumerate(found)], list(wrong)
 
 
-def _listed(settings: Settings, folder: Path) -> tuple[list[str], list[str]]:
+def _listed(settings: SensorSettings, folder: Path) -> tuple[list[str], list[str]]:
     """Names of the files that the patterns match, and of patterns that match none the refusals."""
     names: list[str] = []
     wrong = []
@@ -119,12 +120,12 @@ def _listed(settings: Settings, folder: Path) -> tuple[list[str], list[str]]:
     return sorted(dict.fromkeys(names)), wrong
 
 
-def _without_accuracy(settings: Settings) -> dict[str, Any]:
+def _without_accuracy(settings: SensorSettings) -> dict[str, Any]:
     return {"accuracy": []} if isinstance(settings, Ins) else {}
 
 
 def _parts(
-    sensor: Sensor, settings: Settings, folder: Path, names: Sequence[str]
+    sensor: Sensor, settings: SensorSettings, folder: Path, names: Sequence[str]
 ) -> Iterator[tuple[str, Sequence[Part] | RawDataError]]:
     """By file its parts, or why there are none. All files together where that goes: weeks follow from the first one."""
     without = _without_accuracy(settings)
@@ -157,7 +158,7 @@ def _escaped(name: str) -> str:
 
 
 def _look(
-    sensor: Sensor, settings: Settings, folder: Path, name: str, parts: Sequence[Part] | RawDataError, files: int,
+    sensor: Sensor, settings: SensorSettings, folder: Path, name: str, parts: Sequence[Part] | RawDataError, files: int,
     place: Path,
 ) -> Seen:
     path = folder / name

@@ -24,7 +24,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.tokens import CommentToken
 
-from pipeline.config.yaml_models import content_of
+from pipeline.config.yaml_file import content_of
 from pipeline.errors import ConfigError
 
 Content = dict[str, Any]

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 import pipeline
 from pipeline.atomic_files import sha256, write_bytes, writing
 from pipeline.coarse.session_edit import edit_mounts
-from pipeline.config.instruments import applied
+from pipeline.config.instruments import merge_presets
 from pipeline.config.session import SessionConfig
-from pipeline.config.yaml_models import content_of, parse, text_of
+from pipeline.config.yaml_file import content_of, text_of
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.mount import Mounted
@@ -40,7 +41,7 @@ def read_session(folder: Path) -> tuple[str, Content]:
 
 def _check(content: Content, folder: Path) -> SessionConfig:
     path = folder / "session.yaml"
-    filled = with_cast(applied(content, folder)[0], folder)
+    filled = with_cast(merge_presets(content, folder)[0], folder)
     for name in SENSORS:
         if isinstance(filled.get(name), dict):
             filled[name] = {"mount": ZERO_MOUNT} | filled[name]

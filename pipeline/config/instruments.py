@@ -1,8 +1,9 @@
-"""Presets of instruments: what is published of one, under the session's own keys.
+"""Presets of instruments: published figures of an instrument, under the session's own keys.
 
-session.yaml names one by ``instrument: r2sonic_2024`` in the sensor's block. The file is SESSION/instruments/NAME.yaml,
-else configs/instruments/NAME.yaml. Precedence: session, preset, default; nested blocks key by key. What was taken from
-where stays with the sensor's block as :class:`InstrumentUsed`, so that run.yaml is read again without presets.
+session.yaml names a preset by ``instrument: r2sonic_2024`` in the sensor's block. The file is
+SESSION/instruments/NAME.yaml, else configs/instruments/NAME.yaml. A value of the session goes before the preset's, and
+the preset's before the default; nested blocks are merged key by key. The sensor's block keeps where each value was
+taken from (:class:`InstrumentUsed`), so that run.yaml is read again without presets.
 """
 
 import os
@@ -16,9 +17,10 @@ from pydantic import BaseModel, Field, create_model
 from pipeline import CONFIGS
 from pipeline.config.plan import LaserFigures, MbesFigures, Plan
 from pipeline.config.quantities import Model
-from pipeline.config.resolved import INSTRUMENT, InstrumentTitle
+from pipeline.config.references import INSTRUMENT, InstrumentTitle
 from pipeline.config.session import Ins, Laser, Mbes
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
 Sensor = Literal["ins", "laser", "mbes"]
@@ -34,7 +36,7 @@ MOST_PRESETS = 1000  # that a message looks through
 
 
 class Instrument(Model):
-    """NAME.yaml"""
+    """A preset: NAME.yaml."""
 
     title: InstrumentTitle
     sensor: Sensor
@@ -44,45 +46,62 @@ class Instrument(Model):
 
 
 def _part(model: type[BaseModel], names: tuple[str, ...]) -> type[Model]:
-    """A model of some of the fields alone."""
+    """Return a model of some of the fields alone."""
     fields: Block = {name: (model.model_fields[name].annotation, model.model_fields[name]) for name in names}
     return create_model(f"{model.__name__}Part", __base__=Model, **fields)
 
 
 def settings_model(sensor: Sensor) -> type[Model]:
+    """Return the model of what a preset may say of the sensor under ``settings``."""
     return _part(SENSORS[sensor], SETTINGS[sensor])
 
 
 def rates_model(sensor: Sensor) -> type[Model]:
+    """Return the model of what a preset may say of the sensor under ``rates``."""
     plans: Mapping[Sensor, type[Model]] = {"laser": LaserFigures, "mbes": MbesFigures}
     return plans[sensor] if sensor in plans else _part(Plan, ("ins_rate_hz",))
 
 
 def load_instrument(path: Path) -> Instrument:
-    """A preset, checked."""
-    found = parse(Instrument, read_yaml(path), str(path))
-    parse(settings_model(found.sensor), found.settings, f"{path}: settings")
-    parse(rates_model(found.sensor), found.rates, f"{path}: rates")
-    given = set(_paths(found.settings)) & {*figures(found.sensor)} | {f"rates.{key}" for key in found.rates}
-    for key in found.unverified:
-        if key not in given:
+    """Return the preset in a file, checked; raise ConfigError where it is none."""
+    instrument = parse(Instrument, read_yaml(path), str(path))
+    parse(settings_model(instrument.sensor), instrument.settings, f"{path}: settings")
+    parse(rates_model(instrument.sensor), instrument.rates, f"{path}: rates")
+    keys = set(_dotted_keys(instrument.settings)) & {*figures(instrument.sensor)}
+    keys |= {f"rates.{key}" for key in instrument.rates}
+    for key in instrument.unverified:
+        if key not in keys:
             raise ConfigError(f"{path}: unverified: {key!r}: is given no value here; name one that is")
-    return found
+    return instrument
 
 
-def applied(content: Block, folder: Path) -> tuple[Block, frozenset[str]]:
-    """session.yaml's ``content`` with the presets that it names under its own keys, and these keys (``ins.drift``,
-    ``ins.drift.heading_deg``): what a preset says was not said by the session."""
+def merge_presets(content: Block, folder: Path) -> tuple[Block, frozenset[str]]:
+    """Merge the presets that session.yaml names into its content.
+
+    Parameters
+    ----------
+    content : dict[str, Any]
+        What session.yaml says; its own keys go before a preset's.
+    folder : Path
+        The session folder, which may have presets of its own.
+
+    Returns
+    -------
+    tuple[dict[str, Any], frozenset[str]]
+        The content with the presets' values, and the keys that session.yaml itself has (``ins.drift``,
+        ``ins.drift.heading_deg``): what a preset says was not said by the session.
+    """
     full = {sensor: _with_preset(sensor, content[sensor], folder) for sensor in SENSORS if sensor in content}
-    return content | full, frozenset(_paths(content))
+    return content | full, frozenset(_dotted_keys(content))
 
 
 def _with_preset(sensor: Sensor, block: Any, folder: Path) -> Any:
+    """Return a sensor's block with the preset that it names, and with where each figure comes from."""
     name = block.get("instrument") if isinstance(block, dict) else None
     if name is None:
         return block
-    instrument = _named(sensor, name, folder)
-    own, preset = set(_paths(block)), set(_paths(instrument.settings))
+    instrument = _instrument_by_name(sensor, name, folder)
+    own, preset = set(_dotted_keys(block)), set(_dotted_keys(instrument.settings))
     used = {  # InstrumentUsed
         "name": name,
         "title": instrument.title,
@@ -92,64 +111,71 @@ def _with_preset(sensor: Sensor, block: Any, folder: Path) -> Any:
         },
         "rates": instrument.rates,
     }
-    return under(block, instrument.settings) | {"instrument": used}
+    return deep_merge(instrument.settings, block) | {"instrument": used}
 
 
-def under(own: Any, lower: Any) -> Any:
-    """``own`` with what it lacks from ``lower``, block by block.
+def deep_merge(defaults: Any, own: Any) -> Any:
+    """Return ``own`` with what it lacks taken from ``defaults``, block by block.
 
-    >>> under({"a": 1, "b": {"c": 2}}, {"a": 3, "b": {"d": 4}, "e": 5})
+    >>> deep_merge({"a": 3, "b": {"d": 4}, "e": 5}, {"a": 1, "b": {"c": 2}})
     {'a': 1, 'b': {'d': 4, 'c': 2}, 'e': 5}
     """
-    if not (isinstance(own, dict) and isinstance(lower, dict)):
+    if not (isinstance(own, dict) and isinstance(defaults, dict)):
         return own
-    return lower | {key: under(value, lower.get(key)) for key, value in own.items()}
+    return defaults | {key: deep_merge(defaults.get(key), value) for key, value in own.items()}
 
 
 def figures(sensor: Sensor) -> list[str]:
-    """Dotted keys of all that a preset may say of the sensor."""
+    """Return the dotted keys of all that a preset may say of the sensor."""
     fields = SENSORS[sensor].model_fields
     blocks = {name: getattr(fields[name].annotation, "model_fields", None) for name in SETTINGS[sensor]}
-    return [key for name, inner in blocks.items() for key in ([f"{name}.{one}" for one in inner] if inner else [name])]
+    keys = ([f"{name}.{key}" for key in inner] if inner else [name] for name, inner in blocks.items())
+    return [key for group in keys for key in group]
 
 
-def _paths(content: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
+def _dotted_keys(content: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the keys of nested blocks, those of a block after its own."""
     for key, value in content.items():
         yield f"{prefix}{key}"
         if isinstance(value, dict):
-            yield from _paths(value, f"{prefix}{key}.")
+            yield from _dotted_keys(value, f"{prefix}{key}.")
 
 
 # --- files -----------------------------------------------------------------------------------------------------------
-def _named(sensor: Sensor, name: Any, folder: Path) -> Instrument:
+def _instrument_by_name(sensor: Sensor, name: Any, folder: Path) -> Instrument:
     where = f"{folder / 'session.yaml'}: {sensor}.instrument = {str(name)[:60]!r}"
     if not (isinstance(name, str) and fullmatch(INSTRUMENT, name)):
         raise ConfigError(f"{where}: is no name, of a-z, 0-9 and _; {_known(sensor, folder)}")
     path = _path(name, folder)
     if path is None:
         raise ConfigError(f"{where}: no such instrument; {_known(sensor, folder)}")
-    found = load_instrument(path)
-    if found.sensor != sensor:
-        raise ConfigError(f"{where}: is a preset for {found.sensor} ({found.title}); {_known(sensor, folder)}")
-    return found
+    instrument = load_instrument(path)
+    if instrument.sensor != sensor:
+        raise ConfigError(
+            f"{where}: is a preset for {instrument.sensor} ({instrument.title}); {_known(sensor, folder)}"
+        )
+    return instrument
 
 
 def _path(name: str, folder: Path) -> Path | None:
-    own, ours = folder / "instruments" / f"{name}.yaml", PRESETS / f"{name}.yaml"
-    if os.path.lexists(own):
-        if not os.path.isfile(own) or not own.resolve().is_relative_to(folder.resolve()):
-            raise ConfigError(f"{own}: is no file inside the session folder; put the preset itself there")
-        return own
-    return ours if os.path.isfile(ours) else None
+    """Return the preset's file, the session's own before the program's; None where there is none."""
+    in_session, in_program = folder / "instruments" / f"{name}.yaml", PRESETS / f"{name}.yaml"
+    if os.path.lexists(in_session):
+        if not os.path.isfile(in_session) or not in_session.resolve().is_relative_to(folder.resolve()):
+            raise ConfigError(f"{in_session}: is no file inside the session folder; put the preset itself there")
+        return in_session
+    return in_program if os.path.isfile(in_program) else None
 
 
 def _known(sensor: Sensor, folder: Path) -> str:
+    """Return for a message which presets there are for the sensor."""
     names = {path.stem for place in (PRESETS, folder / "instruments") for path in sorted(place.glob("*.yaml"))}
     fitting = [name for name in sorted(names)[:MOST_PRESETS] if _sensor_of(name, folder) == sensor]
     return f"known for {sensor}: {', '.join(fitting) or 'none'}"
 
 
 def _sensor_of(name: str, folder: Path) -> Sensor | None:
+    """Return the sensor that a preset is for; None where it cannot be read."""
     try:
         path = _path(name, folder)
         return load_instrument(path).sensor if path else None

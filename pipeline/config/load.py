@@ -1,18 +1,20 @@
-"""The YAML files of a pool and of a session, read whole."""
+"""Read the YAML files of a pool and of a session whole."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pipeline.config.instruments import merge_presets
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.target_mesh import with_mesh
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
 
 def load_pool(path: Path) -> PoolConfig:
-    """The pool's config, checked."""
+    """Return the pool's config, checked."""
     content = read_yaml(path)
     if "target" not in content and {"ins", "laser"} & content.keys():
         raise ConfigError(f"{path}: is a session's file; --config wants the pool's, which says where the target is")
@@ -22,16 +24,28 @@ def load_pool(path: Path) -> PoolConfig:
 def load_session(
     folder: Path, with_cast: Callable[[dict[str, Any], Path], dict[str, Any]] | None = None
 ) -> SessionConfig:
-    """The session's config, checked. ``with_cast``: puts a cast in the place of its file's name (readers/casts.py,
-    which the simulator must not come to through here); a session that names one cannot be loaded without."""
+    """Return the session's config, checked.
+
+    Parameters
+    ----------
+    folder : Path
+        The session folder.
+    with_cast : Callable, optional
+        Puts a cast in the place of its file's name in the file's content (readers/casts.py, which the simulator must
+        not reach through here). A session that names a cast's file cannot be loaded without it.
+
+    Raises
+    ------
+    ConfigError
+        In one line, of what is wrong in session.yaml or in a preset that it names.
+    """
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
-    from pipeline.config.instruments import applied  # here: it is made of the models above
-
     path = folder / "session.yaml"
-    content, own = applied(read_yaml(path), folder)
+    content, own_keys = merge_presets(read_yaml(path), folder)
     content = content if with_cast is None else with_cast(content, folder)
     ins = content.get("ins")
-    if isinstance(ins, dict) and "drift" in ins and "ins.drift" not in own:  # a preset's: what files tell goes first
+    if isinstance(ins, dict) and "drift" in ins and "ins.drift" not in own_keys:
+        # The drift is a preset's: what the files tell goes before it.
         content = content | {"ins": {"drift_from": "files"} | ins}
     return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | content, str(path))

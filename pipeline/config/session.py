@@ -1,10 +1,9 @@
 """The session's config: instrument files, mounts, sigmas."""
 
 from itertools import pairwise
-from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from pipeline.config.mount import Covariance, Mount, MountOrigin, MountSigma
 from pipeline.config.quantities import (
@@ -19,41 +18,11 @@ from pipeline.config.quantities import (
     SigmaS,
     SoundSpeed,
 )
-from pipeline.config.resolved import CastUsed, InstrumentUsed
+from pipeline.config.recording import Files, Heights, LasTime, MaxRecords, Pattern, Recordings, Week, recording_of
+from pipeline.config.references import CastUsed, InstrumentUsed
 from pipeline.errors import ConfigError
 
-Calibrated = Literal["mbes", "laser"]
-
-
-def inside(pattern: str) -> str:
-    path = PurePosixPath(pattern)
-    if not pattern or path.is_absolute() or ".." in path.parts or "\\" in pattern or "\0" in pattern:
-        raise ValueError("must be a path or pattern inside the session folder, with / between its parts")
-    if any("**" in part and part != "**" for part in path.parts):
-        raise ValueError("must have ** only as a whole part between two /")
-    if path.parts.count("**") > 2 or len(pattern) > 300:  # each more takes several times as long to search
-        raise ValueError("must have ** twice at most, and no more than 300 letters")
-    return pattern
-
-
-Pattern = Annotated[str, AfterValidator(inside)]
-Files = Annotated[list[Pattern], Field(min_length=1)]
-Heights = Literal["ellipsoidal"] | None
-LasTime = Literal["adjusted_standard", "seconds_of_week"] | None
-MaxRecords = Annotated[int, Field(ge=1, le=10**12)] | None  # of one file; null: 16 to each of its bytes
-
-
-def _whole_week(week: int) -> int:
-    if 0 <= week < FIRST_WEEK:
-        raise ValueError(
-            f"is a GPS week modulo 1024, or before 1999; for files from April 2019 on write {week} + 2048 = "
-            f"{week + 2048}, for files of 1999 to 2019 {week} + 1024 = {week + 1024}"
-        )
-    return week
-
-
-FIRST_WEEK = 1000  # March 1999
-Week = Annotated[int, AfterValidator(_whole_week), Field(ge=0, le=5000)] | None  # GPS week, not modulo 1024
+Calibrated = Literal["mbes", "laser"]  # which sensor is calibrated
 
 
 class Drift(Model):
@@ -172,25 +141,8 @@ class Mbes(Model):
         return self
 
 
-class Recording(Model):
-    """Of a sensor, what its readers need: trying another mount or sigma must not read the files again."""
-
-    files: tuple[str, ...]
-    accuracy: tuple[str, ...] = ()
-    format: str
-    gps_week: Week = None
-    latency_s: float
-    frame: str = "laser"
-    heights: Heights = None
-    time: LasTime = None
-    sound_speed_m_s: float | None = None  # of GSF alone, which may have none
-    projector_offset_m: tuple[float, float, float] | None = None  # of Kongsberg's files alone, which tell one too
 
 
-class Recordings(Model):
-    ins: Recording
-    laser: Recording
-    mbes: Recording | None
 
 
 class SessionConfig(Model):
@@ -215,20 +167,6 @@ class SessionConfig(Model):
 
     @property
     def recordings(self) -> Recordings:
-        def of(sensor: Ins | Laser | Mbes) -> Recording:
-            return Recording(
-                files=tuple(sensor.files),
-                accuracy=tuple(getattr(sensor, "accuracy", ())),
-                format=sensor.format,
-                gps_week=getattr(sensor, "gps_week", None),
-                latency_s=sensor.latency_s,
-                frame=getattr(sensor, "frame", "laser"),
-                heights=getattr(sensor, "heights", None),
-                time=getattr(sensor, "time", None),
-                sound_speed_m_s=getattr(sensor, "sound_speed_m_s", None) if sensor.format == "gsf" else None,
-                projector_offset_m=(
-                    getattr(sensor, "projector_offset_m", None) if sensor.format in ("kmall", "all") else None
-                ),
-            )
-
-        return Recordings(ins=of(self.ins), laser=of(self.laser), mbes=None if self.mbes is None else of(self.mbes))
+        """What the readers need of the three sensors."""
+        mbes = None if self.mbes is None else recording_of(self.mbes)
+        return Recordings(ins=recording_of(self.ins), laser=recording_of(self.laser), mbes=mbes)

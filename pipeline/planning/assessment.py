@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import considered_of, correlated
 from pipeline.adjustment.iteration import free_unknowns
-from pipeline.config.instruments import under
+from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
 from pipeline.config.pool import PoolConfig, Verdict
 from pipeline.config.session import SessionConfig
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.maths.adjustment.parameters import SIX
 from pipeline.maths.adjustment.solution import Solution, solve, weakest_direction
@@ -71,7 +72,7 @@ def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Setting:
 
 def load_plan(path: Path, session: SessionConfig) -> Plan:
     """A plan that can be sailed, with the sonar under water; rates that it leaves out are those of the instruments."""
-    plan = parse(Plan, under(read_yaml(path), _rates(session)), str(path))
+    plan = parse(Plan, deep_merge(_rates(session), read_yaml(path)), str(path))
     sonar = plan.ins_height_m + session.sonar.mount.z_m
     if sonar >= 0:
         raise ConfigError(

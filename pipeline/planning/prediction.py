@@ -16,6 +16,7 @@ from pipeline.adjustment.observation_model import Scene, by_design
 from pipeline.config.plan import Pass, Plan
 from pipeline.config.pool import Segment
 from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.config.stage_settings import SonarBeams, narrow
 from pipeline.maths.adjustment.interval_sums import EpochSums, epoch_sums, merged
 from pipeline.maths.adjustment.normal_equations import Body, normal_equations
 from pipeline.maths.adjustment.observations import SPEED_M_S
@@ -229,7 +230,7 @@ def labelled(
     segment, level = setting.segment, setting.model.water_level_m
     if sensor == "mbes":
         _, R_target_from_body = trajectory.poses_at(t_ns[met])
-        beams = beams_in_target(R_target_from_body, R, own, setting.mbes)
+        beams = beams_in_target(R_target_from_body, R, own, narrow(SonarBeams, setting.mbes))
         heights = (-np.inf, level - segment.water_margin_m)
     else:
         beams, heights = Beams(directions, range_m), (level + segment.water_margin_m, np.inf)

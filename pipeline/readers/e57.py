@@ -33,17 +33,9 @@ from pipeline.readers.claimed_counts import refuse_claim
 from pipeline.readers.crs import AXES, Array, Frame, keep_placed
 from pipeline.readers.declared_crs import refuse_another
 from pipeline.readers.decoder_process import ADVICE, Numbers, batches, text
+from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.raw_file import opened, size_of
-from pipeline.readers.row_checks import (
-    LASER_COLUMNS,
-    LAST_WEEK,
-    Sieve,
-    chunk,
-    latency_ns,
-    no_rows,
-    possible_ns,
-    through_float32,
-)
+from pipeline.readers.row_checks import LASER_COLUMNS, LAST_WEEK, Sieve, chunk, latency_ns, no_rows, possible_ns
 
 WORKER = Path(__file__).with_name("e57_worker.py")
 MAX_TEXT = 1 << 24

@@ -1,19 +1,72 @@
-"""What a file is found to be, and what to do with it."""
+"""Kinds of files that the content tells apart: what each is called, and how it is read or what to do with it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
-class Kind:
-    """``format``: session.yaml's word where this program reads it, for these ``sensors``; where not, ``advice``, and
-    ``advices`` where it is another for a sensor."""
+class FileKind:
+    """A kind of file.
+
+    Parameters
+    ----------
+    title
+        What messages call it.
+    format
+        session.yaml's word for it; None if it is not read.
+    sensors
+        The sensors whose data it may hold, if it is read.
+    advice
+        What to do with a file that is not read.
+    advice_by_sensor
+        Advice that differs for some sensors.
+    """
 
     title: str
     format: str | None = None
     sensors: tuple[str, ...] = ()
     advice: str = ""
-    advices: Mapping[str, str] = field(default_factory=dict)
+    advice_by_sensor: Mapping[str, str] = field(default_factory=dict)
 
     def advice_for(self, sensor: str) -> str:
-        return self.advices.get(sensor, self.advice)
+        """Return what to do with a file that is listed for this sensor."""
+        return self.advice_by_sensor.get(sensor, self.advice)
+
+
+# --- read ------------------------------------------------------------------------------------------------------------
+NOVATEL = FileKind("a NovAtel log", "novatel", ("ins",))
+SBET = FileKind("SBET", "sbet", ("ins",))
+INERTIAL_EXPLORER = FileKind("an Inertial Explorer export", "inertial_explorer", ("ins",))
+LAS = FileKind("LAS or LAZ", "las", ("laser",))
+E57 = FileKind("E57", "e57", ("laser",))
+GSF = FileKind("GSF", "gsf", ("mbes",))
+KMALL = FileKind("Kongsberg .kmall", "kmall", ("mbes",))
+KONGSBERG_ALL = FileKind("Kongsberg .all", "all", ("mbes",))
+XTF = FileKind("XTF", "r2sonic", ("mbes",))
+R2SONIC_PACKETS = FileKind("R2Sonic packets", "r2sonic", ("mbes",))
+PARQUET = FileKind("a Parquet table", "table", ("ins", "laser", "mbes"))
+CSV = FileKind("a CSV table", "table", ("ins", "laser", "mbes"))
+
+# --- not read; widespread formats of other makers are in unread_formats.py -------------------------------------------
+EMPTY_FILE = FileKind("empty", advice="copy it again, or take it out of the list")
+SMRMSG = FileKind(
+    "an accuracy file (SMRMSG)", advice="give the SBET that belongs to it, and list this one under ins.accuracy"
+)
+FLOAT32_TEXT = FileKind(
+    "a text whose numbers went through float32: times and positions have lost their digits",
+    advice="export it again in double precision, as LAS or as a table with the columns that README.md names",
+)
+TEXT = FileKind(
+    "a text without the columns of a table",
+    advice="name the columns in its first line as README.md has them, or export it in a format of the instrument",
+)
+TRAJECTORY_TEXT = FileKind(
+    "a trajectory as text, of a layout that is not read",
+    advice="export it as SBET (POSPac, Qinertia, Delph INS, OxTS and Inertial Explorer have it), or as a table with "
+    "the columns that README.md names; if it is Inertial Explorer's, export it with its header",
+)
+UTF16_TEXT = FileKind("a text in UTF-16", advice="save it as UTF-8")
+UNKNOWN = FileKind(
+    "of no kind that is read",
+    advice="export it in one of the formats that README.md names; if it should be one of them, copy it again",
+)

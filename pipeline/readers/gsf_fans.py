@@ -1,12 +1,13 @@
-"""Whether the fans of a GSF file are fixed to the boat, by where it says that its soundings lie.
+"""Test whether the fans of a GSF file are fixed to the boat, by the positions of its soundings.
 
-GSF tells along-track and across-track distances and depths of beams, level and along the boat's heading, and the boat's
+GSF has along-track and across-track distances and depths of beams, level and along the boat's heading, and the boat's
 roll (starboard down +) and pitch (bow up +). A fan fixed to the boat is one plane of the body's frame,
 
     y = y_0 + p x + q z     (x starboard, y forward, z down),
 
-in all pings; a fan stabilised in pitch is one of the level frame instead, one stabilised in yaw or of tilted sectors
-none of either. Both planes are fitted in least squares, residuals divided by the distance: they are angles.
+in all pings. A fan stabilised in pitch is one plane of the level frame instead. A fan stabilised in yaw, or of tilted
+sectors, is no plane of either. Both planes are fitted by least squares, with residuals divided by the distance: they
+are angles.
 """
 
 from dataclasses import dataclass, field
@@ -18,70 +19,86 @@ from pipeline.errors import RawDataError
 from pipeline.maths.geometry.rotations import rotation_x, rotation_y
 
 Array = NDArray[np.float64]
-LEAST_PINGS, LEAST_BEAMS = 3, 5  # of a ping
+MIN_PINGS, MIN_BEAMS = 3, 5  # of a file, of a ping
 NEAREST_M = 0.1
 UNSTEADY_DEG = 0.2  # residuals of no plane
-STABILISED_DEG, TIMES = 0.1, 2.0  # residuals of the body's plane: that large, and so many times those of the level one
-ADVICE = "give the sonar's own files (.kmall and .all tell how each ping was sent), or sail again without stabilisation"
+STABILISED_DEG = 0.1  # residuals of the body's plane that show stabilisation,
+STABILISED_RATIO = 2.0  # if they are that many times those of the level plane
+_ADVICE = (
+    "give the sonar's own files (.kmall and .all tell how each ping was sent), or sail again without stabilisation"
+)
+
+
+@dataclass(frozen=True)
+class BeamPositions:
+    """One ping's soundings (n,) [m], level and along the heading, and the boat's roll and pitch [degrees]."""
+
+    along_m: Array
+    across_m: Array
+    depth_m: Array
+    roll_deg: float
+    pitch_deg: float
 
 
 @dataclass
-class Plane:
-    """Sums of one least-squares fit."""
+class FanPlaneFit:
+    """Sums of the least-squares fit of one plane to all fans."""
 
-    normal: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    right: Array = field(default_factory=lambda: np.zeros(3))
-    squares: float = 0.0
+    normal_matrix: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    right_side: Array = field(default_factory=lambda: np.zeros(3))
+    sum_of_squares: float = 0.0
 
-    def add(self, places_m: Array, weight: Array) -> None:
-        """Forward, starboard, down (3, n)."""
-        forward, starboard, down = places_m
-        rows = np.stack([np.ones_like(starboard), starboard, down]) * weight
-        self.normal += rows @ rows.T
-        self.right += rows @ (forward * weight)
-        self.squares += float((forward * weight) @ (forward * weight))
+    def add(self, positions_m: Array, weight: Array) -> None:
+        """Add soundings (3, n), forward, starboard, down, with the square root of each one's weight (n,)."""
+        forward, starboard, down = positions_m
+        design = np.stack([np.ones_like(starboard), starboard, down]) * weight
+        self.normal_matrix += design @ design.T
+        self.right_side += design @ (forward * weight)
+        self.sum_of_squares += float((forward * weight) @ (forward * weight))
 
     def rms_deg(self, count: int) -> float:
-        found = np.linalg.lstsq(self.normal, self.right, rcond=1e-12)[0]
-        return float(np.degrees(np.sqrt(np.maximum(self.squares - found @ self.right, 0.0) / count)))
+        """Return the root mean square residual of ``count`` soundings [degrees]."""
+        parameters = np.linalg.lstsq(self.normal_matrix, self.right_side, rcond=1e-12)[0]
+        residuals_squared = np.maximum(self.sum_of_squares - parameters @ self.right_side, 0.0)
+        return float(np.degrees(np.sqrt(residuals_squared / count)))
 
 
 @dataclass
-class Fans:
-    """What a file's pings tell so far."""
+class StabilisationTest:
+    """The two planes through the fans of a file's pings."""
 
-    body: Plane = field(default_factory=Plane)
-    level: Plane = field(default_factory=Plane)
+    body: FanPlaneFit = field(default_factory=FanPlaneFit)
+    level: FanPlaneFit = field(default_factory=FanPlaneFit)
     pings: int = 0
     beams: int = 0
 
     @np.errstate(all="ignore")  # damaged numbers are left out
-    def add(self, along_m: Array, across_m: Array, depth_m: Array, roll_deg: float, pitch_deg: float) -> None:
-        """One ping's usable beams; nothing is learnt of one without distances along track."""
-        places = np.stack([along_m, across_m, depth_m])
-        distance = np.linalg.norm(places, axis=0)
+    def add(self, positions: BeamPositions, usable: NDArray[np.bool_]) -> None:
+        """Add one ping's usable beams; pings without along-track distances are left out, for they tell nothing."""
+        positions_m = np.stack([positions.along_m[usable], positions.across_m[usable], positions.depth_m[usable]])
+        distance = np.linalg.norm(positions_m, axis=0)
         good = np.isfinite(distance) & (distance > NEAREST_M)
-        if np.count_nonzero(good) < LEAST_BEAMS or not np.any(along_m[good]):
+        if np.count_nonzero(good) < MIN_BEAMS or not np.any(positions_m[0, good]):
             return
-        places, weight = places[:, good], 1 / distance[good]
-        R_body_from_level = (rotation_y(np.radians(pitch_deg)) @ rotation_x(np.radians(roll_deg))).T
-        self.level.add(places, weight)
-        self.body.add(R_body_from_level @ places, weight)
+        positions_m, weight = positions_m[:, good], 1 / distance[good]
+        R_level_from_body = rotation_y(np.radians(positions.pitch_deg)) @ rotation_x(np.radians(positions.roll_deg))
+        self.level.add(positions_m, weight)
+        self.body.add(R_level_from_body.T @ positions_m, weight)
         self.pings += 1
         self.beams += len(weight)
 
-    def refuse(self, name: str) -> None:
-        """RawDataError where they are not fixed to the boat."""
-        if self.pings < LEAST_PINGS:
+    def refuse_stabilised(self, name: str) -> None:
+        """Raise RawDataError where the fans are not fixed to the boat."""
+        if self.pings < MIN_PINGS:
             return
-        body, level = self.body.rms_deg(self.beams), self.level.rms_deg(self.beams)
-        if body > STABILISED_DEG and body > TIMES * level:
+        body_deg, level_deg = self.body.rms_deg(self.beams), self.level.rms_deg(self.beams)
+        if body_deg > STABILISED_DEG and body_deg > STABILISED_RATIO * level_deg:
             raise RawDataError(
-                f"{name}: its fans stand level while the boat pitches, to {level:.2f} degrees (in the boat to "
-                f"{body:.2f}): they are stabilised; {ADVICE}"
+                f"{name}: its fans stand level while the boat pitches, to {level_deg:.2f} degrees (in the boat to "
+                f"{body_deg:.2f}): they are stabilised; {_ADVICE}"
             )
-        if body > UNSTEADY_DEG:
+        if body_deg > UNSTEADY_DEG:
             raise RawDataError(
                 f"{name}: its fans are not fixed to the boat: its distances along track leave one plane by "
-                f"{body:.2f} degrees; {ADVICE}"
+                f"{body_deg:.2f} degrees; {_ADVICE}"
             )

@@ -1,7 +1,7 @@
-"""Where headers, pings and profiles lie in GSF files (big-endian).
+"""Find the headers, pings and profiles of GSF files (big-endian).
 
-A record: u32 size, u32 of checksum flag (bit 31) and kind (bits 0 to 21), with the flag the u32 sum of the bytes, then
-the bytes. Where none begins the next ping or profile is searched, and that is counted.
+A record: u32 size, u32 of checksum flag (bit 31) and kind (bits 0 to 21); with the flag, the u32 sum of the bytes; then
+the bytes. Where no record begins, the next ping or profile is searched for, and the gap is counted.
 """
 
 import struct
@@ -11,18 +11,18 @@ from typing import BinaryIO
 
 from pipeline.readers.raw_file import read_at, size_of
 
-HEAD = struct.Struct(">2I")
+RECORD_HEAD = struct.Struct(">2I")
 CHECKED, KIND = 1 << 31, (1 << 22) - 1
 HEADER, PING, PROFILE, KINDS = 1, 2, 3, 12
-LARGEST = 524_288
-BLOCK = 1 << 16
+_MAX_RECORD = 524_288
+_SEARCH_BLOCK = 1 << 16
 
 
-def records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, bytes]]:
-    """Headers, pings and profiles: kind and bytes."""
+def gsf_records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, bytes]]:
+    """Yield the kind and the bytes of each header, ping and profile."""
     size, position = size_of(file), 0
     while position < size:
-        head = read_at(file, position, HEAD.size + 4)
+        head = read_at(file, position, RECORD_HEAD.size + 4)
         span = _span(head)
         if span is None or position + span[1] > size:
             cut = span is not None
@@ -41,28 +41,28 @@ def records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, bytes]
 
 
 def _span(head: bytes) -> tuple[int, int] | None:
-    """Where a record's bytes begin, and where they end, from its start; None where none begins."""
-    if len(head) < HEAD.size:
+    """Return where a record's bytes begin and end, counted from the record's start; None where no record begins."""
+    if len(head) < RECORD_HEAD.size:
         return None
-    size, word = HEAD.unpack_from(head)
-    start = HEAD.size + (4 if word & CHECKED else 0)
-    return (start, start + size) if 0 < size <= LARGEST and 0 < word & KIND <= KINDS else None
+    size, word = RECORD_HEAD.unpack_from(head)
+    start = RECORD_HEAD.size + (4 if word & CHECKED else 0)
+    return (start, start + size) if 0 < size <= _MAX_RECORD and 0 < word & KIND <= KINDS else None
 
 
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
-    """Where the next ping or profile begins that another record or the end follows, or the file's end."""
+    """Return the start of the next ping or profile that a record or the end of the file follows, or the file's end."""
     marks = [struct.pack(">I", flag | kind) for kind in (PING, PROFILE) for flag in (0, CHECKED)]
     while start < size:
-        block = read_at(file, start, BLOCK + 8)
-        found = {at for mark in marks for at in _all_of(block, mark) if 4 <= at < BLOCK + 4}
-        for at in sorted(found):
+        block = read_at(file, start, _SEARCH_BLOCK + 8)
+        candidates = {at for mark in marks for at in _positions_of(mark, block) if 4 <= at < _SEARCH_BLOCK + 4}
+        for at in sorted(candidates):
             if _is_record(file, start + at - 4, size):
                 return start + at - 4
-        start += BLOCK
+        start += _SEARCH_BLOCK
     return size
 
 
-def _all_of(block: bytes, mark: bytes) -> Iterator[int]:
+def _positions_of(mark: bytes, block: bytes) -> Iterator[int]:
     at = block.find(mark)
     while at >= 0:
         yield at
@@ -70,8 +70,8 @@ def _all_of(block: bytes, mark: bytes) -> Iterator[int]:
 
 
 def _is_record(file: BinaryIO, position: int, size: int) -> bool:
-    span = _span(read_at(file, position, HEAD.size))
+    span = _span(read_at(file, position, RECORD_HEAD.size))
     if span is None or position + span[1] > size:
         return False
     following = position + span[1]
-    return following == size or _span(read_at(file, following, HEAD.size)) is not None
+    return following == size or _span(read_at(file, following, RECORD_HEAD.size)) is not None

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
+from pipeline.readers.float32_checks import refuse_float32
 from pipeline.readers.inertial_explorer_layout import POSITION, SIGMAS, Layout, read_layout
 from pipeline.readers.inertial_explorer_names import column_names
 from pipeline.readers.inertial_explorer_times import SECOND, combine, days_of, keep_times
@@ -38,7 +39,6 @@ from pipeline.readers.row_checks import (
     keep_possible_poses,
     latency_ns,
     no_rows,
-    refuse_float32,
     sigma_rows,
 )
 from pipeline.readers.sbet import running_weeks

@@ -1,8 +1,8 @@
-"""Where #MRZ and #IIP datagrams lie in Kongsberg's .kmall files (little-endian).
+"""Find the #MRZ and #IIP datagrams of Kongsberg's .kmall files (little-endian).
 
 A datagram: u32 length, '#' and three letters, u8 version, u8 system, u16 sonar, u32 Unix seconds (UTC), u32
 nanoseconds, its body, u32 length again. Where the two lengths differ, or no datagram begins, the next whole one is
-searched, and that is counted.
+searched for, and the gap is counted.
 """
 
 import struct
@@ -12,15 +12,15 @@ from typing import BinaryIO
 
 from pipeline.readers.raw_file import read_at, size_of
 
-HEAD = struct.Struct("<I4s2BH2I")
-LENGTH = struct.Struct("<I")
-SMALLEST, LARGEST = HEAD.size + LENGTH.size, 1 << 24
-BLOCK = 1 << 16
+KMALL_HEAD = struct.Struct("<I4s2BH2I")
+KMALL_LENGTH = struct.Struct("<I")
+_MIN_DATAGRAM, _MAX_DATAGRAM = KMALL_HEAD.size + KMALL_LENGTH.size, 1 << 24
+_SEARCH_BLOCK = 1 << 16
 MRZ, IIP = b"#MRZ", b"#IIP"  # soundings; the installation
 
 
-def datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
-    """The whole #MRZ and #IIP datagrams of a file, one after another."""
+def kmall_datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
+    """Yield the whole #MRZ and #IIP datagrams of a file, one after another."""
     size, position = size_of(file), 0
     while position < size:
         length = _length_at(file, position, size)
@@ -34,7 +34,7 @@ def datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
 
 
 def _length_at(file: BinaryIO, position: int, size: int) -> int | None:
-    """The length of the datagram that begins here; None where none does, or its two lengths differ."""
+    """Return the length of the datagram that begins here; None where none does, or its two lengths differ."""
     head = read_at(file, position, 8)
     length = int.from_bytes(head[:4], "little")
     if not _is_head(head) or position + length > size:
@@ -44,8 +44,8 @@ def _length_at(file: BinaryIO, position: int, size: int) -> int | None:
 
 def _is_head(head: bytes) -> bool:
     letters = head[5:8]
-    sound = len(head) == 8 and head[4:5] == b"#" and letters.isalnum() and letters.isupper()
-    return sound and SMALLEST <= int.from_bytes(head[:4], "little") <= LARGEST
+    plausible = len(head) == 8 and head[4:5] == b"#" and letters.isalnum() and letters.isupper()
+    return plausible and _MIN_DATAGRAM <= int.from_bytes(head[:4], "little") <= _MAX_DATAGRAM
 
 
 def _cut_off(file: BinaryIO, position: int, size: int) -> bool:
@@ -54,13 +54,13 @@ def _cut_off(file: BinaryIO, position: int, size: int) -> bool:
 
 
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
-    """Where the next whole datagram begins, or the file's end."""
+    """Return the start of the next whole datagram, or the file's end."""
     while start < size:
-        block = read_at(file, start, BLOCK + 8)
-        found = block.find(b"#", 4)
-        while 0 <= found < BLOCK + 4:
-            if _length_at(file, start + found - 4, size) is not None:
-                return start + found - 4
-            found = block.find(b"#", found + 1)
-        start += BLOCK
+        block = read_at(file, start, _SEARCH_BLOCK + 8)
+        mark = block.find(b"#", 4)
+        while 0 <= mark < _SEARCH_BLOCK + 4:
+            if _length_at(file, start + mark - 4, size) is not None:
+                return start + mark - 4
+            mark = block.find(b"#", mark + 1)
+        start += _SEARCH_BLOCK
     return size

@@ -6,9 +6,10 @@ the transmitter; then 16 a beam: 0 i16 angle to the receiving array [0.01 degree
 sectors, 3 u8 detection info (bit 7: none is valid), 8 f32 two-way time [s], 14 i8 cleaning (negative: flagged out).
 Times are UTC, in whole milliseconds.
 
-The tilt is what the sector was sent with, steering of pitch and yaw stabilisation in it: in files of stabilised sonars
-the soundings so placed lie where Kongsberg's XYZ datagrams have them. Frame and installation (datagram I) are as in
-:mod:`pipeline.readers.kmall`. Datagrams F (70) and f (102) of older sonars, which have no such sectors, are not read.
+The tilt is what the sector was sent with. It includes the steering of pitch and yaw stabilisation: in files of
+stabilised sonars, soundings computed with it lie where Kongsberg's XYZ datagrams have them. Frame and installation
+(datagram I) are as in :mod:`pipeline.readers.kmall`. Datagrams F (70) and f (102) of older sonars, which have no such
+sectors, are not read.
 """
 
 import struct
@@ -22,13 +23,14 @@ import numpy as np
 
 from pipeline.errors import RawDataError
 from pipeline.gps_time import gps_ns_from_unix_utc
-from pipeline.readers.kongsberg import MAX_BEAMS, KongsbergPart, Ping, Sectors, possible
-from pipeline.readers.kongsberg_all_datagrams import INNER, TAIL, datagrams
-from pipeline.readers.kongsberg_arrays import of_all
-from pipeline.readers.repeated_pings import Repeats
+from pipeline.readers.kongsberg import KongsbergPart, KongsbergPing, PingSectors, are_possible
+from pipeline.readers.kongsberg_all_datagrams import HEAD_WITHOUT_LENGTH, TAIL, kongsberg_all_datagrams
+from pipeline.readers.kongsberg_installation import transmitter_of_all
+from pipeline.readers.repeated_pings import RepeatedPings
+from pipeline.readers.sounding_chunks import MAX_BEAMS
 
-RANGES, INSTALLATION, OLDER = ord("N"), b"Ii", b"Ff"
-RAW = struct.Struct("<4HfI")
+RAW_RANGES, INSTALLATION, OLDER_RAW_RANGES = b"N", b"Ii", b"Ff"
+RAW_RANGES_HEAD = struct.Struct("<4HfI")
 SECTOR = np.dtype(
     {"names": ["tilt", "delay", "part"], "formats": ["<i2", "<f4", "u1"], "offsets": [0, 8, 19], "itemsize": 24}
 )
@@ -47,59 +49,64 @@ INVALID = 0x80
 class AllPart(KongsbergPart):
     """One file."""
 
-    def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[Ping]:
-        installation, found, older, repeats = "", False, 0, Repeats()
-        for datagram in datagrams(file, bytes([RANGES]) + INSTALLATION + OLDER, dropped):
+    def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[KongsbergPing]:
+        installation, has_pings, older, repeated = "", False, 0, RepeatedPings()
+        for datagram in kongsberg_all_datagrams(file, RAW_RANGES + INSTALLATION + OLDER_RAW_RANGES, dropped):
             kind = datagram[1]
             if kind in INSTALLATION:
-                installation = datagram[INNER.size + 2 : -TAIL].decode("latin-1")
-            elif kind in OLDER:
+                installation = datagram[HEAD_WITHOUT_LENGTH.size + 2 : -TAIL].decode("latin-1")
+            elif kind in OLDER_RAW_RANGES:
                 older += 1
-            elif (ping := decode(datagram, installation)) is not None:
-                found = True
-                if repeats.is_new(datagram, dropped):
+            elif (ping := decode_raw_ranges(datagram, installation)) is not None:
+                has_pings = True
+                if repeated.is_new(datagram, dropped):
                     yield ping
             else:
                 dropped["damaged datagram"] += 1
-        if older and not found:
+        if older and not has_pings:
             raise RawDataError(
                 f"{self.name}: has raw ranges of older sonars alone ({older} datagrams F or f, none N); export it to "
                 "GSF with travel times and beam angles, from a sonar without pitch and yaw stabilisation"
             )
 
 
-def decode(datagram: bytes, installation: str) -> Ping | None:
-    """The contents of one datagram N; None where they contradict themselves."""
-    start = INNER.size
-    if len(datagram) < start + RAW.size + TAIL:
+def decode_raw_ranges(datagram: bytes, installation: str) -> KongsbergPing | None:
+    """Return the contents of one datagram N; None where they contradict themselves."""
+    start = HEAD_WITHOUT_LENGTH.size
+    if len(datagram) < start + RAW_RANGES_HEAD.size + TAIL:
         return None
-    _, _, model, date, milliseconds, number, serial = INNER.unpack_from(datagram)
-    speed, sectors, beams, _, _, _ = RAW.unpack_from(datagram, start)
+    _, _, model, date, milliseconds, number, serial = HEAD_WITHOUT_LENGTH.unpack_from(datagram)
+    speed, n_sectors, n_beams, _, _, _ = RAW_RANGES_HEAD.unpack_from(datagram, start)
     t_ns = _gps_ns(date, milliseconds)
-    start += RAW.size
-    if t_ns is None or start + sectors * SECTOR.itemsize + beams * BEAM.itemsize + TAIL > len(datagram):
+    start += RAW_RANGES_HEAD.size
+    if t_ns is None or start + n_sectors * SECTOR.itemsize + n_beams * BEAM.itemsize + TAIL > len(datagram):
         return None
-    sent = np.frombuffer(datagram, SECTOR, sectors, start)
-    heard = np.frombuffer(datagram, BEAM, beams, start + sent.nbytes)
-    arrays = of_all(installation, serial, model)
-    told = Sectors(sent["delay"].astype(float), sent["tilt"] / 100, sent["part"].astype(int), [arrays] * sectors)
-    if beams > MAX_BEAMS or not possible(told, heard["sector"]):
+    sector_rows = np.frombuffer(datagram, SECTOR, n_sectors, start)
+    beam_rows = np.frombuffer(datagram, BEAM, n_beams, start + sector_rows.nbytes)
+    sectors = PingSectors(
+        delay_s=sector_rows["delay"].astype(float),
+        tilt_deg=sector_rows["tilt"] / 100,
+        array_part=sector_rows["part"].astype(int),
+        transmitters=[transmitter_of_all(installation, serial, model)] * n_sectors,
+    )
+    if n_beams > MAX_BEAMS or not are_possible(sectors, beam_rows["sector"]):
         return None
-    return Ping(
-        t_ns,
-        number,
-        f"{model} {serial}",
-        speed / 10,
-        told,
-        heard["sector"],
-        np.zeros(beams, dtype=bool),
-        (heard["info"] & INVALID != 0) | (heard["cleaning"] < 0),
-        heard["angle"] / 100,
-        heard["time"].astype(np.float64),
+    return KongsbergPing(
+        t_ns=t_ns,
+        number=number,
+        receiver=f"{model} {serial}",
+        sound_speed_m_s=speed / 10,
+        sectors=sectors,
+        sector=beam_rows["sector"],
+        extra=np.zeros(n_beams, dtype=bool),
+        rejected=(beam_rows["info"] & INVALID != 0) | (beam_rows["cleaning"] < 0),
+        angle_deg=beam_rows["angle"] / 100,
+        two_way_time_s=beam_rows["time"].astype(np.float64),
     )
 
 
 def _gps_ns(date: int, milliseconds: int) -> int | None:
+    """Return GPS time [ns] of a date (year month day in digits) and the milliseconds of its day; None if impossible."""
     try:
         day = datetime(date // 10_000, date // 100 % 100, date % 100, tzinfo=UTC)
     except ValueError:

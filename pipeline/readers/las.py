@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import BATCH_ROWS, Chunk
-from pipeline.config.session import LasTime
+from pipeline.config.recording import LasTime
 from pipeline.errors import RawDataError
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, gps_ns_from_week_seconds
 from pipeline.readers.crs import Frame, keep_placed, placing_of

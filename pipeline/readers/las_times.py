@@ -8,10 +8,11 @@ standard time, September 2011: so times tell beyond doubt where flag or key cont
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.session import LasTime
+from pipeline.config.recording import LasTime
 from pipeline.errors import RawDataError
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS
-from pipeline.readers.row_checks import FIRST_WEEK, LAST_WEEK, through_float32
+from pipeline.readers.float32_checks import through_float32
+from pipeline.readers.row_checks import FIRST_WEEK, LAST_WEEK
 
 WEEK_S = WEEK_NS / NS
 NAMES = {True: "adjusted standard GPS time", False: "seconds of GPS week"}

@@ -11,8 +11,8 @@ letters), u16 size (all of it), padded to 4 bytes; unknown ones are skipped by t
     A2   4 f32 first, 8 f32 scale, 36 u16 step[N]        angle[n] = first + (step[0] + ... + step[n]) * scale
 
 Angles [rad] are from the array's normal, starboard +, not roll corrected; roll stabilisation only moves the sector.
-Pitch stabilisation (2020, 2026) steers the transmit fan by up to 10°. Which sign forward has is documented nowhere, and
-no file at hand has it: such pings are refused. How packets lie in files: ``packets.py``.
+Pitch stabilisation (2020, 2026) steers the transmit fan by up to 10°. No document says which sign forward has, and no
+file at hand has such steering: such pings are refused. :mod:`pipeline.readers.r2sonic_packets` finds the packets.
 """
 
 import math
@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,29 +31,24 @@ from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, gps_ns_from_unix_utc
 from pipeline.readers.r2sonic_packets import Sections, bare_packets, xtf_packets
 from pipeline.readers.raw_file import opened
-from pipeline.readers.repeated_pings import Repeats
-from pipeline.readers.row_checks import (
-    MBES_COLUMNS,
-    Sieve,
-    chunk,
-    keep_possible_soundings,
-    latency_ns,
-    no_rows,
-    possible_ns,
-)
+from pipeline.readers.repeated_pings import RepeatedPings
+from pipeline.readers.row_checks import Sieve
+from pipeline.readers.sounding_chunks import MAX_BEAMS, beam_numbers, checked_chunk, chunks_of_pings, per_sounding
 
-SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
-PINGS = 8_192
-MAX_POINTS = np.iinfo(np.int16).max
-HEAD = struct.Struct(">28xIII4xf20xf42xH")
-LEAST_STEERING, MAX_STEERING = 1e-4, 0.6  # rad: 0.006°; 20° is possible at 200 kHz
+H0 = struct.Struct(">28xIII4xf20xf42xH")
+MIN_STEERING, MAX_STEERING = 1e-4, 0.6  # rad: 0.006°; 20° is possible at 200 kHz
 TWO_FLOATS = struct.Struct(">4xff")
 SCALE = struct.Struct(">4xf")
-STEPS = 36
+A2_STEPS_OFFSET = 36
 
 
-class Ping(NamedTuple):
-    """One packet's contents; ``steps`` is None where angles are evenly spaced from ``first_rad`` to ``second``."""
+@dataclass(frozen=True)
+class R2sonicPing:
+    """One packet's contents.
+
+    ``steps`` is None where angles are evenly spaced from ``first_rad`` to ``last_rad_or_scale``; else the latter is the
+    scale of the steps.
+    """
 
     seconds: int
     nanoseconds: int
@@ -63,8 +58,16 @@ class Ping(NamedTuple):
     range_scale_s: float
     ranges: NDArray[np.uint16]
     first_rad: float
-    second: float
+    last_rad_or_scale: float
     steps: NDArray[np.uint16] | None
+
+    @property
+    def angles_rad(self) -> NDArray[np.float64]:
+        """Angles of the beams (n,), starboard +."""
+        if self.steps is None:
+            return np.linspace(self.first_rad, self.last_rad_or_scale, len(self.ranges), dtype=np.float64)
+        sums: NDArray[np.int64] = np.cumsum(self.steps, dtype=np.int64)
+        return np.asarray(self.first_rad + sums * self.last_rad_or_scale, dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -77,91 +80,86 @@ class R2sonicPart:
     latency_s: float
 
     def chunks(self) -> Iterator[Chunk]:
+        """Yield the soundings, chunk by chunk."""
         dropped: Counter[str] = Counter()
-        pings: list[Ping] = []
-        waiting, repeats = 0, Repeats()
         with opened(self.path, self.name) as file:
-            packets = xtf_packets(file, dropped) if self.xtf else bare_packets(file, dropped)
-            for sections in packets:
-                ping = decode(sections)
-                if ping is None:
-                    dropped["damaged packet"] += 1
-                    continue
-                if not repeats.is_new(b"".join(sections.values()), dropped):
-                    continue
-                self._refuse_steered(ping)
-                pings.append(ping)
-                waiting += len(ping.ranges)
-                if waiting >= SOUNDINGS or len(pings) >= PINGS:
-                    yield _chunk(pings, self.latency_s, dropped)
-                    pings, waiting = [], 0
-            if waiting:
-                yield _chunk(pings, self.latency_s, dropped)
-            if dropped:
-                yield no_rows(MBES_COLUMNS, dropped)
+            yield from chunks_of_pings(
+                pings=self._usable_pings(file, dropped),
+                n_soundings=lambda ping: len(ping.ranges),
+                chunk_of=lambda pings: _chunk(pings, self.latency_s, dropped),
+                dropped=dropped,
+            )
 
-    def _refuse_steered(self, ping: Ping) -> None:
-        if abs(ping.steering_rad) > LEAST_STEERING:
+    def _usable_pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[R2sonicPing]:
+        """Yield the pings, each once; count damaged packets."""
+        repeated = RepeatedPings()
+        for sections in xtf_packets(file, dropped) if self.xtf else bare_packets(file, dropped):
+            ping = decode_bth0(sections)
+            if ping is None:
+                dropped["damaged packet"] += 1
+                continue
+            if not repeated.is_new(b"".join(sections.values()), dropped):
+                continue
+            self._refuse_steered(ping)
+            yield ping
+
+    def _refuse_steered(self, ping: R2sonicPing) -> None:
+        if abs(ping.steering_rad) > MIN_STEERING:
             raise RawDataError(
                 f"{self.name}: ping {ping.number} was sent with its fan steered by "
                 f"{math.degrees(ping.steering_rad):+.2f}° along track; switch pitch stabilisation off and sail again"
             )
 
 
-def decode(sections: Sections) -> Ping | None:
-    """The contents of one packet; None where they contradict themselves."""
-    head, ranges, a0, a2 = (sections.get(name, b"") for name in (b"H0", b"R0", b"A0", b"A2"))
-    if len(head) < HEAD.size or len(ranges) < SCALE.size:
+def decode_bth0(sections: Sections) -> R2sonicPing | None:
+    """Return the contents of one packet; None where they contradict themselves."""
+    h0, r0, a0, a2 = (sections.get(name, b"") for name in (b"H0", b"R0", b"A0", b"A2"))
+    if len(h0) < H0.size or len(r0) < SCALE.size:
         return None
-    seconds, nanoseconds, number, speed, steering, points = HEAD.unpack_from(head)
-    if points > MAX_POINTS or nanoseconds >= NS or len(ranges) < SCALE.size + 2 * points:
+    seconds, nanoseconds, number, speed, steering, points = H0.unpack_from(h0)
+    if points > MAX_BEAMS or nanoseconds >= NS or len(r0) < SCALE.size + 2 * points:
         return None
     if not abs(steering) < MAX_STEERING:
         return None
     steps = None
-    if len(a2) >= STEPS + 2 * points:
-        steps = np.frombuffer(a2, ">u2", points, STEPS)
+    if len(a2) >= A2_STEPS_OFFSET + 2 * points:
+        steps = np.frombuffer(a2, ">u2", points, A2_STEPS_OFFSET)
     elif a2 or len(a0) < TWO_FLOATS.size:
         return None
-    first, second = TWO_FLOATS.unpack_from(a2 or a0)
-    (scale,) = SCALE.unpack_from(ranges)
-    ticks = np.frombuffer(ranges, ">u2", points, SCALE.size)
-    return Ping(seconds, nanoseconds, number, speed, steering, scale, ticks, first, second, steps)
-
-
-def _angles(ping: Ping) -> NDArray[np.float64]:
-    if ping.steps is None:
-        return np.linspace(ping.first_rad, ping.second, len(ping.ranges), dtype=np.float64)
-    sums: NDArray[np.int64] = np.cumsum(ping.steps, dtype=np.int64)
-    return np.asarray(ping.first_rad + sums * ping.second, dtype=np.float64)
+    first_rad, last_rad_or_scale = TWO_FLOATS.unpack_from(a2 or a0)
+    (range_scale_s,) = SCALE.unpack_from(r0)
+    return R2sonicPing(
+        seconds=seconds,
+        nanoseconds=nanoseconds,
+        number=number,
+        sound_speed_m_s=speed,
+        steering_rad=steering,
+        range_scale_s=range_scale_s,
+        ranges=np.frombuffer(r0, ">u2", points, SCALE.size),
+        first_rad=first_rad,
+        last_rad_or_scale=last_rad_or_scale,
+        steps=steps,
+    )
 
 
 @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-def _chunk(pings: list[Ping], latency_s: float, dropped: Counter[str]) -> Chunk:
+def _chunk(pings: list[R2sonicPing], latency_s: float, dropped: Counter[str]) -> Chunk:
     counts = np.array([len(ping.ranges) for ping in pings])
     seconds = np.array([ping.seconds for ping in pings], dtype=np.int64)
     nanoseconds = np.array([ping.nanoseconds for ping in pings], dtype=np.int64)
     t_ns = gps_ns_from_unix_utc(seconds, nanoseconds)
-
-    def spread(values: Any, dtype: Any) -> NDArray[Any]:
-        return np.repeat(np.asarray(values, dtype=dtype), counts)
-
-    scale_s = spread([ping.range_scale_s for ping in pings], np.float64)
-    two_way_time_s = np.concatenate([ping.ranges for ping in pings]).astype(np.float64) * scale_s
-    angle_rad = np.concatenate([_angles(ping) for ping in pings])
+    scale_s = per_sounding([ping.range_scale_s for ping in pings], counts, np.float64)
+    angle_rad = np.concatenate([ping.angles_rad for ping in pings])
     sieve = Sieve(
         {
-            "t_ns": spread(t_ns, np.int64),
-            "ping": spread([ping.number for ping in pings], np.int64),
-            "beam": np.concatenate([np.arange(count, dtype=np.int16) for count in counts]),
-            "two_way_time_s": two_way_time_s,
+            "t_ns": per_sounding(t_ns, counts, np.int64),
+            "ping": per_sounding([ping.number for ping in pings], counts, np.int64),
+            "beam": beam_numbers(counts),
+            "two_way_time_s": np.concatenate([ping.ranges for ping in pings]).astype(np.float64) * scale_s,
             "angle_rad": angle_rad,
             "transmit_tilt_rad": np.zeros_like(angle_rad),
-            "sound_speed_m_s": spread([ping.sound_speed_m_s for ping in pings], np.float64),
+            "sound_speed_m_s": per_sounding([ping.sound_speed_m_s for ping in pings], counts, np.float64),
         },
         dropped,
     )
-    sieve.keep(possible_ns(sieve["t_ns"]), "impossible time (clock not set)")
-    keep_possible_soundings(sieve)
-    sieve.columns["t_ns"] = sieve["t_ns"] - latency_ns(latency_s)
-    return chunk(sieve.columns, MBES_COLUMNS, dropped)
+    return checked_chunk(sieve, latency_s)

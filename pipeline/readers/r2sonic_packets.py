@@ -1,15 +1,15 @@
-"""Where R2Sonic's BTH0 packets lie in files: one after another, in HYPACK .R2S files, in XTF.
+"""Find R2Sonic's BTH0 packets in files: one after another, in HYPACK .R2S files, in XTF.
 
 Bare packets: each begins with its name and its size (u32, big-endian). HYPACK .R2S puts the size before it once more
 (u32, little-endian). Other packets of the sonar (snippets, water column, ...) have the same header and are skipped.
 
 XTF (Triton, "XTF File Format", rev. 40; little-endian): a file header of 1024 bytes (or a multiple), then records:
 u16 0xFACE, u8 type, u8, u16, 2 x u16, u32 length of the whole record. R2Sonic's packets are in records of type 65
-(QINSy) and 68 (Triton), behind a ping header whose length is not relied on: the packet is found by its name. The shell
-is so small that it is read here: a library that unpickles an index file it finds beside the data, and that never ends
-on a record of length 0, is not for files from elsewhere.
+(QINSy) and 68 (Triton), behind a ping header. The length of that header is not relied on: the packet is found by its
+name. XTF's records are so simple that they are read here. The library for them unpickles an index file that it finds
+beside the data, and never ends on a record of length 0: it is not for files from elsewhere.
 
-Between packets that follow each other both readers search for the next mark where it is not at its place, and count.
+Both readers search for the next mark where it is not at its place, and count the gap.
 """
 
 import struct
@@ -20,7 +20,7 @@ from typing import BinaryIO
 from pipeline.readers.raw_file import find, read_at, size_of
 
 BTH0 = b"BTH0"
-OTHERS = (b"SNI0", b"WCD0", b"AID0", b"TPX0", b"TPX1", b"STH0")
+OTHER_PACKETS = (b"SNI0", b"WCD0", b"AID0", b"TPX0", b"TPX1", b"STH0")
 MIN_PACKET, MAX_PACKET = 12, 65_535  # the sonar sends each as one UDP datagram
 SECTION = struct.Struct(">2sH")
 XTF_HEADER, XTF_MAGIC, XTF_RECORD = 1024, b"\xce\xfa", 14
@@ -30,26 +30,26 @@ Sections = dict[bytes, bytes]
 
 
 def packet_size(head: bytes) -> int | None:
-    """The size that a packet's first eight bytes promise; None where they are no packet's."""
+    """Return the size that a packet's first eight bytes promise; None where they are no packet's."""
     size = int.from_bytes(head[4:8], "big")
-    return size if len(head) >= 8 and head[:4] in (BTH0, *OTHERS) and MIN_PACKET <= size <= MAX_PACKET else None
+    return size if len(head) >= 8 and head[:4] in (BTH0, *OTHER_PACKETS) and MIN_PACKET <= size <= MAX_PACKET else None
 
 
 def sections_of(packet: bytes) -> Sections | None:
-    """A packet's sections by name, their heads included; None where their sizes contradict the packet's."""
-    found: Sections = {}
+    """Return a packet's sections by name, their heads included; None where their sizes contradict the packet's."""
+    sections: Sections = {}
     offset = MIN_PACKET
     while offset + SECTION.size <= len(packet):
         name, size = SECTION.unpack_from(packet, offset)
         if size < SECTION.size or offset + size > len(packet):
             return None
-        found.setdefault(name, packet[offset : offset + size])
+        sections.setdefault(name, packet[offset : offset + size])
         offset += size
-    return found
+    return sections
 
 
 def bare_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
-    """BTH0 packets that follow one another, with or without HYPACK's length before each."""
+    """Yield the sections of BTH0 packets that follow one another, with or without HYPACK's length before each."""
     size, position = size_of(file), 0
     while position < size:
         head = read_at(file, position, 12)
@@ -76,21 +76,21 @@ def _prefixed(head: bytes) -> bool:
 
 
 def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
-    """BTH0 packets out of the records of an XTF file; a file without any has its other records counted."""
+    """Yield the sections of BTH0 packets in an XTF file; in a file without any, count the other records."""
     size = size_of(file)
     position = find(file, XTF_MAGIC, XTF_HEADER)
-    packets = others = 0
+    packets = other_records = 0
     while 0 <= position < size:
         head = read_at(file, position, XTF_RECORD)
         length = int.from_bytes(head[10:14], "little")
-        sound = len(head) == XTF_RECORD and head[:2] == XTF_MAGIC and XTF_RECORD <= length <= XTF_MAX
-        following = position + length if sound and position + length <= size else find(file, XTF_MAGIC, position + 2)
-        broken = not sound or (following != position + length)
+        whole = len(head) == XTF_RECORD and head[:2] == XTF_MAGIC and XTF_RECORD <= length <= XTF_MAX
+        following = position + length if whole and position + length <= size else find(file, XTF_MAGIC, position + 2)
+        broken = not whole or (following != position + length)
         if broken:
             dropped["truncated record" if following < 0 else "stray bytes"] += 1
-        if sound and head[2] not in XTF_TYPES:
-            others += 1
-        elif sound and (not broken or following < 0):
+        if whole and head[2] not in XTF_TYPES:
+            other_records += 1
+        elif whole and (not broken or following < 0):
             sections = _sections_in(read_at(file, position, length))
             if sections is not None:
                 packets += 1
@@ -99,11 +99,11 @@ def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
                 dropped["damaged packet"] += 1
         position = following
     if not packets:
-        dropped["XTF record other than R2Sonic bathymetry"] += others
+        dropped["XTF record other than R2Sonic bathymetry"] += other_records
 
 
 def _sections_in(record: bytes) -> Sections | None:
-    """The sections of the first sound BTH0 packet in a record."""
+    """Return the sections of the first whole BTH0 packet in a record."""
     start = record.find(BTH0)
     while start >= 0:
         length = packet_size(record[start : start + 8])

@@ -1,7 +1,7 @@
 """Pings that a file holds twice: a logger that heard each packet on two ways, or a file that was copied behind itself.
 
 Each sounding would count twice, and the sigmas would be too small, without a word. A repeated ping has the same bytes
-as one before it, its time among them.
+as an earlier one, its time among them.
 """
 
 from collections import Counter
@@ -10,16 +10,16 @@ from hashlib import blake2b
 
 
 @dataclass
-class Repeats:
-    """Of one file; of each of its pings eight bytes are kept."""
+class RepeatedPings:
+    """Recognises the repeated pings of one file; keeps eight bytes for each ping."""
 
-    seen: set[bytes] = field(default_factory=set)
+    digests: set[bytes] = field(default_factory=set)
 
     def is_new(self, record: bytes, dropped: Counter[str]) -> bool:
-        """Whether no ping before had these bytes; one that had is counted."""
-        mark = blake2b(record, digest_size=8).digest()
-        if mark in self.seen:
+        """Return whether no earlier ping had these bytes; otherwise count the ping in ``dropped``."""
+        digest = blake2b(record, digest_size=8).digest()
+        if digest in self.digests:
             dropped["repeated ping"] += 1
             return False
-        self.seen.add(mark)
+        self.digests.add(digest)
         return True

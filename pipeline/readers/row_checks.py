@@ -1,4 +1,7 @@
-"""What every reader asks of its rows, whatever the format: finite, possible, in order of time. Nothing is repaired."""
+"""Checks of every reader's rows: finite, possible, in order of time. Nothing is repaired.
+
+Rows that fail are left out and counted under a reason. Limits are those of instruments and water, not of a session.
+"""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -21,7 +24,7 @@ MBES_COLUMNS = ("t_ns", "ping", "beam", "two_way_time_s", "angle_rad", "transmit
 SIGMA_COLUMNS = ("t_ns", "north_m", "east_m", "up_m", "roll_deg", "pitch_deg", "heading_deg")
 TYPES = {"t_ns": np.int64, "ping": np.int64, "beam": np.int16}
 
-FIRST_WEEK, LAST_WEEK = 1000, 5000  # as in config: March 1999 to 2075
+FIRST_WEEK, LAST_WEEK = 1000, 5000  # as in config.session: March 1999 to 2075
 MAX_ANGLE_RAD = 1.2 * np.pi / 2
 MAX_TILT_RAD = np.pi / 4
 MIN_SPEED_M_S, MAX_SPEED_M_S = 1300.0, 1700.0
@@ -37,7 +40,19 @@ def chunk(
     dropped: Counter[str],
     sigmas: Mapping[str, NDArray[Any]] | None = None,
 ) -> Chunk:
-    """A chunk with exactly the canonical columns and types; ``dropped`` starts again from nothing."""
+    """Return a chunk with exactly the canonical columns and types, and empty ``dropped`` into it.
+
+    Parameters
+    ----------
+    columns
+        Arrays (n,) by name; further ones are left out.
+    names
+        The canonical columns: INS_COLUMNS, LASER_COLUMNS or MBES_COLUMNS.
+    dropped
+        Counts of what was left out, by reason; empty afterwards.
+    sigmas
+        The INS's own accuracy: SIGMA_COLUMNS, at times of their own.
+    """
     typed = {name: np.ascontiguousarray(columns[name], dtype=TYPES.get(name, np.float64)) for name in names}
     counts = {reason: number for reason, number in dropped.items() if number}
     dropped.clear()
@@ -45,7 +60,7 @@ def chunk(
 
 
 def no_rows(names: tuple[str, ...], dropped: Counter[str]) -> Chunk:
-    """A chunk that only tells what was left out."""
+    """Return a chunk without rows, for the counts of what was left out."""
     return chunk({name: np.empty(0) for name in names}, names, dropped)
 
 
@@ -63,12 +78,14 @@ class Sieve:
         return self.columns[name]
 
     def keep(self, good: Mask, reason: str) -> None:
+        """Keep the rows that are ``good`` (n,), and count the others under ``reason``."""
         lost = len(good) - int(np.count_nonzero(good))
         if lost:
             self.dropped[reason] += lost
             self.columns = {name: values[good] for name, values in self.columns.items()}
 
     def keep_finite(self) -> None:
+        """Keep the rows whose floating-point numbers are all finite."""
         good = np.ones(len(self), dtype=bool)
         for values in self.columns.values():
             if values.dtype.kind == "f":
@@ -77,47 +94,64 @@ class Sieve:
 
 
 def possible_week_time(week: NDArray[Any], seconds: NDArray[Any]) -> Mask:
-    """Weeks as accepted in session.yaml; seconds may run on beyond the end of their week, by one week at most."""
+    """Return where GPS weeks and seconds of week are possible.
+
+    Weeks are limited as in session.yaml; seconds may run on beyond the end of their week, by one week at most.
+    """
     good: Mask = (week >= FIRST_WEEK) & (week <= LAST_WEEK) & (seconds >= 0) & (seconds < 2 * WEEK_NS / NS)
     return good
 
 
 def possible_ns(t_ns: NDArray[np.int64]) -> Mask:
+    """Return where GPS times lie in a week that session.yaml accepts."""
     good: Mask = (t_ns >= FIRST_WEEK * WEEK_NS) & (t_ns <= LAST_WEEK * WEEK_NS)
     return good
 
 
 def latency_ns(latency_s: float) -> int:
+    """Return the latency in whole nanoseconds."""
     return round(latency_s * NS)
 
 
 def keep_possible_poses(sieve: Sieve) -> None:
-    """INS rows (t_ns not needed yet): a position on the earth, angles of an attitude. Azimuths go to [0, 2 pi)."""
+    """Keep the INS rows with a position on the earth and angles of an attitude; bring azimuths into [0, 2 pi).
+
+    The column t_ns is not needed yet.
+    """
     sieve.keep_finite()
     latitude, longitude = sieve["latitude_rad"], sieve["longitude_rad"]
-    somewhere = (latitude > -np.pi / 2) & (latitude < np.pi / 2) & (np.abs(longitude) <= 2 * np.pi)
-    sieve.keep(somewhere & ((latitude != 0) | (longitude != 0)), "no position")
+    on_earth = (latitude > -np.pi / 2) & (latitude < np.pi / 2) & (np.abs(longitude) <= 2 * np.pi)
+    sieve.keep(on_earth & ((latitude != 0) | (longitude != 0)), "no position")
     sieve.keep(np.abs(sieve["height_m"]) < MAX_HEIGHT_M, "impossible height")
     angles = (np.abs(sieve["roll_rad"]) <= np.pi) & (np.abs(sieve["pitch_rad"]) <= np.pi / 2)
     sieve.keep(angles & (np.abs(sieve["azimuth_rad"]) <= 4 * np.pi), "impossible attitude")
     sieve.columns["azimuth_rad"] = np.mod(sieve["azimuth_rad"], 2 * np.pi)
 
 
-def sigma_rows(t_ns: NDArray[np.int64], given: Mapping[str, NDArray[Any]], dropped: Counter[str]) -> Columns:
-    """What an INS says of its own accuracy, columns SIGMA_COLUMNS (NaN: it does not say); nothing where it says
-    nothing. Zero is no standard deviation."""
-    if not given or not len(t_ns):
+def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dropped: Counter[str]) -> Columns:
+    """Return an INS's own accuracy as the columns SIGMA_COLUMNS; nothing where nothing is recorded.
+
+    Parameters
+    ----------
+    t_ns
+        GPS times (n,).
+    recorded
+        Standard deviations (n,) by the names of SIGMA_COLUMNS; columns that are not recorded become NaN.
+    dropped
+        Counts rows with an impossible sigma. Zero is no standard deviation.
+    """
+    if not recorded or not len(t_ns):
         return {}
-    sieve = Sieve({"t_ns": t_ns} | {name: np.asarray(values, np.float64) for name, values in given.items()}, dropped)
+    sieve = Sieve({"t_ns": t_ns} | {name: np.asarray(values, np.float64) for name, values in recorded.items()}, dropped)
     good = np.ones(len(sieve), dtype=bool)
-    for name in given:
+    for name in recorded:
         good &= (sieve[name] > 0) & (sieve[name] <= MAX_SIGMA[name.rpartition("_")[2]])
     sieve.keep(good, "impossible accuracy")
     return {name: sieve.columns.get(name, np.full(len(sieve), np.nan)) for name in SIGMA_COLUMNS}
 
 
 def keep_possible_soundings(sieve: Sieve) -> None:
-    """Soundings: a detection, with a travel time, an angle and a sound speed that water and sonar can have."""
+    """Keep the soundings with a detection, and a travel time, angles and a sound speed that are possible."""
     sieve.keep_finite()
     speed = sieve["sound_speed_m_s"]
     sieve.keep((speed >= MIN_SPEED_M_S) & (speed <= MAX_SPEED_M_S), "impossible sound speed")
@@ -130,7 +164,7 @@ def keep_possible_soundings(sieve: Sieve) -> None:
 
 @dataclass
 class Order:
-    """Holds the INS records of one file in ascending order of time; small steps back are left out and counted."""
+    """Keeps the INS records of one file in ascending order of time; records that step back are left out and counted."""
 
     name: str
     last_ns: int = field(default=np.iinfo(np.int64).min)
@@ -138,52 +172,21 @@ class Order:
     backwards: int = 0
 
     def keep(self, sieve: Sieve) -> None:
+        """Keep the rows that are later than all rows before, in this batch and the ones before it."""
         t_ns = sieve["t_ns"]
         latest = np.maximum.accumulate(np.concatenate([[self.last_ns], t_ns]))
-        back = t_ns < latest[:-1]
+        earlier = t_ns < latest[:-1]
         self.records += len(t_ns)
-        self.backwards += int(np.count_nonzero(back))
+        self.backwards += int(np.count_nonzero(earlier))
         self.last_ns = int(latest[-1])
-        new = t_ns > latest[:-1]
-        sieve.keep(new | back, "repeated time")
-        sieve.keep(new[new | back], "time running backwards")
+        later = t_ns > latest[:-1]
+        sieve.keep(later | earlier, "repeated time")
+        sieve.keep(later[later | earlier], "time running backwards")
 
     def check(self) -> None:
+        """Raise RawDataError where more than MAX_BACKWARDS_SHARE of the records run backwards."""
         if self.backwards > MAX_BACKWARDS_SHARE * self.records:
             raise RawDataError(
                 f"{self.name}: time runs backwards in {self.backwards} of {self.records} records; "
                 "export the file again in order of time, one log a file"
             )
-
-
-@np.errstate(all="ignore")
-def through_float32(values: NDArray[np.float64]) -> bool:
-    """Whether times (or other large numbers) have lost their digits by being stored as float32.
-
-    All values are then float32 numbers, which by chance happens only to multiples of 1/8 s and the like.
-
-    >>> through_float32(np.array([76892.6953125, 76892.703125])), through_float32(np.array([76892.5, 76893.0]))
-    (True, False)
-    """
-    values = values[np.isfinite(values) & (np.abs(values) < 1e30)]
-    if not len(values) or not np.array_equal(values, values.astype(np.float32)):
-        return False
-    step = float(np.spacing(np.float32(np.abs(values).max())))
-    if step < 1e-4:
-        return False
-    if step < 1:
-        return bool(np.any(np.mod(values * 8, 1) != 0))
-    return len(values) >= 100 and step >= 8
-
-
-@np.errstate(all="ignore")
-def refuse_float32(columns: Mapping[str, NDArray[Any]], name: str) -> None:
-    """RawDataError where seconds_of_week, latitude_deg or longitude_deg have lost their digits as float32."""
-    seconds = columns.get("seconds_of_week")
-    degraded = seconds is not None and through_float32(seconds)
-    for column in ("latitude_deg", "longitude_deg"):
-        values = columns.get(column)
-        if values is not None and len(values) >= 20 and len(np.unique(values)) > 1:
-            degraded = degraded or bool(np.all(np.abs(values - values.astype(np.float32)) < 1e-11))
-    if degraded:
-        raise RawDataError(f"{name}: its times or positions went through float32; export it again in double precision")

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, WEEK_NS, gps_ns_from_week_seconds
+from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.row_checks import (
     INS_COLUMNS,
@@ -30,7 +31,6 @@ from pipeline.readers.row_checks import (
     latency_ns,
     no_rows,
     possible_week_time,
-    through_float32,
 )
 
 RECORD = 17 * 8

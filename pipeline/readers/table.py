@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.streams import Chunk
 from pipeline.gps_time import gps_ns_from_week_seconds
 from pipeline.readers.crs import Frame, keep_placed
+from pipeline.readers.float32_checks import refuse_float32
 from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import (
     INS_COLUMNS,
@@ -42,7 +43,6 @@ from pipeline.readers.row_checks import (
     no_rows,
     possible_ns,
     possible_week_time,
-    refuse_float32,
 )
 from pipeline.readers.table_columns import WHOLE, Sensor, batches
 

@@ -1,7 +1,7 @@
-"""Files of kinds that are not read: what marks them, and what to export in their place.
+"""Files of kinds that are not read: how to recognise them, and what to export in their place.
 
-Marks at a fixed place are those of the formats' documents or of public readers. What has only a short mark, or none, is
-known by the shape of its first record (:mod:`pipeline.readers.unread_records`).
+Marks at a fixed place are those of the formats' documents or of public readers. A kind with a short mark, or none, is
+recognised by the shape of its first record (:mod:`pipeline.readers.unread_records`).
 """
 
 import re
@@ -9,78 +9,82 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.readers import unread_records as shape
-from pipeline.readers.file_kind import Kind
+from pipeline.readers import unread_records
+from pipeline.readers.file_kind import FileKind
 
-CLOUD = "export it to LAS or LAZ with GPS time stamps"
-SONAR = (
+EXPORT_LAS = "export it to LAS or LAZ with GPS time stamps"
+EXPORT_PINGS = (
     "give the sonar's own files (R2Sonic packets, Kongsberg .kmall or .all), or export GSF with travel times and beam "
     "angles, of one head"
 )
-TRACK = "export the INS's solution as SBET, as a text of Inertial Explorer, or as a table with README.md's columns"
-BY_SENSOR = {"ins": TRACK, "laser": CLOUD, "mbes": SONAR}
-PROCESS = (
+EXPORT_SOLUTION = (
+    "export the INS's solution as SBET, as a text of Inertial Explorer, or as a table with README.md's columns"
+)
+EXPORT_BY_SENSOR = {"ins": EXPORT_SOLUTION, "laser": EXPORT_LAS, "mbes": EXPORT_PINGS}
+PROCESS_GNSS = (
     "process it together with the IMU's data (Inertial Explorer, POSPac, Qinertia and the like), and export the "
     "solution as SBET, as a text of Inertial Explorer, or as a table with README.md's columns"
 )
 
 
-def _recorded(title: str) -> Kind:
-    """Something that may hold each sensor's data."""
-    return Kind(title, advice="export each sensor's data in a format that README.md names", advices=BY_SENSOR)
+def _recorded(title: str) -> FileKind:
+    """Return a kind of file that may hold each sensor's data."""
+    return FileKind(
+        title, advice="export each sensor's data in a format that README.md names", advice_by_sensor=EXPORT_BY_SENSOR
+    )
 
 
-def _packed(title: str) -> Kind:
-    return Kind(title, advice="unpack it, and list what was in it")
+def _packed(title: str) -> FileKind:
+    return FileKind(title, advice="unpack it, and list what was in it")
 
 
-CAPTURE = Kind(
+CAPTURE = FileKind(
     "a capture of network traffic",
     advice="export each sensor's data in a format that README.md names",
-    advices=BY_SENSOR
+    advice_by_sensor=EXPORT_BY_SENSOR
     | {
-        "laser": f"{CLOUD} by the scanner's own software (of Velodyne, Hesai, Ouster, Livox and the like)",
+        "laser": f"{EXPORT_LAS} by the scanner's own software (of Velodyne, Hesai, Ouster, Livox and the like)",
         "mbes": "take the packets of the sonar's bathymetry port out of it, or give the sonar's own files",
     },
 )
-ALL_OF_A_SUN = Kind(
+BIG_ENDIAN_ALL = FileKind(
     "Kongsberg .all in big-endian order",
     advice="convert it to the order that the sonars of today write, or export GSF with travel times and beam angles",
-    advices={"ins": TRACK, "laser": CLOUD},
+    advice_by_sensor={"ins": EXPORT_SOLUTION, "laser": EXPORT_LAS},
 )
-S7K = Kind("a .s7k file (Teledyne Reson, Norbit)", advice=SONAR)
-JSF = Kind("an EdgeTech .jsf file", advice=SONAR)
-HYPACK = Kind(
+S7K = FileKind("a .s7k file (Teledyne Reson, Norbit)", advice=EXPORT_PINGS)
+JSF = FileKind("an EdgeTech .jsf file", advice=EXPORT_PINGS)
+HYPACK = FileKind(
     "a HYPACK file (.RAW, .HSX, .VEL)",
     advice="give the sonar's own files that were logged beside it (.R2S), or export GSF with travel times and angles",
-    advices={"ins": TRACK, "laser": CLOUD},
+    advice_by_sensor={"ins": EXPORT_SOLUTION, "laser": EXPORT_LAS},
 )
-POSPAC = Kind("a log of an Applanix POS", advice=f"{PROCESS} (POSPac: SBET)")
-SBG = Kind("a log of an SBG INS", advice=f"{PROCESS} (Qinertia: SBET)")
-SBF = Kind("a log of a Septentrio receiver (SBF)", advice=PROCESS)
-UBX = Kind("a log of a u-blox receiver (UBX)", advice=PROCESS)
-GSOF = Kind("a log of a Trimble receiver (GSOF)", advice=PROCESS)
-RINEX = Kind("RINEX, observations of a GNSS receiver", advice=PROCESS)
-NMEA = Kind("a log of NMEA sentences", advice=f"these have no angles of the full precision: {TRACK}")
-POF = Kind("a trajectory of RIEGL (.pof)", advice=f"{TRACK}: it was made from one of these")
-POQ = Kind("a trajectory's accuracies of RIEGL (.poq)", advice=f"{TRACK}: it was made from one of these")
-PTX = Kind("a PTX file", advice=f"its points have no times: {CLOUD}")
+POSPAC = FileKind("a log of an Applanix POS", advice=f"{PROCESS_GNSS} (POSPac: SBET)")
+SBG = FileKind("a log of an SBG INS", advice=f"{PROCESS_GNSS} (Qinertia: SBET)")
+SBF = FileKind("a log of a Septentrio receiver (SBF)", advice=PROCESS_GNSS)
+UBX = FileKind("a log of a u-blox receiver (UBX)", advice=PROCESS_GNSS)
+GSOF = FileKind("a log of a Trimble receiver (GSOF)", advice=PROCESS_GNSS)
+RINEX = FileKind("RINEX, observations of a GNSS receiver", advice=PROCESS_GNSS)
+NMEA = FileKind("a log of NMEA sentences", advice=f"these have no angles of the full precision: {EXPORT_SOLUTION}")
+POF = FileKind("a trajectory of RIEGL (.pof)", advice=f"{EXPORT_SOLUTION}: it was made from one of these")
+POQ = FileKind("a trajectory's accuracies of RIEGL (.poq)", advice=f"{EXPORT_SOLUTION}: it was made from one of these")
+PTX = FileKind("a PTX file", advice=f"its points have no times: {EXPORT_LAS}")
 
-MAGICS: tuple[tuple[int, bytes, Kind], ...] = (
-    (8, b"RieglLMS", Kind("a RIEGL .rxp file", advice=f"{CLOUD} (RiSCAN PRO, RiPROCESS, or RiVLib)")),
-    (0, b"ply\n", Kind("a PLY file", advice=CLOUD)),
-    (0, b"ply\r\n", Kind("a PLY file", advice=CLOUD)),
-    (0, b"# .PCD", Kind("a PCD file", advice=CLOUD)),
-    (0, b"VERSION 0.7\nFIELDS", Kind("a PCD file", advice=CLOUD)),
-    (0, b"VERSION .7\nFIELDS", Kind("a PCD file", advice=CLOUD)),
+_MARKS: tuple[tuple[int, bytes, FileKind], ...] = (
+    (8, b"RieglLMS", FileKind("a RIEGL .rxp file", advice=f"{EXPORT_LAS} (RiSCAN PRO, RiPROCESS, or RiVLib)")),
+    (0, b"ply\n", FileKind("a PLY file", advice=EXPORT_LAS)),
+    (0, b"ply\r\n", FileKind("a PLY file", advice=EXPORT_LAS)),
+    (0, b"# .PCD", FileKind("a PCD file", advice=EXPORT_LAS)),
+    (0, b"VERSION 0.7\nFIELDS", FileKind("a PCD file", advice=EXPORT_LAS)),
+    (0, b"VERSION .7\nFIELDS", FileKind("a PCD file", advice=EXPORT_LAS)),
     (0, b"#ROSBAG V", _recorded("a ROS bag")),
     (0, b"\x89MCAP0\r\n", _recorded("a ROS bag (MCAP)")),
     (0, b"SQLite format 3\0", _recorded("a database (SQLite: QINSy, ROS 2 and others)")),
     (0, b"\x89HDF\r\n\x1a\n", _recorded("an HDF5 file (NetCDF, BAG and others)")),
     (0, b"FTP NEW 2", HYPACK),
-    (0, b"[SVP_VERSION_", Kind("a cast of sound speed (CARIS .svp)", advice="give the cast under mbes.svp")),
-    (0, b"PK\x03\x04", Kind("a ZIP archive", advice="unpack it; if it is a workbook, save the sheet as CSV")),
-    (0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", Kind("a document of Office", advice="save the sheet as CSV")),
+    (0, b"[SVP_VERSION_", FileKind("a cast of sound speed (CARIS .svp)", advice="give the cast under mbes.svp")),
+    (0, b"PK\x03\x04", FileKind("a ZIP archive", advice="unpack it; if it is a workbook, save the sheet as CSV")),
+    (0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", FileKind("a document of Office", advice="save the sheet as CSV")),
     (0, b"\x1f\x8b\x08", _packed("a gzip archive")),
     (0, b"7z\xbc\xaf\x27\x1c", _packed("a 7z archive")),
     (0, b"Rar!\x1a\x07", _packed("a RAR archive")),
@@ -95,18 +99,18 @@ MAGICS: tuple[tuple[int, bytes, Kind], ...] = (
 )
 
 
-def marked(head: bytes) -> Kind | None:
-    """By a mark that no other file begins with."""
-    return next((kind for at, magic, kind in MAGICS if head[at : at + len(magic)] == magic), None)
+def kind_by_mark(head: bytes) -> FileKind | None:
+    """Return the kind whose mark the file has; no other file begins with one of these marks."""
+    return next((kind for at, magic, kind in _MARKS if head[at : at + len(magic)] == magic), None)
 
 
-def binary(head: bytes, size: int) -> Kind | None:
-    """By the shape of its first record."""
-    return next((kind for is_one, kind in SHAPES if is_one(head, size)), None)
+def kind_by_first_record(head: bytes, size: int) -> FileKind | None:
+    """Return the kind that the first record of a binary file of ``size`` bytes has the shape of."""
+    return next((kind for has_shape, kind in _SHAPES if has_shape(head, size)), None)
 
 
-def text(head: str) -> Kind | None:
-    """Of text by its first lines."""
+def kind_of_text(head: str) -> FileKind | None:
+    """Return the kind of a text, by its first lines."""
     lines = [line.rstrip() for line in head.splitlines()]
     first = lines[0] if lines else ""
     if first[60:].strip() in ("RINEX VERSION / TYPE", "CRINEX VERS   / TYPE"):
@@ -123,22 +127,22 @@ _SENTENCE = re.compile(r"[$!]([A-Z]{2}[A-Z0-9]{3,},[^*$]*)\*([0-9A-Fa-f]{2})")
 
 
 def _is_sentence(line: str) -> bool:
-    """NMEA 0183: talker and sentence, fields, and the exclusive or of their letters."""
-    found = _SENTENCE.search(line)
-    if found is None or not found[1].isascii():
+    """Return whether NMEA 0183 is in the line: talker and sentence, fields, and the exclusive or of their letters."""
+    sentence = _SENTENCE.search(line)
+    if sentence is None or not sentence[1].isascii():
         return False
-    return int(np.bitwise_xor.reduce(np.frombuffer(found[1].encode(), np.uint8))) == int(found[2], 16)
+    return int(np.bitwise_xor.reduce(np.frombuffer(sentence[1].encode(), np.uint8))) == int(sentence[2], 16)
 
 
-SHAPES: tuple[tuple[Callable[[bytes, int], bool], Kind], ...] = (
-    (shape.is_all_of_a_sun, ALL_OF_A_SUN),
-    (shape.is_s7k, S7K),
-    (shape.is_jsf, JSF),
-    (shape.is_applanix, POSPAC),
-    (shape.is_sbg, SBG),
-    (shape.is_sbf, SBF),
-    (shape.is_ubx, UBX),
-    (shape.is_gsof, GSOF),
-    (shape.is_pof, POF),
-    (shape.is_poq, POQ),
+_SHAPES: tuple[tuple[Callable[[bytes, int], bool], FileKind], ...] = (
+    (unread_records.is_big_endian_all, BIG_ENDIAN_ALL),
+    (unread_records.is_s7k, S7K),
+    (unread_records.is_jsf, JSF),
+    (unread_records.is_applanix, POSPAC),
+    (unread_records.is_sbg, SBG),
+    (unread_records.is_sbf, SBF),
+    (unread_records.is_ubx, UBX),
+    (unread_records.is_gsof, GSOF),
+    (unread_records.is_pof, POF),
+    (unread_records.is_poq, POQ),
 )

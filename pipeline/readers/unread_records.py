@@ -1,7 +1,8 @@
-"""The first records of files that are not read, by which these are known.
+"""Recognise files that are not read by their first record.
 
-A mark of two or three bytes, which other files may begin with by chance, counts only where the record that it begins is
-whole: its length leads to its end mark, to a checksum that is right, or to the next record. Little-endian:
+Other files may begin with a mark of two or three bytes by chance. Such a mark therefore counts only where its record is
+whole: the length leads to the end mark, to a correct checksum, or to the next record. Each function takes the beginning
+of a file and the file's size in bytes. Little-endian:
 
     .s7k                   u16 version, u16 offset 60, u32 0x0000FFFF, u32 size, ..., at byte 32 u32 type of record
     EdgeTech .jsf          u16 0x1601, u8 version, u8 session, u16 type, 4 u8, u16, u32 bytes that follow
@@ -18,14 +19,16 @@ import struct
 
 import numpy as np
 
-from pipeline.readers.kongsberg_all_datagrams import is_head
+from pipeline.readers.kongsberg_all_datagrams import is_datagram_header
 
 
-def is_all_of_a_sun(head: bytes, size: int) -> bool:
-    return is_head(head[:20], ">")
+def is_big_endian_all(head: bytes, size: int) -> bool:
+    """Return whether the file is a Kongsberg .all file written in big-endian order (on a Sun)."""
+    return is_datagram_header(head[:20], ">")
 
 
 def is_s7k(head: bytes, size: int) -> bool:
+    """Return whether the file is a .s7k file of Teledyne Reson."""
     if len(head) < 36 or head[4:8] != b"\xff\xff\0\0":
         return False
     offset, length, record = struct.unpack_from("<2xH4xI20xI", head)
@@ -33,17 +36,19 @@ def is_s7k(head: bytes, size: int) -> bool:
 
 
 def is_jsf(head: bytes, size: int) -> bool:
+    """Return whether the file is a .jsf file of EdgeTech."""
     if head[:2] != b"\x01\x16" or len(head) < 16:
         return False
     return _follows(head, size, 16 + struct.unpack_from("<I", head, 12)[0])
 
 
 def _follows(head: bytes, size: int, end: int) -> bool:
-    """The next record begins as the first; or it lies beyond what is seen of the file, or is its end."""
+    """Return whether at ``end`` the next record begins with the first one's mark, or the file ends, or ``head``."""
     return end <= size and (end >= len(head) or head[end : end + 2] == head[:2])
 
 
 def is_applanix(head: bytes, size: int) -> bool:
+    """Return whether the file is a log of an Applanix POS."""
     if head[:4] not in (b"$GRP", b"$MSG") or len(head) < 8:
         return False
     end = 8 + struct.unpack_from("<H", head, 6)[0]
@@ -51,6 +56,7 @@ def is_applanix(head: bytes, size: int) -> bool:
 
 
 def is_sbg(head: bytes, size: int) -> bool:
+    """Return whether the file is a log of an SBG INS."""
     if head[:2] != b"\xff\x5a" or len(head) < 6:
         return False
     length = struct.unpack_from("<H", head, 4)[0]
@@ -58,6 +64,7 @@ def is_sbg(head: bytes, size: int) -> bool:
 
 
 def is_sbf(head: bytes, size: int) -> bool:
+    """Return whether the file is a log of a Septentrio receiver (SBF)."""
     if head[:2] != b"$@" or len(head) < 8:
         return False
     length = struct.unpack_from("<H", head, 6)[0]
@@ -65,17 +72,19 @@ def is_sbf(head: bytes, size: int) -> bool:
 
 
 def is_ubx(head: bytes, size: int) -> bool:
+    """Return whether the file is a log of a u-blox receiver (UBX)."""
     if head[:2] != b"\xb5\x62" or len(head) < 8:
         return False
     end = 6 + struct.unpack_from("<H", head, 4)[0]
-    one = two = 0
+    first_sum = second_sum = 0
     for byte in head[2:end]:
-        one = (one + byte) & 0xFF
-        two = (two + one) & 0xFF
-    return head[end : end + 2] == bytes((one, two))
+        first_sum = (first_sum + byte) & 0xFF
+        second_sum = (second_sum + first_sum) & 0xFF
+    return head[end : end + 2] == bytes((first_sum, second_sum))
 
 
 def is_gsof(head: bytes, size: int) -> bool:
+    """Return whether the file is a log of a Trimble receiver (GSOF)."""
     if len(head) < 6 or head[0] != 2 or head[2] != 0x40:
         return False
     end = 4 + head[3]
@@ -84,18 +93,20 @@ def is_gsof(head: bytes, size: int) -> bool:
 
 @np.errstate(all="ignore")  # whatever the bytes are as numbers
 def is_pof(head: bytes, size: int) -> bool:
+    """Return whether the file is a trajectory of RIEGL (.pof)."""
     if len(head) < 97:
         return False
     major, minor, data, year, month, day, records = struct.unpack_from("<2HI3Hq", head, 27)
     limits = struct.unpack_from("<6d", head, 49)
-    sound = major == 1 and minor < 10 and 97 <= data <= 4096 and records > 0 and 56 * records <= size
-    sound = sound and 1990 <= year <= 2100 and 1 <= month <= 12 and 1 <= day <= 31
-    return sound and all(np.abs(limits) <= 1e5) and all(low <= high for low, high in (limits[:2], limits[2:4]))
+    plausible = major == 1 and minor < 10 and 97 <= data <= 4096 and records > 0 and 56 * records <= size
+    plausible = plausible and 1990 <= year <= 2100 and 1 <= month <= 12 and 1 <= day <= 31
+    return plausible and all(np.abs(limits) <= 1e5) and all(low <= high for low, high in (limits[:2], limits[2:4]))
 
 
 @np.errstate(all="ignore")
 def is_poq(head: bytes, size: int) -> bool:
+    """Return whether the file is a file of a trajectory's accuracies of RIEGL (.poq)."""
     if len(head) < 63:
         return False
-    major, minor, mean, most, scatter = struct.unpack_from("<2H3d", head, 35)
-    return bool(major == 1 and minor < 10 and 1e-4 < mean < 100 and mean <= most < 1e6 and 1e-12 < scatter < 1e5)
+    major, minor, mean, greatest, scatter = struct.unpack_from("<2H3d", head, 35)
+    return bool(major == 1 and minor < 10 and 1e-4 < mean < 100 and mean <= greatest < 1e6 and 1e-12 < scatter < 1e5)

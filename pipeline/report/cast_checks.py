@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.config.resolved import CastUsed
+from pipeline.config.references import CastUsed
 from pipeline.config.session import Mbes
 from pipeline.gps_time import NS, unix_ns_from_gps, utc_text
 

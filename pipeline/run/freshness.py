@@ -7,6 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.config.stage_settings import plain_settings, stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
 from pipeline.run import manifest, provenance
@@ -51,7 +52,6 @@ def present(this: Run, where: Path, old: manifest.Manifest) -> dict[str, str | N
 
 
 def key_of(this: Run, stage: ModuleType) -> manifest.Key:
-    settings = this.settings.resolved_plainly()
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
     for marker in declared(stage.Inputs).values():
@@ -61,8 +61,8 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
             raw |= all_raw(this)
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
-    config = {field.name: settings[field.name] for field in dataclasses.fields(stage.Config)}
-    if "mbes" in config:
+    config = plain_settings(vars(stage_config(stage.Config, this.settings.resolved())))
+    if "svp" in (config.get("mbes") or {}):
         raw |= cast_digest(this)
     return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.atomic_files import read_json
-from pipeline.config.yaml_models import read_yaml
+from pipeline.config.yaml_file import read_yaml
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run import manifest
 from pipeline.run.freshness import EMPTY, Run, raw_of
@@ -22,7 +22,7 @@ def refuse_another(this: Run, stages: Sequence[str]) -> None:
     """One line, where the run folder's results are of another session than ``this`` run's."""
     session = this.settings.session
     there = _digests_in(this.path, stages)
-    sensor = "mbes" if session.mbes is not None else "laser"
+    sensor = session.calibrated
     if not there or there & set(raw_of(this, sensor).values()):
         return
     name, folder = _recorded(this.path)

@@ -12,6 +12,7 @@ from pipeline.artefacts.parquet import read_table, rows_of
 from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import ParquetPart, Stream
 from pipeline.atomic_files import read_json
+from pipeline.config.stage_settings import plain_settings
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run import manifest
 from pipeline.run.settings import read_settings
@@ -69,7 +70,7 @@ def recording_path(run: Path, stage: str) -> Path:
 
 def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
     """The finished stages that follow from each other and from run.yaml, in order."""
-    settings = read_settings(run).resolved_plainly()
+    settings = plain_settings(read_settings(run).resolved())
     found: dict[str, manifest.Manifest] = {}
     for stage in stages:
         one = manifest.read(run / stage)
@@ -80,7 +81,14 @@ def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
 
 def _as_set(one: manifest.Manifest, settings: Mapping[str, Any]) -> bool:
     """Whether the stage ran with the settings in run.yaml."""
-    return all(name in settings and settings[name] == value for name, value in one.key.config.items())
+    return all(name in settings and _covers(settings[name], value) for name, value in one.key.config.items())
+
+
+def _covers(setting: Any, used: Any) -> bool:
+    """Whether a stage that used so much of a setting used it as it is: a stage has some of a block's fields."""
+    if not (isinstance(setting, dict) and isinstance(used, dict)):
+        return bool(setting == used)
+    return all(name in setting and setting[name] == value for name, value in used.items())
 
 
 PAGE = "report.html"

@@ -4,7 +4,6 @@ The stages themselves come from above (:mod:`stages`): this module knows their p
 (:mod:`pipeline.run.stage_protocol`), not their names.
 """
 
-import dataclasses
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from pipeline.artefacts.sinks import FolderSink
 from pipeline.artefacts.streams import EMPTY, Chunk, ParquetPart, Part, Stream
 from pipeline.atomic_files import remove, write_text, writing
 from pipeline.config.session import Calibrated
+from pipeline.config.stage_settings import stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
 from pipeline.run import folder, manifest, provenance
@@ -134,8 +134,7 @@ def _execute(this: Run, stage: ModuleType) -> None:
     target = this.folder(name_of(stage))
     partial = folder.partial(target)
     key = key_of(this, stage)
-    settings = this.settings.resolved()
-    config = stage.Config(**{field.name: settings[field.name] for field in dataclasses.fields(stage.Config)})
+    config = stage_config(stage.Config, this.settings.resolved())
     inputs = stage.Inputs(**{name: _read(this, marker) for name, marker in declared(stage.Inputs).items()})
     remove(partial)
     try:

@@ -5,14 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from pydantic import BaseModel
 
 from pipeline.atomic_files import write_text
 from pipeline.config.load import load_pool, load_session
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
+from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.readers.casts import with_cast
 from pipeline.target.design import target_of
@@ -30,16 +31,7 @@ class Settings:
 
     def resolved(self) -> dict[str, Any]:
         """Every setting by the name under which a stage's Config asks for it."""
-        blocks = (self.pool, self.session)
-        found = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
-        return found | {"target_place": self.pool.target_place, "recordings": self.session.recordings}
-
-    def resolved_plainly(self) -> dict[str, Any]:
-        """The same as plain values."""
-        return {
-            name: value.model_dump(mode="json") if isinstance(value, BaseModel) else value
-            for name, value in self.resolved().items()
-        }
+        return settings_by_name(self.pool, self.session)
 
     def as_json(self) -> dict[str, Any]:
         """The same as plain values, defaults filled in."""
@@ -60,7 +52,7 @@ def load_settings(
     session = load_session(session_folder, with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
-    elif calibrated == "mbes" and session.mbes is None:
+    elif calibrated == "mbes" and session.calibrated == "laser":
         where = session_folder / "session.yaml"
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:

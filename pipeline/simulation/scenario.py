@@ -22,7 +22,8 @@ from pipeline.config.quantities import (
 from pipeline.config.session import Drift, White
 from pipeline.config.target import Letters, Origin, Target
 from pipeline.config.target_mesh import with_mesh
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
 SCENARIOS = CONFIGS / "scenarios"

@@ -2,26 +2,21 @@
 
 from functools import lru_cache
 
-from pipeline.config.target import Faces, Letters, Target
+from pipeline.config.target import FaceSettings, Letters, RelationSettings, Target
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.outlines import Outline, Relation, build_target
 from pipeline.maths.target.patent_target import lettered
 
 
 def target_of(target: Target) -> TargetModel:
-    """The target's faces; nobody changes them, for they are kept: many ask, and it takes a twentieth of a second."""
-    return _built(type(target), target.model_dump_json())
+    """Return the target's model; nobody changes it, for it is kept: many ask, and it takes a twentieth of a second."""
+    if isinstance(target, Letters):
+        return _by_letters(target)
+    return _by_faces(tuple(target.faces.items()), target.relations, target.water_level_m, target.repeats_m)
 
 
 @lru_cache(maxsize=16)
-def _built(kind: type[Letters] | type[Faces], text: str) -> TargetModel:
-    target = kind.model_validate_json(text)
-    if isinstance(target, Faces):
-        outlines = [Outline(name, one.corners, one.role or "", one.seen) for name, one in target.faces.items()]
-        relations = [
-            Relation(kind, faces, one.name or "") for one in target.relations for kind, faces in one.given.items()
-        ]
-        return build_target(outlines, relations, target.water_level_m, target.repeats_m)
+def _by_letters(target: Letters) -> TargetModel:
     outlines, relations, repeats_m = lettered(
         target.a,
         target.b,
@@ -33,3 +28,17 @@ def _built(kind: type[Letters] | type[Faces], text: str) -> TargetModel:
         target.stagger_m,
     )
     return build_target(outlines, relations, target.water_level_m, repeats_m)
+
+
+@lru_cache(maxsize=16)
+def _by_faces(
+    faces: tuple[tuple[str, FaceSettings], ...],
+    relations: tuple[RelationSettings, ...],
+    water_level_m: float,
+    repeats_m: float | None,
+) -> TargetModel:
+    outlines = [Outline(name, face.corners, face.role or "", face.seen) for name, face in faces]
+    stated = [
+        Relation(kind, names, relation.name or "") for relation in relations for kind, names in relation.given.items()
+    ]
+    return build_target(outlines, stated, water_level_m, repeats_m)

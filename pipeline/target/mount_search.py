@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.pool import Segment
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.target.labelling import label_points
 from pipeline.maths.target.model import TargetModel
@@ -57,7 +57,7 @@ def find_mount(
     model: TargetModel,
     R_body_from_mbes: Array,
     lever_arm_m: Array,
-    mbes: Mbes,
+    mbes: SonarBeams,
     settings: Segment,
 ) -> FoundMount:
     """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search

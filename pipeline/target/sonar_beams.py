@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.session import Mbes
+from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.sonar.soundings import beam_half_widths
 from pipeline.maths.target.labelling import Beams
 
@@ -15,7 +15,7 @@ def beams_in_target(
     R_target_from_body: Array,
     R_body_from_mbes: Array,
     points_mbes_m: Array,
-    mbes: Mbes,
+    mbes: SonarBeams,
 ) -> Beams:
     """Rays and half widths of soundings (n, 3) with attitudes (n, 3, 3); beams stray by three sigmas of their angle.
 

@@ -148,7 +148,7 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
     session = read_settings(tables.run).session
     trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
     mounts = {"laser": mount_of(session.laser.mount)}
-    calibrated = "laser" if session.mbes is None else "mbes"
+    calibrated = session.calibrated
     mounts[calibrated] = _calibrated(tables, mount_of((session.mbes or session.laser).mount))
     for (sensor, number), rows in residuals.groupby(["sensor", "pass"], sort=True):
         t_ns = rows["t_ns"].to_numpy()

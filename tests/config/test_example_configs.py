@@ -11,7 +11,8 @@ from pipeline.config.load import load_pool
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Mbes
 from pipeline.config.target import Letters
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.simulation.scenario import Scenario
 from tests.support.roots import CONFIGS

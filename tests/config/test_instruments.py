@@ -10,11 +10,12 @@ import pytest
 import yaml
 
 from pipeline.config import instruments
-from pipeline.config.instruments import PRESETS, applied, load_instrument
+from pipeline.config.instruments import PRESETS, load_instrument, merge_presets
 from pipeline.config.load import load_session
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Drift, SessionConfig, White
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.planning import assessment
 from pipeline.report.calibration_document import instruments_block
@@ -94,7 +95,7 @@ def test_each_stands_over_the_defaults_and_under_the_session(path: Path, tmp_pat
     block = getattr(found, given.sensor)
     assert (block.instrument.name, block.instrument.title) == (path.stem, given.title)
     plain = getattr(session(tmp_path), given.sensor).model_dump(mode="json")
-    expected = instruments.under(given.settings, plain) | {"instrument": None}
+    expected = instruments.deep_merge(plain, given.settings) | {"instrument": None}
     assert block.model_copy(update={"instrument": None}).model_dump(mode="json") == expected
     assert set(block.instrument.origins.values()) == {"preset", "default"}
     for sensor in {"ins", "laser", "mbes"} - {given.sensor}:
@@ -128,7 +129,7 @@ def test_the_sessions_own_key_wins_key_by_key(tmp_path: Path) -> None:
 
 def test_what_the_session_itself_gave_is_told(tmp_path: Path) -> None:
     for drift, own in (({}, False), ({"drift": {"heading_deg": 0.1}}, True)):
-        merged, keys = applied(content(ins={"instrument": "novatel_span_lci"} | drift), tmp_path)
+        merged, keys = merge_presets(content(ins={"instrument": "novatel_span_lci"} | drift), tmp_path)
         assert "drift" in merged["ins"]
         assert ("ins.drift" in keys, "ins.drift.heading_deg" in keys) == (own, own)
         assert "ins.drift.vertical_m" not in keys

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import PoolcalError
-from pipeline.readers.detect import HEAD, kind_of_bytes
+from pipeline.readers.detect import HEAD_BYTES, kind_of_bytes
 from tests.support.effort import often
 from tests.support.files import build, e57_files, ie_files, sonar_files
 
@@ -157,7 +157,7 @@ def test_random_bytes(how: tuple[str, str], start: bytes, content: bytes) -> Non
 @settings(max_examples=often(120, 300), **OPTIONS)
 @given(st.sampled_from(STARTS), st.binary(max_size=600) | st.text(max_size=300).map(str.encode), st.integers(1, 2**40))
 def test_every_content_is_of_some_kind(start: bytes, content: bytes, size: int) -> None:
-    head = (start + content)[:HEAD]
+    head = (start + content)[:HEAD_BYTES]
     kind = kind_of_bytes(head, max(size, len(head)) if head else 0)
     assert kind.title
     assert kind.advice or (kind.format and kind.sensors)

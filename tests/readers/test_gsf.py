@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config.session import Mbes
 from pipeline.errors import RawDataError
-from pipeline.readers import gsf
+from pipeline.readers import gsf_pings, sounding_chunks
 from pipeline.readers.dispatch import raw_parts
 from tests.support.files.build import GPS_2024, MOUNT, read, rows
 from tests.support.files.sonar_files import (
@@ -291,7 +291,7 @@ def test_other_records_are_passed_over(file: Path) -> None:
 
 
 def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gsf, "SOUNDINGS", 10)
+    monkeypatch.setattr(sounding_chunks, "CHUNK_SOUNDINGS", 10)
     file.write_bytes(made(7))
     (part,) = raw_parts("mbes", Mbes(files=[file.name], format="gsf", mount=MOUNT), file.parent)
     assert [len(chunk.columns["beam"]) for chunk in part.chunks()] == [10, 10, 10, 5]
@@ -306,5 +306,5 @@ def test_a_ping_that_is_there_twice_counts_once(file: Path) -> None:
 
 
 def test_angles_that_are_infinite_are_counted_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
-    assert not gsf._is_smooth(np.array([60.0, np.inf, np.inf, -60.0]))
+    assert not gsf_pings.angles_are_smooth(np.array([60.0, np.inf, np.inf, -60.0]))
     assert not recwarn

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.readers.detect import INERTIAL_EXPLORER, kind_of_bytes
+from pipeline.readers.detect import kind_of_bytes
 from pipeline.readers.dispatch import raw_parts
+from pipeline.readers.file_kind import INERTIAL_EXPLORER
 from tests.support.files import build
 from tests.support.files.build import rows
 from tests.support.files.ie_files import HEADER, LAYOUTS, WEEK, Columns, Row, export, truth, whole

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 from pipeline.config.session import Ins, Laser, Mbes, SessionConfig
 from pipeline.errors import RawDataError
 from pipeline.maths.sonar.soundings import points_in_mbes
-from pipeline.readers import kmall, kongsberg
+from pipeline.readers import kmall, sounding_chunks
 from pipeline.readers.dispatch import raw_parts
-from pipeline.readers.kmall_datagrams import datagrams
+from pipeline.readers.kmall_datagrams import kmall_datagrams
 from tests.support.files.build import GPS_2024, MOUNT, UTC_2024, read, rows
 from tests.support.files.sonar_files import ANGLES_DEG, datagram, iip, mrz, sounding
 from tests.support.files.sonar_files import kmall as made
@@ -75,7 +75,7 @@ def test_soundings_are_the_library_s(file: Path) -> None:
     reader: Any = library()
     reader.FID = io.BytesIO(content)
     theirs = reader.read_EMdgmMRZ()
-    ours = kmall.decode(content, {})
+    ours = kmall.decode_mrz(content, {})
     assert ours is not None
     assert ours.angle_deg.tolist() == list(theirs["sounding"]["beamAngleReRx_deg"])
     assert ours.two_way_time_s.tolist() == list(theirs["sounding"]["twoWayTravelTime_sec"])
@@ -317,7 +317,7 @@ def test_lengths_that_claim_more_than_there_is(file: Path) -> None:
 
 
 def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kongsberg, "SOUNDINGS", 10)
+    monkeypatch.setattr(sounding_chunks, "CHUNK_SOUNDINGS", 10)
     file.write_bytes(made(7))
     (part,) = raw_parts("mbes", Mbes(files=[file.name], format="kmall", mount=MOUNT), file.parent)
     assert [len(chunk.columns["beam"]) for chunk in part.chunks()] == [10, 10, 10, 5]
@@ -326,12 +326,12 @@ def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_only_mrz_is_looked_into(file: Path) -> None:
     content = datagram(b"#MWC", bytes(500)) + datagram(b"#SVP", bytes(10))
     dropped: Counter[str] = Counter()
-    assert list(datagrams(io.BytesIO(content), dropped)) == []
+    assert list(kmall_datagrams(io.BytesIO(content), dropped)) == []
     assert not dropped
 
 
 def test_unix_time_is_the_datagram_s() -> None:
-    ping = kmall.decode(mrz(1, FAN, seconds=UTC_2024, nanoseconds=5), {})
+    ping = kmall.decode_mrz(mrz(1, FAN, seconds=UTC_2024, nanoseconds=5), {})
     assert ping is not None
     assert ping.t_ns == GPS_2024 * NS + 5
 

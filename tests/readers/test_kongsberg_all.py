@@ -8,7 +8,7 @@ import pytest
 from pipeline.config.session import Mbes
 from pipeline.errors import RawDataError
 from pipeline.gps_time import GPS_EPOCH_UNIX_S
-from pipeline.readers import kongsberg
+from pipeline.readers import sounding_chunks
 from pipeline.readers.dispatch import raw_parts
 from tests.support.files.build import MOUNT, read, rows
 from tests.support.files.sonar_files import (
@@ -221,7 +221,7 @@ def test_cut_anywhere(file: Path) -> None:
 
 
 def test_chunks_stay_small(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kongsberg, "SOUNDINGS", 10)
+    monkeypatch.setattr(sounding_chunks, "CHUNK_SOUNDINGS", 10)
     file.write_bytes(kongsberg_all(7))
     (part,) = raw_parts("mbes", Mbes(files=[file.name], format="all", mount=MOUNT), file.parent)
     assert [len(chunk.columns["beam"]) for chunk in part.chunks()] == [10, 10, 10, 5]

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.readers import detect, unread_formats
-from pipeline.readers.detect import HEAD, kind_of_bytes
+from pipeline.readers import file_kind, unread_formats
+from pipeline.readers.detect import HEAD_BYTES, kind_of_bytes
 from pipeline.readers.dispatch import raw_parts
 from tests.readers.test_fuzz import WHOLE
 from tests.support.files import build
@@ -153,11 +153,11 @@ def test_advice_is_for_the_sensor(tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", WHOLE)
 def test_what_is_read_is_not_taken_for_another(form: str) -> None:
     sensor, kind, whole = WHOLE[form]
-    found = kind_of_bytes(whole[:HEAD], len(whole))
+    found = kind_of_bytes(whole[:HEAD_BYTES], len(whole))
     assert found.format == kind
     assert sensor in found.sensors
-    assert unread_formats.marked(whole) is None
-    assert unread_formats.binary(whole, len(whole)) is None
+    assert unread_formats.kind_by_mark(whole) is None
+    assert unread_formats.kind_by_first_record(whole, len(whole)) is None
 
 
 MARKS = {"jsf": b"\x01\x16", "sbg": b"\xff\x5a", "sbf": b"$@", "ubx": b"\xb5\x62", "gsof": b"\x02\x28\x40\x28"}
@@ -167,11 +167,11 @@ MARKS = {"jsf": b"\x01\x16", "sbg": b"\xff\x5a", "sbf": b"$@", "ubx": b"\xb5\x62
 def test_two_bytes_are_no_mark(name: str) -> None:
     """Other files begin with them by chance; a record whose end is wrong is none."""
     content = FILES[name][0]
-    assert kind_of_bytes(MARKS[name] + REST, 9999) is detect.UNKNOWN
-    damaged = bytearray(content[:HEAD])
+    assert kind_of_bytes(MARKS[name] + REST, 9999) is file_kind.UNKNOWN
+    damaged = bytearray(content[:HEAD_BYTES])
     for k in range(len(MARKS[name]) + 6, len(damaged)):
         damaged[k] ^= 0x55
-    assert kind_of_bytes(bytes(damaged), len(damaged)) is detect.UNKNOWN
+    assert kind_of_bytes(bytes(damaged), len(damaged)) is file_kind.UNKNOWN
 
 
 def test_an_sbet_may_begin_with_any_two_bytes() -> None:
@@ -185,7 +185,7 @@ def test_an_sbet_may_begin_with_any_two_bytes() -> None:
 def test_damaged_sentences_are_a_text() -> None:
     """A checksum that is wrong in most lines: whatever that is, no log of NMEA."""
     wrong = _nmea().replace(b",N,", b",S,")
-    assert kind_of_bytes(wrong, len(wrong)) is detect.TEXT
+    assert kind_of_bytes(wrong, len(wrong)) is file_kind.TEXT
 
 
 def test_a_novatel_log_among_sentences_is_novatel() -> None:
@@ -195,4 +195,4 @@ def test_a_novatel_log_among_sentences_is_novatel() -> None:
 
 def test_numbers_are_no_ptx() -> None:
     text = b"3\n2\n0 0 0\n" + b"1 2 3\n" * 50
-    assert kind_of_bytes(text, len(text)) is detect.TEXT
+    assert kind_of_bytes(text, len(text)) is file_kind.TEXT

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.readers.dispatch import Sensor, raw_parts
+from pipeline.config.instruments import Sensor
+from pipeline.readers.dispatch import raw_parts
 from tests.support.real_files import DEFAULT, settings_of
 
 Columns = dict[str, np.ndarray]

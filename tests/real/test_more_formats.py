@@ -13,9 +13,10 @@ import pytest
 
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, unix_ns_from_gps
-from pipeline.readers import e57, gsf, kmall
-from pipeline.readers.gsf_records import PING, records
-from pipeline.readers.kmall_datagrams import datagrams
+from pipeline.readers import e57, kmall
+from pipeline.readers.gsf_pings import GsfScales, decode_gsf_ping
+from pipeline.readers.gsf_records import PING, gsf_records
+from pipeline.readers.kmall_datagrams import kmall_datagrams
 from tests.real.conftest import Read
 
 GSF = "mbes/GSF3_08_test_file.gsf"
@@ -48,7 +49,7 @@ def test_kmall_against_its_library(data: Path, read: Read) -> None:
     reader = importlib.import_module("KMALL").kmall()
     dropped: Counter[str] = Counter()
     with (data / KMALL).open("rb") as file:
-        found = [datagram for datagram in datagrams(file, dropped) if datagram[4:8] == b"#MRZ"]
+        found = [datagram for datagram in kmall_datagrams(file, dropped) if datagram[4:8] == b"#MRZ"]
     assert len(found) == 5
     columns: dict[str, list[float]] = {"y": [], "angle": [], "time": []}
     for datagram in found:
@@ -58,7 +59,8 @@ def test_kmall_against_its_library(data: Path, read: Read) -> None:
         columns["angle"] += list(their["beamAngleReRx_deg"])
         columns["time"] += list(their["twoWayTravelTime_sec"])
     with (data / KMALL).open("rb") as file:  # as recorded; read() turns them into those of one head in one place
-        recorded = [kmall.decode(datagram, {}) for datagram in datagrams(file, dropped) if datagram[4:8] == b"#MRZ"]
+        mrz = (datagram for datagram in kmall_datagrams(file, dropped) if datagram[4:8] == b"#MRZ")
+        recorded = [kmall.decode_mrz(datagram, {}) for datagram in mrz]
     pings = [ping for ping in recorded if ping is not None]
     assert np.concatenate([ping.two_way_time_s for ping in pings]).tolist() == columns["time"]
     assert np.concatenate([ping.angle_deg for ping in pings]).tolist() == columns["angle"]
@@ -80,10 +82,10 @@ def test_kmall_cut_in_the_middle(data: Path, read: Read) -> None:
 
 # --- GSF -------------------------------------------------------------------------------------------------------------
 def pings_of(path: Path) -> list[Any]:
-    scales: gsf.Scales = {}
+    scales: GsfScales = {}
     with path.open("rb") as file:
-        bodies = [body for kind, body in records(file, Counter()) if kind == PING]
-    return [gsf.decode(body, 3, scales) for body in bodies]
+        bodies = [body for kind, body in gsf_records(file, Counter()) if kind == PING]
+    return [decode_gsf_ping(body, 3, scales) for body in bodies]
 
 
 def test_gsf(data: Path) -> None:

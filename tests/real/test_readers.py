@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, GPS_EPOCH_UNIX_S, NS, WEEK_NS
-from pipeline.readers import detect
+from pipeline.readers import detect, file_kind
 from tests.real.conftest import Read
 from tests.real.test_kongsberg_all import HE, TURBEAMS
 from tests.real.test_more_formats import BUNNY, GSF, KMALL, MOVED
@@ -357,7 +357,7 @@ def test_every_file_is_tried(data: Path, read: Read) -> None:
     assert set(REFUSED) | REFUSED_LATER <= set(names)
     for path, name in zip(paths, names, strict=True):
         kind = detect.kind_of(path, path.name)
-        assert (kind is detect.UNKNOWN) == (name in NO_KIND), name
+        assert (kind is file_kind.UNKNOWN) == (name in NO_KIND), name
         if kind.format is None:
             for sensor, formats in FORMATS.items():
                 with pytest.raises(RawDataError) as error:

@@ -11,7 +11,8 @@ from pipeline.atomic_files import read_json, read_regular
 from pipeline.config.mount import Mount
 from pipeline.config.session import Ins, Laser, SessionConfig
 from pipeline.config.target_mesh import with_mesh
-from pipeline.config.yaml_models import MAX_YAML_BYTES, parse, read_yaml
+from pipeline.config.yaml_file import MAX_YAML_BYTES, read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.dispatch import raw_files, raw_parts
 from tests.support.limits import limited

@@ -12,7 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pipeline.config.pool import PoolConfig
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.maths.target.model import TargetModel
 from pipeline.results.pages import face_maps, target_plots
 from pipeline.results.pages.rendering import drawing_style

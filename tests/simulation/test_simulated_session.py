@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.config.load import load_pool, load_session
-from pipeline.config.yaml_models import read_yaml
+from pipeline.config.yaml_file import read_yaml
 from pipeline.errors import ConfigError
 from pipeline.simulation import session as session_module
 from pipeline.simulation.ins import drift

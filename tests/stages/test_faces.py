@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 from pipeline.artefacts.streams import Stream
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import simulate
 from tests.support.places import errors, sigmas

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.artefacts.streams import Chunk, MemoryPart, Stream
 from pipeline.config.pool import Ingest, TargetPlace
-from pipeline.config.session import Recording, Recordings
+from pipeline.config.recording import Recording, Recordings
 from pipeline.errors import RawDataError
 from pipeline.run.stage_protocol import run_in_memory
 from pipeline.simulation.session import SimulatedSession

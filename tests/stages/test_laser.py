@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from pipeline.adjustment.laser_design import bounds_of, coarse_covariance, held_of
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
-from pipeline.config.yaml_models import parse, read_yaml
+from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_models import parse
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario

@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from pipeline.config.instruments import Sensor
 from pipeline.config.mount import Mount
 from pipeline.config.session import Ins, Laser, Mbes
-from pipeline.readers.dispatch import Sensor
 from tests.support.roots import ROOT
 
 DEFAULT = ROOT.parent / "shared" / "data"

@@ -16,8 +16,8 @@ from markupsafe import Markup
 from pipeline.artefacts.catalogue.points import FILES, GAPS, PASSES, POOL_FRAME
 from pipeline.artefacts.catalogue.results import ADJUST_SUMMARY, CALIBRATION, CELLS, ESTIMATE, FREED, GROUPS
 from pipeline.atomic_files import write_text
+from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
-from pipeline.config.yaml_models import changes
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import by_design
@@ -174,7 +174,7 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
     rows = [
         {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
         for where, model in (("pool", settings.pool), ("session", settings.session))
-        for key, default, value in changes(model)
+        for key, default, value in changed_settings(model)
         if ".instrument." not in key  # these have a table of their own
     ]
     return sorted(rows, key=lambda row: not row["default"])

@@ -1,4 +1,4 @@
-"""What a name in session.yaml stood for: run.yaml holds all of it."""
+"""What the names in session.yaml refer to, of an instrument and of a cast's file: run.yaml holds all of it."""
 
 from typing import Annotated, Literal
 
@@ -11,7 +11,7 @@ InstrumentTitle = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class InstrumentUsed(Model):
-    """A preset as applied; session.yaml has its name alone (pipeline/config/instruments.py), run.yaml all of this."""
+    """A preset as it was used; session.yaml has its name alone (pipeline/config/instruments.py)."""
 
     name: Annotated[str, Field(pattern=f"^{INSTRUMENT}$")]
     title: InstrumentTitle
@@ -21,7 +21,7 @@ class InstrumentUsed(Model):
 
 
 class CastUsed(Model):
-    """A file's cast as it was used; session.yaml has the file's name alone (readers/casts.py), run.yaml all of this."""
+    """A cast as it was used; session.yaml has its file's name alone (pipeline/readers/casts.py)."""
 
     file: Annotated[str, Field(max_length=1000)]  # in the session folder
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]

@@ -1,0 +1,95 @@
+"""What each stage gets of the settings: no more than it uses, so that another setting does not run it again.
+
+A stage names in its Config the blocks it wants (``laser``, ``mbes``, ``segment``, ...). Where it annotates one with a
+narrower model than the block's own, it gets that model, filled with the block's fields of the same names. Keys keep the
+names of session.yaml, and so do the reasons why a stage is run again.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, TypeVar, get_args, get_type_hints
+
+from pydantic import BaseModel
+
+from pipeline.config.mount import Mount
+from pipeline.config.pool import PoolConfig
+from pipeline.config.quantities import Model
+from pipeline.config.session import SessionConfig
+
+C = TypeVar("C")
+M = TypeVar("M", bound=BaseModel)
+
+
+class SensorMount(Model):
+    """The coarse mount of a sensor."""
+
+    mount: Mount
+
+
+class LaserPlacement(Model):
+    """What places the laser's points in the pool: its mount, and the frame that its files are in."""
+
+    mount: Mount
+    frame: str
+
+
+class SonarPlacement(Model):
+    """What places soundings in the pool: the mount, and what turns times and angles into points."""
+
+    mount: Mount
+    sound_speed_m_s: float | None
+    svp: tuple[tuple[float, float], ...] | None
+    projector_offset_m: tuple[float, float, float] | None
+
+
+class SonarBeams(Model):
+    """What footprints on the target depend on: the mount, the width of the beams, and how far their angles stray."""
+
+    mount: Mount
+    beam_deg: tuple[float, float]
+    angle_sigma_deg: float
+
+
+def narrow(model: type[M], block: BaseModel) -> M:
+    """Return the fields that ``model`` has, taken from a block of settings that has more."""
+    return model.model_validate({name: getattr(block, name) for name in model.model_fields})
+
+
+def settings_by_name(pool: PoolConfig, session: SessionConfig) -> dict[str, Any]:
+    """Return every setting by the name under which a stage's Config asks for it."""
+    blocks: tuple[BaseModel, ...] = (pool, session)
+    settings = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
+    return settings | {"target_place": pool.target_place, "recordings": session.recordings}
+
+
+def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:
+    """Build a stage's Config.
+
+    Parameters
+    ----------
+    config : type
+        The stage's Config, a dataclass.
+    settings : Mapping[str, Any]
+        Every setting by its name, of :func:`settings_by_name`.
+    """
+    annotations = get_type_hints(config)
+    names = [field.name for field in fields(config)]  # type: ignore[arg-type]
+    return config(**{name: _as_annotated(annotations[name], settings[name]) for name in names})
+
+
+def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings as JSON has them."""
+    return {
+        name: value.model_dump(mode="json") if isinstance(value, BaseModel) else value
+        for name, value in settings.items()
+    }
+
+
+def _as_annotated(annotation: Any, value: Any) -> Any:
+    """Return a setting as a Config annotates it: as it is, or narrowed."""
+    choices = get_args(annotation) or (annotation,)
+    models = [choice for choice in choices if isinstance(choice, type) and issubclass(choice, BaseModel)]
+    if not isinstance(value, BaseModel) or not models or isinstance(value, tuple(models)):
+        return value
+    (model,) = models
+    return narrow(model, value)

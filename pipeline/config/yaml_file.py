@@ -1,0 +1,90 @@
+"""A YAML file read strictly: every way in which this can fail is one line that names the file."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pipeline.atomic_files import read_regular
+from pipeline.errors import ConfigError
+
+MAX_YAML_BYTES = 1_000_000
+MAX_INTEGER = 2**63
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """Load safe YAML; refuse a key given twice (YAML would silently take the last) and aliases (no bombs)."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.events.AliasEvent):
+            raise yaml.YAMLError("aliases (*name) are not accepted")
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        keys: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, (list, dict)):
+                raise yaml.YAMLError(f"line {key_node.start_mark.line + 1}: a key must be a plain word")
+            if key in keys:
+                raise yaml.YAMLError(f"line {key_node.start_mark.line + 1}: key {key!r} is given twice")
+            keys.add(key)
+        return super().construct_mapping(node, deep)
+
+    def construct_yaml_int(self, node: Any) -> int:
+        value = super().construct_yaml_int(node)
+        if abs(value) >= MAX_INTEGER:  # thousands of digits cannot even be shown
+            raise yaml.YAMLError(f"line {node.start_mark.line + 1}: a whole number of more than 18 digits")
+        return value
+
+
+_StrictLoader.add_constructor("tag:yaml.org,2002:int", _StrictLoader.construct_yaml_int)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Return the mapping in a YAML file; every way in which this can fail is a ConfigError."""
+    return content_of(text_of(path), path)
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a YAML file as it stands, line ends and all."""
+    try:
+        content = read_regular(path, MAX_YAML_BYTES)
+        if len(content) > MAX_YAML_BYTES:
+            raise ConfigError(f"{path}: {path.stat().st_size} bytes is no config; name the YAML file meant")
+        return content.decode("utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
+
+
+def content_of(text: str, path: Path) -> dict[str, Any]:
+    """Return the mapping that a YAML text holds; ``path`` is the file that messages name."""
+    content = _loaded(text, path, _StrictLoader.get_single_data)
+    if content is None:
+        raise ConfigError(f"{path}: is empty; see README.md for what it must say")
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path}: holds {type(content).__name__}, not a mapping of keys; see README.md")
+    return content
+
+
+def compose(text: str, path: Path) -> yaml.Node:
+    """Return the nodes of a YAML text, which know their places in it; ``path`` is the file that messages name."""
+    node: yaml.Node = _loaded(text, path, _StrictLoader.get_single_node)
+    return node
+
+
+def _loaded(text: str, path: Path, load: Callable[[_StrictLoader], Any]) -> Any:
+    try:
+        return load(_StrictLoader(text))
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigError(f"{path}: not valid YAML: {error}; correct the file") from error
+    except RecursionError as error:
+        raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; correct the file") from error
+    except Exception as error:  # the library alone runs here, and raises anything at a value it cannot read
+        raise ConfigError(
+            f"{path}: not valid YAML: a value is not what it is said or seems to be ({type(error).__name__}: {error}); "
+            "put it in quotes, and take tags such as !!float out"
+        ) from error

@@ -1,0 +1,42 @@
+"""A changed setting runs only the stages that use it, and those after them."""
+
+import pytest
+
+from stages import ORDER
+from tests.support.places import Place
+
+FIRST_STAGE: dict[str, tuple[object, str]] = {  # by key: another value, and the first stage that uses it
+    "mbes.latency_s": (0.002, "ingest"),
+    "mbes.sound_speed_m_s": (1481.0, "georeference"),
+    "mbes.svp": ([[0.1, 1480.0], [3.9, 1482.0]], "georeference"),
+    "mbes.projector_offset_m": ([0.0, 0.1, 0.0], "georeference"),
+    "mbes.mount": ({"x_m": 0.37}, "georeference"),
+    "laser.mount": ({"x_m": 0.37}, "georeference"),
+    "mbes.beam_deg": ([0.6, 1.1], "segment"),
+    "mbes.angle_sigma_deg": (0.07, "segment"),
+    "mbes.range_sigma_m": (0.009, "adjust"),
+    "mbes.range_bias_sigma_m": (0.003, "adjust"),
+    "mbes.sound_speed_sigma_m_s": (0.3, "adjust"),
+    "mbes.sound_speed_gradient_sigma_1_s": (0.2, "adjust"),
+    "mbes.latency_sigma_s": (0.0006, "adjust"),
+    "laser.range_sigma_m": (0.006, "adjust"),
+    "laser.angle_sigma_deg": (0.004, "adjust"),
+    "laser.mount_sigma": ({"angle_deg": 0.006}, "adjust"),
+    "ins.white": ({"position_m": 0.003}, "adjust"),
+}
+
+
+@pytest.mark.parametrize("key", FIRST_STAGE)
+def test_the_first_stage_that_runs_again(done: Place, key: str) -> None:
+    """Stages before it are up to date; adjust and report, which take nearly every setting, run in any case."""
+    value, first = FIRST_STAGE[key]
+    sensor, name = key.split(".")
+    done.edit_session(sensor, **{name: value})
+    told = done.calibrate()
+    assert told.ran[0] == first, told.err
+    (reason,) = [line for line in told.err.splitlines() if line.startswith(f"{first}: ") and " -> " in line]
+    assert key in reason
+    before = ORDER[: ORDER.index(first)]
+    assert [stage for stage in before if f"{stage}: up to date\n" in told.err] == list(before)
+    if first == "adjust":
+        assert told.ran == ["adjust", "report"]
