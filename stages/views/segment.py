@@ -8,10 +8,11 @@ from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, TARGET_PO
 from pipeline.artefacts.families import families_of, shown_as
 from pipeline.artefacts.streams import xyz
 from pipeline.run.results import Tables
-from stages.views.recording import AT_MOST, COLOURS, DOT_M
+from stages.views.recording import COLOURS, DOT_M, MOST_POINTS
 
 
 def log(recording: Any, tables: Tables) -> None:
+    """Log the pool's place, the target by design, and the labelled laser points."""
     import rerun as rr
 
     pose = tables.table(TARGET_POSE).iloc[0]
@@ -23,7 +24,7 @@ def log(recording: Any, tables: Tables) -> None:
     faces = tables.table(FACES)
     family_of = faces["family"].to_numpy()
     laser, step = tables.sample(
-        LASER_LABELLED, AT_MOST, "face", *(f"{axis}_target_m" for axis in "xyz")
+        LASER_LABELLED, MOST_POINTS, "face", *(f"{axis}_target_m" for axis in "xyz")
     )
     points, family = xyz(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
     for name, colour in shown_as(families_of(faces), COLOURS).items():
