@@ -1,4 +1,4 @@
-"""From the configuration's degrees to what the mathematics takes."""
+"""A sensor on the body: rotation and lever arm, from and to the configuration's degrees and metres."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,43 +23,51 @@ class Mounted:
     lever_arm_body_m: Array
 
     def settings(self) -> dict[str, float]:
-        """The contract's six numbers: pitch within ±90°, roll and yaw within ±180°, whatever way they were written."""
+        """Return the six numbers of a mount in session.yaml: pitch within ±90°, roll and yaw within ±180°."""
         names = ("roll_deg", "pitch_deg", "yaw_deg")
         angles = (round(float(np.degrees(angle)), 12) for angle in mount_from_rotation(self.R_body_from_sensor))
         lever = (float(value) for value in self.lever_arm_body_m)
         return dict(zip(names, angles, strict=True)) | dict(zip(("x_m", "y_m", "z_m"), lever, strict=True))
 
     def sigmas(self, covariance: Array) -> dict[str, float]:
-        """Standard deviations of the six settings, from the covariance (6, 6) of (ε about body x, y, z; lever arm)."""
+        """Return the sigmas of the six settings, from the covariance (6, 6) of (ε about body x, y, z; lever arm)."""
         partials = mount_partials(self.R_body_from_sensor)
         angles = np.degrees(np.sqrt(np.diag(partials @ covariance[:3, :3] @ partials.T)))
-        six = [*angles, *np.sqrt(np.diag(covariance)[3:])]
-        return {key: float(six[place]) for _, place, key, _ in PARAMETERS}
+        sigmas = [*angles, *np.sqrt(np.diag(covariance)[3:])]
+        return {key: float(sigmas[place]) for _, place, key, _ in PARAMETERS}
 
 
-def turned(mount: Mount, turn_deg: Sequence[float]) -> Mounted:
-    """A mount after a correction by a rotation vector about the body's x, y, z, its lever arm as it is."""
-    as_given = mount_of(mount)
-    return Mounted(exp_so3(np.radians(turn_deg)) @ as_given.R_body_from_sensor, as_given.lever_arm_body_m)
+def corrected_mount(mount: Mount, rotation_vector_deg: Array) -> Mounted:
+    """Return a mount after a correction by a rotation vector (3,) about the body's x, y, z; its lever arm stays."""
+    coarse = mount_of(mount)
+    return Mounted(exp_so3(np.radians(rotation_vector_deg)) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m)
 
 
 def mount_of(mount: Mount) -> Mounted:
-    """Radians and matrices from a mount's settings."""
+    """Return the matrix and the vector of a mount's settings."""
     angles = np.radians([mount.roll_deg, mount.pitch_deg, mount.yaw_deg])
     return Mounted(rotation_from_mount(*map(float, angles)), np.array([mount.x_m, mount.y_m, mount.z_m]))
 
 
-def six_of(block: Mapping[str, Sequence[float] | None] | None) -> list[float]:
-    """Correction or sigma of calibration.json in one list: rotation about body x, y, z (degrees), lever arm (m).
+def parameters_of(block: Mapping[str, Sequence[float] | None] | None) -> list[float]:
+    """Return a correction or a sigma of calibration.json as one list (6,), NaN where the block has none.
 
-    Not numbers where it has none.
+    Rotation about body x, y, z (degrees), lever arm (m).
     """
     parts = [] if block is None else [block["rotation_vector_deg"], block["lever_arm_m"]]
     return [float(value) for part in parts if part is not None for value in part] or [float("nan")] * 6
 
 
-def change_of(total: Mapping[str, float], coarse: Mapping[str, float], key: str) -> float:
-    """Calibrated minus coarse; of angles the way that is shorter, never a whole turn."""
+def setting_change(total: Mapping[str, float], coarse: Mapping[str, float], key: str) -> float:
+    """Return calibrated minus coarse of one setting; an angle changes by the shorter way, never by a whole turn.
+
+    Parameters
+    ----------
+    total, coarse
+        Settings of the calibrated and of the coarse mount, degrees and metres.
+    key
+        Name of the setting.
+    """
     change = total[key] - coarse[key]
     return change - 360.0 * round(change / 360.0) if key.endswith("_deg") else change
 

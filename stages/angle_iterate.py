@@ -8,11 +8,12 @@ import pandas as pd
 
 from pipeline.artefacts.catalogue.patent import ANGLES, ITERATIONS, PASS_ITERATIONS
 from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
-from pipeline.artefacts.from_tables import angle_passes
+from pipeline.artefacts.patent_tables import angle_passes
+from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.pool import AngleIterate, FitPlanes
 from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
-from pipeline.maths.patent.angles import AngleResult, iterate_angles
+from pipeline.maths.patent.angles import AngleResult, AngleTolerances, iterate_angles
 from pipeline.mount import mount_of
 
 
@@ -38,20 +39,21 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
+    """Iterate the angles; where the geometry does not allow it, the table says why."""
     settings = config.angle_iterate
+    tolerances = AngleTolerances(
+        max_iterations=settings.max_iterations,
+        step_rad=np.radians(settings.step_tolerance_deg),
+        angle_rad=np.radians(settings.angle_tolerance_deg),
+    )
+    lever_arm_m = mount_of(config.mbes.mount).lever_arm_body_m
+    reason = ""
     try:
-        result = iterate_angles(
-            angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points),
-            mount_of(config.mbes.mount).lever_arm_body_m,
-            settings.max_iterations,
-            np.radians(settings.step_tolerance_deg),
-            np.radians(settings.angle_tolerance_deg),
-        )
-        reason = ""
+        passes = angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
+        result = iterate_angles(passes, lever_arm_m, tolerances)
     except DegenerateGeometryError as error:
         result, reason = AngleResult(np.full(3, np.nan), False, 0, [], []), str(error)
-    vector = np.degrees(result.rotation_vector_rad)
-    angles = {f"rotation_{axis}_deg": vector[k] for k, axis in enumerate("xyz")}
+    angles = xyz_columns("rotation_{}_deg", np.degrees(result.rotation_vector_rad))
     angles |= {"converged": result.converged, "iterations": result.iterations, "reason": reason}
     return Outputs(
         pd.DataFrame(result.rows, columns=[column.name for column in ITERATIONS.columns]),

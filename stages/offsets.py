@@ -8,15 +8,25 @@ import pandas as pd
 
 from pipeline.artefacts.catalogue.patent import ALTERNATION, ANGLES, CORRECTIONS, OFFSET_PAIRS
 from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
-from pipeline.artefacts.from_tables import angle_passes, horizontal_faces, offset_passes
+from pipeline.artefacts.from_tables import rotation_vector_deg
+from pipeline.artefacts.patent_tables import angle_passes, offset_observations
+from pipeline.artefacts.to_tables import mount_correction_columns
 from pipeline.config.pool import FitPlanes, Offsets
 from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.patent.offsets import alternate, offsets
+from pipeline.maths.patent.angles import PassPlanes
+from pipeline.maths.patent.offsets import (
+    AlternationResult,
+    AlternationTolerances,
+    OffsetObservations,
+    PatentOffsets,
+    alternate,
+    patent_offsets,
+)
 from pipeline.mount import mount_of
 
-METHODS = ("patent_sequential", "patent_alternating")
+SEQUENTIAL, ALTERNATING = "patent_sequential", "patent_alternating"
 
 
 @dataclass(frozen=True)
@@ -42,42 +52,61 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
+    """Compute the offsets by both methods; where the geometry does not allow one, the table says why."""
+    min_points = config.fit_planes.min_points
     try:
-        passes = angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
+        passes = angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, min_points)
     except DegenerateGeometryError as error:
-        return _tables([_none(method, str(error)) for method in METHODS], [], [])
-    pool = offset_passes(passes, inputs.planes)
-    dry, wet = horizontal_faces(inputs.faces, inputs.planes, inputs.sounding_moments, config.fit_planes.min_points)
-    lever = mount_of(config.mbes.mount).lever_arm_body_m
-    settings = config.offsets
-    angles = inputs.angles.iloc[0]
+        return _tables([_no_correction(method, str(error)) for method in (SEQUENTIAL, ALTERNATING)], [], [])
+    observations = offset_observations(passes, inputs.faces, inputs.planes, inputs.sounding_moments, min_points)
+    lever_arm_m = mount_of(config.mbes.mount).lever_arm_body_m
     corrections: list[dict[str, Any]] = []
     pairs: list[dict[str, Any]] = []
     alternation: list[dict[str, float]] = []
 
-    vector = np.radians([float(angles[f"rotation_{axis}_deg"]) for axis in "xyz"])
-    method = METHODS[0]
+    angles = inputs.angles.iloc[0]
     try:
-        if angles["reason"]:
-            raise DegenerateGeometryError(str(angles["reason"]))
-        once = offsets(pool, dry, wet, exp_so3(vector), lever, settings.apply_x_first)
-        pairs += [{"method": method, **pair} for pair in once.pairs]
-        corrections.append(_row(method, vector, once.body_m, bool(angles["converged"]), int(angles["iterations"]), ""))
+        sequential = _sequential(angles, observations, lever_arm_m, config.offsets.apply_x_first)
+        pairs += [{"method": SEQUENTIAL, **pair} for pair in sequential.pairs]
+        state = {"converged": bool(angles["converged"]), "iterations": int(angles["iterations"]), "reason": ""}
+        vector_rad = np.radians(rotation_vector_deg(angles))
+        corrections.append(_row(SEQUENTIAL, vector_rad, sequential.body_m, state))
     except DegenerateGeometryError as error:
-        corrections.append(_none(method, str(error)))
+        corrections.append(_no_correction(SEQUENTIAL, str(error)))
 
-    method = METHODS[1]
     try:
-        tolerances = (np.radians(settings.step_tolerance_deg), settings.step_tolerance_m)
-        result = alternate(passes, pool, dry, wet, lever, settings.max_iterations, *tolerances)
-        rotation, shift = result.rotation_vector_rad, result.lever_arm_correction_m
-        last = offsets(pool, dry, wet, exp_so3(rotation), lever + shift, True)
-        pairs += [{"method": method, **pair} for pair in last.pairs]
+        result, last = _alternating(passes, observations, lever_arm_m, config.offsets)
+        pairs += [{"method": ALTERNATING, **pair} for pair in last.pairs]
         alternation = result.rows
-        corrections.append(_row(method, rotation, shift, result.converged, result.iterations, ""))
+        state = {"converged": result.converged, "iterations": result.iterations, "reason": ""}
+        corrections.append(_row(ALTERNATING, result.rotation_vector_rad, result.lever_arm_correction_m, state))
     except DegenerateGeometryError as error:
-        corrections.append(_none(method, str(error)))
+        corrections.append(_no_correction(ALTERNATING, str(error)))
     return _tables(corrections, pairs, alternation)
+
+
+def _sequential(
+    angles: pd.Series, observations: OffsetObservations, lever_arm_m: np.ndarray, apply_x_first: bool
+) -> PatentOffsets:
+    """Return the offsets once after the angles."""
+    if angles["reason"]:
+        raise DegenerateGeometryError(str(angles["reason"]))
+    rotation = exp_so3(np.radians(rotation_vector_deg(angles)))
+    return patent_offsets(observations, rotation, lever_arm_m, apply_x_first)
+
+
+def _alternating(
+    passes: list[PassPlanes], observations: OffsetObservations, lever_arm_m: np.ndarray, settings: Offsets
+) -> tuple[AlternationResult, PatentOffsets]:
+    """Return the fixed point of angles and offsets in turn, and the offsets there."""
+    tolerances = AlternationTolerances(
+        max_iterations=settings.max_iterations,
+        step_rad=np.radians(settings.step_tolerance_deg),
+        step_m=settings.step_tolerance_m,
+    )
+    result = alternate(passes, observations, lever_arm_m, tolerances)
+    rotation = exp_so3(result.rotation_vector_rad)
+    return result, patent_offsets(observations, rotation, lever_arm_m + result.lever_arm_correction_m, True)
 
 
 def _tables(
@@ -90,14 +119,10 @@ def _tables(
     )
 
 
-def _none(method: str, reason: str) -> dict[str, Any]:
-    return _row(method, np.full(3, np.nan), np.full(3, np.nan), False, 0, reason)
+def _no_correction(method: str, reason: str) -> dict[str, Any]:
+    state = {"converged": False, "iterations": 0, "reason": reason}
+    return _row(method, np.full(3, np.nan), np.full(3, np.nan), state)
 
 
-def _row(
-    method: str, vector_rad: np.ndarray, lever_m: np.ndarray, converged: bool, iterations: int, reason: str
-) -> dict[str, Any]:
-    row: dict[str, Any] = {"method": method}
-    row |= {f"rotation_{axis}_deg": float(np.degrees(vector_rad[k])) for k, axis in enumerate("xyz")}
-    row |= {f"lever_arm_{axis}_m": float(lever_m[k]) for k, axis in enumerate("xyz")}
-    return row | {"converged": converged, "iterations": iterations, "reason": reason}
+def _row(method: str, vector_rad: np.ndarray, lever_arm_m: np.ndarray, state: dict[str, Any]) -> dict[str, Any]:
+    return {"method": method} | mount_correction_columns(vector_rad, lever_arm_m) | state

@@ -27,12 +27,13 @@ from pipeline.artefacts.catalogue.results import (
     PATTERNS,
 )
 from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT, SOUNDING_MOMENTS, TARGET_POSE
+from pipeline.artefacts.from_tables import rotation_vector_deg, vector_of
 from pipeline.artefacts.schema import Provenance
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Adjust, Method, Segment, Verdict
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.config.target import Target
-from pipeline.mount import Mounted, mount_of, turned
+from pipeline.mount import Mounted, corrected_mount, mount_of
 from pipeline.report.as_built import as_found, by_design, oddities
 from pipeline.report.calibration_document import (
     SCHEMA,
@@ -177,7 +178,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
 def _asked(coarse: Mount, provisional: pd.DataFrame) -> str:
     """What to enter where the coarse angles have been checked, and the soundings yet ask for others."""
     found = provisional.iloc[0]
-    settings = turned(coarse, [float(found[f"rotation_{axis}_deg"]) for axis in "xyz"]).settings()
+    settings = corrected_mount(coarse, rotation_vector_deg(found)).settings()
     values = ", ".join(f"{key} {settings[key]:.1f}" for key in ("roll_deg", "pitch_deg", "yaw_deg"))
     return f"; if you have checked the signs, enter {values} as mbes.mount and run again"
 
@@ -203,7 +204,7 @@ def _cast_block(mbes: Mbes) -> dict[str, Any]:
 def _patent_methods(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, dict[str, Any]]:
     methods = {}
     for row in corrections.to_dict("records"):
-        vector = np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"])
-        lever = np.array([row[f"lever_arm_{axis}_m"] for axis in "xyz"])
+        vector = np.radians(rotation_vector_deg(row))
+        lever = vector_of(row, "lever_arm_{}_m")
         methods[str(row["method"])] = method_block(vector, lever, coarse, row)
     return methods

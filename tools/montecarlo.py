@@ -25,8 +25,9 @@ import numpy as np
 import pandas as pd
 import yaml
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
+
+from pipeline.maths.comparison import mount_error
 
 Array = NDArray[np.float64]
 NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about / along body x, y, z
@@ -140,9 +141,8 @@ def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
 
 def errors_of(R_body_from_sensor: Array, lever_arm_m: Array, truth: Mapping[str, Any], sensor: str = "mbes") -> Array:
     """(6,): ε of R_true = Exp(ε) R_body_from_sensor in rad, then the lever arm's error in m."""
-    R_true = np.array(truth[sensor][f"R_body_from_{sensor}"])
-    rotation = Rotation.from_matrix(R_true @ R_body_from_sensor.T).as_rotvec()
-    return np.concatenate([rotation, np.array(truth[sensor]["lever_arm_m"]) - lever_arm_m])
+    R_true, lever_arm_true_m = (np.array(truth[sensor][name]) for name in (f"R_body_from_{sensor}", "lever_arm_m"))
+    return mount_error(R_true, lever_arm_true_m, R_body_from_sensor, lever_arm_m)
 
 
 def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
@@ -227,27 +227,28 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
 
 def pairs(table: pd.DataFrame) -> str:
     """Sessions 0 and 1, 2 and 3, … compared as poolcal diff does: as they are, and with one of the six moved."""
-    from pipeline.maths.comparison import Estimate, compare
+    from pipeline.maths.comparison import MountEstimate, compare_estimates
     from pipeline.maths.geometry.rotations import exp_so3
     from pipeline.results.mount_difference import SIGNIFICANCE
 
-    def estimate(row: Any, moved: Array) -> Estimate:
+    def estimate(row: Any, moved: Array) -> MountEstimate:
         """As found on a mount of zero moved by ``moved``: found = Exp(-error) · true."""
         error = np.array([row[f"error_{name}"] for name in NAMES]) * UNITS
         covariance = np.zeros((6, 6))
         for i in range(6):
             for k in range(i + 1):
                 covariance[i, k] = covariance[k, i] = row[f"covariance_{i}{k}"]
-        return Estimate(exp_so3(-error[:3]) @ exp_so3(moved[:3]), moved[3:] - error[3:], covariance)
+        return MountEstimate(exp_so3(-error[:3]) @ exp_so3(moved[:3]), moved[3:] - error[3:], covariance)
 
     rows = table.to_dict("records")
     two = list(zip(rows[::2], rows[1::2], strict=True))
-    alarms = sum(compare(estimate(a, np.zeros(6)), estimate(b, np.zeros(6))).probability < SIGNIFICANCE for a, b in two)
+    still = np.zeros(6)
+    alarms = sum(compare_estimates(estimate(a, still), estimate(b, still)).probability < SIGNIFICANCE for a, b in two)
     lines = [f"  compared in {len(two)} pairs: {alarms} false alarms, {100 * alarms / len(two):.1f} % (level 1 %)"]
     for k, name in enumerate(NAMES):
         move = np.zeros(6)
         move[k] = np.radians(MOVED_DEG) if k < 3 else MOVED_MM / 1000
-        told = [compare(estimate(a, np.zeros(6)), estimate(b, move)).moved(SIGNIFICANCE) for a, b in two]
+        told = [compare_estimates(estimate(a, still), estimate(b, move)).significant(SIGNIFICANCE) for a, b in two]
         found, named = (100 * np.mean([bool(one) for one in told]), 100 * np.mean([k in one for one in told]))
         size = f"{MOVED_DEG}°" if k < 3 else f"{MOVED_MM} mm"
         lines.append(f"  {name} moved by {size}: found in {found:.1f} % of the pairs, {name} named in {named:.1f} %")

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.artefacts.from_tables import target_frame
 from pipeline.config.pool import LaserFit, Verdict
 from pipeline.config.session import Laser
 from pipeline.maths.adjustment.design_constraints import Design
@@ -25,8 +26,6 @@ def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: LaserFit)
         corners = [model.faces[k].vertices_m - model.faces[k].offset_m * family.normal for k in family.faces]
         planes[family.name] = family.normal, np.concatenate(corners).mean(axis=0)
     pose = target_pose.iloc[0]
-    R_target_from_pool = np.array(pose["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
-    origin = np.array([pose[f"origin_{axis}_pool_m"] for axis in "xyz"], dtype=np.float64)
     turned = np.radians(float(pose["azimuth_correction_deg"]))
     place = settings.origin_sigma_m
     heading, plumb = settings.azimuth_sigma_deg, np.radians(settings.plumb_sigma_deg)
@@ -36,7 +35,7 @@ def design_of(model: TargetModel, target_pose: pd.DataFrame, settings: LaserFit)
         planes,
         float(np.radians(settings.face_sigma_deg)),
         settings.face_sigma_m,
-        np.r_[-R_target_from_pool @ origin, 0.0, 0.0, turned],
+        np.r_[target_frame(target_pose).shift_m, 0.0, 0.0, turned],
         np.array(sigma),
     )
 

@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.weighting import Observations, Weighting
-from pipeline.artefacts.from_tables import ALL_PASSES, laser_planes
-from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.columns import ALL_PASSES
+from pipeline.artefacts.from_tables import laser_planes, trajectory_in_target
 from pipeline.artefacts.streams import Batch, xyz
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.maths.adjustment.interval_sums import MOVING, Runs
@@ -66,7 +66,7 @@ class Scene:
     ) -> Observations:
         """The observations of a batch of labelled points; of known drift v is free, and of the mean of its noise."""
         points, surface = self._ordered(batch)
-        record, share = self.body.trajectory.located(points["t_ns"])
+        record, share = self.body.trajectory.interval_of(points["t_ns"])
         see = self._see_laser if sensor == "laser" else self._see_sonar
         v, mean, sigma = np.empty((3, len(surface)))
         features, slopes = np.empty((FEATURES[sensor], len(surface))), np.empty((FEATURES[sensor] - 1, len(surface)))

@@ -8,15 +8,16 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.artefacts.catalogue.results import RESIDUALS
+from pipeline.artefacts.columns import ALL_PASSES
+from pipeline.artefacts.from_tables import normal_of
 from pipeline.artefacts.streams import Batch
 from pipeline.gps_time import NS
-from pipeline.maths.geometry.face_grid import Bins, binned, cell_centres, cells_on_face
+from pipeline.maths.geometry.face_grid import BinStatistics, bin_statistics, cell_centres, cells_on_face
 
 SENSORS = ("laser", "mbes")
 WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # degrees, m, s
 CELL_M = 0.1
 FEWEST = 10  # points behind a mean that is shown to people
-ALL_PASSES = -1
 
 
 def step_for(total: int, at_most: int) -> int:
@@ -70,7 +71,7 @@ def map_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
         of_sensor = residuals[residuals["sensor"] == sensor]
         for face in faces.to_dict("records"):
             points = of_sensor[of_sensor["face"] == face["face"]]
-            normal = np.array([face[f"normal_{axis}_target_1"] for axis in "xyz"], dtype=np.float64)
+            normal = normal_of(face)
             where = points[[f"{axis}_target_m" for axis in "xyz"]].to_numpy(np.float64)
             cells = cells_on_face(where, normal, CELL_M)
             found = _binned(points, cells[:, 0], cells[:, 1])
@@ -81,12 +82,12 @@ def map_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(rows, ignore_index=True)
 
 
-def _binned(points: pd.DataFrame, *keys: Any) -> Bins:
+def _binned(points: pd.DataFrame, *keys: Any) -> BinStatistics:
     values = (points[name].to_numpy(np.float64) for name in ("residual_m", "weight"))
-    return binned(np.column_stack([np.asarray(key, dtype=np.int64) for key in keys]), *values)
+    return bin_statistics(np.column_stack([np.asarray(key, dtype=np.int64) for key in keys]), *values)
 
 
-def _columns(found: Bins) -> dict[str, Any]:
+def _columns(found: BinStatistics) -> dict[str, Any]:
     return {"count": found.count, "mean_m": found.mean_m, "rms_m": found.rms_m}
 
 

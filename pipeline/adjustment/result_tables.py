@@ -12,6 +12,7 @@ from pipeline.adjustment.iteration import Adjusted
 from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.residual_statistics import Cells
 from pipeline.artefacts.catalogue.results import CELLS
+from pipeline.artefacts.to_tables import normal_columns
 from pipeline.config.pool import Adjust
 from pipeline.console import plural
 from pipeline.maths.adjustment.parameters import NAMES, SIX
@@ -140,7 +141,7 @@ def _freed_table(found: Adjusted, considered: Array, estimate: pd.DataFrame) -> 
 def _surfaces_table(found: Adjusted, cells: Cells) -> pd.DataFrame:
     rows = []
     for k, surface in enumerate(found.state.surfaces):
-        row: dict[str, Any] = {f"normal_{axis}_target_1": surface.normal[i] for i, axis in enumerate("xyz")}
+        row = normal_columns(surface.normal)
         row |= {"family": surface.family, "distance_m": surface.distance_m}
         for sensor, name in (("laser", "laser_points"), ("mbes", "soundings")):
             row[name] = sum(cell.count for (s, number, _), cell in cells.items() if s == sensor and number == k)

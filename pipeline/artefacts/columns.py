@@ -26,6 +26,7 @@ ROTATION = tuple(
 MOUNT_CORRECTION = (
     *ROTATION, *(Column(f"lever_arm_{axis}_m", F64, "m", f"lever arm correction, body {axis}") for axis in "xyz")
 )
+ALL_PASSES = -1  # number in place of a pass, in rows of all passes together
 T_NS = Column("t_ns", I64, "ns", "GPS time: nanoseconds since 1980-01-06 00:00:00 GPS, latency removed")
 PASS = Column("pass", I16, "1", "number of the pass, from 0; -1: none (or all of them together)")
 COUNTS = (

@@ -6,7 +6,7 @@ import pandas as pd
 
 
 def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]) -> pd.DataFrame:
-    """Columns source, reason, count: the chunks' counts summed, reasons in alphabetical order."""
+    """Return the table source, reason, count: the chunks' counts summed, reasons in alphabetical order."""
     rows = []
     for source, pieces in partials.items():
         total: dict[str, int] = {"used": 0}
@@ -15,3 +15,21 @@ def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]
                 total[reason] = total.get(reason, 0) + number
         rows += [{"source": source, "reason": reason, "count": number} for reason, number in sorted(total.items())]
     return pd.DataFrame(rows, columns=["source", "reason", "count"])
+
+
+def used(counts: pd.DataFrame, source: str) -> float:
+    """Return how many records of a source went on."""
+    return float(counts[(counts["source"] == source) & (counts["reason"] == "used")]["count"].sum())
+
+
+def by_reason(counts: pd.DataFrame, source: str) -> pd.Series:
+    """Return the counts of a source by reason."""
+    return counts[counts["source"] == source].set_index("reason")["count"]
+
+
+def why_none_used(counts: pd.DataFrame, source: str) -> str | None:
+    """Return the counts of a source by reason, as text, if no record went on; else None."""
+    of_source = by_reason(counts, source)
+    if of_source["used"]:
+        return None
+    return ", ".join(f"{number} {reason}" for reason, number in of_source.items() if number and reason != "used")

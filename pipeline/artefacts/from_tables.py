@@ -1,113 +1,116 @@
-"""From fit_planes' tables back to what the patent's steps take."""
+"""Rows of the tables back into vectors, frames, trajectories and planes: their columns are taken apart here alone."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.planes import Plane
-from pipeline.maths.patent.angles import PassPlanes
+from pipeline.maths.geometry.rotations import rotation_from_quaternion
+from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.patent.lifted_moments import SIZE
-from pipeline.maths.patent.offsets import DryFace, PassOffsets, WetFace, by_family
-from pipeline.maths.target.model import LEVEL
+from pipeline.maths.target.face import HORIZONTAL_COSINE
+from pipeline.maths.target.frame import TargetFrame
+from pipeline.maths.target.model import ROLES
 
 Array = NDArray[np.float64]
-ALL_PASSES = -1
+Row = Mapping[Any, Any] | pd.Series
 
 
-def laser_planes(planes: pd.DataFrame) -> dict[tuple[int, str], Plane]:
-    """The laser's planes by (pass, name), P4 left out."""
-    return planes_of(planes, "laser")
+def vector_of(row: Row, columns: str) -> Array:
+    """Return three columns of a row as a vector (3,); ``columns`` has ``{}`` where x, y and z stand.
+
+    >>> vector_of({"x_m": 1, "y_m": 2, "z_m": 3}, "{}_m")
+    array([1., 2., 3.])
+    """
+    return np.array([row[columns.format(axis)] for axis in "xyz"], dtype=np.float64)
 
 
-def planes_of(planes: pd.DataFrame, sensor: str) -> dict[tuple[int, str], Plane]:
-    """One sensor's."""
+def normal_of(row: Row) -> Array:
+    """Return the normal (3,) of a face, plane or surface, target frame."""
+    return vector_of(row, "normal_{}_target_1")
+
+
+def normals_of(table: pd.DataFrame) -> Array:
+    """Return the normals (n, 3) of faces, planes or surfaces, target frame."""
+    return table[["normal_x_target_1", "normal_y_target_1", "normal_z_target_1"]].to_numpy(dtype=np.float64)
+
+
+def is_horizontal(faces: pd.DataFrame) -> NDArray[np.bool_]:
+    """Return which faces (n,) are horizontal."""
+    return np.asarray(faces["normal_z_target_1"].abs() > HORIZONTAL_COSINE)
+
+
+def rotation_vector_deg(row: Row) -> Array:
+    """Return the rotation vector (3,) of a correction of the mount, degrees, body axes."""
+    return vector_of(row, "rotation_{}_deg")
+
+
+def target_frame(target_pose: pd.DataFrame) -> TargetFrame:
+    """Return the target frame as it lies in the pool, from the table ``target_pose`` (one row)."""
+    row = target_pose.iloc[0]
+    R_target_from_pool = np.array(row["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
+    return TargetFrame(R_target_from_pool, vector_of(row, "origin_{}_pool_m"))
+
+
+def trajectory_in_pool(poses: pd.DataFrame) -> Trajectory:
+    """Return the trajectory in the pool frame from the table ``poses`` of stage georeference."""
+    return Trajectory.build(
+        poses["t_ns"].to_numpy(),
+        poses[["x_pool_m", "y_pool_m", "z_pool_m"]].to_numpy(),
+        rotation_from_quaternion(poses[["qw", "qx", "qy", "qz"]].to_numpy()),
+    )
+
+
+def trajectory_in_target(poses: pd.DataFrame, target_pose: pd.DataFrame) -> Trajectory:
+    """Return the trajectory in the target frame: x_target = R_target_from_pool (x_pool - origin)."""
+    return target_frame(target_pose).trajectory_from_pool(trajectory_in_pool(poses))
+
+
+def family_names(faces: pd.DataFrame) -> list[str]:
+    """Return the names of the families: roles first, horizontal ones last, else in order of the faces."""
+    horizontal = dict(zip(faces["family"], is_horizontal(faces), strict=True))
+
+    def place(name: str) -> int:
+        return ROLES.index(name) if name in ROLES else len(ROLES) + bool(horizontal[name])
+
+    return sorted(dict.fromkeys(faces["family"].tolist()), key=place)
+
+
+def horizontal_families(faces: pd.DataFrame) -> set[str]:
+    """Return the names of the families of horizontal faces."""
+    return set(faces.loc[is_horizontal(faces), "family"])
+
+
+def planes_of_sensor(planes: pd.DataFrame, sensor: str) -> dict[tuple[int, str], Plane]:
+    """Return the planes of one sensor by (pass, name), without P4."""
     rows = planes[(planes["sensor"] == sensor) & (planes["plane"] != "P4")]
-    found = {}
-    for row in rows.to_dict("records"):
-        found[(int(row["pass"]), str(row["plane"]))] = Plane(
-            normal=np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]),
+    return {
+        (int(row["pass"]), str(row["plane"])): Plane(
+            normal=normal_of(row),
             distance_m=float(row["distance_m"]),
-            centroid_m=np.array([row[f"centroid_{axis}_target_m"] for axis in "xyz"]),
+            centroid_m=vector_of(row, "centroid_{}_target_m"),
             count=int(row["count"]),
             rms_m=float(row["rms_m"]),
             eigenvalues_m2=np.array(row["eigenvalues_m2"], dtype=np.float64),
             tangents=np.array(row["tangents"], dtype=np.float64).reshape(2, 3),
             covariance=np.array(row["covariance"], dtype=np.float64).reshape(3, 3),
         )
-    return found
+        for row in rows.to_dict("records")
+    }
 
 
-def lifted_moments(sounding_moments: pd.DataFrame) -> dict[tuple[int, int], Array]:
-    """Lifted moments (40, 40) by (pass, face)."""
+def laser_planes(planes: pd.DataFrame) -> dict[tuple[int, str], Plane]:
+    """Return the planes of the laser by (pass, name), without P4."""
+    return planes_of_sensor(planes, "laser")
+
+
+def moments_by_face(sounding_moments: pd.DataFrame) -> dict[tuple[int, int], Array]:
+    """Return the lifted moments (40, 40) of the soundings by (pass, face)."""
     keys = zip(sounding_moments["pass"].tolist(), sounding_moments["face"].tolist(), strict=True)
     return {
         key: np.array(moments, dtype=np.float64).reshape(SIZE, SIZE)
         for key, moments in zip(keys, sounding_moments["moments"], strict=True)
     }
-
-
-def angle_passes(
-    faces: pd.DataFrame, planes: pd.DataFrame, sounding_moments: pd.DataFrame, min_points: int
-) -> list[PassPlanes]:
-    """Passes in which both sensors have all of P1, P2, P3: with the laser's normals of the same pass.
-
-    Raises
-    ------
-    DegenerateGeometryError
-        The target has not all of these.
-    """
-    missing = sorted({"P1", "P2", "P3"} - set(faces["family"]))
-    if missing:
-        raise DegenerateGeometryError(
-            f"the patent's steps need faces with the roles P1, P2, P3; this target has none with {', '.join(missing)}"
-        )
-    laser = laser_planes(planes)
-    laser_p4 = planes[(planes["sensor"] == "laser") & (planes["plane"] == "P4")]
-    fourth = {
-        int(row["pass"]): np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"])
-        for row in laser_p4.to_dict("records")
-    }
-    families = _families(faces, sounding_moments)
-    found = []
-    for number in sorted({number for number, _ in families}):
-        lifted = {f: families[(number, f)] for f in ("P1", "P2", "P3") if (number, f) in families}
-        complete = len(lifted) == 3 and all(m[-1, -1] >= min_points for m in lifted.values())
-        if complete and number in fourth and (number, "P3") in laser:
-            normals = {f: laser[(number, f)].normal for f in ("P1", "P2", "P3")} | {"P4": fourth[number]}
-            found.append(PassPlanes(number, lifted, normals))
-    return found
-
-
-def offset_passes(passes: list[PassPlanes], planes: pd.DataFrame) -> list[PassOffsets]:
-    """The same passes with the laser's planes P1 and P2."""
-    laser = laser_planes(planes)
-    return [PassOffsets(one, laser[(one.number, "P2")], laser[(one.number, "P1")]) for one in passes]
-
-
-def _families(faces: pd.DataFrame, sounding_moments: pd.DataFrame) -> Mapping[tuple[int, str], Array]:
-    return by_family(
-        dict(zip(faces["face"].tolist(), faces["family"].tolist(), strict=True)), lifted_moments(sounding_moments)
-    )
-
-
-def horizontal_faces(
-    faces: pd.DataFrame, planes: pd.DataFrame, sounding_moments: pd.DataFrame, min_points: int
-) -> tuple[list[DryFace], list[WetFace]]:
-    """Horizontal faces that the laser and the sonar see with at least ``min_points``, over all passes."""
-    laser = laser_planes(planes)
-    total: dict[int, Array] = {}
-    for (_, face), lifted in lifted_moments(sounding_moments).items():
-        total[face] = total[face] + lifted if face in total else lifted
-    dry, wet = [], []
-    for row in faces[faces["normal_z_target_1"].abs() > LEVEL].to_dict("records"):
-        design = float(row["distance_m"] * row["normal_z_target_1"])
-        plane = laser.get((ALL_PASSES, row["name"]))
-        if plane is not None and plane.count >= min_points:
-            dry.append(DryFace(row["name"], float(plane.centroid_m[2]), design, plane.count))
-        seen = total.get(int(row["face"]))
-        if seen is not None and seen[-1, -1] >= min_points:
-            wet.append(WetFace(row["name"], seen, design))
-    return dry, wet

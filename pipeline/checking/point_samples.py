@@ -81,8 +81,8 @@ def sample(
         columns["angle_rad"],
         columns["transmit_tilt_rad"],
         columns["sound_speed_m_s"],
-        mbes.sound_speed_m_s,
-        offset,
+        true_sound_speed_m_s=mbes.sound_speed_m_s,
+        projector_offset_m=offset,
     )
     return Sample(sensor, columns["t_ns"][valid], points[valid], mbes.mount)
 
@@ -101,5 +101,5 @@ def put(
     t_ns = some.t_ns - round(ahead_s * NS)
     covered = track.trajectory.covers(t_ns, NS)
     placed = np.full(body.shape, np.nan)
-    placed[covered] = track.trajectory.place(t_ns[covered], body[covered])
+    placed[covered] = track.trajectory.points_from_body(t_ns[covered], body[covered])
     return placed

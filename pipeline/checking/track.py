@@ -10,8 +10,8 @@ from pipeline.checking.file_survey import Columns, Seen
 from pipeline.config.pool import Ingest, TargetPlace
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
-from pipeline.maths.geometry.passes import beside, estimate_azimuth, find_passes
-from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.geometry.passes import abeam, estimate_azimuth, find_passes
+from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_in_pool
 from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def frame_of(ins: Columns, place: TargetPlace) -> PoolFrame | None:
 def track_of(
     ins: Columns, frame: PoolFrame, model: TargetModel, files: Sequence[Seen], settings: Ingest
 ) -> Track:
-    positions, R = poses_in_pool(frame, *(ins[name] for name in NAMES))
+    positions, R = poses_in_pool(frame, GeodeticPoses(**{name: ins[name] for name in NAMES}))
     t_ns = ins["t_ns"]
     low, high = model.bounds()
     reach, max_gap_ns = float(max(-low[1], high[1])), round(settings.max_gap_s * NS)
@@ -112,7 +112,7 @@ def askew_deg(track: Track) -> float | None:
     near, within ±180 degrees: the lesser of the two, none where they do not agree. None where it never had."""
     x, y = track.trajectory.positions_m[:, :2].T
     ahead = track.trajectory.R_frame_from_body[:, :2, 1]
-    near = beside(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
+    near = abeam(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
     if not near.any():
         return None
     steps = np.flatnonzero(near[1:] & near[:-1])

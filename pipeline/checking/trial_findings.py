@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.artefacts.from_tables import rotation_vector_deg, target_frame
 from pipeline.checking.findings import Finding
 from pipeline.checking.heights import profile, way
 from pipeline.checking.point_samples import Sample, put
@@ -16,7 +17,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.target import Letters, Target
 from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import mount_of, turned
+from pipeline.mount import corrected_mount, mount_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
@@ -37,8 +38,8 @@ def other_pose(
     """Whether the laser's points lie better on the target elsewhere than where they were found to: at another height,
     or with its sides exchanged; and what of that cannot be told."""
     found = pose.iloc[0]
-    R = np.array(found["R_target_from_pool"]).reshape(3, 3)
-    origin = np.array([found[f"origin_{axis}_pool_m"] for axis in "xyz"])
+    frame = target_frame(pose)
+    R, origin = frame.R_target_from_pool, frame.origin_pool_m
     points = put(track, laser.near(track))
     points = (points[np.isfinite(points[:, 0])] - origin) @ R.T
     if not len(points):
@@ -114,10 +115,10 @@ def signs(
     if np.linalg.matrix_rank(normals, tol=DIRECTIONS) < 3:
         return
     row = provisional.iloc[0]
-    turn_deg = [float(row[f"rotation_{axis}_deg"]) for axis in "xyz"]
+    turn_deg = rotation_vector_deg(row)
     if not np.isfinite(turn_deg).all():
         return
-    wanted = turned(given, turn_deg)
+    wanted = corrected_mount(given, turn_deg)
 
     def off_deg(mount: Mount) -> float:
         R = mount_of(mount).R_body_from_sensor

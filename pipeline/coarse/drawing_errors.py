@@ -15,7 +15,7 @@ from pipeline.coarse.frames import Array, MarkFrames
 from pipeline.coarse.mirror_images import MIRRORED, axis_hint, is_flat, mirrored, nearest_flip
 from pipeline.console import plural
 from pipeline.errors import ConfigError, DegenerateGeometryError
-from pipeline.maths.survey.data_snooping import LEVEL, LINE_RAD, fits, limit, sigma_about_line
+from pipeline.maths.survey.data_snooping import LINE_RAD, SNOOPING_LEVEL, fit_of_frame, global_limit, sigma_about_line
 from pipeline.maths.survey.frame_adjustment import Frame, Survey, closed_form
 
 UNITS = {"mm": 1000.0, "cm": 100.0, "inches": 1 / 0.0254, "feet": 1 / 0.3048}  # how many of them are a metre
@@ -109,26 +109,26 @@ def _refuse_units(survey: Survey, frame: Frame, key: str) -> None:
 def _refuse_misfit(frames: MarkFrames, name: str, key: str, R_present: Mapping[str, Array]) -> None:
     """Refuse a frame that does not fit, but clearly does as its mirror image or with two names interchanged.
 
-    Clearly: the quotient of the two Ω is beyond F at LEVEL. The explanations that are named are those that fit as well
-    as the best. Where leaving out one mark explains the misfit too, interchanged names must explain it in full.
+    Clearly: the quotient of the two Ω is beyond F at SNOOPING_LEVEL. The explanations that are named are those that fit
+    as well as the best. Where leaving out one mark explains the misfit too, interchanged names must explain it in full.
     """
     frame, survey = frames.by_name[name], frames.survey
-    squares, redundancy = fits(survey, frame)
-    if squares <= limit(redundancy):
+    squares, redundancy = fit_of_frame(survey, frame)
+    if squares <= global_limit(redundancy):
         return
-    far = float(fdtri(redundancy, redundancy, 1 - LEVEL))
-    enough = squares / far if np.isfinite(squares) else limit(redundancy)
-    tried = {pair: fits(survey, interchanged(frame, *pair))[0] for pair in _likely_pairs(survey, frame)}
+    far = float(fdtri(redundancy, redundancy, 1 - SNOOPING_LEVEL))
+    enough = squares / far if np.isfinite(squares) else global_limit(redundancy)
+    tried = {pair: fit_of_frame(survey, interchanged(frame, *pair))[0] for pair in _likely_pairs(survey, frame)}
     better = {pair: left for pair, left in tried.items() if left < enough}
-    if any(left > limit(redundancy) for left in better.values()) and _fits_without_one(survey, frame):
-        better = {pair: left for pair, left in better.items() if left <= limit(redundancy)}
-    squares_mirrored = np.inf if is_flat(survey, frame) else fits(survey, mirrored(frame, 0))[0]
+    if any(left > global_limit(redundancy) for left in better.values()) and _fits_without_one(survey, frame):
+        better = {pair: left for pair, left in better.items() if left <= global_limit(redundancy)}
+    squares_mirrored = np.inf if is_flat(survey, frame) else fit_of_frame(survey, mirrored(frame, 0))[0]
     if squares_mirrored < enough:
         better[()] = squares_mirrored
     if not better:
         return
     best = min(better.values())
-    named = [pair for pair, left in better.items() if left <= max(limit(redundancy), best)]
+    named = [pair for pair, left in better.items() if left <= max(global_limit(redundancy), best)]
     pairs = ", or ".join(" and ".join(frames.mark_names[frame.marks[k]] for k in pair) for pair in named if pair)
     words = []
     if () in named:
@@ -141,7 +141,8 @@ def _refuse_misfit(frames: MarkFrames, name: str, key: str, R_present: Mapping[s
 def _fits_without_one(survey: Survey, frame: Frame) -> bool:
     """Whether all marks but one fit."""
     count = len(frame.marks)
-    return count > 3 and any(fits(survey, frame.without(k))[0] <= limit(3 * count - 9) for k in range(count))
+    limit = global_limit(3 * count - 9)
+    return count > 3 and any(fit_of_frame(survey, frame.without(k))[0] <= limit for k in range(count))
 
 
 def _likely_pairs(survey: Survey, frame: Frame) -> Sequence[tuple[int, ...]]:

@@ -10,8 +10,8 @@ from scipy.special import chdtri
 from pipeline.coarse.mounts_from_marks import Array, MarksAssessment
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.maths.survey.data_snooping import LEVEL, SURVEY, MarkTest, limit
-from pipeline.mount import Mounted, change_of
+from pipeline.maths.survey.data_snooping import SNOOPING_LEVEL, SURVEY, MarkTest, global_limit
+from pipeline.mount import Mounted, setting_change
 from pipeline.text_table import text_table
 
 MOST_NAMED = 8
@@ -52,11 +52,11 @@ def as_plain(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> dic
     """Return all of it as plain values, for YAML; ``present``: the mounts that session.yaml has."""
     first = assessment.snooped.first
     tests = {
-        "level": LEVEL,
+        "level": SNOOPING_LEVEL,
         "statistic": first.squares,
         "degrees_of_freedom": first.redundancy,
-        "limit": limit(first.redundancy),
-        "passed": first.squares <= limit(first.redundancy),
+        "limit": global_limit(first.redundancy),
+        "passed": first.squares <= global_limit(first.redundancy),
         "variance_factor": first.squares / first.redundancy,
     }
     mounts = {}
@@ -66,7 +66,7 @@ def as_plain(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> dic
             "mount": settings,
             "sigma_mount": mounted.sigmas(covariance),
             "session": session,
-            "change": None if session is None else {key: change_of(settings, session, key) for key in settings},
+            "change": None if session is None else {key: setting_change(settings, session, key) for key in settings},
             "R_body_from_sensor": mounted.R_body_from_sensor.tolist(),
             "covariance": covariance.tolist(),
         }
@@ -98,7 +98,7 @@ def _mount_table(assessment: MarksAssessment, name: str, present: Mounted | None
     for parameter, _, key, unit_of_setting in PARAMETERS:
         unit = "°" if unit_of_setting == "deg" else unit_of_setting
         before = "-" if session is None else f"{session[key]:.4f} {unit}"
-        change = "-" if session is None else f"{signed(change_of(settings, session, key), 4)} {unit}"
+        change = "-" if session is None else f"{signed(setting_change(settings, session, key), 4)} {unit}"
         rows.append((parameter, before, f"{settings[key]:.4f} {unit}", change, f"{sigma[key]:.4f} {unit}"))
     return text_table("<12>12>14>14>12", (f"{name} mount", "session", "coarse", "change", "sigma"), rows)
 
@@ -128,8 +128,8 @@ def _residual_lines(assessment: MarksAssessment) -> list[str]:
 
 def _global_line(assessment: MarksAssessment) -> str:
     first = assessment.snooped.first
-    freedom, passed = first.redundancy, first.squares <= limit(first.redundancy)
-    line = f"Global test: {first.squares:.1f}, limit {limit(freedom):.1f}, {freedom} degrees of freedom: "
+    freedom, passed = first.redundancy, first.squares <= global_limit(first.redundancy)
+    line = f"Global test: {first.squares:.1f}, limit {global_limit(freedom):.1f}, {freedom} degrees of freedom: "
     line += f"{'passed' if passed else 'failed'}. Variance factor {first.squares / freedom:.2f}"
     if freedom < CAUTIOUS:
         low, high = (float(chdtri(freedom, share)) / freedom for share in (0.975, 0.025))

@@ -8,8 +8,8 @@ import numpy as np
 from pipeline.coarse.frames import NEAR_DEG, Array, MarkFrames
 from pipeline.errors import ConfigError
 from pipeline.maths.geometry.rotations import log_so3
-from pipeline.maths.survey.data_snooping import limit
-from pipeline.maths.survey.frame_adjustment import Frame, Survey, adjust
+from pipeline.maths.survey.data_snooping import global_limit
+from pipeline.maths.survey.frame_adjustment import Frame, Survey, adjust_frames
 
 AXES = "xyz"
 FAR_DEG = 90.0  # a mount that is farther from the session's is turned over
@@ -53,7 +53,7 @@ def is_flat(survey: Survey, frame: Frame) -> bool:
     """
     variance = float(np.trace(survey.covariance[frame.marks] + frame.covariance, axis1=1, axis2=2).mean()) / 3
     thickness = np.linalg.svd(frame.drawing_m - frame.drawing_m.mean(axis=0), compute_uv=False)[-1]
-    return bool(4 * thickness**2 / variance <= limit(3 * len(frame.marks) - 6))
+    return bool(4 * thickness**2 / variance <= global_limit(3 * len(frame.marks) - 6))
 
 
 def nearest_flip(frames: MarkFrames, name: str, R_present: Mapping[str, Array]) -> AxisFlip | None:
@@ -73,7 +73,7 @@ def nearest_flip(frames: MarkFrames, name: str, R_present: Mapping[str, Array]) 
         return None
 
     def R_survey_from(frame: Frame) -> Array:
-        return adjust(frames.survey, [frame]).poses[0].R_survey_from_frame
+        return adjust_frames(frames.survey, [frame]).poses[0].R_survey_from_frame
 
     as_drawn = {frame: R_survey_from(frames.by_name[frame]) for frame in ("body", *sensors)}
 

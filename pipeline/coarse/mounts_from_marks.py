@@ -14,8 +14,8 @@ from pipeline.coarse.session_file import mount_block
 from pipeline.config.marks import Marks
 from pipeline.errors import ConfigError, NotConvergedError
 from pipeline.maths.geometry.rotations import log_so3
-from pipeline.maths.survey.data_snooping import Snooped, snoop
-from pipeline.maths.survey.frame_adjustment import mounted_on
+from pipeline.maths.survey.data_snooping import SnoopingResult, snoop
+from pipeline.maths.survey.frame_adjustment import relative_mount
 from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class MarksAssessment:
     """
 
     frames: MarkFrames
-    snooped: Snooped
+    snooped: SnoopingResult
     mounts: Mapping[str, tuple[Mounted, Array]]
     warnings: tuple[str, ...]
 
@@ -79,7 +79,7 @@ def assess_marks(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Ma
     mounts = {}
     for number, name in enumerate(frames.by_name):
         if name != "body":
-            R, lever_arm_m, covariance = mounted_on(snooped.last, 0, number)
+            R, lever_arm_m, covariance = relative_mount(snooped.last, 0, number)
             if np.abs(lever_arm_m).max() > FARTHEST_M:
                 length = float(np.linalg.norm(lever_arm_m))
                 raise ConfigError(f"{where}: {name}: lies {length:.0f} m from the INS; give all coordinates in m")

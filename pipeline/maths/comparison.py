@@ -1,4 +1,4 @@
-"""Two calibrations of one mount: is what differs more than their noise?
+"""Two estimates of one mount, and an estimate against the truth: is the difference more than noise?
 
 With R_true = Exp(ε_A) R_A = Exp(ε_B) R_B, and d = Log(R_B R_Aᵀ), to first order d = ε_A - ε_B; likewise the lever arms,
 l_B - l_A = ε_A - ε_B. So where the mount has not moved, the six differences have mean zero and, the two sessions being
@@ -6,10 +6,10 @@ independent, the covariance C = C_A + C_B. Then
 
     T = dᵀ C⁻¹ d
 
-is chi-square with six degrees of freedom: one test of all six at one level, where six separate ones would give six
-times as many false alarms. (Errors that both sessions share, the laser's mount above all, cancel in d.)
+is chi-square with six degrees of freedom: one test of all six parameters at one level; six separate tests would give
+six times as many false alarms. (Errors that both sessions share, the laser's mount above all, cancel in d.)
 
-People read a mount as pitch, roll, yaw, so what differs is named by these: their differences, with the covariance
+People read a mount as pitch, roll, yaw, so the difference is given in these, with the covariance
 J_A C_A J_Aᵀ + J_B C_B J_Bᵀ, J = ∂(pitch, roll, yaw)/∂ε (:func:`pipeline.maths.geometry.rotations.mount_partials`); each
 z_i = d_i / root(C_ii) is standard normal. For a head near zero yaw these are the rotations about body x, y, z; for one
 turned by 90° pitch and roll are the other way round.
@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
-from pipeline.maths.geometry.rotations import log_so3, mount_from_rotation, mount_partials
+from pipeline.maths.geometry.rotations import mount_from_rotation, mount_partials, rotation_error
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Estimate:
+class MountEstimate:
     """R_body_from_sensor (3, 3), lever arm (3,) m, covariance (6, 6) of (ε rad, lever arm m), body axes."""
 
     R_body_from_sensor: Array
@@ -36,9 +36,20 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Second minus first: pitch, roll, yaw (rad) and lever arm (m) in one vector (6,); its sigmas and z (6,) each; the
-    joint statistic T and its probability if nothing has moved."""
+class MountDifference:
+    """Difference of two estimates, second minus first.
+
+    Parameters
+    ----------
+    difference
+        Pitch, roll, yaw (rad) and lever arm (m) in one vector (6,).
+    covariance, sigma
+        Its covariance (6, 6) and sigmas (6,).
+    z
+        Differences in sigmas (6,).
+    statistic, probability
+        The joint statistic T, and its probability if nothing has moved.
+    """
 
     difference: Array
     covariance: Array
@@ -47,50 +58,76 @@ class Comparison:
     statistic: float
     probability: float
 
-    def moved(self, level: float) -> list[int]:
-        """Which of the six stand out, where the joint test says that something does: |z| beyond the limit that six
-        values exceed together with probability ``level`` (Šidák), the largest at least."""
+    def significant(self, level: float) -> list[int]:
+        """Return which of the six parameters have changed, if the joint test says that any has.
+
+        Those with |z| beyond the limit that six values exceed together with probability ``level`` (Šidák); the largest
+        at least.
+        """
         if self.probability >= level:
             return []
         limit = -float(ndtri((1 - (1 - level) ** (1 / 6)) / 2))
         size = np.abs(self.z)
-        found = np.flatnonzero(size > limit).tolist()
-        return found or [int(np.argmax(size))]
+        beyond = np.flatnonzero(size > limit).tolist()
+        return beyond or [int(np.argmax(size))]
 
 
-def compare(first: Estimate, second: Estimate) -> Comparison:
-    """The second minus the first.
+def compare_estimates(first: MountEstimate, second: MountEstimate) -> MountDifference:
+    """Compute the second estimate minus the first, and test it.
 
-    >>> one = Estimate(np.eye(3), np.zeros(3), np.eye(6) * 1e-6)
-    >>> compare(one, one).probability
+    >>> estimate = MountEstimate(np.eye(3), np.zeros(3), np.eye(6) * 1e-6)
+    >>> compare_estimates(estimate, estimate).probability
     1.0
     """
-    rotation = log_so3(second.R_body_from_sensor @ first.R_body_from_sensor.T)
+    rotation = rotation_error(second.R_body_from_sensor, first.R_body_from_sensor)
     lever_arm = second.lever_arm_m - first.lever_arm_m
-    statistic = _squared(np.concatenate([rotation, lever_arm]), first.covariance + second.covariance)
-    one, other = (_settings(estimate.R_body_from_sensor) for estimate in (first, second))
-    angles = np.mod(other - one + np.pi, 2 * np.pi) - np.pi
+    statistic = _mahalanobis_squared(np.concatenate([rotation, lever_arm]), first.covariance + second.covariance)
+    first_angles, second_angles = (_pitch_roll_yaw(estimate.R_body_from_sensor) for estimate in (first, second))
+    angles = np.mod(second_angles - first_angles + np.pi, 2 * np.pi) - np.pi
     difference = np.concatenate([angles, lever_arm])
-    covariance = _turned(first) + _turned(second)
+    covariance = _covariance_of_settings(first) + _covariance_of_settings(second)
     sigma = np.sqrt(np.diag(covariance))
-    return Comparison(difference, covariance, sigma, difference / sigma, statistic, float(chdtrc(6, statistic)))
+    return MountDifference(
+        difference=difference,
+        covariance=covariance,
+        sigma=sigma,
+        z=difference / sigma,
+        statistic=statistic,
+        probability=float(chdtrc(6, statistic)),
+    )
 
 
-def _squared(d: Array, covariance: Array) -> float:
-    """dᵀ C⁻¹ d, scaled first: rad and m are of different size."""
+def mount_error(R_true: Array, lever_arm_true_m: Array, R_found: Array, lever_arm_found_m: Array) -> Array:
+    """Return the error (6,) of an estimated mount, true minus found: ε of R_true = Exp(ε) R_found, lever arm.
+
+    Parameters
+    ----------
+    R_true, R_found
+        R_body_from_sensor (3, 3).
+    lever_arm_true_m, lever_arm_found_m
+        Lever arms (3,), body axes.
+
+    Returns
+    -------
+    Rotation vector in rad, lever arm in m, body axes.
+    """
+    return np.concatenate([rotation_error(R_true, R_found), lever_arm_true_m - lever_arm_found_m])
+
+
+def _mahalanobis_squared(d: Array, covariance: Array) -> float:
+    """Return dᵀ C⁻¹ d, scaled first: rad and m are of different size."""
     sigma = np.sqrt(np.diag(covariance))
     z = d / sigma
     return float(z @ np.linalg.solve(covariance / np.outer(sigma, sigma), z))
 
 
-def _settings(R_body_from_sensor: Array) -> Array:
-    """Pitch, roll, yaw."""
+def _pitch_roll_yaw(R_body_from_sensor: Array) -> Array:
     roll, pitch, yaw = mount_from_rotation(R_body_from_sensor)
     return np.array([pitch, roll, yaw])
 
 
-def _turned(estimate: Estimate) -> Array:
-    """The covariance of (pitch, roll, yaw, lever arm)."""
-    turn = np.eye(6)
-    turn[:3, :3] = mount_partials(estimate.R_body_from_sensor)
-    return np.asarray(turn @ estimate.covariance @ turn.T)
+def _covariance_of_settings(estimate: MountEstimate) -> Array:
+    """Return the covariance (6, 6) of (pitch, roll, yaw, lever arm)."""
+    partials = np.eye(6)
+    partials[:3, :3] = mount_partials(estimate.R_body_from_sensor)
+    return np.asarray(partials @ estimate.covariance @ partials.T)

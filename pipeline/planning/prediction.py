@@ -25,7 +25,8 @@ from pipeline.maths.adjustment.pose_errors import Drift, knots_of
 from pipeline.maths.geometry.rotations import rotation_from_attitude
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.sonar.soundings import points_in_mbes
-from pipeline.maths.target.labelling import Beams, label_points
+from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.labelling import LabelSettings, label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.mount import mount_of
 from pipeline.target.sonar_beams import beams_in_target
@@ -221,8 +222,8 @@ def labelled(
     R = setting.state.R_body_from_sensor if mount is None else mount.R_body_from_sensor
     lever = setting.state.lever_arm_m if mount is None else mount.lever_arm_body_m
     figures = setting.plan.laser if sensor == "laser" else setting.plan.mbes
-    origins = trajectory.place(t_ns, np.broadcast_to(lever, rays.shape))
-    directions = trajectory.place(t_ns, rays @ R.T + lever) - origins
+    origins = trajectory.points_from_body(t_ns, np.broadcast_to(lever, rays.shape))
+    directions = trajectory.points_from_body(t_ns, rays @ R.T + lever) - origins
     range_m = caster.ranges(origins, directions)
     met = np.flatnonzero(range_m < figures.max_range_m)
     own, range_m, directions = rays[met] * range_m[met, None], range_m[met], directions[met]
@@ -234,10 +235,15 @@ def labelled(
         heights = (-np.inf, level - segment.water_margin_m)
     else:
         beams, heights = Beams(directions, range_m), (level + segment.water_margin_m, np.inf)
-    grazing = float(np.radians(segment.min_grazing_deg))
-    margin = segment.margin_m
-    seen = "wet" if sensor == "mbes" else "dry"
-    labels = label_points(setting.model, points, beams, segment.gate_m, margin, grazing, None, heights, seen)
+    limits = LabelSettings(
+        gate_m=segment.gate_m,
+        margin_m=segment.margin_m,
+        min_grazing_rad=float(np.radians(segment.min_grazing_deg)),
+        lowest_m=heights[0],
+        highest_m=heights[1],
+        seen="wet" if sensor == "mbes" else "dry",
+    )
+    labels = label_points(setting.model, points, beams, limits)
     on = np.flatnonzero(labels.face >= 0)
     columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}
     columns |= {f"{axis}_target_m": points[on, k] for k, axis in enumerate("xyz")}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.yaml_models import FOOT_M
+from pipeline.config.faults import FOOT_M
 from pipeline.errors import RawDataError
 from pipeline.maths.sonar.cast_profile import ascending, largest_difference, one_way
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.config.recording import inside_session
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.maths.sonar.cast_profile import TOLERANCE_M_S, thinned
+from pipeline.maths.sonar.cast_profile import TOLERANCE_M_S, thinned_profile
 from pipeline.readers.cast_checks import usable_rows
 from pipeline.readers.cast_text import casts_of
 from pipeline.readers.cast_values import RecordedCast
@@ -89,7 +89,7 @@ def read_cast(path: Path, name: str, number: Any = None) -> tuple[list[list[floa
     kind, casts = casts_of(_text(content, name), name)
     cast, chosen_number = _chosen(casts, number, name)
     rows = usable_rows(np.array(cast.rows, dtype=np.float64).reshape(-1, 2), name)
-    profile = thinned(rows.depth_m, rows.speed_m_s)
+    profile = thinned_profile(rows.depth_m, rows.speed_m_s)
     if profile.scatter_m_s > MAX_SCATTER_M_S:
         raise RawDataError(
             f"{name}: its sound speeds scatter by {profile.scatter_m_s:.1f} m/s about their mean at a depth; check the "

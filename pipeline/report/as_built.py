@@ -19,7 +19,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.artefacts.from_tables import ALL_PASSES, laser_planes
+from pipeline.artefacts.columns import ALL_PASSES
+from pipeline.artefacts.from_tables import laser_planes
 from pipeline.maths.target.model import TargetModel
 
 Plane = tuple[NDArray[np.float64], float]  # normal, distance

@@ -9,12 +9,13 @@ import pandas as pd
 import yaml
 from numpy.typing import NDArray
 
+from pipeline.artefacts.from_tables import vector_of
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.gps_time import utc_text
 from pipeline.maths.adjustment.parameters import NAMES, SIX
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
-from pipeline.mount import WITHIN_95, Mounted, change_of, six_of
+from pipeline.mount import WITHIN_95, Mounted, parameters_of, setting_change
 from pipeline.report.suspected_causes import estimated
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def free_block(freed: pd.DataFrame) -> dict[str, Any]:
 def target_block(pose: pd.Series) -> dict[str, Any]:
     """How the target was found, against the pool's config."""
     return {
-        "offset_m": [float(pose[f"origin_{axis}_pool_m"]) for axis in "xyz"],
+        "offset_m": vector_of(pose, "origin_{}_pool_m").tolist(),
         "azimuth_correction_deg": float(pose["azimuth_correction_deg"]),
         "tilt_deg": [float(pose["tilt_x_deg"]), float(pose["tilt_y_deg"])],
         "rms_m": plain(pose["rms_m"]),
@@ -146,7 +147,7 @@ def matrix(table: pd.DataFrame, column: str) -> list[list[float]] | None:
 def calibration_table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted) -> pd.DataFrame:
     rows = []
     for method, block in methods.items():
-        correction, sigma = (six_of(block[name]) for name in ("correction", "sigma"))
+        correction, sigma = (parameters_of(block[name]) for name in ("correction", "sigma"))
         names = ("mount", "sigma_mount", "sigma_mount_total")
         total, random, sigma_mount = (block[name] or dict.fromkeys(SETTINGS, np.nan) for name in names)
         for parameter, place, key, unit in PARAMETERS:
@@ -157,7 +158,7 @@ def calibration_table(methods: Mapping[str, Mapping[str, Any]], coarse: Mounted)
                     "unit": unit,
                     "coarse": coarse.settings()[key],
                     "total": total[key],
-                    "change": change_of(total, coarse.settings(), key) if block["mount"] else np.nan,
+                    "change": setting_change(total, coarse.settings(), key) if block["mount"] else np.nan,
                     "correction": correction[place],
                     "sigma": sigma[place],
                     "sigma_random": random[key],

@@ -7,11 +7,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.artefacts.catalogue.results import CLOSING
-from pipeline.artefacts.from_tables import ALL_PASSES, laser_planes, lifted_moments
+from pipeline.artefacts.columns import ALL_PASSES
+from pipeline.artefacts.from_tables import laser_planes, moments_by_face
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.planes import angle_between, fit_plane
-from pipeline.maths.patent.lifted_moments import plane_moments
-from pipeline.maths.patent.offsets import by_family
+from pipeline.maths.patent.lifted_moments import by_family, plane_moments
 from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
@@ -55,6 +55,6 @@ def families_of(faces: pd.DataFrame, sounding_moments: pd.DataFrame) -> dict[str
     """Lifted moments of each family over all passes."""
     family = dict(zip(faces["face"].tolist(), faces["family"].tolist(), strict=True))
     total: dict[str, Array] = {}
-    for (_, name), moments in sorted(by_family(family, lifted_moments(sounding_moments)).items()):
+    for (_, name), moments in sorted(by_family(family, moments_by_face(sounding_moments)).items()):
         total[name] = total[name] + moments if name in total else moments
     return total

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.artefacts.catalogue.target import FACES, PLANES
-from pipeline.artefacts.families import families_of, level_families
+from pipeline.artefacts.from_tables import family_names, horizontal_families, normal_of
 from pipeline.maths.geometry.planes import angle_between
 from pipeline.results.finished_run import FinishedRun
 from pipeline.results.mount_difference import Row, Tolerances, answer_sentence, is_same_result, mount_difference
@@ -81,7 +81,7 @@ def _plane_changes(first: FinishedRun, second: FinishedRun, not_compared: list[s
         return
     tables = []
     faces = Tables(first.path).table(FACES)
-    upright = [name for name in families_of(faces.loc[faces["one_plane"]]) if name not in level_families(faces)]
+    upright = [name for name in family_names(faces.loc[faces["one_plane"]]) if name not in horizontal_families(faces)]
     for run in (first, second):
         rows = Tables(run.path).table(PLANES).query("`pass` == -1").to_dict("records")
         tables.append({(row["sensor"], row["plane"]): row for row in rows})
@@ -100,7 +100,7 @@ def _plane_changes(first: FinishedRun, second: FinishedRun, not_compared: list[s
 
 
 def _plane_change(a: Mapping[Any, Any], b: Mapping[Any, Any]) -> Row:
-    normals = [np.array([float(row[f"normal_{axis}_target_1"]) for axis in "xyz"]) for row in (a, b)]
+    normals = [normal_of(row) for row in (a, b)]
     return {
         "angle_deg": float(np.degrees(angle_between(*normals))),
         "distance_m": float(b["distance_m"] - a["distance_m"]),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.errors import ArtefactError
-from pipeline.maths.comparison import Estimate
+from pipeline.maths.comparison import MountEstimate
 from pipeline.results.screen import summary
 from pipeline.run import manifest
 from pipeline.run.output_files import as_written
@@ -47,7 +47,7 @@ class FinishedRun:
         return cls(path, read_settings(path), result, manifests)
 
 
-def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
+def estimate_of(result: Mapping[str, Any]) -> MountEstimate | None:
     """Return the adjustment's estimate of the mount, from the content of calibration.json; None if it has none.
 
     The patent's methods have no covariance to test with.
@@ -56,7 +56,8 @@ def estimate_of(result: Mapping[str, Any]) -> Estimate | None:
     if block["covariance"] is None or block["mount"] is None:
         return None
     shapes = {"R_body_from_mbes": (3, 3), "lever_arm_m": (3,), "covariance": (6, 6)}
-    estimate = Estimate(*(np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items()))
+    arrays = (np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items())
+    estimate = MountEstimate(*arrays)
     if not np.linalg.eigvalsh(estimate.covariance).min() > 0:
         raise ValueError("the covariance is not positive")
     return estimate

@@ -18,7 +18,7 @@ import pandas as pd
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
-from pipeline.maths.comparison import Estimate, compare
+from pipeline.maths.comparison import MountEstimate, compare_estimates
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.report.verdict import SIX
 from pipeline.results.finished_run import estimate_of
@@ -160,14 +160,14 @@ def _checked_time(text: str) -> str:
     return text
 
 
-def _with_jumps(sessions: list[tuple[dict[str, Any], Estimate | None]]) -> Iterator[dict[str, Any]]:
+def _with_jumps(sessions: list[tuple[dict[str, Any], MountEstimate | None]]) -> Iterator[dict[str, Any]]:
     """Yield the rows, each accepted one tested against the accepted one before it."""
-    before: Estimate | None = None
+    before: MountEstimate | None = None
     for row, now in sessions:
         if row["verdict"] == "accepted" and now is not None:
             if before is not None:
-                comparison = compare(before, now)
-                moved = ", ".join(SIX[k] for k in comparison.moved(SIGNIFICANCE))
+                comparison = compare_estimates(before, now)
+                moved = ", ".join(SIX[k] for k in comparison.significant(SIGNIFICANCE))
                 row = row | {"probability": comparison.probability, "moved": moved}
             before = now
         yield row

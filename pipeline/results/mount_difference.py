@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.maths.comparison import compare
+from pipeline.maths.comparison import compare_estimates
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.verdict import SIX
 from pipeline.results.finished_run import FinishedRun, estimate_of
@@ -50,8 +50,8 @@ def mount_difference(
         without = [run.result["session"] for run, estimate in runs if estimate is None]
         not_compared.append(f"mount: {' and '.join(without)} has no result with a covariance")
         return {"comparable": False, "parameters": [], "joint": None, "beyond_tolerance": []}
-    comparison = compare(before, after)
-    moved = comparison.moved(SIGNIFICANCE)
+    comparison = compare_estimates(before, after)
+    moved = comparison.significant(SIGNIFICANCE)
     scale = [np.degrees(1.0)] * 3 + [1.0] * 3
     limits = tolerances.limits()
     rows: list[Row] = []

@@ -6,7 +6,7 @@ from typing import Any
 
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.mount import change_of
+from pipeline.mount import setting_change
 from pipeline.text_table import text_table
 
 SIGMAS_IN_WORDS = {
@@ -68,7 +68,7 @@ def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
         total, change = "-", "-"
         if block["mount"]:
             total = f"{block['mount'][key]:.4f} {unit}"
-            change = f"{change_of(block['mount'], coarse, key):+.4f} {unit}"
+            change = f"{setting_change(block['mount'], coarse, key):+.4f} {unit}"
         sigma, sigma_total = (
             f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in ("sigma_mount", "sigma_mount_total")
         )

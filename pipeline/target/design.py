@@ -5,7 +5,7 @@ from functools import lru_cache
 from pipeline.config.target import FaceSettings, Letters, RelationSettings, Target
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.outlines import Outline, Relation, build_target
-from pipeline.maths.target.patent_target import lettered
+from pipeline.maths.target.patent_target import PatentDimensions, patent_outlines
 
 
 def target_of(target: Target) -> TargetModel:
@@ -17,15 +17,17 @@ def target_of(target: Target) -> TargetModel:
 
 @lru_cache(maxsize=16)
 def _by_letters(target: Letters) -> TargetModel:
-    outlines, relations, repeats_m = lettered(
-        target.a,
-        target.b,
-        target.c,
-        target.e,
-        target.low_side,
-        target.blocks_per_side,
-        target.first_base_m,
-        target.stagger_m,
+    outlines, relations, repeats_m = patent_outlines(
+        PatentDimensions(
+            a=target.a,
+            b=target.b,
+            c=target.c,
+            e=target.e,
+            low_side=target.low_side,
+            blocks_per_side=target.blocks_per_side,
+            first_base_m=target.first_base_m,
+            stagger_m=target.stagger_m,
+        )
     )
     return build_target(outlines, relations, target.water_level_m, repeats_m)
 

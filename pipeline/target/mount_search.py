@@ -1,6 +1,4 @@
-"""The sonar's provisional mount: with which the soundings fall onto the target's wet faces."""
-
-from dataclasses import dataclass
+"""Search for the sonar's provisional mount, with which the soundings fall onto the target's wet faces."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,77 +6,79 @@ from numpy.typing import NDArray
 from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.target.labelling import label_points
+from pipeline.maths.target.labelling import LabelSettings, label_points
 from pipeline.maths.target.model import TargetModel
-from pipeline.maths.target.registration import (
-    MountCorrection,
-    refine,
-    score,
-    search,
-)
+from pipeline.maths.target.placements import MountCorrection
+from pipeline.maths.target.registration import Labeller, SearchCriteria, Surface, refine, score, search
 from pipeline.mount import Mounted
-from pipeline.target.pose_search import BEHIND_M, SHARP_M, WIDE_M, gate_of, planes_of
+from pipeline.target.matching import REFINEMENT_GATE_M, SCORE_REACH_M, gate_of, planes_of_faces
+from pipeline.target.samples import SoundingSample
+from pipeline.target.search_results import ProvisionalMount
 from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
+BEHIND_M = 0.15  # farther behind a face than this is no noise
 
 
-@dataclass(frozen=True)
-class SoundingSample:
-    """Soundings with their poses in the target frame: positions (n, 3), R (n, 3, 3); points_mbes_m (n, 3)."""
+def search_mount(
+    sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: SonarBeams, settings: Segment
+) -> ProvisionalMount:
+    """Return the correction of the coarse mount with which the soundings fall onto the wet faces.
 
-    positions_m: Array
-    R_target_from_body: Array
-    points_mbes_m: Array
+    The coarse mount may be wrong by up to the search limits. First comes the front (the patent's wall): roll turns it
+    about the track and x shifts it, and no other parameter moves it. So both follow from a vote over the part of it
+    that is the front wherever the rest still stands; without a front roll is searched as well. Then follows a search
+    over yaw, y and z; blocks repeat every period, so z is sought within the lever arm's limits and a rival there is
+    reported.
 
-
-@dataclass(frozen=True)
-class FoundMount:
-    """The mount for labelling: rotation vector from coarse (body), lever arm correction, and the gate that follows."""
-
-    rotation_vector_rad: Array
-    lever_arm_correction_m: Array
-    scale_m: float
-    gate_m: float
-    score: float
-    rival_score: float
-    ambiguous: bool
-    within: bool
-
-    def on(self, coarse: Mounted) -> tuple[Array, Array]:
-        """R_body_from_sensor (3, 3) and lever arm (3,) that follow."""
-        R_body_from_sensor = exp_so3(self.rotation_vector_rad) @ coarse.R_body_from_sensor
-        return R_body_from_sensor, coarse.lever_arm_body_m + self.lever_arm_correction_m
-
-
-def find_mount(
-    sample: SoundingSample,
-    model: TargetModel,
-    R_body_from_mbes: Array,
-    lever_arm_m: Array,
-    mbes: SonarBeams,
-    settings: Segment,
-) -> FoundMount:
-    """Mount correction with which the soundings fall onto the wet faces; coarse values wrong by up to the search
-    limits.
-
-    First the front (the patent's wall): roll turns it about the track and x shifts it, nothing else moves it, so both
-    follow from a vote over the part of it that is the front wherever the rest still stands; without one roll is
-    searched as well. Then a search over yaw, y and z; blocks repeat every period, so z is sought within the lever arm's
-    limits and a rival there is reported.
+    Parameters
+    ----------
+    sample
+        Soundings with their poses in the target frame.
+    model
+        The target by design.
+    coarse
+        Coarse mount of the sonar.
+    mbes
+        The sonar's settings, for its beams.
+    settings
+        Settings of stage segment.
     """
     angle, arm = np.radians(settings.search_mount_deg), settings.search_mount_m
-    sigmas = np.array([angle, angle, angle, arm, arm, arm])
-    body = sample.points_mbes_m @ R_body_from_mbes.T
-    placement = MountCorrection(sample.positions_m, sample.R_target_from_body, body, lever_arm_m, sigmas)
-    normals, distances = planes_of(model)
+    placement = MountCorrection(
+        positions_m=sample.positions_m,
+        R_target_from_body=sample.R_target_from_body,
+        points_body_m=sample.points_mbes_m @ coarse.R_body_from_sensor.T,
+        lever_arm_m=coarse.lever_arm_body_m,
+        prior_sigmas=np.array([angle, angle, angle, arm, arm, arm]),
+    )
     closest = ClosestSurface(model)
-    vote = _wall_vote(placement, model, settings)
+    surface = Surface(closest, planes_of_faces(model))
+    criteria = _criteria(placement, model, closest, settings)
+    result = search(placement, _starts(placement, model, settings), surface, criteria)
+    label = _wet_labeller(sample, model, coarse, mbes, settings)
+    refined = refine(placement, result.parameters, label, surface.planes)
+    return ProvisionalMount(
+        rotation_vector_rad=refined.parameters[:3],
+        lever_arm_correction_m=refined.parameters[3:],
+        scale_m=refined.scale_m,
+        gate_m=gate_of(refined, settings),
+        score=result.score,
+        rival_score=result.rival_score,
+        ambiguous=bool(result.rival_score > result.score * (1 - settings.ambiguity_margin)),
+        within=result.within,
+    )
+
+
+def _starts(placement: MountCorrection, model: TargetModel, settings: Segment) -> list[list[Array]]:
+    """Return corrections (6,) to start from, in groups of one height."""
+    angle, arm = np.radians(settings.search_mount_deg), settings.search_mount_m
+    vote = _front_vote(placement, model, settings)
     bases = [np.array([0.0, roll, 0.0, 0.0, 0.0, 0.0]) for roll in np.linspace(-angle, angle, 5)]
     if vote is not None:
         bases = [np.r_[0.0, vote[0], 0.0, vote[1]]]
-    starts = [
+    return [
         [
             base + np.array([0.0, 0.0, yaw, 0.0, y, z])
             for base in bases
@@ -88,45 +88,50 @@ def find_mount(
         for z in np.linspace(-arm, arm, 7)
     ]
 
+
+def _criteria(
+    placement: MountCorrection, model: TargetModel, closest: ClosestSurface, settings: Segment
+) -> SearchCriteria:
     def same(p: Array, q: Array) -> bool:
         return bool(np.max(np.abs(p[3:] - q[3:])) < model.half_period_m / 2)
 
-    def judge(p: Array) -> float:
+    def quality(p: Array) -> float:
         """A sounding behind a face cannot be: a stack shifted onto the floor or the next block explains as many."""
         behind = closest.hides(placement.origins(p), placement.points(p), BEHIND_M)
-        return score(placement, p, closest, SHARP_M) - float(np.mean(behind))
+        return score(placement, p, closest, SCORE_REACH_M) - float(np.mean(behind))
 
     limits = np.repeat(settings.farthest_mount, 3) * np.repeat([np.pi / 180, 1.0], 3)
-    found = search(placement, starts, closest, normals, same, limits, judge)
+    return SearchCriteria(same, quality, limits)
 
-    def label(parameters: Array, points: Array) -> NDArray[np.int16]:
-        R = exp_so3(parameters[:3]) @ R_body_from_mbes
-        beams = beams_in_target(sample.R_target_from_body, R, sample.points_mbes_m, mbes)
-        wet = (-np.inf, model.water_level_m - settings.water_margin_m)
-        grazing = np.radians(settings.min_grazing_deg)
-        return label_points(model, points, beams, WIDE_M, settings.margin_m, grazing, heights_m=wet, seen="wet").face
 
-    refined = refine(placement, found.parameters, label, normals, distances)
-    ambiguous = bool(found.rival_score > found.score * (1 - settings.ambiguity_margin))
-    return FoundMount(
-        refined.parameters[:3],
-        refined.parameters[3:],
-        refined.scale_m,
-        gate_of(refined, settings),
-        found.score,
-        found.rival_score,
-        ambiguous,
-        found.within,
+def _wet_labeller(
+    sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: SonarBeams, settings: Segment
+) -> Labeller:
+    """Return the function that labels the soundings below the water, with their beams turned by the correction."""
+    limits = LabelSettings(
+        gate_m=REFINEMENT_GATE_M,
+        margin_m=settings.margin_m,
+        min_grazing_rad=np.radians(settings.min_grazing_deg),
+        highest_m=model.water_level_m - settings.water_margin_m,
+        seen="wet",
     )
 
+    def label(parameters: Array, points: Array) -> NDArray[np.int16]:
+        R_body_from_mbes = exp_so3(parameters[:3]) @ coarse.R_body_from_sensor
+        beams = beams_in_target(sample.R_target_from_body, R_body_from_mbes, sample.points_mbes_m, mbes)
+        return label_points(model, points, beams, limits).face
 
-def _wall_vote(
+    return label
+
+
+def _front_vote(
     placement: MountCorrection, model: TargetModel, settings: Segment
 ) -> tuple[float, Array] | None:
-    """Roll correction (rad) and shift (3,) of the lever arm (m, body) that gather most soundings of the front's middle
-    in one plane; None where the target has no front, or it was not seen.
+    """Return the roll correction (rad) and the shift (3,) of the lever arm (m, body) that gather most of the front.
 
-    A turn ρ about body y moves a sounding by ρ T (e_y × m); only its part along the front's normal matters there.
+    They bring most soundings of the front's middle into one plane. None where the target has no front, or the sonar did
+    not see it. A turn ρ about body y moves a sounding by ρ T (e_y × m); only its part along the front's normal matters
+    there.
     """
     front = model.front()
     if front is None:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.sonar.soundings import beam_half_widths
-from pipeline.maths.target.labelling import Beams
+from pipeline.maths.target.beams import Beams
 
 Array = NDArray[np.float64]
 STRAY_SIGMAS = 3.0

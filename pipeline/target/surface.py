@@ -21,7 +21,7 @@ class ClosestSurface:
         import open3d  # half a second: only where needed
 
         o3d: Any = open3d
-        vertices, triangles = model.context()
+        vertices, triangles = model.triangles()
         self._tensor = o3d.core.Tensor
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
         self._scene.add_triangles(self._tensor(vertices.astype(np.float32)), self._tensor(triangles.astype(np.uint32)))
@@ -29,11 +29,11 @@ class ClosestSurface:
         self._model = model
 
     def __reduce__(self) -> tuple[type, tuple[TargetModel]]:
-        """For workers: the scene is made anew there."""
+        """Return how workers make it: the scene is built anew there."""
         return ClosestSurface, (self._model,)
 
     def around(self, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
-        """Which points (n, 3) can be within reach of the surface at all: those in its box, so much larger."""
+        """Return which points (n, 3) m can be within reach of the surface at all: those in its box, so much larger."""
         low, high = self._model.bounds()
         return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=1))
 
@@ -43,19 +43,19 @@ class ClosestSurface:
         return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]
 
     def ranges(self, origins_m: Array, directions: Array) -> Array:
-        """How far along unit rays (n, 3) the surface is, (n,) m; infinite where they miss it."""
+        """Return how far along unit rays (n, 3) the surface is, (n,) m; infinite where they miss it."""
         rays = np.hstack([origins_m, directions]).astype(np.float32)
         return np.asarray(self._cast(rays)["t_hit"].numpy(), dtype=np.float64)
 
     def first_met(self, origins_m: Array, directions: Array) -> NDArray[np.int64]:
-        """The face that each ray (n, 3) meets first, by its number; -1 where it meets none."""
+        """Return the number of the face that each ray (n, 3) meets first; -1 where it meets none."""
         rays = np.hstack([origins_m, directions]).astype(np.float32)
         triangle = self._cast(rays)["primitive_ids"].numpy().astype(np.int64)
         missed = triangle >= len(self._face_of_triangle)
         return np.where(missed, -1, self._face_of_triangle[np.where(missed, 0, triangle)])
 
     def hides(self, origins_m: Array, points_m: Array, spare_m: float) -> NDArray[np.bool_]:
-        """Points (n,) that lie more than ``spare_m`` behind the surface, as seen from their origins (n, 3) m."""
+        """Return which points (n, 3) m lie more than ``spare_m`` behind the surface, seen from origins (n, 3) m."""
         away = points_m - origins_m
         rays = np.hstack([origins_m, away]).astype(np.float32)
         share = self._cast(rays)["t_hit"].numpy().astype(np.float64)

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from pipeline.atomic_files import read_json
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Verdict
 from pipeline.errors import ConfigError
+from pipeline.maths.comparison import mount_error
 from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
+from pipeline.mount import Mounted
 from pipeline.run.output_files import as_written
 from pipeline.run.results import calibration
 from pipeline.run.settings import read_settings
@@ -91,8 +92,8 @@ def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) ->
     """What is still wrong: rotation vector in degrees and lever arm in metres, true minus found; None: no result."""
     if values["R_body_from_mbes"] is None or values["lever_arm_m"] is None:
         return None
-    turn = Rotation.from_matrix(R_true @ np.array(values["R_body_from_mbes"]).T).as_rotvec()
-    return np.concatenate([np.degrees(turn), lever_arm_true_m - np.array(values["lever_arm_m"])])
+    error = mount_error(R_true, lever_arm_true_m, np.array(values["R_body_from_mbes"]), np.array(values["lever_arm_m"]))
+    return np.asarray(error * np.repeat([np.degrees(1.0), 1.0], 3))
 
 
 def _sigma_of(values: dict[str, Any]) -> Array | None:
@@ -112,12 +113,11 @@ def _table(
     error = errors_of(values, R_true, lever_arm_true_m)
     if error is None:
         return ["  no result"]
-    yaw, pitch, roll = Rotation.from_matrix(R_true).as_euler("ZXY", degrees=True)
-    truth = (pitch, roll, yaw, *lever_arm_true_m)
+    truth = Mounted(R_true, lever_arm_true_m).settings()
     rows = []
     for name, k, key, unit in PARAMETERS:
         spread = ("-", "-") if sigma is None else (f"{sigma[k]:.5f}", f"{error[k] / sigma[k]:.1f}")
-        numbers = (f"{value:.5f}" for value in (getattr(coarse, key), values["mount"][key], truth[k], error[k]))
+        numbers = (f"{value:.5f}" for value in (getattr(coarse, key), values["mount"][key], truth[key], error[k]))
         rows.append((name, *numbers, *spread, unit))
     heads = ("", "coarse", "calibrated", "truth", "error", "sigma", "error/sigma")
     return text_table("  <6>11>12>11>11>10>13 <1", heads, rows)

@@ -47,7 +47,7 @@ from pipeline.report.calibration_document import (
 from pipeline.report.verdict import NO_DRIFT, Evidence, Settings, drift_doubt, reasons, warnings
 from pipeline.results.screen import verdict_in_words
 from pipeline.target.design import target_of
-from pipeline.target.laser_search import FARTHEST
+from pipeline.target.laser_search import LARGEST_TURN
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     drift, level = drift_of(config.ins, inputs.ins_sigmas, inputs.passes), config.adjust.test_level
     tolerated = config.adjust.test_tolerance_m
     doubt = drift_doubt(inputs.drift, drift, "the INS's files say" if from_files else "ins.drift says")
-    farthest = (FARTHEST * config.segment.search_laser_deg, np.inf)
+    farthest = (LARGEST_TURN * config.segment.search_laser_deg, np.inf)
     given = Settings(config.verdict, level, tolerated, "adjustment", farthest, doubt, config.target.shape, "laser")
     found = reasons(evidence, {"adjustment": block}, given)
     built = as_found(inputs.planes, inputs.patterns, model)

@@ -20,13 +20,13 @@ from pipeline.artefacts.catalogue.results import (
     SURFACES,
 )
 from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
-from pipeline.artefacts.families import families_of, shown_as
-from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.from_tables import family_names, normal_of, normals_of, trajectory_in_target
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.face_grid import face_axes
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, mount_of
+from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
 from pipeline.text_table import text_table
@@ -68,7 +68,7 @@ def log(recording: Any, tables: Tables) -> None:
     faces, residuals = tables.table(FACES), tables.table(RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span, steps = _span(residuals), _steps(tables, residuals)
-    shades = shown_as(families_of(faces), COLOURS)
+    shades = styles_of_families(family_names(faces), COLOURS)
     _clouds(recording, tables, ResidualPoints(residuals, family, span, steps), shades)
     _maps(recording, tables.table(RESIDUAL_MAP), faces, span)
     _fans(recording, tables, residuals)
@@ -109,7 +109,7 @@ def _clouds(recording: Any, tables: Tables, points: ResidualPoints, shades: Shad
 
     surfaces: Any = tables.table(SURFACES).to_dict("records")
     # shown on its surface: in front of it a point would hide those behind, and all would look as if they stood before
-    normals = {row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in surfaces}
+    normals = {row["family"]: normal_of(row) for row in surfaces}
     solved = bool(np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all())
     for sensor in SENSORS:
         of_sensor = (points.residuals["sensor"] == sensor).to_numpy()
@@ -133,10 +133,10 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
     import rerun as rr
 
     cells = cells[np.isfinite(cells["mean_m"]) & (cells["count"] >= FEWEST)]
-    normals = np.column_stack([faces[f"normal_{axis}_target_1"] for axis in "xyz"])
+    normals = normals_of(faces)
     family = faces["family"].to_numpy()
     for sensor in SENSORS:
-        for name in families_of(faces):
+        for name in family_names(faces):
             numbers = cells["face"].to_numpy().astype(int)
             rows = cells[(cells["sensor"] == sensor).to_numpy() & (family[numbers] == name)]
             if not len(rows):

@@ -9,8 +9,8 @@ import pandas as pd
 from pipeline.artefacts.catalogue.patent import ANGLES, ITERATIONS
 from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS, SOUNDINGS_LABELLED, TARGET_POSE
-from pipeline.artefacts.from_tables import ALL_PASSES, laser_planes
-from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.columns import ALL_PASSES
+from pipeline.artefacts.from_tables import laser_planes, rotation_vector_deg, trajectory_in_target
 from pipeline.artefacts.streams import xyz
 from pipeline.maths.geometry.planes import fit_plane
 from pipeline.maths.geometry.rotations import exp_so3
@@ -47,7 +47,7 @@ def log(recording: Any, tables: Tables) -> None:
     log_reasons(recording, "angles", tables.table(ANGLES))
     for row in iterations.iloc[:: max(1, -(-len(iterations) // STEPS))].to_dict("records"):
         recording.set_time("iteration", sequence=int(row["iteration"]))
-        correction = exp_so3(np.radians([row[f"rotation_{axis}_deg"] for axis in "xyz"]))
+        correction = exp_so3(np.radians(rotation_vector_deg(row)))
         turned = body @ correction.T + mount.lever_arm_body_m
         points = (positions + np.einsum("nij,nj->ni", R_target_from_body, turned)).astype(np.float32)
         for name in FAMILIES:

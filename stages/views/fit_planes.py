@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline.artefacts.catalogue.target import FACES, PLANES
-from pipeline.artefacts.families import families_of
-from pipeline.artefacts.from_tables import ALL_PASSES, planes_of
+from pipeline.artefacts.columns import ALL_PASSES
+from pipeline.artefacts.from_tables import family_names, planes_of_sensor
 from pipeline.maths.geometry.planes import Plane
 from pipeline.run.results import Tables
 from stages.views.recording import GREY, SONAR
@@ -21,8 +21,8 @@ def log(recording: Any, tables: Tables) -> None:
 
     faces, planes = tables.table(FACES), tables.table(PLANES)
     for sensor, colour in SHOWN.items():
-        fitted = planes_of(planes, sensor)
-        for family in families_of(faces):
+        fitted = planes_of_sensor(planes, sensor)
+        for family in family_names(faces):
             plane = fitted.get((ALL_PASSES, family))
             if plane is None:
                 continue

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.artefacts.families import shown_as
 from pipeline.atomic_files import write_bytes
 from pipeline.planning.assessment import Answer, Outlook
 from pipeline.planning.prediction import track
+from pipeline.results.pages.families import styles_of_families
 from stages.views.recording import COLOURS, GREY, LASER, SONAR, recording_content, text_document
 
 PLENTY = 1000  # soundings on a face, from which on it is coloured in full
@@ -32,7 +32,7 @@ def save_plan(answer: Answer, said: str, path: Path) -> None:
 def _target(recording: Any, answer: Answer) -> None:
     import rerun as rr
 
-    colours = shown_as([family.name for family in answer.setting.model.families], COLOURS)
+    colours = styles_of_families([family.name for family in answer.setting.model.families], COLOURS)
     for face in answer.setting.model.faces:
         outline = np.vstack([face.vertices_m, face.vertices_m[:1]]).astype(np.float32)
         strip = rr.LineStrips3D([outline], radii=0.008, colors=colours[face.family])

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, TARGET_POSE
-from pipeline.artefacts.families import families_of, shown_as
+from pipeline.artefacts.from_tables import family_names, target_frame
 from pipeline.artefacts.streams import xyz
+from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
 from stages.views.recording import COLOURS, DOT_M, MOST_POINTS
 
@@ -15,10 +16,8 @@ def log(recording: Any, tables: Tables) -> None:
     """Log the pool's place, the target by design, and the labelled laser points."""
     import rerun as rr
 
-    pose = tables.table(TARGET_POSE).iloc[0]
-    R_target_from_pool = np.array(pose["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
-    origin = np.array([pose[f"origin_{axis}_pool_m"] for axis in "xyz"], dtype=np.float64)
-    placed = rr.Transform3D(translation=-R_target_from_pool @ origin, mat3x3=R_target_from_pool)
+    frame = target_frame(tables.table(TARGET_POSE))
+    placed = rr.Transform3D(translation=frame.shift_m, mat3x3=frame.R_target_from_pool)
     recording.log("pool", placed, static=True)
 
     faces = tables.table(FACES)
@@ -27,7 +26,7 @@ def log(recording: Any, tables: Tables) -> None:
         LASER_LABELLED, MOST_POINTS, "face", *(f"{axis}_target_m" for axis in "xyz")
     )
     points, family = xyz(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
-    for name, colour in shown_as(families_of(faces), COLOURS).items():
+    for name, colour in styles_of_families(family_names(faces), COLOURS).items():
         corners = [np.reshape(c, (-1, 3)) for c in faces.loc[family_of == name, "vertices_target_m"]]
         outlines = [np.vstack([one, one[:1]]).astype(np.float32) for one in corners]
         recording.log(f"target/model/{name}", rr.LineStrips3D(outlines, radii=0.008, colors=colour), static=True)

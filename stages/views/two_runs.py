@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.target import SOUNDINGS_LABELLED, TARGET_POSE
-from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.artefacts.streams import xyz
 from pipeline.atomic_files import write_bytes
 from pipeline.results.compare_text import comparison_text

@@ -19,6 +19,7 @@ from pipeline.maths.adjustment.parameters import State, Surface
 from pipeline.maths.adjustment.solution import freed, solve
 from pipeline.maths.geometry.trajectory import Trajectory
 from tests.support.effort import often
+from tests.support.mount_errors import rotation_error
 
 R_TRUE = Rotation.from_euler("ZXY", np.radians([-2.0, 1.2, -48.8])).as_matrix()
 LEVER_TRUE = np.array([0.3, 0.2, -2.0])
@@ -104,7 +105,7 @@ def made(
     length = np.linalg.norm(x, axis=1, keepdims=True)
     x = x + sensors * np.radians(0.003) * length * np.cross(ray, rng.normal(size=x.shape))
     t_ns = (moment * NS).round().astype(np.int64)
-    target = trajectory.place(t_ns, x @ R_LASER.T + LASER_LEVER)
+    target = trajectory.points_from_body(t_ns, x @ R_LASER.T + LASER_LEVER)
     laser = columns(t_ns, face, x, "laser_m") | {f"{axis}_target_m": target[:, k] for k, axis in enumerate("xyz")}
 
     moment = moments(30, 160)
@@ -142,7 +143,7 @@ def columns(t_ns: np.ndarray, face: np.ndarray, x: np.ndarray, suffix: str) -> d
 
 def error_of(found: Adjusted) -> np.ndarray:
     """ε of R_true = Exp(ε) R, and of the lever arm."""
-    rotation = Rotation.from_matrix(R_TRUE @ found.state.R_body_from_sensor.T).as_rotvec()
+    rotation = rotation_error(R_TRUE, found.state.R_body_from_sensor)
     return np.concatenate([rotation, LEVER_TRUE - found.state.lever_arm_m])
 
 

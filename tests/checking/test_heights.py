@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 import yaml
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from pipeline.checking import check_session as asked
 from pipeline.checking import target_hits, track_checks, trial_findings
@@ -29,6 +28,7 @@ from pipeline.mount import mount_of
 from pipeline.target.design import target_of
 from pipeline.target.surface import ClosestSurface
 from tests.support.effort import often
+from tests.support.mount_errors import rotation_error
 from tests.support.places import poolcal, simulate
 from tests.support.roots import SCENARIOS
 
@@ -254,8 +254,8 @@ BLOCKS = target_of(Letters(a=8, b=3, c=1, e=0.5, origin=Origin(latitude_deg=36, 
 
 
 def _provisional(given: Mount) -> pd.DataFrame:
-    turn = Rotation.from_matrix(mount_of(TRUE).R_body_from_sensor @ mount_of(given).R_body_from_sensor.T)
-    return pd.DataFrame([dict(zip((f"rotation_{a}_deg" for a in "xyz"), turn.as_rotvec(degrees=True), strict=True))])
+    turn_deg = np.degrees(rotation_error(mount_of(TRUE).R_body_from_sensor, mount_of(given).R_body_from_sensor))
+    return pd.DataFrame([dict(zip((f"rotation_{a}_deg" for a in "xyz"), turn_deg, strict=True))])
 
 
 SIGNS = [

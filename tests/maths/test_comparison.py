@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.comparison import Estimate, compare
+from pipeline.maths.comparison import MountEstimate, compare_estimates
 
 MOUNT = Rotation.from_euler("ZXY", [-2.0, 1.2, -48.8], degrees=True)
 LEVER = np.array([0.3, 0.2, -2.0])
@@ -25,17 +25,17 @@ def drawn(rng, C, moved=STILL):
     error = np.linalg.cholesky(C) @ rng.normal(size=6)
     true = Rotation.from_rotvec(moved[:3]) * MOUNT
     found = Rotation.from_rotvec(error[:3]).inv() * true
-    return Estimate(found.as_matrix(), LEVER + moved[3:] - error[3:], C)
+    return MountEstimate(found.as_matrix(), LEVER + moved[3:] - error[3:], C)
 
 
 def test_the_second_minus_the_first():
     C = np.eye(6) * 1e-8
     turned = Rotation.from_rotvec([0.0, 0.0, np.radians(0.1)]) * MOUNT
     shifted = LEVER + np.array([0.0, 0.002, 0.0])
-    found = compare(Estimate(MOUNT.as_matrix(), LEVER, C), Estimate(turned.as_matrix(), shifted, C))
+    found = compare_estimates(MountEstimate(MOUNT.as_matrix(), LEVER, C), MountEstimate(turned.as_matrix(), shifted, C))
     np.testing.assert_allclose(found.difference, [0, 0, np.radians(0.1), 0, 0.002, 0], atol=1e-12)
     np.testing.assert_allclose(found.sigma, np.sqrt(2e-8), rtol=2e-3)  # the angles' axes are not quite at right angles
-    assert found.moved(0.01) == [2, 4]
+    assert found.significant(0.01) == [2, 4]
 
 
 @pytest.mark.parametrize("yaw", [0.0, 90.0, 180.0, -135.0])
@@ -48,11 +48,12 @@ def test_what_moved_is_named_as_it_is_set(yaw, place, angle):
         Rotation.from_euler("ZXY", [s["yaw"], s["pitch"], s["roll"]], degrees=True).as_matrix()
         for s in (settings, moved)
     )
-    found = compare(Estimate(one, LEVER, np.eye(6) * 1e-8), Estimate(other, LEVER, np.eye(6) * 1e-8))
+    C = np.eye(6) * 1e-8
+    found = compare_estimates(MountEstimate(one, LEVER, C), MountEstimate(other, LEVER, C))
     expected = np.zeros(6)
     expected[place] = np.radians(0.3)
     np.testing.assert_allclose(found.difference, expected, atol=1e-12)
-    assert found.moved(0.01) == [place]
+    assert found.significant(0.01) == [place]
 
 
 def test_false_alarms_are_as_many_as_the_level_says():
@@ -60,9 +61,9 @@ def test_false_alarms_are_as_many_as_the_level_says():
     alarms = 0
     for _ in range(1000):
         first, second = covariance(rng), covariance(rng, rng.uniform(0.5, 3.0))
-        found = compare(drawn(rng, first), drawn(rng, second))
+        found = compare_estimates(drawn(rng, first), drawn(rng, second))
         alarms += found.probability < 0.01
-        assert bool(found.moved(0.01)) == (found.probability < 0.01)
+        assert bool(found.significant(0.01)) == (found.probability < 0.01)
     assert 3 <= alarms <= 20
 
 
@@ -70,13 +71,14 @@ def test_false_alarms_are_as_many_as_the_level_says():
 def test_a_moved_bracket_is_found_and_named(seed):
     rng = np.random.default_rng(seed)
     moved = np.array([0, 0, np.radians(0.05), 0, 0, 0.002])
-    found = compare(drawn(rng, covariance(rng, 0.5)), drawn(rng, covariance(rng, 0.5), moved))
+    found = compare_estimates(drawn(rng, covariance(rng, 0.5)), drawn(rng, covariance(rng, 0.5), moved))
     assert found.probability < 1e-4
-    assert {2, 5} <= set(found.moved(0.01))
+    assert {2, 5} <= set(found.significant(0.01))
 
 
 def test_a_movement_that_only_all_six_show_together_names_the_largest():
     C = np.eye(6) * 1e-8
-    found = compare(Estimate(np.eye(3), np.zeros(3), C), Estimate(np.eye(3), np.full(3, 2.45 * np.sqrt(2e-8)), C))
+    moved = MountEstimate(np.eye(3), np.full(3, 2.45 * np.sqrt(2e-8)), C)
+    found = compare_estimates(MountEstimate(np.eye(3), np.zeros(3), C), moved)
     assert found.probability < 0.01
-    assert len(found.moved(0.01)) == 1
+    assert len(found.significant(0.01)) == 1

@@ -14,7 +14,7 @@ import yaml
 from pipeline.coarse.session_file import read_session
 from pipeline.config.load import load_session
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.maths.sonar.cast_profile import MOST, ascending, one_way, thinned
+from pipeline.maths.sonar.cast_profile import MOST, ascending, one_way, thinned_profile
 from pipeline.readers.casts import read_cast, with_cast
 
 PROFILE = [(0.5, 1480.0), (1.0, 1480.3), (1.5, 1481.2), (2.0, 1481.0), (3.0, 1483.5)]  # nothing that thins
@@ -237,7 +237,7 @@ def test_damage_is_refused_or_read(form: str, file: Path) -> None:
 def test_every_row_lies_within_the_tolerance(rows: int) -> None:
     depth, _ = ascending(np.random.default_rng(7).uniform(0, 12, rows), np.zeros(rows))
     speed = np.round(1480 + 3 * np.tanh(depth - 5), 2)
-    profile = thinned(depth, speed)
+    profile = thinned_profile(depth, speed)
     assert len(profile.depth_m) <= MOST
     assert profile.averaged_m == 0.0
     off = np.interp(depth, profile.depth_m, profile.speed_m_s) - speed
@@ -251,7 +251,7 @@ def test_rows_that_scatter_are_averaged(noise: float) -> None:
     rng = np.random.default_rng(7)
     depth, _ = ascending(rng.uniform(0, 12, 8000), np.zeros(8000))
     truth = 1480 + 3 * np.tanh(depth - 5)
-    profile = thinned(depth, truth + rng.normal(scale=noise, size=len(depth)))
+    profile = thinned_profile(depth, truth + rng.normal(scale=noise, size=len(depth)))
     assert 2 < len(profile.depth_m) <= MOST
     assert profile.averaged_m > 0
     off = np.interp(depth, profile.depth_m, profile.speed_m_s) - truth
@@ -261,11 +261,11 @@ def test_rows_that_scatter_are_averaged(noise: float) -> None:
 
 def test_straight_lines_need_their_ends_alone() -> None:
     depth = np.linspace(0, 10, 1001)
-    profile = thinned(depth, 1480 + 0.3 * depth)
+    profile = thinned_profile(depth, 1480 + 0.3 * depth)
     assert profile.depth_m.tolist() == [0.0, 10.0]
-    bent = thinned(depth, 1480 + np.where(depth == 5.0, 0.0201, 0.0))
+    bent = thinned_profile(depth, 1480 + np.where(depth == 5.0, 0.0201, 0.0))
     assert 5.0 in bent.depth_m.tolist()
-    level = thinned(depth, 1480 + np.where(depth == 5.0, 0.0199, 0.0))
+    level = thinned_profile(depth, 1480 + np.where(depth == 5.0, 0.0199, 0.0))
     assert level.depth_m.tolist() == [0.0, 10.0]
 
 

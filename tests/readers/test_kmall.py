@@ -216,7 +216,7 @@ def test_ranges_run_from_the_sector_s_part_to_the_receiver(file: Path) -> None:
         columns, _ = read("mbes", file, "kmall", **more)
         names = ("two_way_time_s", "angle_rad", "transmit_tilt_rad", "sound_speed_m_s")
         offset = np.array(more["projector_offset_m"]) if more else None
-        points, valid = points_in_mbes(*(columns[name] for name in names), None, offset)
+        points, valid = points_in_mbes(*(columns[name] for name in names), projector_offset_m=offset)
         assert valid.all()
         assert points == pytest.approx(wanted, abs=2e-6)  # times and angles are single precision
 

@@ -23,9 +23,9 @@ from pipeline.maths.geometry.geodesy import (
     rotation_ecef_from_level,
 )
 from pipeline.maths.geometry.rotations import mount_from_rotation, rotation_from_attitude, rotation_from_mount
-from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_in_pool
 from pipeline.maths.sonar.ray_tracing import Cast, trace
-from pipeline.maths.sonar.soundings import points_in_mbes, traced
+from pipeline.maths.sonar.soundings import points_in_mbes, refracted_points
 from pipeline.mount import mount_of
 
 # x east, y north, z up from x north, y west, z up; and x starboard, y forward, z up from x forward, y port, z up.
@@ -84,7 +84,7 @@ def test_lidar_toolkit_rows(rows: np.ndarray) -> None:
     assert np.abs(position + np.einsum("nij,nj->ni", attitude, body) - expected).max() < 1e-9
     t_ns, first = np.unique(np.rint(rows[:, 3] * 1e9).astype(np.int64), return_index=True)
     trajectory = Trajectory.build(t_ns, position[first], attitude[first])
-    assert np.abs(trajectory.place(t_ns, body[first]) - expected[first]).max() < 1e-9
+    assert np.abs(trajectory.points_from_body(t_ns, body[first]) - expected[first]).max() < 1e-9
 
 
 # --- MBES-lib: soundings ---------------------------------------------------------------------------------------------
@@ -117,7 +117,7 @@ def test_mbes_lib_soundings(case: str) -> None:
     mounted = mount_of(_mount(boresight_deg, lever_m))
     frame = PoolFrame.at(*np.radians(centroid[:2]), centroid[2], 0.0)
     pose = [np.array([value]) for value in (*np.radians(PLACE[:2]), PLACE[2], *np.radians(attitude_deg))]
-    positions, R_pool_from_body = poses_in_pool(frame, *pose)
+    positions, R_pool_from_body = poses_in_pool(frame, GeodeticPoses(*pose))
     straight_down = np.array([[0.0, 0.0, -1480.0 * 0.01 / 2]])
     body = straight_down @ mounted.R_body_from_sensor.T + mounted.lever_arm_body_m
     placed = Trajectory(np.zeros(1, np.int64), positions, R_pool_from_body, np.zeros((1, 3)))
@@ -163,7 +163,7 @@ def test_mbes_lib_ray_traced_sounding() -> None:
     frame = PoolFrame.at(0.859286627204, -1.189078930041, -25.711914675768, 0.0)
     attitude = (0.0273983876, 0.0243184966, 0.1056083942)
     pose = [np.array([value]) for value in (*place, height, *attitude)]
-    positions, R_pool_from_body = poses_in_pool(frame, *pose)
+    positions, R_pool_from_body = poses_in_pool(frame, GeodeticPoses(*pose))
     R = R_pool_from_body @ mount_of(_mount((0.62, 0.0, 0.0), (0.0, 0.0, 0.0))).R_body_from_sensor
     speed, times, angle = np.array([1446.4250488]), np.array([2 * 0.0091418369]), np.array([0.7031931281])
     straight, _ = points_in_mbes(times, angle, np.zeros(1), speed)
@@ -172,7 +172,7 @@ def test_mbes_lib_ray_traced_sounding() -> None:
     level = np.hypot(*ray[:2])
     across, depth = trace(cast, np.zeros(1), np.arcsin(level * cast.speed_at(np.zeros(1)) / speed), times / 2)
     theirs = np.array([*(ray[:2] / level * across), -depth[0]])
-    ours = R[0] @ traced(straight, speed, R, np.zeros(1), cast)[0]
+    ours = R[0] @ refracted_points(straight, speed, R, np.zeros(1), cast)[0]
     expected = np.array([-26.8825997032, 7.3549385469, 10.4758625062])
     misses = [np.abs(R_OURS_FROM_NED.T @ (positions[0] + one) - expected) for one in (theirs, R[0] @ straight[0])]
     assert misses[0].max() < 0.015

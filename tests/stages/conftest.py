@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.simulation.session import SimulatedSession
+from tests.support.mount_errors import mount_error
 from tests.support.simulated import QUIET, calibrated, made
 
 
@@ -40,12 +41,8 @@ Errors = Callable[[Mapping[str, Any], Mapping[str, Any]], np.ndarray]
 @pytest.fixture(scope="session")
 def errors_of() -> Errors:
     """(6,): a method's block of calibration.json against the truth: rotation in degrees, lever arm in mm."""
-    from scipy.spatial.transform import Rotation
 
     def errors(block: Mapping[str, Any], truth: Mapping[str, Any]) -> np.ndarray:
-        R_true, R_found = np.array(truth["mbes"]["R_body_from_mbes"]), np.array(block["R_body_from_mbes"])
-        rotation = Rotation.from_matrix(R_true @ R_found.T).as_rotvec(degrees=True)
-        lever = 1000 * (np.array(truth["mbes"]["lever_arm_m"]) - np.array(block["lever_arm_m"]))
-        return np.concatenate([rotation, lever])
+        return mount_error(block, truth) * np.repeat([np.degrees(1.0), 1000.0], 3)
 
     return errors

@@ -5,20 +5,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from pipeline.adjustment.laser_design import bounds_of, coarse_covariance, held_of
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
-from pipeline.maths.geometry.rotations import exp_so3, log_so3
+from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate
 from stages.in_memory import calibrate_in_memory
 from tests.stages.test_faces import SCENARIOS
 from tests.support.effort import often
+from tests.support.mount_errors import mount_error, rotation_error
 from tests.support.simulated import THIN, made, merged
 
 OFF = {"laser": {"coarse_angle_deg": 0.3, "coarse_lever_m": 0.03}, "mbes": {"ping_rate_hz": 0.5}}
@@ -50,9 +50,7 @@ def result_of(found: dict[str, Any]) -> dict[str, Any]:
 
 def errors(result: dict[str, Any], truth: dict[str, Any]) -> np.ndarray:
     """(6,) true minus found: rotation vector about body x, y, z (rad), lever arm (m)."""
-    block, true = result["laser"], truth["laser"]
-    turn = Rotation.from_matrix(true["R_body_from_laser"]) * Rotation.from_matrix(block["R_body_from_laser"]).inv()
-    return np.concatenate([turn.as_rotvec(), np.subtract(true["lever_arm_m"], block["lever_arm_m"])])
+    return mount_error(result["laser"], truth, "laser")
 
 
 @pytest.mark.parametrize("drift", often([DRIFT], [{}, DRIFT]))
@@ -186,7 +184,7 @@ def test_the_sonars_total_takes_the_lasers_covariance_as_whole_calibrations_do()
     share = 1e4  # so much that all else is nothing beside it
     growth = np.array(found(0.0, share)["covariance_total"]) / share
     one, other = found(1.0, 1.0), found(-1.0, 1.0)
-    turn = log_so3(np.array(one["R_body_from_mbes"]) @ np.array(other["R_body_from_mbes"]).T)
+    turn = rotation_error(one["R_body_from_mbes"], other["R_body_from_mbes"])
     Gv = np.concatenate([turn, np.subtract(one["lever_arm_m"], other["lever_arm_m"])]) / 2.0
     unit = np.repeat([np.abs(Gv[:3]).max(), np.abs(Gv[3:]).max()], 3)
     np.testing.assert_allclose(growth / np.outer(unit, unit), np.outer(Gv, Gv) / np.outer(unit, unit), atol=0.15)

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.config.mount import Mount
 from pipeline.errors import RawDataError
-from pipeline.mount import change_of, mount_of
+from pipeline.mount import mount_of, setting_change
 from tests.support.effort import often
 from tests.support.simulated import QUIET, calibrated, made
 
@@ -183,8 +183,8 @@ def test_a_single_pass_is_weak_and_says_so(noisy, noisy_found):
 def test_a_head_mounted_the_other_way_round_changes_by_the_short_way():
     coarse = mount_of(Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=179.9, x_m=0.0, y_m=0.0, z_m=0.0)).settings()
     total = mount_of(Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=-179.6, x_m=0.0, y_m=0.0, z_m=0.0)).settings()
-    assert change_of(total, coarse, "yaw_deg") == pytest.approx(0.5)
-    assert change_of(coarse, total, "yaw_deg") == pytest.approx(-0.5)
+    assert setting_change(total, coarse, "yaw_deg") == pytest.approx(0.5)
+    assert setting_change(coarse, total, "yaw_deg") == pytest.approx(-0.5)
     turned = mount_of(Mount(roll_deg=0.0, pitch_deg=177.7, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)).settings()
     assert abs(turned["pitch_deg"]) <= 90
 

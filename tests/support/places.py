@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from scipy.spatial.transform import Rotation
 
 from stages import ORDER
 from stages.cli import call
+from tests.support.mount_errors import mount_error
 from tests.support.roots import ROOT
 
 POOLCAL = [sys.executable, "-m", "stages.cli"]
@@ -156,10 +156,7 @@ def digests(run: Path) -> dict[str, str]:
 
 def errors(block: dict[str, Any], truth: dict[str, Any]) -> np.ndarray:
     """True minus found: rotation vector in degrees about the body's axes, lever arm in metres."""
-    R_true = Rotation.from_matrix(truth["mbes"]["R_body_from_mbes"])
-    R_found = Rotation.from_matrix(block["R_body_from_mbes"])
-    turn = np.degrees((R_true * R_found.inv()).as_rotvec())
-    return np.concatenate([turn, np.subtract(truth["mbes"]["lever_arm_m"], block["lever_arm_m"])])
+    return np.asarray(mount_error(block, truth) * np.repeat([np.degrees(1.0), 1.0], 3))
 
 
 def sigmas(block: dict[str, Any]) -> np.ndarray:

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tests.support.mount_errors import rotation_error
+
 Array = np.ndarray
 
 
@@ -74,5 +76,5 @@ class World:
 
 def error(world: World, sensor: str, R_found: Array, lever_arm_m: Array) -> Array:
     """(ε, δl): R_true = Exp(ε) R_found; true minus found."""
-    turn = (world.rotation(sensor) * Rotation.from_matrix(R_found).inv()).as_rotvec()
+    turn = rotation_error(world.rotation(sensor).as_matrix(), R_found)
     return np.concatenate([turn, world.lever_arm(sensor) - lever_arm_m])

@@ -4,11 +4,11 @@ from typing import Any
 
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.outlines import build_target
-from pipeline.maths.target.patent_target import lettered
+from pipeline.maths.target.patent_target import PatentDimensions, patent_outlines
 
 
 def by_letters(a: float, b: float, c: float, e: float, water_level_m: float = 0.0, **more: Any) -> TargetModel:
-    outlines, relations, repeats_m = lettered(a, b, c, e, **more)
+    outlines, relations, repeats_m = patent_outlines(PatentDimensions(a, b, c, e, **more))
     return build_target(outlines, relations, water_level_m, repeats_m)
 
 
@@ -21,7 +21,7 @@ def as_faces(target: dict[str, Any]) -> dict[str, Any]:
     """A pool's target by its letters, as the same target by its faces: plain values for YAML."""
     place = {"origin", "azimuth_deg", "water_level_m"}
     letters = {name: value for name, value in target.items() if name not in place | {"kind"}}
-    outlines, relations, repeats_m = lettered(**letters)
+    outlines, relations, repeats_m = patent_outlines(PatentDimensions(**letters))
     faces: dict[str, Any] = {}
     for one in outlines:
         faces[one.name] = {"corners": [[float(v) for v in corner] for corner in one.corners]}

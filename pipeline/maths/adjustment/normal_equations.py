@@ -64,7 +64,7 @@ class Body:
 
     def poses(self, record: Integers, share: Array, drift: Drift | None) -> Poses:
         """At these moments, corrected by the drift found so far: the design is wanted where the body is."""
-        positions, T = self.trajectory.between(record, share)
+        positions, T = self.trajectory.poses_within(record, share)
         if drift is not None:
             error = drift.at(self.moments(record, share))
             positions, T = positions + error[:, :3], exp_so3(error[:, 3:]) @ T

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.geometry.planes import tangents_of
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.target.model import LEVEL
+from pipeline.maths.target.face import HORIZONTAL_COSINE
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -55,7 +55,7 @@ class Surface:
     @property
     def level(self) -> bool:
         """Whether it is horizontal."""
-        return bool(abs(self.normal[2]) > LEVEL)
+        return bool(abs(self.normal[2]) > HORIZONTAL_COSINE)
 
     @property
     def distance_m(self) -> float:

@@ -1,4 +1,4 @@
-"""What is left over, laid out to be looked at: along one variable at a time, and over each face.
+"""Residuals along one variable, and over each face: means by bin, and the grid of a face.
 
 All means are weighted with the robust weights w of the adjustment, mean = Σ w v / Σ w and rms = root(Σ w v² / Σ w), so
 that what the adjustment cut does not hide what is systematic. A bin in which every weight is zero has NaN for both.
@@ -14,8 +14,8 @@ Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Bins:
-    """keys (b, k): one row a bin, ascending; count (b,), mean_m (b,), rms_m (b,)."""
+class BinStatistics:
+    """Statistics of residuals by bin: keys (b, k), one row a bin, ascending; count, mean and RMS (b,) each."""
 
     keys: Integers
     count: Integers
@@ -23,28 +23,35 @@ class Bins:
     rms_m: Array
 
 
-def binned(keys: Integers, residual_m: Array, weight: Array) -> Bins:
-    """Residuals (n,) with weights (n,) by whole-number keys (n, k), such as (family, pass, number of the bin).
+def bin_statistics(keys: Integers, residual_m: Array, weight: Array) -> BinStatistics:
+    """Compute count, mean and RMS of residuals by bin.
 
-    >>> binned(np.array([[0], [0], [5]]), np.array([1.0, 3.0, 2.0]), np.array([1.0, 1.0, 0.5])).mean_m
+    Parameters
+    ----------
+    keys
+        Whole-number keys (n, k) of the bin of each residual, such as (family, pass, number of the bin).
+    residual_m, weight
+        Residuals and their weights (n,).
+
+    >>> bin_statistics(np.array([[0], [0], [5]]), np.array([1.0, 3.0, 2.0]), np.array([1.0, 1.0, 0.5])).mean_m
     array([2., 2.])
     """
     if not len(keys):
-        return Bins(keys, np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
+        return BinStatistics(keys, np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
     low, spans = keys.min(axis=0), np.ptp(keys, axis=0) + 1
     flat, inverse = np.unique(np.ravel_multi_index((keys - low).T, spans), return_inverse=True)
-    found, size = np.column_stack(np.unravel_index(flat, spans)) + low, len(flat)
+    bins, size = np.column_stack(np.unravel_index(flat, spans)) + low, len(flat)
     w, wv, wvv = (
         np.bincount(inverse, weights=part, minlength=size)
         for part in (weight, weight * residual_m, weight * residual_m**2)
     )
     with np.errstate(invalid="ignore", divide="ignore"):
         mean, rms = wv / w, np.sqrt(wvv / w)
-    return Bins(found, np.bincount(inverse, minlength=size), mean, rms)
+    return BinStatistics(bins, np.bincount(inverse, minlength=size), mean, rms)
 
 
 def face_axes(normal: Array) -> Array:
-    """Two unit vectors (2, 3) in a face: horizontal first; of a horizontal face the frame's x and y.
+    """Return two unit vectors (2, 3) in a face, the horizontal one first; in a horizontal face the frame's x and y.
 
     >>> face_axes(np.array([-1.0, 0.0, 0.0]))
     array([[ 0., -1.,  0.],
@@ -58,12 +65,32 @@ def face_axes(normal: Array) -> Array:
 
 
 def cells_on_face(points_m: Array, normal: Array, size_m: float) -> Integers:
-    """Square cells (n, 2) of a grid on the face, counted from the frame's origin along :func:`face_axes`."""
+    """Return the square cells (n, 2) of points on a face, counted from the frame's origin along :func:`face_axes`.
+
+    Parameters
+    ----------
+    points_m
+        Points (n, 3), target frame.
+    normal
+        Unit normal (3,) of the face.
+    size_m
+        Side of a cell.
+    """
     return np.floor(points_m @ face_axes(normal).T / size_m).astype(np.int64)
 
 
 def cell_centres(cells: Integers, normal: Array, distance_m: float, size_m: float) -> Array:
-    """The cells' centres (n, 3) on the face normal · x = distance."""
+    """Return the centres (n, 3) m of cells on the face normal · x = distance.
+
+    Parameters
+    ----------
+    cells
+        Cells (n, 2) of :func:`cells_on_face`.
+    normal, distance_m
+        Unit normal (3,) and distance of the face.
+    size_m
+        Side of a cell.
+    """
     axes = face_axes(normal)
     flat = (cells + 0.5) * size_m @ axes
     return np.asarray(flat + np.outer(distance_m - flat @ normal, normal))

@@ -15,10 +15,17 @@ ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
 
 
 def ecef_from_geodetic(latitude_rad: Array, longitude_rad: Array, height_m: Array) -> Array:
-    """Earth-centred, earth-fixed coordinates, (n,) each -> (n, 3) m.
+    """Return earth-centred, earth-fixed coordinates (n, 3) m.
 
     X = (N + h) cos φ cos λ, Y = (N + h) cos φ sin λ, Z = (N (1 - e²) + h) sin φ, N = a / √(1 - e² sin² φ)
     (e.g. Torge, Geodesy, 4.1.3). Rounding at the earth's radius: 1e-9 m.
+
+    Parameters
+    ----------
+    latitude_rad, longitude_rad
+        Geodetic latitude and longitude (n,).
+    height_m
+        Ellipsoidal height (n,).
 
     >>> ecef_from_geodetic(np.zeros(1), np.zeros(1), np.zeros(1))[0]
     array([6378137.,       0.,       0.])
@@ -37,7 +44,7 @@ def ecef_from_geodetic(latitude_rad: Array, longitude_rad: Array, height_m: Arra
 
 
 def rotation_ecef_from_level(latitude_rad: Array, longitude_rad: Array) -> Array:
-    """``R_ecef_from_level``, (n,) each -> (n, 3, 3): columns are east, north, up at the place."""
+    """Return ``R_ecef_from_level`` (n, 3, 3) at places (n,): its columns are east, north, up."""
     sin_lat, cos_lat = np.sin(latitude_rad), np.cos(latitude_rad)
     sin_lon, cos_lon = np.sin(longitude_rad), np.cos(longitude_rad)
     zero = np.zeros_like(sin_lat + sin_lon)
@@ -59,6 +66,17 @@ class PoolFrame:
 
     @classmethod
     def at(cls, latitude_rad: float, longitude_rad: float, height_m: float, azimuth_rad: float) -> "PoolFrame":
+        """Return the frame at an origin.
+
+        Parameters
+        ----------
+        latitude_rad, longitude_rad
+            Geodetic latitude and longitude of the origin.
+        height_m
+            Its ellipsoidal height.
+        azimuth_rad
+            Direction of the y axis, clockwise from true north.
+        """
         latitude, longitude = np.array(latitude_rad), np.array(longitude_rad)
         # Level to pool: y of the pool lies at azimuth A, so coordinates turn by +A about z.
         R_pool_from_level = rotation_z(azimuth_rad)
@@ -68,5 +86,5 @@ class PoolFrame:
         )
 
     def points_from_ecef(self, points_ecef_m: Array) -> Array:
-        """(n, 3) m in ECEF -> (n, 3) m in the pool frame."""
+        """Return points (n, 3) m of ECEF in the pool frame."""
         return (points_ecef_m - self.origin_ecef_m) @ self.R_pool_from_ecef.T

@@ -11,7 +11,7 @@ Interval = tuple[int, int]
 
 
 def split_at_gaps(t_ns: Times, max_gap_ns: int) -> list[Interval]:
-    """First and last moment of each stretch of ascending times without a gap above ``max_gap_ns``.
+    """Return the first and last time of each stretch of ascending times without a gap above ``max_gap_ns``.
 
     >>> split_at_gaps(np.array([0, 1, 2, 10, 11]), 5)
     [(0, 2), (10, 11)]
@@ -24,7 +24,16 @@ def split_at_gaps(t_ns: Times, max_gap_ns: int) -> list[Interval]:
 
 
 def reversals(t_ns: Times, along_m: Array, hysteresis_m: float) -> list[int]:
-    """Moments of turning: extremes of the along-track coordinate that are left by more than ``hysteresis_m``.
+    """Return the times of turning: extremes of the along-track coordinate that are left by more than the hysteresis.
+
+    Parameters
+    ----------
+    t_ns
+        Times (n,), ascending.
+    along_m
+        Along-track coordinate (n,).
+    hysteresis_m
+        Smallest way back from an extreme that makes it a turn.
 
     >>> reversals(np.arange(7) * 1_000_000_000, np.array([0.0, 1, 2, 3, 2, 1, 0]), 1.5)
     [3000000000]
@@ -65,7 +74,27 @@ def find_passes(
     reversal_m: float,
     shortest_ns: int = 1_000_000_000,
 ) -> list[Interval]:
-    """Intervals in which INS and soundings run without a gap and the boat does not turn back; ascending, disjoint."""
+    """Return the intervals in which INS and soundings run without a gap and the boat does not turn back.
+
+    Parameters
+    ----------
+    ins_t_ns
+        Times (n,) of the INS records, ascending.
+    along_m
+        Along-track coordinate (n,) at these times.
+    ping_t_ns
+        Times of the pings, ascending.
+    max_gap_ns
+        Longest gap in either.
+    reversal_m
+        Smallest way back that ends a pass.
+    shortest_ns
+        Shortest pass.
+
+    Returns
+    -------
+    First and last time of each pass; ascending, disjoint.
+    """
     pings = split_at_gaps(ping_t_ns, max_gap_ns)
     passes: list[Interval] = []
     for start, end in split_at_gaps(ins_t_ns, max_gap_ns):
@@ -80,7 +109,15 @@ def find_passes(
 
 
 def pass_of(t_ns: Times, starts_ns: Times, ends_ns: Times) -> NDArray[np.int16]:
-    """Number of the pass each moment lies in, -1 for none; (n,)."""
+    """Return the number of the pass in which each time (n,) lies, -1 for none.
+
+    Parameters
+    ----------
+    t_ns
+        Times (n,).
+    starts_ns, ends_ns
+        First and last time of each pass, ascending.
+    """
     if len(starts_ns) == 0:
         return np.full(len(t_ns), -1, dtype=np.int16)
     index = np.searchsorted(starts_ns, t_ns, side="right") - 1
@@ -88,20 +125,40 @@ def pass_of(t_ns: Times, starts_ns: Times, ends_ns: Times) -> NDArray[np.int16]:
     return np.where(inside, index, -1).astype(np.int16)
 
 
-def beside(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> NDArray[np.bool_]:
-    """Where (n,) an INS at east, north (n,) from the target's origin has that abeam to starboard, and near."""
+def abeam(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> NDArray[np.bool_]:
+    """Return where (n,) an INS has the target abeam to starboard, and near.
+
+    Parameters
+    ----------
+    east_m, north_m
+        Position (n,) of the INS from the target's origin.
+    azimuth_rad
+        Heading (n,), clockwise from true north.
+    within_m
+        Largest distance.
+    """
     starboard = -(east_m * np.cos(azimuth_rad) - north_m * np.sin(azimuth_rad))
     ahead = -(east_m * np.sin(azimuth_rad) + north_m * np.cos(azimuth_rad))
     return np.asarray((starboard > 0) & (starboard < within_m) & (np.abs(ahead) < starboard))
 
 
 def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> float | None:
-    """Direction of the track past the origin, clockwise from north: mean heading while the origin is near, to
-    starboard.
+    """Return the direction (rad) of the track past the origin: mean heading while the origin is near, to starboard.
 
-    east, north (n,): the INS relative to the target's origin. None when the boat never had the target to starboard.
+    Parameters
+    ----------
+    east_m, north_m
+        Position (n,) of the INS from the target's origin.
+    azimuth_rad
+        Heading (n,), clockwise from true north.
+    within_m
+        Largest distance.
+
+    Returns
+    -------
+    The direction, clockwise from true north; None if the boat never had the target to starboard.
     """
-    near = beside(east_m, north_m, azimuth_rad, within_m)
+    near = abeam(east_m, north_m, azimuth_rad, within_m)
     if not near.any():
         return None
     return float(np.arctan2(np.sin(azimuth_rad[near]).mean(), np.cos(azimuth_rad[near]).mean()))

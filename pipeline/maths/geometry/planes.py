@@ -12,12 +12,20 @@ ACROSS = 1e-3  # variance of points across their rays in any one direction, of t
 
 
 @dataclass(frozen=True)
-class Moments:
+class PlaneMoments:
     """Sums over points from which a plane follows; they add, so points are never kept.
 
-    count; total (3,) = Σ x; products (3, 3) = Σ x xᵀ, in a frame whose origin is near the points (pool or target: with
-    coordinates of metres the smallest eigenvalue keeps an absolute precision of 1e-14 m²); noise (3, 3) = Σ cov(x) up
-    to a factor: how the points' errors lie in space.
+    Parameters
+    ----------
+    count
+        Number of points.
+    total
+        Σ x (3,).
+    products
+        Σ x xᵀ (3, 3), in a frame whose origin is near the points (pool or target: with coordinates of metres the
+        smallest eigenvalue keeps an absolute precision of 1e-14 m²).
+    noise
+        Σ cov(x) (3, 3) up to a factor: how the points' errors lie in space.
     """
 
     count: int
@@ -26,16 +34,17 @@ class Moments:
     noise: Array
 
     @classmethod
-    def of(cls, points_m: Array) -> "Moments":
-        """Of points that err alike in all directions."""
+    def of(cls, points_m: Array) -> "PlaneMoments":
+        """Return the moments of points (n, 3) m whose errors are alike in all directions."""
         return cls(len(points_m), points_m.sum(axis=0), points_m.T @ points_m, len(points_m) * np.eye(3))
 
     @classmethod
-    def zero(cls) -> "Moments":
+    def zero(cls) -> "PlaneMoments":
+        """Return the moments of no points."""
         return cls(0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)))
 
-    def __add__(self, other: "Moments") -> "Moments":
-        return Moments(
+    def __add__(self, other: "PlaneMoments") -> "PlaneMoments":
+        return PlaneMoments(
             self.count + other.count,
             self.total + other.total,
             self.products + other.products,
@@ -45,8 +54,11 @@ class Moments:
 
 @dataclass(frozen=True)
 class Plane:
-    """``normal · x = distance_m``; the covariance is that of (turn of the normal along t1, along t2, distance at the
-    centroid) in rad and m, for independent points of the RMS found."""
+    """The plane ``normal · x = distance_m``, fitted to points.
+
+    The covariance (3, 3) is that of (turn of the normal along t1, along t2, distance at the centroid) in rad and m, for
+    independent points with the RMS of their residuals.
+    """
 
     normal: Array
     distance_m: float
@@ -58,8 +70,8 @@ class Plane:
     covariance: Array
 
 
-def fit_plane(moments: Moments, toward: Array) -> Plane:
-    """Plane that minimises nᵀ S n / nᵀ N n: mean square of n · x - d over what is expected of it [0061-0088].
+def fit_plane(moments: PlaneMoments, toward: Array) -> Plane:
+    """Fit the plane that minimises nᵀ S n / nᵀ N n: mean square of n · x - d over its expectation [0061-0088].
 
     S is the centred scatter matrix of the points and d = n · mean. A point x = x0 + e of the plane n · x0 = d with an
     error of covariance s C gives E[S] = S0 + s N, where N is the mean of C and S0 n = 0: the eigenvector n of
@@ -71,6 +83,13 @@ def fit_plane(moments: Moments, toward: Array) -> Plane:
     The normal is turned so that n · toward > 0; the tangents are the eigenvectors of S across it, eigenvalues λ_k.
     First-order covariance (e.g. Kanatani 1996, ch. 10): turning n along t_k changes the residuals by t_k · (x - mean),
     so var = σ² / (count λ_k), and var of the distance at the centroid σ² / count, with σ² = count nᵀ S n / (count - 3).
+
+    Parameters
+    ----------
+    moments
+        Moments of the points.
+    toward
+        Vector (3,) on whose side of the plane the normal is to point.
 
     Raises
     ------
@@ -97,23 +116,23 @@ def fit_plane(moments: Moments, toward: Array) -> Plane:
     return Plane(normal, float(normal @ mean), mean, n, float(np.sqrt(square)), values, tangents, covariance)
 
 
-def angle_between(one: Array, other: Array) -> float:
-    """Angle between two unit vectors, rad, by the chord: exact where it is small.
+def angle_between(first: Array, second: Array) -> float:
+    """Return the angle (rad) between two unit vectors (3,), by the chord: exact where it is small.
 
     >>> round(angle_between(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])), 12) == round(np.pi / 2, 12)
     True
     """
-    return float(2 * np.arcsin(min(float(np.linalg.norm(one - other)) / 2, 1.0)))
+    return float(2 * np.arcsin(min(float(np.linalg.norm(first - second)) / 2, 1.0)))
 
 
 def _signed(rows: Array) -> Array:
-    """Eigenvectors have no sign: make the largest component positive, so that tables are reproducible."""
+    """Give eigenvectors (k, 3) a sign: make the largest component positive, so that tables are reproducible."""
     largest = np.take_along_axis(rows, np.argmax(np.abs(rows), axis=1)[:, None], axis=1)
     return np.where(largest < 0, -rows, rows)
 
 
 def tangents_of(normal: Array) -> Array:
-    """Two unit vectors (2, 3) that span the plane with this normal, right-handed: t1 x t2 = normal."""
+    """Return two unit vectors (2, 3) that span the plane with this normal, right-handed: t1 x t2 = normal."""
     helper = np.eye(3)[int(np.argmin(np.abs(normal)))]
     first = np.cross(helper, normal)
     first /= np.linalg.norm(first)

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def rotation_x(angle_rad: float) -> Array:
-    """Right-handed rotation about x, (3, 3).
+    """Return the right-handed rotation (3, 3) about x.
 
     >>> (rotation_x(np.pi / 2) @ [0, 1, 0]).round(12)  # y turns towards z
     array([0., 0., 1.])
@@ -21,26 +21,26 @@ def rotation_x(angle_rad: float) -> Array:
 
 
 def rotation_y(angle_rad: float) -> Array:
-    """Right-handed rotation about y, (3, 3): z turns towards x."""
+    """Return the right-handed rotation (3, 3) about y: z turns towards x."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def rotation_z(angle_rad: float) -> Array:
-    """Right-handed rotation about z, (3, 3): x turns towards y."""
+    """Return the right-handed rotation (3, 3) about z: x turns towards y."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def skew(vector: Array) -> Array:
-    """Cross-product matrix: ``skew(a) @ b = a x b``; (..., 3) -> (..., 3, 3)."""
+    """Return the cross-product matrix, ``skew(a) @ b = a x b``; (..., 3) -> (..., 3, 3)."""
     x, y, z = np.moveaxis(np.asarray(vector, dtype=np.float64), -1, 0)
     zero = np.zeros_like(x)
     return np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
 
 
 def exp_coefficients(squared_angle: Array) -> tuple[Array, Array]:
-    """sin(t)/t and (1 - cos t)/t² of t² (series below t = 1e-3, where they are exact to 1e-17)."""
+    """Return sin(t)/t and (1 - cos t)/t² of t² (series below t = 1e-3, where they are exact to 1e-17)."""
     small = squared_angle < 1e-6
     first = 1 - squared_angle / 6 + squared_angle**2 / 120
     second = 0.5 - squared_angle / 24 + squared_angle**2 / 720
@@ -51,7 +51,9 @@ def exp_coefficients(squared_angle: Array) -> tuple[Array, Array]:
 
 
 def exp_so3(rotation_vector: Array) -> Array:
-    """Rotation of a rotation vector (Rodrigues): I + sin t / t · K + (1 - cos t) / t² · K², K = skew(vector).
+    """Return the rotation of a rotation vector (Rodrigues).
+
+    R = I + sin t / t · K + (1 - cos t) / t² · K², K = skew(vector), t its length.
 
     The patent writes I + K [0032]; that is no rotation and at 1° wrong by 1.5e-4 of the range.
     (..., 3) -> (..., 3, 3).
@@ -63,9 +65,11 @@ def exp_so3(rotation_vector: Array) -> Array:
 
 
 def log_so3(R: Array) -> Array:
-    """Rotation vector (length in [0, pi]) of a rotation: inverse of :func:`exp_so3`; (..., 3, 3) -> (..., 3).
+    """Return the rotation vector (length in [0, pi]) of a rotation: inverse of :func:`exp_so3`.
 
-    Goes through the quaternion with the largest component first, so it is exact near 0 and near pi.
+    (..., 3, 3) -> (..., 3).
+
+    It goes through the quaternion with the largest component first, so it is exact near 0 and near pi.
 
     >>> log_so3(exp_so3(np.array([0.1, -0.2, 0.3]))).round(12)
     array([ 0.1, -0.2,  0.3])
@@ -80,7 +84,10 @@ def log_so3(R: Array) -> Array:
 
 
 def quaternion_from_rotation(R: Array) -> Array:
-    """Unit quaternion (w, x, y, z), w >= 0, of (..., 3, 3) (Shepperd's method: the largest component is the root)."""
+    """Return the unit quaternion (w, x, y, z), w >= 0, of a rotation (..., 3, 3).
+
+    Shepperd's method: the largest component is the root.
+    """
     m = np.asarray(R, dtype=np.float64)
     trace = np.trace(m, axis1=-2, axis2=-1)
     diagonal = np.diagonal(m, axis1=-2, axis2=-1)
@@ -101,7 +108,7 @@ def quaternion_from_rotation(R: Array) -> Array:
 
 
 def rotation_from_quaternion(quaternion: Array) -> Array:
-    """Rotation (..., 3, 3) of unit quaternions (w, x, y, z)."""
+    """Return the rotations (..., 3, 3) of unit quaternions (w, x, y, z)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
     return np.stack(
         [
@@ -114,12 +121,12 @@ def rotation_from_quaternion(quaternion: Array) -> Array:
 
 
 def rotation_from_mount(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Array:
-    """``R_body_from_sensor`` = Rz(yaw) · Rx(pitch) · Ry(roll): yaw counter-clockwise seen from above."""
+    """Return ``R_body_from_sensor`` = Rz(yaw) · Rx(pitch) · Ry(roll): yaw counter-clockwise seen from above."""
     return rotation_z(yaw_rad) @ rotation_x(pitch_rad) @ rotation_y(roll_rad)
 
 
 def mount_from_rotation(R_body_from_sensor: Array) -> tuple[float, float, float]:
-    """(roll, pitch, yaw) in radians: inverse of :func:`rotation_from_mount`, pitch in [-pi/2, pi/2].
+    """Return (roll, pitch, yaw) in radians: inverse of :func:`rotation_from_mount`, pitch in [-pi/2, pi/2].
 
     From the product Rz(y)·Rx(p)·Ry(r): third row (-cos p sin r, sin p, cos p cos r), second column
     (-sin y cos p, cos y cos p, sin p).
@@ -130,7 +137,7 @@ def mount_from_rotation(R_body_from_sensor: Array) -> tuple[float, float, float]
 
 
 def mount_partials(R_body_from_sensor: Array) -> Array:
-    """∂(pitch, roll, yaw)/∂ε (3, 3) of R = Exp(ε) · Rz(yaw)·Rx(pitch)·Ry(roll), ε about body x, y, z.
+    """Return ∂(pitch, roll, yaw)/∂ε (3, 3) of R = Exp(ε) · Rz(yaw)·Rx(pitch)·Ry(roll), ε about body x, y, z.
 
     Each angle turns about its own axis in the body: pitch about Rz(yaw) e_x, roll about Rz(yaw) Rx(pitch) e_y, yaw
     about e_z; so ε = A (dpitch, droll, dyaw) with these as columns, and the partials are A⁻¹ (none at pitch = ±90°,
@@ -143,7 +150,7 @@ def mount_partials(R_body_from_sensor: Array) -> Array:
 
 
 def rotation_from_attitude(roll_rad: Array, pitch_rad: Array, azimuth_rad: Array) -> Array:
-    """``R_level_from_body`` = Rz(-azimuth) · Rx(pitch) · Ry(roll), (n,) each -> (n, 3, 3).
+    """Return ``R_level_from_body`` = Rz(-azimuth) · Rx(pitch) · Ry(roll), (n,) each -> (n, 3, 3).
 
     Level is east, north, up; body starboard, forward, up; azimuth clockwise from north (NovAtel SPAN, APN-037).
 
@@ -161,3 +168,8 @@ def rotation_from_attitude(roll_rad: Array, pitch_rad: Array, azimuth_rad: Array
         ],
         -2,
     )
+
+
+def rotation_error(R_true: Array, R_found: Array) -> Array:
+    """Return the error ε (3,) rad of a rotation (3, 3), true minus found: R_true = Exp(ε) R_found."""
+    return log_so3(R_true @ R_found.T)

@@ -22,11 +22,21 @@ BLOCK = 16_384  # points turned at a time: fits the cache
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Body poses in one fixed frame F (pool or target).
+    """Poses of the body in one fixed frame F (pool or target).
 
-    t_ns (n,) ascending; positions_m (n, 3) in F; R_frame_from_body (n, 3, 3). Between records k and k + 1, with
-    s in [0, 1]: position p_k + s (p_{k+1} - p_k), attitude R_k · Exp(s φ_k), φ_k = Log(R_kᵀ R_{k+1}) (slerp). At 200 Hz
-    and roll of 1° in 4 s this is within 1e-7 rad of the smooth motion.
+    Between records k and k + 1, with s in [0, 1]: position p_k + s (p_{k+1} - p_k), attitude R_k · Exp(s φ_k),
+    φ_k = Log(R_kᵀ R_{k+1}) (slerp). At 200 Hz and roll of 1° in 4 s this is within 1e-7 rad of the smooth motion.
+
+    Parameters
+    ----------
+    t_ns
+        Times (n,), ascending.
+    positions_m
+        Positions (n, 3) in F.
+    R_frame_from_body
+        Rotations (n, 3, 3).
+    steps_rad
+        Rotation vectors φ_k (n, 3), body axes; the last is zero.
     """
 
     t_ns: Times
@@ -36,11 +46,15 @@ class Trajectory:
 
     @classmethod
     def build(cls, t_ns: Times, positions_m: Array, R_frame_from_body: Array) -> "Trajectory":
+        """Return the trajectory of records at ``t_ns`` (n,): positions (n, 3) m and rotations (n, 3, 3)."""
         steps = log_so3(np.swapaxes(R_frame_from_body[:-1], -1, -2) @ R_frame_from_body[1:])
         return cls(t_ns, positions_m, R_frame_from_body, np.concatenate([steps, np.zeros((1, 3))]))
 
-    def moved(self, R_new_from_frame: Array, shift_m: Array) -> "Trajectory":
-        """The same poses in another frame: x_new = R_new_from_frame · x + shift; steps are body vectors and stay."""
+    def transformed(self, R_new_from_frame: Array, shift_m: Array) -> "Trajectory":
+        """Return the same poses in another frame: x_new = R_new_from_frame · x + shift.
+
+        The steps are body vectors and stay.
+        """
         return Trajectory(
             self.t_ns,
             self.positions_m @ R_new_from_frame.T + shift_m,
@@ -48,14 +62,14 @@ class Trajectory:
             self.steps_rad,
         )
 
-    def located(self, t_ns: Times) -> tuple[NDArray[np.int64], Array]:
-        """The last record before each moment, and the moment's place between it and the next, 0 to 1; (n,) each."""
+    def interval_of(self, t_ns: Times) -> tuple[NDArray[np.int64], Array]:
+        """Return the last record before each time, and the share of the interval to the next, 0 to 1; (n,) each."""
         index = np.clip(np.searchsorted(self.t_ns, t_ns, side="right") - 1, 0, len(self.t_ns) - 2)
         start = self.t_ns[index]
         return index, (t_ns - start) / (self.t_ns[index + 1] - start)
 
     def covers(self, t_ns: Times, max_interval_ns: int) -> NDArray[np.bool_]:
-        """Which moments lie between two records not further apart than ``max_interval_ns``; (n,)."""
+        """Return which times (n,) lie between two records not further apart than ``max_interval_ns``."""
         if len(self.t_ns) < 2:
             return np.zeros(len(t_ns), dtype=bool)
         covered = (t_ns >= self.t_ns[0]) & (t_ns <= self.t_ns[-1])
@@ -66,18 +80,21 @@ class Trajectory:
         return np.asarray(covered)
 
     def poses_at(self, t_ns: Times) -> tuple[Array, Array]:
-        """Positions (n, 3) and rotations R_frame_from_body (n, 3, 3) at ``t_ns`` (n,)."""
-        return self.between(*self.located(t_ns))
+        """Return positions (n, 3) m and rotations R_frame_from_body (n, 3, 3) at ``t_ns`` (n,)."""
+        return self.poses_within(*self.interval_of(t_ns))
 
-    def between(self, record: NDArray[np.int64], share: Array) -> tuple[Array, Array]:
-        """The same at a share of the step from each record (n,) to the next."""
+    def poses_within(self, record: NDArray[np.int64], share: Array) -> tuple[Array, Array]:
+        """Return positions and rotations at a share (n,) of the interval from each record (n,) to the next."""
         step = self.positions_m[record + 1] - self.positions_m[record]
         positions = self.positions_m[record] + share[:, None] * step
         return positions, self.R_frame_from_body[record] @ exp_so3(self.steps_rad[record] * share[:, None])
 
     def rates(self, reach_s: float) -> Array:
-        """Velocity and turning of each record in this frame, (n, 6) m/s and rad/s: the mean from ``reach_s`` before it
-        to ``reach_s`` after it, or as far as records go without a step longer than that."""
+        """Return velocity and rate of rotation at each record in this frame, (n, 6) m/s and rad/s.
+
+        Each is the mean from ``reach_s`` before the record to ``reach_s`` after it, or as far as records go without an
+        interval longer than that.
+        """
         reach = round(reach_s * 1e9)
         holes = np.r_[-1, np.flatnonzero(np.diff(self.t_ns) > reach), len(self.t_ns) - 1]
         run = np.searchsorted(holes, np.arange(len(self.t_ns))) - 1
@@ -89,8 +106,8 @@ class Trajectory:
         way = self.positions_m[last] - self.positions_m[first]
         return np.asarray(np.concatenate([way, turning], axis=1) / seconds)
 
-    def place(self, t_ns: Times, points_body_m: Array) -> Array:
-        """Points in the body's frame, (n, 3) m, into this frame at their moments: p(t) + R(t) x; (n, 3) m.
+    def points_from_body(self, t_ns: Times, points_body_m: Array) -> Array:
+        """Return points (n, 3) m of the body's frame in this frame at their times (n,): p(t) + R(t) x.
 
         R(t) x = R_k Exp(v) x with v = s φ_k is evaluated without forming the matrices (Rodrigues on the vector),
         block by block so that the work stays in the cache.
@@ -98,7 +115,7 @@ class Trajectory:
         placed = np.empty((3, len(points_body_m)))
         for start in range(0, len(t_ns), BLOCK):
             rows = slice(start, start + BLOCK)
-            index, share = self.located(t_ns[rows])
+            index, share = self.interval_of(t_ns[rows])
             x = points_body_m[rows].T
             v = self.steps_rad[index].T * share
             first, second = exp_coefficients(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
@@ -113,8 +130,8 @@ class Trajectory:
                 )
         return placed.T
 
-    def carried(self, t_ns: Times, point_body_m: Array) -> Array:
-        """Where a point fixed to the body (3,) m is at moments (n,), linear between records; (n, 3) m.
+    def track_of_point(self, t_ns: Times, point_body_m: Array) -> Array:
+        """Return the positions (n, 3) m of a point (3,) m fixed to the body at times (n,), linear between records.
 
         For directions of rays: off by |φ|² |x| / 8, which at 1e-3 rad between records and 2 m is a quarter of a
         micrometre.
@@ -125,27 +142,31 @@ class Trajectory:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Cross product of (3, n) arrays (numpy's own is several times slower)."""
+    """Return the cross product of (3, n) arrays (numpy's own is several times slower)."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def poses_in_pool(
-    frame: PoolFrame,
-    latitude_rad: Array,
-    longitude_rad: Array,
-    height_m: Array,
-    roll_rad: Array,
-    pitch_rad: Array,
-    azimuth_rad: Array,
-) -> tuple[Array, Array]:
-    """INS records -> positions (n, 3) m and R_pool_from_body (n, 3, 3) [0034].
+@dataclass(frozen=True)
+class GeodeticPoses:
+    """Records of an INS: latitude, longitude, ellipsoidal height and attitude, (n,) each."""
+
+    latitude_rad: Array
+    longitude_rad: Array
+    height_m: Array
+    roll_rad: Array
+    pitch_rad: Array
+    azimuth_rad: Array
+
+
+def poses_in_pool(frame: PoolFrame, ins: GeodeticPoses) -> tuple[Array, Array]:
+    """Return positions (n, 3) m and R_pool_from_body (n, 3, 3) of INS records [0034].
 
     R_pool_from_body = R_pool_from_ecef · R_ecef_from_level(INS) · R_level_from_body: the level frame is the one at the
     INS, not at the pool's origin (10 m apart they differ by 1.6e-6 rad).
     """
-    positions = frame.points_from_ecef(ecef_from_geodetic(latitude_rad, longitude_rad, height_m))
-    R_ecef_from_body = rotation_ecef_from_level(latitude_rad, longitude_rad) @ rotation_from_attitude(
-        roll_rad, pitch_rad, azimuth_rad
+    positions = frame.points_from_ecef(ecef_from_geodetic(ins.latitude_rad, ins.longitude_rad, ins.height_m))
+    R_ecef_from_body = rotation_ecef_from_level(ins.latitude_rad, ins.longitude_rad) @ rotation_from_attitude(
+        ins.roll_rad, ins.pitch_rad, ins.azimuth_rad
     )
     # Through the quaternion: exactly orthonormal, and what is stored in Parquet is what is used.
     return positions, rotation_from_quaternion(quaternion_from_rotation(frame.R_pool_from_ecef @ R_ecef_from_body))

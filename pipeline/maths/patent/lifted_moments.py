@@ -13,10 +13,12 @@ So Σ X_a X_b = θᵀ (Σ f_a f_bᵀ) θ, and with a constant 1 as fortieth feat
 per pass and face holds all. Iterating over mounts then costs microseconds, and no sounding is read twice.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.geometry.planes import Moments
+from pipeline.maths.geometry.planes import PlaneMoments
 
 Array = NDArray[np.float64]
 FEATURES = 13
@@ -24,7 +26,15 @@ SIZE = 3 * FEATURES + 1  # three axes, and the constant 1 for the sums
 
 
 def lift(R_target_from_body: Array, positions_m: Array, points_body_m: Array) -> Array:
-    """Features (n, 40) of soundings: poses (n, 3, 3), (n, 3) m; points m = R_body_from_mbes x_mbes, (n, 3) m."""
+    """Return the features (n, 40) of soundings.
+
+    Parameters
+    ----------
+    R_target_from_body, positions_m
+        Poses (n, 3, 3) and (n, 3) m, target frame.
+    points_body_m
+        Points m = R_body_from_mbes x_mbes, (n, 3) m, with the coarse mount.
+    """
     n = len(positions_m)
     features = np.empty((n, SIZE))
     for axis in range(3):
@@ -37,11 +47,20 @@ def lift(R_target_from_body: Array, positions_m: Array, points_body_m: Array) ->
     return features
 
 
-def plane_moments(lifted: Array, correction: Array, lever_arm_m: Array) -> Moments:
-    """Moments of the soundings placed with mount Exp(δ) = ``correction`` (3, 3) times coarse, and this lever arm.
+def plane_moments(lifted: Array, correction: Array, lever_arm_m: Array) -> PlaneMoments:
+    """Return the moments of the soundings placed with mount Exp(δ) = ``correction`` times coarse, and this lever arm.
 
     Their noise is Σ r rᵀ of the rays r = T E m: a beam that errs by δ meets a face at incidence i by r δ tan i too
     early or too late, along the ray it is recorded on, which the range's own noise does as well.
+
+    Parameters
+    ----------
+    lifted
+        Lifted moments (40, 40).
+    correction
+        Exp(δ) (3, 3).
+    lever_arm_m
+        Lever arm (3,), body axes.
     """
     place, rays = np.zeros((4, SIZE)), np.zeros((3, SIZE))
     for axis in range(3):
@@ -49,9 +68,20 @@ def plane_moments(lifted: Array, correction: Array, lever_arm_m: Array) -> Momen
         rays[axis, axis * FEATURES : axis * FEATURES + 9] = correction.ravel()
     place[3, -1] = 1.0
     sums = place @ lifted @ place.T
-    return Moments(round(float(sums[3, 3])), sums[:3, 3], sums[:3, :3], rays @ lifted @ rays.T)
+    return PlaneMoments(round(float(sums[3, 3])), sums[:3, 3], sums[:3, :3], rays @ lifted @ rays.T)
 
 
 def attitude_sum(lifted: Array) -> Array:
-    """Σ R_target_from_body (3, 3) over the soundings: the features T_a multiplied by the constant."""
+    """Return Σ R_target_from_body (3, 3) over the soundings: the features T_a multiplied by the constant."""
     return np.array([lifted[axis * FEATURES + 9 : axis * FEATURES + 12, -1] for axis in range(3)])
+
+
+def by_family(
+    family_of_face: Mapping[int, str], moments: Mapping[tuple[int, int], Array]
+) -> dict[tuple[int, str], Array]:
+    """Return the lifted moments of (pass, face) summed over the faces of each family: (pass, family) -> (40, 40)."""
+    total: dict[tuple[int, str], Array] = {}
+    for (number, face), lifted in moments.items():
+        key = (number, family_of_face[face])
+        total[key] = total[key] + lifted if key in total else lifted
+    return total

@@ -5,7 +5,7 @@ are turned by the mean R_body_from_target of the soundings used: a pool that is 
 nonsense otherwise.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.planes import Plane, fit_plane
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
-from pipeline.maths.patent.angles import PassPlanes, look, mean_attitude
+from pipeline.maths.patent.angles import PassPlanes, angle_step, mean_attitude
 from pipeline.maths.patent.lifted_moments import plane_moments
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DryFace:
-    """A horizontal face as the laser sees it."""
+    """A horizontal face that the laser sees: mean height of its points, and the height by design."""
 
     name: str
     mean_z_m: float
@@ -32,7 +32,7 @@ class DryFace:
 
 @dataclass(frozen=True)
 class WetFace:
-    """A horizontal face as the sonar sees it: lifted moments."""
+    """A horizontal face that the sonar sees: lifted moments (40, 40) of its soundings, and the height by design."""
 
     name: str
     lifted: Array
@@ -41,7 +41,7 @@ class WetFace:
 
 @dataclass(frozen=True)
 class PassOffsets:
-    """One pass: lifted moments by family, and the laser's planes P1 and P2."""
+    """One pass: lifted moments by family, and the laser's planes P2 (the wall) and P1."""
 
     planes: PassPlanes
     laser_wall: Plane
@@ -49,7 +49,16 @@ class PassOffsets:
 
 
 @dataclass(frozen=True)
-class Offsets:
+class OffsetObservations:
+    """Observations of the offsets: the passes, and the horizontal faces that each sensor sees."""
+
+    passes: Sequence[PassOffsets]
+    dry: Sequence[DryFace]
+    wet: Sequence[WetFace]
+
+
+@dataclass(frozen=True)
+class PatentOffsets:
     """Displacement of the MBES's cloud onto the laser's: (3,) m in the target frame, in the body frame; pairs for Z."""
 
     target_m: Array
@@ -57,41 +66,59 @@ class Offsets:
     pairs: list[dict[str, float | str]]
 
 
-def offsets(
-    passes: Sequence[PassOffsets],
-    dry: Sequence[DryFace],
-    wet: Sequence[WetFace],
-    rotation: Array,
-    lever_arm_m: Array,
-    apply_x_first: bool,
-) -> Offsets:
-    """X, Y, Z with the mount Exp(δ) = ``rotation`` and this lever arm.
+def patent_offsets(
+    observations: OffsetObservations, rotation: Array, lever_arm_m: Array, apply_x_first: bool
+) -> PatentOffsets:
+    """Compute X, Y, Z with the mount Exp(δ) = ``rotation`` and this lever arm.
 
     X [0126]: mean X of the laser's wall points minus that of the MBES's, pass by pass, weighted by n_L n_M / (n_L +
     n_M). Z [0127]: (z_dry - z_wet) measured minus (z_dry - z_wet) by design, over every pair of horizontal faces.
     Y [0128]: P1 planes projected onto the floor (their traces at their own mean height), cut with a line parallel to Y
     through the faces' centroid, laser minus MBES. Moving the MBES's points by ΔX moves their cut by ΔX n_x / n_y, laser
     minus MBES by the opposite: with ``apply_x_first`` that is added, and Y is what remains after X has been applied.
+
+    Parameters
+    ----------
+    observations
+        Passes and horizontal faces.
+    rotation
+        Correction of the coarse mount, Exp(δ) (3, 3).
+    lever_arm_m
+        Lever arm (3,), body axes.
+    apply_x_first
+        Y is what remains after X has been applied.
+
+    Raises
+    ------
+    DegenerateGeometryError
+        No pass has what the offsets need, or a sensor sees no horizontal face.
     """
+    passes = observations.passes
     if not passes:
         raise DegenerateGeometryError("no pass has laser points and soundings on both P1 and P2")
     x_rows, y_rows = [], []
-    for one in passes:
-        wall = plane_moments(one.planes.lifted["P2"], rotation, lever_arm_m)
-        weight = one.laser_wall.count * wall.count / (one.laser_wall.count + wall.count)
-        x_rows.append((one.laser_wall.centroid_m[0] - wall.total[0] / wall.count, weight))
+    for of_pass in passes:
+        wall = plane_moments(of_pass.planes.lifted["P2"], rotation, lever_arm_m)
+        weight = _pair_weight(of_pass.laser_wall.count, wall.count)
+        x_rows.append((of_pass.laser_wall.centroid_m[0] - wall.total[0] / wall.count, weight))
     dx = _mean(x_rows)
-    for one in passes:
-        slanted = fit_plane(plane_moments(one.planes.lifted["P1"], rotation, lever_arm_m), one.laser_p1.normal)
-        cut_x = one.laser_p1.centroid_m[0]
-        dy = _cut(one.laser_p1, cut_x) - _cut(slanted, cut_x)
+    for of_pass in passes:
+        laser_p1 = of_pass.laser_p1
+        slanted = fit_plane(plane_moments(of_pass.planes.lifted["P1"], rotation, lever_arm_m), laser_p1.normal)
+        cut_x = laser_p1.centroid_m[0]
+        dy = _cut(laser_p1, cut_x) - _cut(slanted, cut_x)
         if apply_x_first:
             dy -= dx * slanted.normal[0] / slanted.normal[1]
-        y_rows.append((dy, one.laser_p1.count * slanted.count / (one.laser_p1.count + slanted.count)))
-    pairs, dz = _height_pairs(dry, wet, rotation, lever_arm_m)
+        y_rows.append((dy, _pair_weight(laser_p1.count, slanted.count)))
+    pairs, dz = _height_pairs(observations, rotation, lever_arm_m)
     target = np.array([dx, _mean(y_rows), dz])
-    attitude = mean_attitude({f"{one.planes.number}-{k}": v for one in passes for k, v in one.planes.lifted.items()})
-    return Offsets(target, attitude @ target, pairs)
+    lifted = {f"{one.planes.number}-{family}": m for one in passes for family, m in one.planes.lifted.items()}
+    return PatentOffsets(target, mean_attitude(lifted) @ target, pairs)
+
+
+def _pair_weight(first: int, second: int) -> float:
+    """Return the weight of a difference of two means of so many points."""
+    return first * second / (first + second)
 
 
 def _mean(rows: Sequence[tuple[float, float]]) -> float:
@@ -99,17 +126,18 @@ def _mean(rows: Sequence[tuple[float, float]]) -> float:
 
 
 def _cut(plane: Plane, x_m: float) -> float:
-    """y where the plane's trace at its centroid's height meets x = x_m."""
+    """Return y where the trace of the plane, at the height of its centroid, meets x = x_m."""
     n, c = plane.normal, plane.centroid_m
     return float(c[1] - (x_m - c[0]) * n[0] / n[1])
 
 
 def _height_pairs(
-    dry: Sequence[DryFace], wet: Sequence[WetFace], rotation: Array, lever_arm_m: Array
+    observations: OffsetObservations, rotation: Array, lever_arm_m: Array
 ) -> tuple[list[dict[str, float | str]], float]:
+    dry, wet = observations.dry, observations.wet
     if not dry or not wet:
-        seen_by = "laser" if not dry else "sonar"
-        raise DegenerateGeometryError(f"the {seen_by} sees no horizontal face well enough: Z cannot be told")
+        sensor = "laser" if not dry else "sonar"
+        raise DegenerateGeometryError(f"the {sensor} sees no horizontal face well enough: Z cannot be told")
     pairs: list[dict[str, float | str]] = []
     rows = []
     for below in wet:
@@ -117,7 +145,7 @@ def _height_pairs(
         for above in dry:
             measured = above.mean_z_m - moments.total[2] / moments.count
             design = above.design_z_m - below.design_z_m
-            rows.append((measured - design, above.count * moments.count / (above.count + moments.count)))
+            rows.append((measured - design, _pair_weight(above.count, moments.count)))
             pairs.append(
                 {
                     "dry_face": above.name,
@@ -134,7 +162,18 @@ def _height_pairs(
 
 
 @dataclass(frozen=True)
+class AlternationTolerances:
+    """When the alternation ends: most iterations, largest last step of the angles and of the offsets."""
+
+    max_iterations: int
+    step_rad: float
+    step_m: float
+
+
+@dataclass(frozen=True)
 class AlternationResult:
+    """Corrections (3,) of rotation and lever arm, body axes, and the rows of all iterations."""
+
     rotation_vector_rad: Array
     lever_arm_correction_m: Array
     converged: bool
@@ -144,42 +183,40 @@ class AlternationResult:
 
 def alternate(
     angle_passes: Sequence[PassPlanes],
-    offset_passes: Sequence[PassOffsets],
-    dry: Sequence[DryFace],
-    wet: Sequence[WetFace],
+    observations: OffsetObservations,
     lever_arm_m: Array,
-    max_iterations: int,
-    step_tolerance_rad: float,
-    step_tolerance_m: float,
+    tolerances: AlternationTolerances,
 ) -> AlternationResult:
-    """One step of the angles, then one of the offsets, until both stand still.
+    """Take one step of the angles, then one of the offsets, until both stand still.
 
     The sequential recipe stops at angles found with a wrong lever arm (method: 0.08° on noise-free data); the fixed
     point of the alternation has neither a deviation nor a displacement left, which only the truth has.
+
+    Parameters
+    ----------
+    angle_passes
+        Passes in which both sensors have P1, P2 and P3.
+    observations
+        Passes and horizontal faces for the offsets.
+    lever_arm_m
+        Coarse lever arm (3,), body axes.
+    tolerances
+        When the alternation ends.
     """
     rotation, correction = np.eye(3), np.zeros(3)
     rows: list[dict[str, float]] = []
     converged = False
-    for iteration in range(1, max_iterations + 1):
-        turn = look(angle_passes, rotation, lever_arm_m + correction).correction_rad
+    for iteration in range(1, tolerances.max_iterations + 1):
+        turn = angle_step(angle_passes, rotation, lever_arm_m + correction).correction_rad
         rotation = exp_so3(turn) @ rotation
-        shift = offsets(offset_passes, dry, wet, rotation, lever_arm_m + correction, apply_x_first=True).body_m
+        shift = patent_offsets(observations, rotation, lever_arm_m + correction, apply_x_first=True).body_m
         correction = correction + shift
         vector = np.degrees(log_so3(rotation))
         step_rad, step_m = float(np.linalg.norm(turn)), float(np.linalg.norm(shift))
         row: dict[str, float] = {"iteration": iteration, "step_deg": float(np.degrees(step_rad)), "step_m": step_m}
         row |= {f"rotation_{axis}_deg": float(vector[k]) for k, axis in enumerate("xyz")}
         rows.append(row | {f"lever_arm_{axis}_m": float(correction[k]) for k, axis in enumerate("xyz")})
-        converged = step_rad <= step_tolerance_rad and step_m <= step_tolerance_m
+        converged = step_rad <= tolerances.step_rad and step_m <= tolerances.step_m
         if converged or step_m > 100:
             break
     return AlternationResult(log_so3(rotation), correction, converged, len(rows), rows)
-
-
-def by_family(faces: Mapping[int, str], moments: Mapping[tuple[int, int], Array]) -> dict[tuple[int, str], Array]:
-    """Sum lifted moments of (pass, face) over the faces of each family: (pass, family) -> (40, 40)."""
-    total: dict[tuple[int, str], Array] = {}
-    for (number, face), lifted in moments.items():
-        key = (number, faces[face])
-        total[key] = total[key] + lifted if key in total else lifted
-    return total

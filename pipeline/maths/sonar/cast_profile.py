@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-SAME_M = 1e-3  # depths are told apart to this
+SAME_DEPTH_M = 1e-3  # depths nearer to each other are one
 MOST = 200  # depths of a profile
 TOLERANCE_M_S = 0.02  # of thinning: what a probe resolves; 0.1 mm in a range of 10 m
 LEAST_HEIGHT_M = 0.05  # over which scattered rows are averaged first
 
 
 def one_way(depth_m: Array) -> NDArray[np.int64]:
-    """Rows of the probe's way down, where that and the way up each cover half of the depths; else all rows, for it went
-    one way only, however unevenly. ``depth_m`` (n,) as recorded."""
+    """Return the rows of the probe's way down, if that and the way up each cover half of the depths; else all rows.
+
+    In the other case the probe went one way only, however unevenly. ``depth_m`` (n,) is as recorded.
+    """
     turn = int(np.argmax(depth_m))
     rows = np.arange(len(depth_m))
     half = (depth_m.max() - depth_m.min()) / 2
@@ -22,25 +24,31 @@ def one_way(depth_m: Array) -> NDArray[np.int64]:
     return parts[0] if len(parts) == 2 else rows
 
 
-def largest_difference(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[float, float]:
-    """How much two profiles (depths ascending, speeds) differ at most, over the depths that both have, and where."""
-    depths = one[0][(one[0] >= other[0][0]) & (one[0] <= other[0][-1])]
+def largest_difference(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[float, float]:
+    """Return the largest difference (m/s) of two profiles over the depths that both have, and its depth (m).
+
+    A profile is (depths, ascending; speeds).
+    """
+    depths = first[0][(first[0] >= second[0][0]) & (first[0] <= second[0][-1])]
     if not len(depths):
         return 0.0, 0.0
-    apart = np.abs(np.interp(depths, *one) - np.interp(depths, *other))
+    apart = np.abs(np.interp(depths, *first) - np.interp(depths, *second))
     return float(apart.max()), float(depths[np.argmax(apart)])
 
 
 def ascending(depth_m: Array, speed_m_s: Array) -> tuple[Array, Array]:
-    """Sorted by depth; rows of the same millimetre become its mean."""
-    millimetre, group = np.unique(np.rint(depth_m / SAME_M), return_inverse=True)
-    return millimetre * SAME_M, np.bincount(group, speed_m_s) / np.bincount(group)
+    """Return depths and speeds sorted by depth; rows of the same millimetre become their mean."""
+    millimetre, group = np.unique(np.rint(depth_m / SAME_DEPTH_M), return_inverse=True)
+    return millimetre * SAME_DEPTH_M, np.bincount(group, speed_m_s) / np.bincount(group)
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Depths ascending. Rows, or means of those within ``averaged_m`` of depth where that is not 0, lie within
-    TOLERANCE_M_S of the straight lines between them; ``scatter_m_s``: RMS of the rows about those lines."""
+    """Sound speed by depth, ascending.
+
+    The rows of the cast lie within TOLERANCE_M_S of the straight lines between these points; where ``averaged_m`` is
+    not 0, the means of the rows over that much depth do. ``scatter_m_s`` is the RMS of the rows about those lines.
+    """
 
     depth_m: Array
     speed_m_s: Array
@@ -48,8 +56,8 @@ class Profile:
     scatter_m_s: float
 
 
-def thinned(depth_m: Array, speed_m_s: Array) -> Profile:
-    """Rows (n,), depths ascending, as at most MOST of them.
+def thinned_profile(depth_m: Array, speed_m_s: Array) -> Profile:
+    """Return a profile of at most MOST points from the rows (n,) of a cast, depths ascending.
 
     Straight lines are split at the row farthest off them (in speed) until none is farther than the tolerance (Ramer
     1972; Douglas & Peucker 1973). Where too many rows remain, they scatter: then they are averaged over 5 cm of depth,
@@ -65,12 +73,14 @@ def thinned(depth_m: Array, speed_m_s: Array) -> Profile:
 
 
 def _averaged(depth: Array, speed: Array, height: float) -> tuple[Array, Array]:
+    """Return the means of depth and speed over layers of so much height."""
     _, layer = np.unique(np.floor((depth - depth[0]) / height), return_inverse=True)
     count = np.bincount(layer)
     return np.bincount(layer, depth) / count, np.bincount(layer, speed) / count
 
 
 def _split(depth: Array, speed: Array, tolerance: float) -> NDArray[np.int64]:
+    """Return the rows whose straight lines leave no row farther off than the tolerance."""
     kept = np.zeros(len(depth), dtype=bool)
     kept[[0, -1]] = True
     waiting = [(0, len(depth) - 1)]

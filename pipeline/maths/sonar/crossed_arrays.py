@@ -22,8 +22,16 @@ Array = NDArray[np.float64]
 
 
 def tilt_in_mbes(angle_rad: Array, tilt_rad: Array, axis_mbes: Array) -> Array:
-    """Tilts (n,) rad round y of rays that the angles θ and tilts τ (n,) make with a transmitter along ``axis_mbes``
-    t (n, 3), its own forward axis; NaN where its cone does not reach the beam's.
+    """Return the tilts (n,) rad round y of the rays of two crossed arrays; NaN where the cones do not meet.
+
+    Parameters
+    ----------
+    angle_rad
+        Angles θ (n,) of the receive beams.
+    tilt_rad
+        Tilts τ (n,) of the transmit fans, about the transmitter's own axis.
+    axis_mbes
+        Forward axes t (n, 3) of the transmitter in frame mbes.
 
     >>> axes = np.array([[0.0, -1.0, 0.0], [0.0, np.cos(0.2), np.sin(0.2)]])  # turned round; forward end up
     >>> tilt_in_mbes(np.zeros(2), np.full(2, 0.01), axes).round(6)

@@ -28,12 +28,24 @@ class Cast:
     speed_m_s: Array
 
     def speed_at(self, depth_m: Array) -> Array:
+        """Return the sound speed (n,) m/s at depths (n,) m."""
         return np.interp(depth_m, self.depth_m, self.speed_m_s)
 
 
 def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[Array, Array]:
-    """Where rays are after ``time_s``: horizontal distance and depth (n,) m; from depths (n,) at angles (n,) from
-    straight down (π: straight up)."""
+    """Return where rays are after a time: horizontal distance and depth, (n,) m each.
+
+    Parameters
+    ----------
+    cast
+        Sound speed by depth.
+    depth_m
+        Depths (n,) at which the rays start.
+    angle_rad
+        Their angles (n,) from straight down (π: straight up).
+    time_s
+        Travel times (n,).
+    """
     theta = np.clip(np.array(angle_rad, dtype=np.float64), LEAST_RAD, np.pi - LEAST_RAD)
     depth, left = np.array(depth_m, dtype=np.float64), np.array(time_s, dtype=np.float64)
     across = np.zeros_like(depth)
@@ -71,8 +83,8 @@ def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[
 def _exit(
     theta: Array, speed: Array, depth: Array, gradient: Array, upper: Array, lower: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Time until a ray leaves its layer, and whether downward; infinite if it never does."""
-    found, downward = np.full(len(theta), np.inf), np.zeros(len(theta), dtype=bool)
+    """Return the time until a ray leaves its layer, and whether downward; infinite if it never does."""
+    exit_time, downward = np.full(len(theta), np.inf), np.zeros(len(theta), dtype=bool)
     for edge, down in ((lower, True), (upper, False)):
         with np.errstate(invalid="ignore"):
             there = speed + gradient * (edge - depth)
@@ -83,6 +95,6 @@ def _exit(
         with np.errstate(divide="ignore", invalid="ignore"):
             bent = np.log(np.tan(end / 2) / np.tan(theta / 2)) / gradient
             time = np.where(gradient == 0.0, (edge - depth) / (speed * np.cos(theta)), bent)
-        sooner = reaches & (time > 1e-15) & (time < found)
-        found, downward = np.where(sooner, time, found), np.where(sooner, down, downward)
-    return found, downward
+        sooner = reaches & (time > 1e-15) & (time < exit_time)
+        exit_time, downward = np.where(sooner, time, exit_time), np.where(sooner, down, downward)
+    return exit_time, downward

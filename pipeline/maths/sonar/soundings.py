@@ -24,22 +24,38 @@ def points_in_mbes(
     angle_rad: Array,
     transmit_tilt_rad: Array,
     sound_speed_m_s: Array,
+    *,
     true_sound_speed_m_s: float | None = None,
     projector_offset_m: Array | None = None,
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Points r u, (n, 3) m in frame mbes, and which of them are possible; inputs (n,).
+    """Return points r u, (n, 3) m in frame mbes, and which of them (n,) are possible.
 
     Sound speed is not only a scale of ranges. Both arrays are flat: they set the slope of the wave front along
     themselves, sin θ / c and sin τ / c. With the speed c the head worked with and the true speed c', k = c' / c:
     r' = k r, sin θ' = k sin θ and sin τ' = k sin τ (R2Sonic manual on sound speed at the head; Snell's law at the
     array's face). Where s² + p² then exceeds 1 no such direction exists.
 
-    ``projector_offset_m`` o (3,): the transmitter in the mbes frame, when ranges are to be counted from it: the path
-    c t = |x - o| + |x| with x = r u gives r = (L² - |o|²) / (2 (L - o · u)), L = c t. None: range = c t / 2.
+    Where the transmitter stands off the receiver by o, the path c t = |x - o| + |x| with x = r u gives
+    r = (L² - |o|²) / (2 (L - o · u)), L = c t; else r = c t / 2.
+
+    Parameters
+    ----------
+    two_way_time_s
+        Two-way travel times (n,).
+    angle_rad
+        Angles θ (n,) of the receive beams, starboard positive.
+    transmit_tilt_rad
+        Tilts τ (n,) of the transmit fans, forward positive.
+    sound_speed_m_s
+        Sound speeds c (n,) that the head worked with.
+    true_sound_speed_m_s
+        Sound speed c'; None: that of the head.
+    projector_offset_m
+        Transmitter o (3,) in the mbes frame, if ranges are to be counted from it.
     """
     speed = sound_speed_m_s if true_sound_speed_m_s is None else np.full_like(sound_speed_m_s, true_sound_speed_m_s)
     slopes = np.column_stack([np.sin(angle_rad), np.sin(transmit_tilt_rad)]) * (speed / sound_speed_m_s)[:, None]
-    direction, valid = _met(slopes, np.where(np.abs(angle_rad) > np.pi / 2, 1.0, -1.0))
+    direction, valid = _intersection(slopes, np.where(np.abs(angle_rad) > np.pi / 2, 1.0, -1.0))
     path = speed * two_way_time_s
     if projector_offset_m is None:
         ranges = path / 2
@@ -48,16 +64,18 @@ def points_in_mbes(
     return direction * ranges[:, None], valid
 
 
-def _met(slopes: Array, side: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Unit vectors (n, 3) in which the cones of ``slopes`` (n, 2), s and p, meet on the ``side`` (n,) of ±z, and where
-    they do; elsewhere a vector in the array's plane."""
+def _intersection(slopes: Array, side: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return where the cones of ``slopes`` (n, 2), s and p, meet on the ``side`` (n,) of ±z.
+
+    Unit vectors (n, 3), and whether the cones meet (n,); where they do not, a vector in the array's plane.
+    """
     square = np.einsum("nk,nk->n", slopes, slopes)
     flat = slopes / np.sqrt(np.maximum(square, 1.0))[:, None]
     return np.column_stack([flat, np.copysign(np.sqrt(np.maximum(1.0 - square, 0.0)), side)]), square <= 1.0
 
 
 def receive_angle(points_mbes_m: Array) -> Array:
-    """The angle θ (n,) rad of the receive beams that points (n, 3) in frame mbes were seen with.
+    """Return the angle θ (n,) rad of the receive beams of points (n, 3) in frame mbes.
 
     >>> receive_angle(np.array([[1.0, 0.0, -1.0], [0.5, np.sqrt(0.5), -0.5]])).round(6)
     array([0.785398, 0.523599])
@@ -66,21 +84,33 @@ def receive_angle(points_mbes_m: Array) -> Array:
     return np.asarray(np.arctan2(x, np.copysign(np.hypot(y, z), -z)))
 
 
-def traced(
+def refracted_points(
     points_mbes_m: Array, speed_m_s: Array, R_up_from_mbes: Array, depth_m: Array, cast: Cast
 ) -> Array:
-    """Points (n, 3) m in the mbes frame, as :func:`points_in_mbes` gives them, where the rays really end.
+    """Return the points (n, 3) m in the mbes frame where the rays really end, traced through a cast.
 
-    ``speed_m_s`` (n,): that with which they were made; R_up_from_mbes (n, 3, 3) into a frame with z up; the head's
-    depth (n,) m. The flat arrays set sin θ / c and sin τ / c along themselves, so that in the water that the cast says
+    The flat arrays set sin θ / c and sin τ / c along themselves, so that in the water that the cast says
     to be at the head's depth both sines are larger by k = c_cast / c: whether c is wrong, or right for a thin layer of
     other water at the arrays' faces. (A layer that lies level would refract otherwise; but the fan of a tilted head
     looks along it, where any difference of the two speeds would turn rays by degrees.) From there the ray is traced for
     the recorded time.
+
+    Parameters
+    ----------
+    points_mbes_m
+        Points (n, 3) of :func:`points_in_mbes`.
+    speed_m_s
+        Sound speeds (n,) with which they were made.
+    R_up_from_mbes
+        Rotations (n, 3, 3) into a frame with z up.
+    depth_m
+        Depths (n,) of the head.
+    cast
+        Sound speed by depth.
     """
     ranges = np.linalg.norm(points_mbes_m, axis=1)
     unit = points_mbes_m / ranges[:, None]
-    directions, _ = _met(unit[:, :2] * (cast.speed_at(depth_m) / speed_m_s)[:, None], unit[:, 2])
+    directions, _ = _intersection(unit[:, :2] * (cast.speed_at(depth_m) / speed_m_s)[:, None], unit[:, 2])
     directions = np.einsum("nij,nj->ni", R_up_from_mbes, directions)
     across = np.hypot(directions[:, 0], directions[:, 1])
     reached, depth = trace(cast, depth_m, np.arctan2(across, -directions[:, 2]), ranges / speed_m_s)
@@ -90,10 +120,15 @@ def traced(
 
 
 def across_beam(x: Array, y: Array, z: Array) -> Array:
-    """r ∂u/∂θ (3, n): how points (n,) each in frame mbes move with the angle of their receive beam, the tilt held.
+    """Return r ∂u/∂θ (3, n): how points move with the angle of their receive beam, with the tilt fixed.
 
     From c² = 1 - s² - p²: ∂u/∂θ = (q, 0, s q / c) with q = cos θ = ±√(p² + c²). Without tilt it is the unit vector
     (c, 0, s) across the fan. At the ends of a tilted fan, where the cones touch, c is 0 and q / c is bounded.
+
+    Parameters
+    ----------
+    x, y, z
+        Coordinates (n,) of the points in frame mbes.
     """
     q = np.hypot(y, z)
     slope = np.minimum(q / np.maximum(np.abs(z), np.finfo(np.float64).tiny), STEEPEST)
@@ -101,10 +136,17 @@ def across_beam(x: Array, y: Array, z: Array) -> Array:
 
 
 def beam_half_widths(points_mbes_m: Array, across_rad: float, along_rad: float) -> tuple[Array, Array]:
-    """Half axes of the beams at the points, (n, 3) m each in frame mbes: across track, and along track.
+    """Return the half axes of the beams at the points, (n, 3) m each in frame mbes: across track, and along track.
 
-    Across it is :func:`across_beam`; along, with θ held, r ∂u/∂τ = r cos τ (0, 1, p / c). Both times the tangent of
-    half the width; arguments are full widths.
+    Across it is :func:`across_beam`; along, with θ fixed, r ∂u/∂τ = r cos τ (0, 1, p / c). Both are multiplied by the
+    tangent of half the width.
+
+    Parameters
+    ----------
+    points_mbes_m
+        Points (n, 3) in frame mbes.
+    across_rad, along_rad
+        Full widths of the beams.
     """
     x, y, z = points_mbes_m.T
     across = across_beam(x, y, z).T * np.tan(across_rad / 2)

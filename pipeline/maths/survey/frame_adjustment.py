@@ -34,12 +34,12 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 STARBOARD, FORWARD = 0, 1  # axes of the body that two marks may give
 MOST_ITERATIONS = 50
-STILL = 1e-9  # largest step, rad and m, that ends the iteration
+STEP_TOLERANCE = 1e-9  # largest step, rad and m, that ends the iteration
 
 
 @dataclass(frozen=True)
 class Survey:
-    """Marks in survey axes, z up: at_m (m, 3), covariance (m, 3, 3) m²; independent of each other."""
+    """Marks in survey axes, z up: at_m (m, 3), covariance (m, 3, 3) m²; the marks are independent of each other."""
 
     at_m: Array
     covariance: Array
@@ -47,8 +47,17 @@ class Survey:
 
 @dataclass(frozen=True)
 class Axes:
-    """``along`` (STARBOARD or FORWARD) runs from the frame's mark number ``first`` to ``second``; the attitude about it
-    as the INS read it: of FORWARD the roll, of STARBOARD the pitch."""
+    """One axis of a frame through two of its marks, and the attitude about it as the INS read it.
+
+    Parameters
+    ----------
+    along
+        STARBOARD or FORWARD.
+    first, second
+        Numbers of the marks within the frame; the axis runs from the first to the second.
+    angle_rad, sigma_rad
+        The attitude and its sigma: roll for FORWARD, pitch for STARBOARD.
+    """
 
     along: int
     first: int
@@ -59,9 +68,16 @@ class Axes:
 
 @dataclass(frozen=True)
 class Frame:
-    """marks (k,): their numbers in the survey; drawing_m (k, 3) and covariance (k, 3, 3) m² in the frame's own axes.
+    """A rigid frame and its marks.
 
-    With ``axes`` only the first mark, the origin, has a place in the drawing: zero.
+    Parameters
+    ----------
+    marks
+        Numbers (k,) of the marks in the survey.
+    drawing_m, covariance
+        Their places (k, 3) and covariance (k, 3, 3) m² by the drawing, in the frame's own axes.
+    axes
+        With it only the first mark, the origin, has a place in the drawing: zero.
     """
 
     marks: Integers
@@ -71,11 +87,11 @@ class Frame:
 
     @property
     def points(self) -> int:
-        """Marks with a residual of their own."""
+        """Return the number of marks with a residual of their own."""
         return len(self.marks) if self.axes is None else 1
 
     def without(self, place: int) -> "Frame":
-        """But for one of its marks."""
+        """Return the frame without one of its marks, the one at ``place``."""
         kept = np.delete(np.arange(len(self.marks)), place)
         return replace(self, marks=self.marks[kept], drawing_m=self.drawing_m[kept], covariance=self.covariance[kept])
 
@@ -87,14 +103,30 @@ class Pose:
     R_survey_from_frame: Array
     origin_m: Array
 
-    def moved(self, step: Array) -> "Pose":
+    def updated(self, step: Array) -> "Pose":
+        """Return the pose after a step (6,): rotation vector η in survey axes, shift of the origin (m)."""
         return Pose(exp_so3(step[:3]) @ self.R_survey_from_frame, self.origin_m + step[3:])
 
 
 @dataclass(frozen=True)
-class Adjusted:
-    """Poses; covariance (6 f, 6 f) of their (η, δt), rad and m in survey axes; residuals (n,) and rows of each frame;
-    weight W = Σ⁻¹ (n, n); by_survey B (n, m, 3); design J (n, 6 f)."""
+class FrameAdjustment:
+    """Result of the adjustment of f frames.
+
+    Parameters
+    ----------
+    poses
+        Poses of the frames.
+    covariance
+        Covariance (6 f, 6 f) of their (η, δt), rad and m in survey axes.
+    residuals, rows
+        Residuals r (n,), and the rows of each frame.
+    weight
+        W = Σ⁻¹ (n, n).
+    by_survey
+        B (n, m, 3): derivatives of the residuals by the marks of the survey.
+    design
+        J (n, 6 f).
+    """
 
     poses: tuple[Pose, ...]
     covariance: Array
@@ -106,22 +138,33 @@ class Adjusted:
 
     @property
     def squares(self) -> float:
+        """Return Ω = rᵀ Σ⁻¹ r."""
         return float(self.residuals @ self.weight @ self.residuals)
 
     @property
     def redundancy(self) -> int:
+        """Return the number of residuals minus that of unknowns."""
         return int(np.subtract(*self.design.shape))
 
     def residuals_of(self, frame: int, points: int) -> Array:
-        """Of a frame's marks (points, 3) m, survey minus drawing, survey axes."""
+        """Return the residuals (points, 3) m of the marks of a frame, survey minus drawing, survey axes."""
         start = self.rows[frame].start
         return self.residuals[start : start + 3 * points].reshape(points, 3)
 
 
 def closed_form(drawing_m: Array, survey_m: Array, weight: Array, mirrored: bool = False) -> tuple[Array, Array]:
-    """R (3, 3) and t (3,) that minimise Σ w |s - R x - t|², det R = +1; ``mirrored``: det R = -1 instead.
+    """Return R (3, 3) and t (3,) that minimise Σ w |s - R x - t|² with det R = +1.
 
     With the centred H = Σ w s xᵀ = U S Vᵀ: R = U diag(1, 1, ±det U det V) Vᵀ (Kabsch; Umeyama, eq. 40 to 43).
+
+    Parameters
+    ----------
+    drawing_m, survey_m
+        Places x and s (n, 3).
+    weight
+        Weights w (n,).
+    mirrored
+        det R = -1 instead.
 
     >>> R, t = closed_form(np.eye(3), np.eye(3) @ rotation_x(0.3).T + [1, 2, 3], np.ones(3))
     >>> bool(np.allclose(R, rotation_x(0.3))), t.round(9)
@@ -135,8 +178,8 @@ def closed_form(drawing_m: Array, survey_m: Array, weight: Array, mirrored: bool
     return R, centre - R @ middle
 
 
-def adjust(survey: Survey, frames: Sequence[Frame]) -> Adjusted:
-    """All frames at once, to the end of the iteration.
+def adjust_frames(survey: Survey, frames: Sequence[Frame]) -> FrameAdjustment:
+    """Adjust all frames at once, to the end of the iteration.
 
     Raises
     ------
@@ -150,8 +193,8 @@ def adjust(survey: Survey, frames: Sequence[Frame]) -> Adjusted:
         system = _system(near, frames, poses)
         whiten = np.linalg.inv(np.linalg.cholesky(system.covariance))
         step = -np.linalg.lstsq(whiten @ system.design, whiten @ system.residuals, rcond=None)[0]
-        poses = [pose.moved(np.asarray(part)) for pose, part in zip(poses, step.reshape(-1, SIX), strict=True)]
-        if np.abs(step).max() < STILL:
+        poses = [pose.updated(np.asarray(part)) for pose, part in zip(poses, step.reshape(-1, SIX), strict=True)]
+        if np.abs(step).max() < STEP_TOLERANCE:
             break
     else:
         raise NotConvergedError("the marks do not fit their drawings even roughly; check names and coordinates")
@@ -160,29 +203,43 @@ def adjust(survey: Survey, frames: Sequence[Frame]) -> Adjusted:
     weight, rotated = whiten.T @ whiten, whiten @ system.design
     covariance = np.linalg.inv(rotated.T @ rotated)
     placed = tuple(replace(pose, origin_m=pose.origin_m + centre) for pose in poses)
-    rows, by_survey = system.rows, system.by_survey
-    return Adjusted(placed, (covariance + covariance.T) / 2, system.residuals, rows, weight, by_survey, system.design)
+    return FrameAdjustment(
+        poses=placed,
+        covariance=(covariance + covariance.T) / 2,
+        residuals=system.residuals,
+        rows=system.rows,
+        weight=weight,
+        by_survey=system.by_survey,
+        design=system.design,
+    )
 
 
-def mounted_on(found: Adjusted, body: int, sensor: int) -> tuple[Array, Array, Array]:
-    """R_body_from_sensor (3, 3), lever arm (3,) m and the contract's covariance (6, 6) of a sensor on the body.
+def relative_mount(adjusted: FrameAdjustment, body: int, sensor: int) -> tuple[Array, Array, Array]:
+    """Return R_body_from_sensor (3, 3), the lever arm (3,) m and their covariance (6, 6) of a sensor on the body.
 
     R_bs = R_wbᵀ R_ws and l = R_wbᵀ (t_s - t_b). With Exp(η) R the true rotations, to first order
 
         ε = R_wbᵀ (η_s - η_b),    δl = R_wbᵀ (δt_s - δt_b - η_b x (t_s - t_b)),
 
     ε in R_true = Exp(ε) R_bs, body axes; rad and m.
+
+    Parameters
+    ----------
+    adjusted
+        Adjustment of the frames.
+    body, sensor
+        Numbers of the two frames.
     """
-    one, other = found.poses[body], found.poses[sensor]
-    to_body = one.R_survey_from_frame.T
-    between = other.origin_m - one.origin_m
-    jacobian = np.zeros((SIX, len(found.covariance)))
+    body_pose, sensor_pose = adjusted.poses[body], adjusted.poses[sensor]
+    to_body = body_pose.R_survey_from_frame.T
+    between = sensor_pose.origin_m - body_pose.origin_m
+    jacobian = np.zeros((SIX, len(adjusted.covariance)))
     for frame, sign in ((body, -1.0), (sensor, 1.0)):
         jacobian[:3, SIX * frame : SIX * frame + 3] += sign * to_body
         jacobian[3:, SIX * frame + 3 : SIX * frame + SIX] += sign * to_body
     jacobian[3:, SIX * body : SIX * body + 3] += to_body @ skew(between)
-    covariance = jacobian @ found.covariance @ jacobian.T
-    return to_body @ other.R_survey_from_frame, to_body @ between, (covariance + covariance.T) / 2
+    covariance = jacobian @ adjusted.covariance @ jacobian.T
+    return to_body @ sensor_pose.R_survey_from_frame, to_body @ between, (covariance + covariance.T) / 2
 
 
 # --- the linear system -----------------------------------------------------------------------------------------------
@@ -196,7 +253,7 @@ class _System:
 
 
 def _system(survey: Survey, frames: Sequence[Frame], poses: Sequence[Pose]) -> _System:
-    """Residuals, J, B and Σ of all frames where the poses stand."""
+    """Return residuals, J, B and Σ of all frames at these poses."""
     parts = [_rows_of(survey, frame, pose) for frame, pose in zip(frames, poses, strict=True)]
     ends = np.cumsum([len(part[0]) for part in parts]).tolist()
     rows = tuple(slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True))
@@ -213,13 +270,13 @@ def _system(survey: Survey, frames: Sequence[Frame], poses: Sequence[Pose]) -> _
 
 
 def _through(by_mark: Array, covariance: Array) -> Array:
-    """Σ_k B_k C_k B_kᵀ over marks: (n, k, 3) and (k, 3, 3) -> (n, n)."""
+    """Return Σ_k B_k C_k B_kᵀ over marks: (n, k, 3) and (k, 3, 3) -> (n, n)."""
     B = np.moveaxis(by_mark, 1, 0)
     return np.asarray(np.tensordot(B @ covariance, B, axes=([0, 2], [0, 2])))
 
 
 def _rows_of(survey: Survey, frame: Frame, pose: Pose) -> tuple[Array, Array, Array, Array]:
-    """Of one frame: r (n,), J (n, 6), B (n, k, 3) by its own marks, and variances (n,) that are no mark's."""
+    """Return of one frame r (n,), J (n, 6), B (n, k, 3) by its own marks, and variances (n,) that are no mark's."""
     R, k = pose.R_survey_from_frame, frame.points
     at = survey.at_m[frame.marks]
     turned = frame.drawing_m[:k] @ R.T
@@ -243,7 +300,7 @@ def _rows_of(survey: Survey, frame: Frame, pose: Pose) -> tuple[Array, Array, Ar
 
 
 def _level(R: Array, along: int) -> tuple[float, Array]:
-    """Roll (along FORWARD) or pitch of R_survey_from_body, and its derivative (3,) by a turn η in survey axes.
+    """Return roll (along FORWARD) or pitch of R_survey_from_body, and its derivative (3,) by η in survey axes.
 
     The third row of Rz(-azimuth) Rx(pitch) Ry(roll) is ρ = (-cos p sin r, sin p, cos p cos r); turned by η, ρ_k changes
     by η · (R e_k x e_z).
@@ -257,7 +314,7 @@ def _level(R: Array, along: int) -> tuple[float, Array]:
 
 
 def _start(survey: Survey, frame: Frame) -> Pose:
-    """The closed form, weighted by the mean variance of each mark; of axes, the vertical made orthogonal and turned."""
+    """Return the closed form, weighted by the mean variance of each mark; with axes, the vertical made orthogonal."""
     at, axes = survey.at_m[frame.marks], frame.axes
     if axes is None:
         variance = np.trace(survey.covariance[frame.marks] + frame.covariance, axis1=1, axis2=2)

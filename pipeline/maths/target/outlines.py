@@ -12,19 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError
-from pipeline.maths.target.model import LEVEL, ROLES, TOUCH_M, Face, Family, TargetModel, names_in_order, plane_of
+from pipeline.maths.target.face import HORIZONTAL_COSINE, TOUCH_M, Face, plane_of
+from pipeline.maths.target.model import ROLES, Family, TargetModel, names_in_order
 
 Array = NDArray[np.float64]
 Kind = Literal["same_plane", "distance", "height", "parallel"]
 FLAT_M = 0.01  # corners farther than this off their own plane make no plane
-SAME_M = 0.02  # faces of one plane may stand this far apart by their corners
+SAME_PLANE_M = 0.02  # faces of one plane may stand this far apart by their corners
 PARALLEL_DEG = 0.5  # and be turned by this
 SMALLEST_M = 0.05  # a face narrower than this shows nothing
 
 
 @dataclass(frozen=True)
 class Outline:
-    """A face as given: corners (k, 3), counter-clockwise as seen from where the sensors see it."""
+    """A face by its corners (k, 3) m, counter-clockwise as seen from where the sensors see it."""
 
     name: str
     corners: Sequence[Sequence[float]]
@@ -34,7 +35,7 @@ class Outline:
 
 @dataclass(frozen=True)
 class Relation:
-    """``name``: of the family, if not to be made of its faces' names."""
+    """A relation between faces; ``name`` is that of their family, if it is not to be made of the faces' names."""
 
     kind: Kind
     faces: tuple[str, ...]
@@ -44,30 +45,49 @@ class Relation:
 def build_target(
     outlines: Sequence[Outline], relations: Sequence[Relation], water_level_m: float, repeats_m: float | None
 ) -> TargetModel:
-    """The model; lengths in metres, target frame.
+    """Build the model of a target from the outlines of its faces and the relations between them.
+
+    Parameters
+    ----------
+    outlines
+        Faces, target frame.
+    relations
+        What is known of their planes.
+    water_level_m
+        Height of the water, target frame.
+    repeats_m
+        Height after which the shape repeats; None where it does not.
 
     Raises
     ------
     ConfigError
         Corners that make no convex polygon, or relations that the corners contradict.
     """
-    planes = {one.name: _plane(one) for one in outlines}
+    planes = {outline.name: _plane(outline) for outline in outlines}
     for relation in relations:
         _check(relation, planes)
-    groups = _groups([one.name for one in outlines], relations)
-    roles = {one.name: one.role for one in outlines if one.role}
-    families = [_family(names, relations, planes, roles, [one.name for one in outlines]) for names in groups]
-    _refuse_twice([one.name for one in families])
+    order = [outline.name for outline in outlines]
+    roles = {outline.name: outline.role for outline in outlines if outline.role}
+    families = [_family(members, relations, planes, roles, order) for members in _groups(order, relations)]
+    _refuse_double_names([family.name for family in families])
     by_face = {outlines[number].name: family for family in families for number in family.faces}
     faces = []
-    for one in outlines:
-        normal, distance_m = planes[one.name]
-        family = by_face[one.name]
+    for outline in outlines:
+        normal, distance_m = planes[outline.name]
+        family = by_face[outline.name]
         sense = float(np.sign(normal @ family.normal))
-        offset_m = 0.0 if family.one_plane else sense * distance_m - family.distance_m
-        vertices = np.array(one.corners, dtype=np.float64)
-        faces.append(Face(one.name, family.name, normal, distance_m, vertices, sense, offset_m, one.seen))
-    faces = _creased(faces)
+        face = Face(
+            name=outline.name,
+            family=family.name,
+            normal=normal,
+            distance_m=distance_m,
+            vertices_m=np.array(outline.corners, dtype=np.float64),
+            sense=sense,
+            offset_m=0.0 if family.one_plane else sense * distance_m - family.distance_m,
+            seen=outline.seen,
+        )
+        faces.append(face)
+    faces = _with_creases(faces)
     pairs = [
         (by_face[relation.faces[0]].name, by_face[other].name)
         for relation in relations
@@ -78,21 +98,22 @@ def build_target(
     return TargetModel(tuple(faces), names_in_order(families), parallel, water_level_m, repeats_m)
 
 
-def _creased(faces: Sequence[Face]) -> list[Face]:
-    """With the lines along which they meet; only faces whose boxes touch can."""
+def _with_creases(faces: Sequence[Face]) -> list[Face]:
+    """Return the faces with the lines along which they meet; only faces whose boxes touch can."""
     low = np.array([face.vertices_m.min(axis=0) for face in faces]) - TOUCH_M
     high = np.array([face.vertices_m.max(axis=0) for face in faces]) + TOUCH_M
     touch = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=2)
-    found = []
+    creased = []
     for face, others in zip(faces, touch, strict=True):
         lines = [face.meets(faces[number]) for number in np.flatnonzero(others).tolist()]
-        found.append(replace(face, creases_m=tuple(line for line in lines if line is not None)))
-    return found
+        creased.append(replace(face, creases_m=tuple(line for line in lines if line is not None)))
+    return creased
 
 
-def _plane(one: Outline) -> tuple[Array, float]:
-    vertices = np.array(one.corners, dtype=np.float64)
-    where = f"target.faces.{one.name}: corners"
+def _plane(outline: Outline) -> tuple[Array, float]:
+    """Return normal and distance of a face; refuse corners that make no polygon the boat can see."""
+    vertices = np.array(outline.corners, dtype=np.float64)
+    where = f"target.faces.{outline.name}: corners"
     after = np.roll(vertices, -1, axis=0)
     area = np.linalg.norm(np.cross(vertices - vertices[0], after - vertices[0]).sum(axis=0)) / 2
     if area < SMALLEST_M**2:
@@ -104,7 +125,7 @@ def _plane(one: Outline) -> tuple[Array, float]:
     turns = np.cross(after - vertices, np.roll(after, -1, axis=0) - after) @ normal
     if np.any(turns <= 0):
         raise ConfigError(f"{where}: make no convex polygon; split the face into convex ones, tied by same_plane")
-    if abs(normal[2]) <= LEVEL and normal[0] > 0.1:
+    if abs(normal[2]) <= HORIZONTAL_COSINE and normal[0] > 0.1:
         raise ConfigError(
             f"{where}: the face looks away from the boat, which passes at x < 0; give its corners counter-clockwise as "
             "seen from the boat"
@@ -113,7 +134,7 @@ def _plane(one: Outline) -> tuple[Array, float]:
 
 
 def _check(relation: Relation, planes: Mapping[str, tuple[Array, float]]) -> None:
-    """What the corners say against it."""
+    """Refuse a relation that the corners contradict."""
     where = f"target.relations: {relation.kind}: {', '.join(relation.faces)}"
     for name in relation.faces:
         if name not in planes:
@@ -126,15 +147,15 @@ def _check(relation: Relation, planes: Mapping[str, tuple[Array, float]]) -> Non
         angle = float(np.degrees(np.arcsin(min(1.0, float(np.linalg.norm(np.cross(first, normal)))))))
         if angle > PARALLEL_DEG:
             raise ConfigError(f"{where}: {name} is turned by {angle:.2f}° against {relation.faces[0]}: not parallel")
-        if relation.kind == "same_plane" and (sense < 0 or abs(other_m - distance_m) > SAME_M):
+        if relation.kind == "same_plane" and (sense < 0 or abs(other_m - distance_m) > SAME_PLANE_M):
             apart = abs(sense * other_m - distance_m)
             raise ConfigError(f"{where}: {name} lies {apart:.3f} m off the plane of {relation.faces[0]}; use distance")
-    if relation.kind == "height" and abs(first[2]) <= LEVEL:
+    if relation.kind == "height" and abs(first[2]) <= HORIZONTAL_COSINE:
         raise ConfigError(f"{where}: {relation.faces[0]} is not horizontal; use distance")
 
 
 def _groups(names: Sequence[str], relations: Sequence[Relation]) -> list[list[str]]:
-    """Faces of one family each, in order of the faces."""
+    """Return the names of the faces of each family, in order of the faces."""
     group = {name: name for name in names}
     for relation in relations:
         if relation.kind != "parallel":
@@ -151,24 +172,28 @@ def _family(
     roles: Mapping[str, str],
     order: Sequence[str],
 ) -> Family:
-    inside = [one for one in relations if one.kind != "parallel" and one.faces[0] in members]
-    has = sorted({roles[name] for name in members if name in roles})
-    if len(has) > 1:
-        raise ConfigError(f"target.faces.{members[0]}: tied to faces of another role ({', '.join(has)}); give one role")
-    named = [one.name for one in inside if one.name]
-    name = has[0] if has else named[0] if named else members[0] + "-etc" * (len(members) > 1)
+    """Return the family of some faces; its name is the role, or that of a relation, or made of the first face's."""
+    inside = [relation for relation in relations if relation.kind != "parallel" and relation.faces[0] in members]
+    own_roles = sorted({roles[name] for name in members if name in roles})
+    if len(own_roles) > 1:
+        raise ConfigError(
+            f"target.faces.{members[0]}: tied to faces of another role ({', '.join(own_roles)}); give one role"
+        )
+    given_names = [relation.name for relation in inside if relation.name]
+    default = members[0] + "-etc" * (len(members) > 1)
+    name = next(iter([*own_roles, *given_names]), default)
     normal, distance_m = planes[members[0]]
-    if abs(normal[2]) > LEVEL:
+    if abs(normal[2]) > HORIZONTAL_COSINE:
         normal, distance_m = np.array([0.0, 0.0, 1.0]), 0.0
-        one_plane = len(members) == 1 or all(one.kind == "same_plane" for one in inside)
+        one_plane = len(members) == 1 or all(relation.kind == "same_plane" for relation in inside)
         if one_plane:
             distance_m = float(planes[members[0]][1] * np.sign(planes[members[0]][0][2]))
     else:
-        one_plane = all(one.kind == "same_plane" for one in inside)
-    return Family(name, normal, distance_m, tuple(order.index(one) for one in members), one_plane)
+        one_plane = all(relation.kind == "same_plane" for relation in inside)
+    return Family(name, normal, distance_m, tuple(order.index(member) for member in members), one_plane)
 
 
-def _refuse_twice(names: Sequence[str]) -> None:
+def _refuse_double_names(names: Sequence[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             how = "its faces are not in one plane by the relations; tie them with same_plane" if name in ROLES else (

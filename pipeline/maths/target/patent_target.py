@@ -12,40 +12,66 @@ Seen from above (the boat passes on the left, x < 0, y upward)::
      '------------------'   y = -b/2 - c
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipeline.maths.target.outlines import Outline, Relation
 
 Corner = tuple[float, float, float]
-LEVEL = "H"  # the family of all tops and bottoms
+HORIZONTAL_FAMILY = "H"  # all tops and bottoms
 
 
-def lettered(
-    a: float,
-    b: float,
-    c: float,
-    e: float,
-    low_side: str = "south",
-    blocks_per_side: int | None = None,
-    first_base_m: float | None = None,
-    stagger_m: float | None = None,
-) -> tuple[list[Outline], list[Relation], float]:
-    """Outlines, relations, and after what height they repeat (metres), in the target frame; CONVENTIONS.md, "The
-    target".
+@dataclass(frozen=True)
+class PatentDimensions:
+    """The letters of the patent's target, in metres; CONVENTIONS.md, "The target".
+
+    Parameters
+    ----------
+    a, b
+        Height and width of the centre wall.
+    c
+        Legs of a block's right-angled triangle.
+    e
+        Height of a block, and the gap to the next above.
+    low_side
+        Side of the lower first base, "south" (-y) or "north".
+    blocks_per_side
+        Default: whole part of a / 2e.
+    first_base_m
+        Height of the low side's first base, default -a/2.
+    stagger_m
+        How much higher the other side's first base stands, default e.
+    """
+
+    a: float
+    b: float
+    c: float
+    e: float
+    low_side: str = "south"
+    blocks_per_side: int | None = None
+    first_base_m: float | None = None
+    stagger_m: float | None = None
+
+
+def patent_outlines(dimensions: PatentDimensions) -> tuple[list[Outline], list[Relation], float]:
+    """Return the outlines, the relations, and the height (m) after which they repeat, in the target frame.
 
     A block on side s = ±1 (+1 is north, +y) is the prism of height e over the triangle (0, s b/2), (c, s b/2),
     (c, s (b/2 + c)). Its measured face runs at 45° from the wall's edge back to the pool's wall; its outward normal is
     (-1, s, 0)/√2. P1 are the faces on -y, P3 those on +y, P2 the wall's front. The low side's first base stands at
     ``first_base_m`` (default -a/2), the other side's ``stagger_m`` (default e) higher; then one block every 2 e.
     """
-    count = int(np.floor(a / (2 * e) + 1e-9)) if blocks_per_side is None else blocks_per_side
+    a, b, c, e = dimensions.a, dimensions.b, dimensions.c, dimensions.e
+    per_side, first_base_m, stagger_m = dimensions.blocks_per_side, dimensions.first_base_m, dimensions.stagger_m
+    count = int(np.floor(a / (2 * e) + 1e-9)) if per_side is None else per_side
     first = -a / 2 if first_base_m is None else first_base_m
     stagger = e if stagger_m is None else stagger_m
     wall = [(0.0, b / 2, -a / 2), (0.0, -b / 2, -a / 2), (0.0, -b / 2, a / 2), (0.0, b / 2, a / 2)]
     outlines, relations = [Outline("P2", wall, "P2")], []
     level: list[str] = []
     for role, side, word in (("P1", -1, "south"), ("P3", 1, "north")):
-        base = first + (0.0 if word == low_side else stagger)
+        base = first + (0.0 if word == dimensions.low_side else stagger)
         near, inner, outer = (0.0, side * b / 2), (c, side * b / 2), (c, side * (b / 2 + c))
         names = []
         for k in range(count):
@@ -61,4 +87,4 @@ def lettered(
             level += [f"{name}-top", f"{name}-bottom"]
         if len(names) > 1:
             relations.append(Relation("same_plane", tuple(names)))
-    return outlines, [*relations, Relation("height", tuple(level), LEVEL)], 2 * e
+    return outlines, [*relations, Relation("height", tuple(level), HORIZONTAL_FAMILY)], 2 * e

@@ -1,195 +1,127 @@
-"""Finding the target in a cloud: a search over coarse poses, then Gauss-Newton onto the nearest surface.
-
-Both sensors use the same two steps; they differ in what moves: for the laser the target's pose (azimuth, x, y, z), for
-the soundings the mount (rotation, lever arm). A ``Placement`` hides which.
-"""
+"""Registration of points to the target: a search over coarse poses, then Gauss-Newton onto the nearest surface."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.geometry.rotations import exp_so3, rotation_z
+from pipeline.maths.target.placements import Placement, SubsetPlacement
 
 Array = NDArray[np.float64]
+Labeller = Callable[[Array, Array], NDArray[np.int16]]  # parameters, points -> face numbers (-1: none)
 Closest = Callable[[Array], tuple[Array, NDArray[np.int64]]]  # points -> nearest points on the model, face numbers
-ROUGH = 2000  # points with which starts are scored and settle at first
-WIDE_M, FINE_M = (0.4, 0.3, 0.2, 0.15), (0.1, 0.07, 0.05)  # reaches while roughly settling, and then
-SAME_M = 0.03  # poses that put no point farther apart are one: less than the finest reach
-
-
-class Placement(Protocol):
-    """Points in the target frame as a function of k parameters, and their derivatives."""
-
-    @property
-    def prior_sigmas(self) -> Array:
-        """(k,): how far from zero the parameters may be expected."""
-        ...
-
-    def points(self, parameters: Array) -> Array:
-        """(k,) -> (n, 3) m."""
-        ...
-
-    def rows(self, parameters: Array, directions: Array) -> Array:
-        """Derivative of ``directions · point``, (n, 3) -> (n, k)."""
-        ...
-
-
-class Searched(Placement, Protocol):
-    """A placement that a search can thin."""
-
-    def thinned(self, most: int) -> Placement:
-        """The same of at most so many of its points."""
-        ...
+ROUGH = 2000  # points with which starts are scored and at first converge
+START_REACH_M = 0.25  # with which starts are scored
+COARSE_REACHES_M, FINE_REACHES_M = (0.4, 0.3, 0.2, 0.15), (0.1, 0.07, 0.05)  # while roughly converging, and then
+SAME_POSE_M = 0.03  # poses that put no point farther apart are one: less than the finest reach
 
 
 @dataclass(frozen=True)
-class TargetPose:
-    """Laser points in the pool frame, (n, 3) m; parameters (azimuth correction β rad, origin o of the target in pool).
+class FacePlanes:
+    """Outward normals (f, 3) and distances (f,) m of the planes of a target's faces."""
 
-    x_target = Rz(β) (x_pool - o): with the target's y axis β further clockwise than configured, coordinates turn by +β.
-    d(g · x_target)/dβ = g · (e_z × x_target), d/do = -gᵀ Rz(β).
-    """
-
-    points_pool_m: Array
-    prior_sigmas: Array
-
-    def thinned(self, most: int) -> "TargetPose":
-        return replace(self, points_pool_m=self.points_pool_m[_some(len(self.points_pool_m), most)])
-
-    def points(self, parameters: Array) -> Array:
-        return (self.points_pool_m - parameters[1:]) @ rotation_z(parameters[0]).T
-
-    def rows(self, parameters: Array, directions: Array) -> Array:
-        placed = self.points(parameters)
-        turn = directions[:, 1] * placed[:, 0] - directions[:, 0] * placed[:, 1]
-        return np.column_stack([turn, -directions @ rotation_z(parameters[0])])
+    normals: Array
+    distances_m: Array
 
 
 @dataclass(frozen=True)
-class MountCorrection:
-    """Soundings with poses (n, 3), (n, 3, 3) in the target frame, m = R_body_from_mbes(coarse) x_mbes (n, 3);
-    parameters (rotation vector δ, lever arm correction): x = p + T (Exp(δ) m + l + Δl).
+class Surface:
+    """The surface of a target: the function that finds its nearest points, and the planes of its faces."""
 
-    Rows [u × g_body, g_body], u = Exp(δ) m, g_body = Tᵀ g: exact for the increment ε of Exp(ε) Exp(δ), and within
-    |δ| / 2 relative for δ itself, enough for an iteration.
-    """
-
-    positions_m: Array
-    R_target_from_body: Array
-    points_body_m: Array
-    lever_arm_m: Array
-    prior_sigmas: Array
-
-    def thinned(self, most: int) -> "MountCorrection":
-        use = _some(len(self.positions_m), most)
-        return replace(
-            self,
-            positions_m=self.positions_m[use],
-            R_target_from_body=self.R_target_from_body[use],
-            points_body_m=self.points_body_m[use],
-        )
-
-    def points(self, parameters: Array) -> Array:
-        body = self.points_body_m @ exp_so3(parameters[:3]).T + self.lever_arm_m + parameters[3:]
-        return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_target_from_body, body))
-
-    def origins(self, parameters: Array) -> Array:
-        """Where the sonar was, (n, 3) m."""
-        return np.asarray(self.positions_m + self.R_target_from_body @ (self.lever_arm_m + parameters[3:]))
-
-    def rows(self, parameters: Array, directions: Array) -> Array:
-        turned = self.points_body_m @ exp_so3(parameters[:3]).T
-        g = np.einsum("nij,ni->nj", self.R_target_from_body, directions)
-        return np.hstack([np.cross(turned, g), g])
-
-
-@dataclass(frozen=True)
-class LaserMount:
-    """Laser points with poses (n, 3), (n, 3, 3) in the pool frame, m = R_body_from_laser(coarse) x_laser (n, 3);
-    parameters (azimuth correction β, origin o of the target in pool, rotation vector δ): where the target stands and
-    how the laser is turned: x_target = Rz(β) (p + T (Exp(δ) m + l) - o).
-    """
-
-    positions_m: Array
-    R_pool_from_body: Array
-    points_body_m: Array
-    lever_arm_m: Array
-    prior_sigmas: Array
-
-    def points(self, parameters: Array) -> Array:
-        return (self._in_pool(parameters) - parameters[1:4]) @ rotation_z(parameters[0]).T
-
-    def _in_pool(self, parameters: Array) -> Array:
-        body = self.points_body_m @ exp_so3(parameters[4:]).T + self.lever_arm_m
-        return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_pool_from_body, body))
-
-    def rows(self, parameters: Array, directions: Array) -> Array:
-        placed = self.points(parameters)
-        turn = directions[:, 1] * placed[:, 0] - directions[:, 0] * placed[:, 1]
-        in_pool = directions @ rotation_z(parameters[0])
-        g = np.einsum("nij,ni->nj", self.R_pool_from_body, in_pool)
-        turned = self.points_body_m @ exp_so3(parameters[4:]).T
-        return np.column_stack([turn, -in_pool, np.cross(turned, g)])
-
-
-def _some(count: int, most: int) -> NDArray[np.int64]:
-    """Which points: by chance, since every so-and-so-many-th of a grid could be one row of it; in their order."""
-    return np.sort(np.random.default_rng(0).permutation(count)[:most])
+    closest: Closest
+    planes: FacePlanes
 
 
 def score(placement: Placement, parameters: Array, closest: Closest, reach_m: float) -> float:
-    """Share of points explained by the model: mean of max(0, 1 - (distance / reach)²), in [0, 1]."""
+    """Return the share of points that the model explains: mean of max(0, 1 - (distance / reach)²), in [0, 1].
+
+    Parameters
+    ----------
+    placement, parameters
+        The points, and their parameters (k,).
+    closest
+        Nearest points on the model.
+    reach_m
+        Distance at which a point counts nothing.
+    """
     points = placement.points(parameters)
     nearest, _ = closest(points)
     squared = np.sum((points - nearest) ** 2, axis=1) / reach_m**2
     return float(np.mean(np.maximum(0.0, 1.0 - squared)))
 
 
-def settle(
-    placement: Placement,
-    start: Array,
-    closest: Closest,
-    normals: Array,
-    reaches_m: Sequence[float],
-    steps: int = 4,
+def converge(
+    placement: Placement, start: Array, surface: Surface, reaches_m: Sequence[float], steps: int = 4
 ) -> Array:
-    """Gauss-Newton onto the nearest surface, within a reach that shrinks from step to step; (k,) parameters.
+    """Return the parameters (k,) after Gauss-Newton steps onto the nearest surface, within a shrinking reach.
 
-    Each point's residual is its distance from the nearest point of the nearest face, along the line between them (along
-    the face's normal where they coincide), weighted (1 - (d / reach)²)² and nothing beyond the reach. The prior keeps
-    directions that the points leave open where they were.
+    The residual of a point is its distance from the nearest point of the nearest face, along the line between them
+    (along the normal of the face where they coincide). Its weight is (1 - (d / reach)²)², and zero beyond the reach.
+    The prior keeps directions that the points leave open where they were.
+
+    Parameters
+    ----------
+    placement, start
+        The points, and the parameters (k,) to start from.
+    surface
+        The surface of the target.
+    reaches_m
+        Reaches, one after another.
+    steps
+        Largest number of steps with each reach.
     """
     parameters = start.copy()
     prior = np.diag(0.05**2 / placement.prior_sigmas**2)  # as if one point with 5 cm said the same
     for reach in reaches_m:
-        still = 1e-5 if reach == reaches_m[-1] else reach / 200
+        tolerance = 1e-5 if reach == reaches_m[-1] else reach / 200
         for _ in range(steps):
             points = placement.points(parameters)
-            nearest, face = closest(points)
+            nearest, face = surface.closest(points)
             away = points - nearest
             distance = np.linalg.norm(away, axis=1)
             use = distance < reach
             if use.sum() < len(parameters):
                 return parameters
-            direction = np.where(distance[:, None] > 1e-4, away / np.maximum(distance, 1e-12)[:, None], normals[face])
+            line = away / np.maximum(distance, 1e-12)[:, None]
+            direction = np.where(distance[:, None] > 1e-4, line, surface.planes.normals[face])
             residual = np.sum(direction * away, axis=1)[use]
             weight = (1 - (residual / reach) ** 2) ** 2
             rows = placement.rows(parameters, direction)[use]
-            normal = (rows * weight[:, None]).T @ rows + prior
-            right = -(rows * weight[:, None]).T @ residual - prior @ parameters
-            step = np.linalg.solve(normal, right)
+            normal_matrix = (rows * weight[:, None]).T @ rows + prior
+            right_side = -(rows * weight[:, None]).T @ residual - prior @ parameters
+            step = np.linalg.solve(normal_matrix, right_side)
             parameters = parameters + step
-            if np.max(np.abs(step)) < still:
+            if np.max(np.abs(step)) < tolerance:
                 break
     return parameters
 
 
 @dataclass(frozen=True)
-class Found:
-    """A pose and what it explains, with the best rival that is another pose (not the same one found again).
+class SearchCriteria:
+    """Which converged poses a search accepts, and how it compares them.
+
+    Parameters
+    ----------
+    same
+        Whether two converged poses (k,) are the same solution.
+    quality
+        How good a converged pose (k,) is; the highest wins.
+    limits
+        (k,): a converged pose further from zero than this is no candidate.
+    starts_per_group
+        How many of each group of starts go on. Where blocks repeat, the best of all may lie round one wrong height.
+    """
+
+    same: Callable[[Array, Array], bool]
+    quality: Callable[[Array], float]
+    limits: Array
+    starts_per_group: int = 1
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """A pose and its score, with the score of the best rival that is another pose (not the same one again).
 
     ``within``: it lies within the limits; otherwise no start led to a pose that does.
     """
@@ -201,63 +133,52 @@ class Found:
 
 
 def search(
-    placement: Searched,
-    starts: Sequence[Sequence[Array]],
-    closest: Closest,
-    normals: Array,
-    same: Callable[[Array, Array], bool],
-    limits: Array,
-    judge: Callable[[Array], float],
-    each: int = 1,
-) -> Found:
-    """Best pose from many starts: all are scored with a wide reach, the best settle and are judged.
+    placement: SubsetPlacement, starts: Sequence[Sequence[Array]], surface: Surface, criteria: SearchCriteria
+) -> SearchResult:
+    """Return the best pose from many starts: all are scored with a wide reach, the best converge and are compared.
 
-    Scored, and settled within the wide reaches, with ROUGH of the points: more do not tell starts apart any better. Of
-    those that settle together one goes on.
+    Starts are scored, and converge within the coarse reaches, with ROUGH of the points: more do not tell starts apart
+    any better. Of several that converge to the same pose one goes on.
 
-    ``starts`` come in groups, of each of which the ``each`` best settle: where blocks repeat, the best of all may lie
-    round one wrong height. ``limits`` (k,): a settled pose further than this from zero is no candidate. ``same`` tells
-    whether two settled poses are the same solution, ``judge`` how good one is.
+    Parameters
+    ----------
+    placement
+        The points.
+    starts
+        Groups of parameters (k,); the best of each group converge.
+    surface
+        The surface of the target.
+    criteria
+        What is a candidate, and how good it is.
     """
-    rough = placement.thinned(ROUGH)
+    rough = placement.subset(ROUGH)
+
+    def start_score(parameters: Array) -> float:
+        return score(rough, parameters, surface.closest, START_REACH_M)
+
     chosen = [
-        start for group in starts for start in sorted(group, key=lambda p: -score(rough, p, closest, 0.25))[:each]
+        start
+        for group in starts
+        for start in sorted(group, key=lambda p: -start_score(p))[: criteria.starts_per_group]
     ]
-    settled: list[Array] = []
-    placed: list[Array] = []
+    converged: list[Array] = []
+    clouds: list[Array] = []
     for start in chosen:
-        wide = settle(rough, start, closest, normals, WIDE_M)
-        points = rough.points(wide)
-        if all(np.max(np.abs(points - other)) > SAME_M for other in placed):
-            placed.append(points)
-            settled.append(settle(placement, wide, closest, normals, FINE_M))
-    allowed = [p for p in settled if np.all(np.abs(p) <= limits)]
-    scored = [(judge(p), p) for p in allowed or settled]
-    best_score, best = max(scored, key=lambda one: one[0])
-    rivals = [s for s, p in scored if not same(best, p)]
-    return Found(best, best_score, max(rivals, default=0.0), bool(allowed))
+        coarse = converge(rough, start, surface, COARSE_REACHES_M)
+        points = rough.points(coarse)
+        if all(np.max(np.abs(points - earlier)) > SAME_POSE_M for earlier in clouds):
+            clouds.append(points)
+            converged.append(converge(placement, coarse, surface, FINE_REACHES_M))
+    allowed = [p for p in converged if np.all(np.abs(p) <= criteria.limits)]
+    candidates = [(criteria.quality(p), p) for p in allowed or converged]
+    best_score, best = max(candidates, key=lambda candidate: candidate[0])
+    rivals = [rival_score for rival_score, p in candidates if not criteria.same(best, p)]
+    return SearchResult(best, best_score, max(rivals, default=0.0), bool(allowed))
 
 
 @dataclass(frozen=True)
-class TiltedTarget:
-    """Points already in the target frame, (n, 3) m; parameters: a small rotation vector and a shift of the points.
-
-    d(g · x)/dω = x × g (from g · (ω × x)), d/ds = g: used once, at zero.
-    """
-
-    points_target_m: Array
-    prior_sigmas: Array
-
-    def points(self, parameters: Array) -> Array:
-        return self.points_target_m @ exp_so3(parameters[:3]).T + parameters[3:]
-
-    def rows(self, parameters: Array, directions: Array) -> Array:
-        return np.hstack([np.cross(self.points(parameters), directions), directions])
-
-
-@dataclass(frozen=True)
-class Refined:
-    """Parameters (k,), covariance (k, k) from the residuals' robust scale, that scale, the RMS and how many points."""
+class Refinement:
+    """Parameters (k,), covariance (k, k) from the residuals' robust scale, that scale, their RMS and their number."""
 
     parameters: Array
     covariance: Array
@@ -266,19 +187,22 @@ class Refined:
     count: int
 
 
-def refine(
-    placement: Placement,
-    start: Array,
-    label: Callable[[Array, Array], NDArray[np.int16]],
-    normals: Array,
-    distances_m: Array,
-    rounds: int = 6,
-) -> Refined:
-    """Point-to-plane least squares on labelled points only, relabelled each round: no bias from edges.
+def refine(placement: Placement, start: Array, label: Labeller, planes: FacePlanes, rounds: int = 6) -> Refinement:
+    """Return the point-to-plane least-squares fit of labelled points alone, relabelled each round: no bias from edges.
 
-    ``label(parameters, points)`` gives face numbers (-1: none). Residual r = n · x - d, Huber weights min(1, k s /
-    |r|) with k = 2 and s = 1.4826 · median |r|; covariance s² (Aᵀ W A + prior)⁻¹. With too few points the start comes
-    back.
+    Residual r = n · x - d, Huber weights min(1, k s / |r|) with k = 2 and s = 1.4826 · median |r|; covariance
+    s² (Aᵀ W A + prior)⁻¹. With too few points the start comes back.
+
+    Parameters
+    ----------
+    placement, start
+        The points, and the parameters (k,) to start from.
+    label
+        ``label(parameters, points)`` gives face numbers (n,), -1 for none.
+    planes
+        The planes of the faces.
+    rounds
+        Number of steps.
     """
     parameters = start.copy()
     scale, rms, count = np.inf, np.nan, 0
@@ -290,16 +214,16 @@ def refine(
         count = int(use.sum())
         if count < 3 * len(parameters):
             break
-        residual = np.sum(points[use] * normals[face[use]], axis=1) - distances_m[face[use]]
+        residual = np.sum(points[use] * planes.normals[face[use]], axis=1) - planes.distances_m[face[use]]
         scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-9)
         rms = float(np.sqrt(np.mean(residual**2)))
         weight = np.minimum(1.0, 2 * scale / np.maximum(np.abs(residual), 1e-12))
         directions = np.zeros_like(points)
-        directions[use] = normals[face[use]]
+        directions[use] = planes.normals[face[use]]
         rows = placement.rows(parameters, directions)[use]
         prior = np.diag((scale / placement.prior_sigmas) ** 2)
         inverse = np.linalg.inv((rows * weight[:, None]).T @ rows + prior)
         step = -inverse @ ((rows * weight[:, None]).T @ residual + prior @ parameters)
         parameters = parameters + step
         covariance = scale**2 * inverse
-    return Refined(parameters, covariance, scale, rms, count)
+    return Refinement(parameters, covariance, scale, rms, count)

@@ -12,9 +12,8 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
-from pipeline.artefacts.families import families_of, level_families
+from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal, normal_of
 from pipeline.maths.geometry.face_grid import face_axes
-from pipeline.maths.target.model import LEVEL
 from pipeline.results.pages.rendering import INK, QUIET, SONAR, WIDTH_IN, picture
 from pipeline.results.pages.target_plots import MOST_PANELS, XYZ
 
@@ -36,11 +35,9 @@ def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) 
     """
     figure = Figure(figsize=(WIDTH_IN, MAP_HEIGHT_IN))
     where = {"left": 0.07, "right": 0.87, "bottom": 0.15, "top": 0.92, "wspace": 0.25}
-    level = level_families(faces)
+    level = horizontal_families(faces)
     family = dict(zip(faces["face"], faces["family"], strict=True))
-    normal = {
-        row["family"]: np.array([row[f"normal_{axis}_target_1"] for axis in "xyz"]) for row in faces.to_dict("records")
-    }
+    normal = {row["family"]: normal_of(row) for row in faces.to_dict("records")}
     enough = (residual_map["count"] >= FEWEST) & np.isfinite(residual_map["mean_m"])
     cells = residual_map[(residual_map["sensor"] == sensor) & enough]
     of_family = np.array([family[face] for face in cells["face"]], dtype=object)
@@ -87,15 +84,15 @@ def _from_the_boat(faces: pd.DataFrame) -> list[str]:
         name: np.mean([np.reshape(corners, (-1, 3))[:, 1].mean() for corners in of_family["vertices_target_m"]])
         for name, of_family in faces.groupby("family", sort=False)
     }
-    level = level_families(faces)
-    return sorted(families_of(faces), key=lambda name: (name in level, -middle[name]))
+    level = horizontal_families(faces)
+    return sorted(family_names(faces), key=lambda name: (name in level, -middle[name]))
 
 
 def _panel_width(faces: pd.DataFrame, name: str) -> float:
     """Return a panel's share of the picture's width, by how wide the family's faces are."""
     outlines = faces.loc[faces["family"] == name, "vertices_target_m"]
     x, y = np.ptp(np.concatenate([np.reshape(outline, (-1, 3)) for outline in outlines]), axis=0)[:2]
-    return float(np.clip((x if name in level_families(faces) else np.hypot(x, y)) / 1.5, 0.8, 2.0))
+    return float(np.clip((x if name in horizontal_families(faces) else np.hypot(x, y)) / 1.5, 0.8, 2.0))
 
 
 def _grid(axis: Axes, x: Array, y: Array, values: Array, size: float, span: float) -> Any:
@@ -127,7 +124,7 @@ def pass_tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_d
     """
     figure = Figure(figsize=(WIDTH_IN, 3.6))
     axis = figure.add_axes((0.08, 0.14, 0.78, 0.77))
-    for corners in faces.loc[faces["normal_z_target_1"].abs() <= LEVEL, "vertices_target_m"]:
+    for corners in faces.loc[~is_horizontal(faces), "vertices_target_m"]:
         points = np.reshape(corners, (-1, 3))
         axis.plot(points[:, 1], points[:, 0], color=INK, linewidth=1.2)
     for number, track in positions_m.items():

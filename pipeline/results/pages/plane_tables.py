@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.adjustment.residual_tables import FEWEST
 from pipeline.artefacts.catalogue.results import CELLS, CLOSING, RESIDUALS
 from pipeline.artefacts.catalogue.target import FACES
-from pipeline.artefacts.families import families_of
+from pipeline.artefacts.from_tables import family_names
 from pipeline.report.as_built import reference, titled
 from pipeline.results.pages.mount_tables import Quantity
 from pipeline.run.results import Tables, calibration
@@ -30,7 +30,7 @@ def plane_agreement_rows(tables: Tables) -> list[dict[str, Any]]:
     residuals, cells = tables.table(RESIDUALS, *columns), tables.table(CELLS)
     family = names[residuals["face"].to_numpy().astype(int)]
     solved = calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
-    for name in families_of(faces):
+    for name in family_names(faces):
         of_family = {sensor: residuals[(residuals["sensor"] == sensor) & (family == name)] for sensor in SENSORS}
         counts = cells[cells["family"] == name].groupby("sensor")["count"].sum()
         if one_plane[name] or any(len(points) < FEWEST for points in of_family.values()):

@@ -12,8 +12,7 @@ from pipeline.artefacts.catalogue.patent import ALTERNATION, ITERATIONS
 from pipeline.artefacts.catalogue.points import PASSES, POOL_FRAME, POSES
 from pipeline.artefacts.catalogue.results import CELLS, RESIDUAL_BINS, RESIDUAL_MAP, RESIDUALS
 from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
-from pipeline.artefacts.families import families_of
-from pipeline.artefacts.poses import trajectory_in_target
+from pipeline.artefacts.from_tables import family_names, trajectory_in_target
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.results.pages import face_maps, residual_plots, target_plots
 from pipeline.results.pages.rendering import drawing_style
@@ -31,7 +30,7 @@ def draw_picture(run: Path, name: str) -> Markup:
 
 def _residuals(tables: Tables) -> Markup:
     passes = tables.table(PASSES)
-    families = families_of(tables.table(FACES))
+    families = family_names(tables.table(FACES))
     return residual_plots.residual_charts(tables.table(RESIDUAL_BINS), tables.table(CELLS), passes, families)
 
 

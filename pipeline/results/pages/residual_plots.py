@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.adjustment.residual_tables import FEWEST
-from pipeline.artefacts.families import shown_as
 from pipeline.gps_time import NS
 from pipeline.mount import WITHIN_95
+from pipeline.results.pages.families import styles_of_families
 from pipeline.results.pages.rendering import AXIS, FAMILY, LASER, MARKS, QUIET, SMALLEST_PT, SONAR, WIDTH_IN, picture
 
 WORDS = {"angle": "swath angle", "range": "distance"}
@@ -33,7 +33,7 @@ def residual_charts(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFram
     families
         Names of the target's families.
     """
-    colours, marks = shown_as(families, FAMILY), shown_as(families, MARKS)
+    colours, marks = styles_of_families(families, FAMILY), styles_of_families(families, MARKS)
     figure = Figure(figsize=(WIDTH_IN, 6.0))
     grid = figure.add_gridspec(3, 2, left=0.08, right=0.98, bottom=0.05, top=0.91, wspace=0.2, hspace=0.55)
     by_face, by_angle, by_range = (figure.add_subplot(grid[place]) for place in ((0, 0), (0, 1), (1, 0)))

@@ -12,8 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
-from pipeline.artefacts.families import families_of, level_families
-from pipeline.maths.target.model import LEVEL
+from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal
 from pipeline.results.pages.cutting_plane import CuttingPlane, cut_line, plane_through, slopes_in
 from pipeline.results.pages.rendering import COARSE, INK, LASER, SONAR, WIDTH_IN, picture
 
@@ -49,7 +48,7 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
         Whether the adjustment has a result to show.
     """
     corners = [np.reshape(outline, (-1, 3)) for outline in faces["vertices_target_m"]]
-    level = faces["normal_z_target_1"].abs().to_numpy() > LEVEL
+    level = is_horizontal(faces)
     face = residuals["face"].to_numpy().astype(int)
     calibrated = _calibrated(residuals)
     of_sensor = {sensor: (residuals["sensor"] == sensor).to_numpy() for sensor in ("laser", "mbes")}
@@ -156,8 +155,9 @@ def distance_charts(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArra
     solved
         Whether the adjustment has a result to show.
     """
-    names, level = [name for name in families_of(faces) if (family == name).any()][:MOST_PANELS], level_families(faces)
-    names = names or families_of(faces)[:1]
+    names = [name for name in family_names(faces) if (family == name).any()][:MOST_PANELS]
+    level = horizontal_families(faces)
+    names = names or family_names(faces)[:1]
     clouds = CLOUDS[_calibrated(residuals)][: None if solved else -1]  # without a result nothing is calibrated
     figure = Figure(figsize=(WIDTH_IN, 3.2))
     where = {"left": 0.07, "right": 0.97, "bottom": 0.23, "top": 0.92, "wspace": 0.16}

@@ -62,7 +62,7 @@ def test_laser_sigma_is_the_scatter_of_noisy_rays() -> None:
 def recomputed(tilts: np.ndarray, true_speed_m_s: float) -> np.ndarray:
     """Points (3, n) of recordings made with 1480 m/s."""
     recorded = np.full(5, 1480.0)
-    return points_in_mbes(2 * RANGES / recorded, ANGLES, tilts, recorded, true_speed_m_s)[0].T
+    return points_in_mbes(2 * RANGES / recorded, ANGLES, tilts, recorded, true_sound_speed_m_s=true_speed_m_s)[0].T
 
 
 def test_beams_that_look_up_have_the_features_of_those_that_look_down() -> None:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.geometry.face_grid import binned, cell_centres, cells_on_face, face_axes
+from pipeline.maths.geometry.face_grid import bin_statistics, cell_centres, cells_on_face, face_axes
 from pipeline.maths.geometry.planes import angle_between
 from pipeline.maths.geometry.rotations import mount_partials
 
@@ -19,7 +19,7 @@ def test_bins_against_a_loop(n: int, width: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     keys = random.integers(-3, 4, (n, width))
     residual, weight = random.normal(size=n), random.choice([0.0, 0.4, 1.0], n)
-    found = binned(keys, residual, weight)
+    found = bin_statistics(keys, residual, weight)
     assert found.count.sum() == n
     assert [tuple(key) for key in found.keys] == sorted({tuple(key) for key in keys})
     for key, count, mean, rms in zip(found.keys, found.count, found.mean_m, found.rms_m, strict=True):

@@ -6,7 +6,7 @@ from pyproj import Transformer
 from scipy.spatial.transform import Rotation, Slerp
 
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
-from pipeline.maths.geometry.trajectory import Trajectory, poses_in_pool
+from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_in_pool
 
 PLACES = np.array([[0.0, 0.0, 0.0], [36.0, 120.1, 12.0], [-72.3, -179.9, 3000.0], [89.999, 10.0, -50.0]])
 
@@ -65,7 +65,7 @@ def test_interpolation_is_linear_and_slerp(wild):
     np.testing.assert_allclose(got_R, expected_R, atol=1e-13)
     np.testing.assert_allclose(got_p, expected_p, atol=1e-12)
     x = np.random.default_rng(5).normal(size=(1000, 3))
-    placed = trajectory.place(moments, x)
+    placed = trajectory.points_from_body(moments, x)
     np.testing.assert_allclose(placed, expected_p + np.einsum("nij,nj->ni", expected_R, x), atol=1e-12)
 
 
@@ -75,8 +75,8 @@ def test_records_themselves_come_back_and_moving_the_frame_commutes(wild):
     np.testing.assert_allclose(trajectory.poses_at(t_ns)[1], R.as_matrix(), atol=1e-14)
     turn, shift = Rotation.from_rotvec([0.1, -0.4, 2.0]).as_matrix(), np.array([5.0, -2.0, 1.0])
     x = np.ones((len(t_ns), 3))
-    moved = trajectory.moved(turn, shift).place(t_ns + 1000, x)
-    np.testing.assert_allclose(moved, trajectory.place(t_ns + 1000, x) @ turn.T + shift, atol=1e-12)
+    moved = trajectory.transformed(turn, shift).points_from_body(t_ns + 1000, x)
+    np.testing.assert_allclose(moved, trajectory.points_from_body(t_ns + 1000, x) @ turn.T + shift, atol=1e-12)
 
 
 def test_holes_and_ends_are_not_covered():
@@ -94,12 +94,14 @@ def test_a_boat_north_of_the_origin_heading_along_the_wall():
     north, east = 10 * np.cos(a), 10 * np.sin(a)
     position, R = poses_in_pool(
         frame,
-        np.array([lat + north / 6_358_000]),  # radius of the meridian at 36 degrees
-        np.array([lon + east / (6_385_500 * np.cos(lat))]),
-        np.array([13.0]),
-        np.zeros(1),
-        np.zeros(1),
-        np.array([a]),
+        GeodeticPoses(
+            np.array([lat + north / 6_358_000]),  # radius of the meridian at 36 degrees
+            np.array([lon + east / (6_385_500 * np.cos(lat))]),
+            np.array([13.0]),
+            np.zeros(1),
+            np.zeros(1),
+            np.array([a]),
+        ),
     )
     np.testing.assert_allclose(position[0], [0, 10, 1], atol=2e-3)
     np.testing.assert_allclose(R[0], np.eye(3), atol=2e-6)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import DegenerateGeometryError
-from pipeline.maths.geometry.planes import Moments, fit_plane, tangents_of
+from pipeline.maths.geometry.planes import PlaneMoments, fit_plane, tangents_of
 from pipeline.maths.patent.lifted_moments import attitude_sum, lift, plane_moments
 
 
@@ -26,7 +26,7 @@ def test_a_wall_is_fitted_as_well_as_a_floor(tilt_deg):
     errors, regression = [], []
     for seed in range(40):
         points, normal = patch(np.random.default_rng(seed), np.radians(tilt_deg))
-        plane = fit_plane(Moments.of(points), normal)
+        plane = fit_plane(PlaneMoments.of(points), normal)
         errors.append(np.degrees(np.arccos(min(1.0, plane.normal @ normal))))
         a, b, _ = np.linalg.lstsq(np.column_stack([points[:, :2], np.ones(1000)]), points[:, 2], rcond=None)[0]
         fitted = np.array([-a, -b, 1]) / np.sqrt(a * a + b * b + 1)
@@ -41,7 +41,8 @@ def test_a_wall_is_fitted_as_well_as_a_floor(tilt_deg):
 def test_a_plane_moves_with_its_points(seed, x, y, z):
     points, normal = patch(np.random.default_rng(seed), 0.7, n=50)
     R, shift = Rotation.from_rotvec([x, y, z]).as_matrix(), np.array([x, z, y])
-    plane, moved = fit_plane(Moments.of(points), normal), fit_plane(Moments.of(points @ R.T + shift), R @ normal)
+    plane = fit_plane(PlaneMoments.of(points), normal)
+    moved = fit_plane(PlaneMoments.of(points @ R.T + shift), R @ normal)
     np.testing.assert_allclose(moved.normal, R @ plane.normal, atol=1e-8)
     assert moved.distance_m == pytest.approx(plane.distance_m + moved.normal @ shift, abs=1e-8)
     assert moved.rms_m == pytest.approx(plane.rms_m, abs=1e-9)
@@ -51,7 +52,7 @@ def test_the_covariance_is_that_of_repeats():
     turns, truth = [], None
     for seed in range(400):
         points, normal = patch(np.random.default_rng(seed), 1.2, n=200)
-        plane = fit_plane(Moments.of(points), normal)
+        plane = fit_plane(PlaneMoments.of(points), normal)
         truth = normal
         turns.append([*(plane.tangents @ truth), plane.normal @ plane.centroid_m - plane.distance_m, plane.distance_m])
     sigma = np.sqrt(np.diag(plane.covariance))[:2]
@@ -66,7 +67,7 @@ def test_errors_along_oblique_rays_do_not_turn_the_plane():
     for seed in range(40):
         rng = np.random.default_rng(seed)
         floor = np.column_stack([rng.uniform(-1, 1, 2000), rng.uniform(-1, 1, 2000), np.zeros(2000)])
-        alike = Moments.of(floor + rng.normal(scale=0.1, size=(2000, 1)) * ray)
+        alike = PlaneMoments.of(floor + rng.normal(scale=0.1, size=(2000, 1)) * ray)
         along = dataclasses.replace(alike, noise=2000 * np.outer(ray, ray))
         for name, moments in zip(turns, (along, alike), strict=True):
             turns[name].append(np.degrees(fit_plane(moments, np.array([0, 0, 1.0])).normal[0]))
@@ -78,7 +79,8 @@ def test_errors_along_oblique_rays_do_not_turn_the_plane():
 
 def test_moments_add_and_rms_is_the_noise():
     points, normal = patch(np.random.default_rng(0), 0.3, n=4000)
-    whole, halves = Moments.of(points), Moments.of(points[:1500]) + Moments.of(points[1500:]) + Moments.zero()
+    whole = PlaneMoments.of(points)
+    halves = PlaneMoments.of(points[:1500]) + PlaneMoments.of(points[1500:]) + PlaneMoments.zero()
     np.testing.assert_allclose(halves.products, whole.products, rtol=1e-12)
     assert 0.95 < fit_plane(halves, normal).rms_m / 0.01 < 1.05
 
@@ -86,7 +88,7 @@ def test_moments_add_and_rms_is_the_noise():
 @pytest.mark.parametrize("points", [np.zeros((3, 3)), np.zeros((10, 3)), np.outer(np.arange(10.0), [1, 2, 3])])
 def test_points_without_a_plane_are_refused(points):
     with pytest.raises(DegenerateGeometryError):
-        fit_plane(Moments.of(points), np.array([0, 0, 1.0]))
+        fit_plane(PlaneMoments.of(points), np.array([0, 0, 1.0]))
 
 
 def test_tangents_are_right_handed():
@@ -103,7 +105,7 @@ def test_lifted_moments_are_those_of_the_placed_points():
     features = lift(T, p, m)
     E, lever = Rotation.from_rotvec([0.03, -0.02, 0.05]).as_matrix(), np.array([0.3, 0.2, -2.0])
     points = p + np.einsum("nij,nj->ni", T, m @ E.T + lever)
-    got, expected = plane_moments(features.T @ features, E, lever), Moments.of(points)
+    got, expected = plane_moments(features.T @ features, E, lever), PlaneMoments.of(points)
     assert got.count == n
     np.testing.assert_allclose(got.total, expected.total, rtol=1e-11)
     np.testing.assert_allclose(got.products, expected.products, rtol=1e-11)

@@ -5,10 +5,26 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import DegenerateGeometryError
-from pipeline.maths.geometry.planes import Moments, fit_plane
-from pipeline.maths.patent.angles import PassPlanes, deviations, fourth_normal, iterate_angles, look, patent_cosines
+from pipeline.maths.geometry.planes import PlaneMoments, fit_plane
+from pipeline.maths.patent.angles import (
+    AngleTolerances,
+    PassPlanes,
+    angle_step,
+    deviations,
+    fourth_normal,
+    iterate_angles,
+    patent_cosines,
+)
 from pipeline.maths.patent.lifted_moments import lift
-from pipeline.maths.patent.offsets import DryFace, PassOffsets, WetFace, alternate, offsets
+from pipeline.maths.patent.offsets import (
+    AlternationTolerances,
+    DryFace,
+    OffsetObservations,
+    PassOffsets,
+    WetFace,
+    alternate,
+    patent_offsets,
+)
 from tests.support.targets import by_letters, members
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -86,7 +102,7 @@ def straight_pass(distance, number, mount_error, lever_error, swing_deg=0.0, azi
         heights[face.name] = face.vertices_m[0, 2]
     for family in ("P1", "P2", "P3"):
         dry = np.concatenate([model.faces[k].vertices_m + np.array([0, 0, 4.0]) for k in members(model, family)])
-        laser[family] = fit_plane(Moments.of(dry @ turn.T), turn @ model.faces[members(model, family)[0]].normal)
+        laser[family] = fit_plane(PlaneMoments.of(dry @ turn.T), turn @ model.faces[members(model, family)[0]].normal)
     normals = {name: plane.normal for name, plane in laser.items()}
     normals["P4"] = fourth_normal(normals["P1"], normals["P2"])
     one = PassPlanes(number, {f: lifted[f] for f in ("P1", "P2", "P3")}, normals)
@@ -107,7 +123,7 @@ def test_one_angle_alone_comes_back_with_its_sign(axis):
     error = np.zeros(3)
     error[axis] = np.radians(1.0)
     passes, _, lever = several(error, np.zeros(3))
-    result = iterate_angles([one.planes for one in passes], lever, 60, 1e-9, 1e-9)
+    result = iterate_angles([one.planes for one in passes], lever, AngleTolerances(60, 1e-9, 1e-9))
     assert result.converged
     np.testing.assert_allclose(result.rotation_vector_rad, error, atol=1e-7)
 
@@ -115,17 +131,18 @@ def test_one_angle_alone_comes_back_with_its_sign(axis):
 def test_a_straight_pass_shows_a_yaw_error_by_half_only():
     """A swept sonar does not turn its cloud rigidly: the wall's normal stays, a 45 degree face turns by half."""
     made = straight_pass(6.0, 0, [0, 0, np.radians(1.0)], np.zeros(3))
-    seen = look([made[0].planes], np.eye(3), made[2])
-    assert seen.correction_rad[2] / np.radians(1.0) == pytest.approx(0.5, abs=0.06)
+    step = angle_step([made[0].planes], np.eye(3), made[2])
+    assert step.correction_rad[2] / np.radians(1.0) == pytest.approx(0.5, abs=0.06)
 
 
 def test_with_a_wrong_lever_arm_the_angles_alone_are_biased_and_the_alternation_is_not():
     error, lever_error = np.radians([0.8, -0.8, 0.8]), np.array([0.08, -0.08, 0.08])
     passes, wet, lever = several(error, lever_error)
-    alone = iterate_angles([one.planes for one in passes], lever, 60, 1e-9, 1e-9)
+    alone = iterate_angles([one.planes for one in passes], lever, AngleTolerances(60, 1e-9, 1e-9))
     assert alone.converged
     assert np.degrees(np.abs(alone.rotation_vector_rad - error)).max() > 0.01
-    result = alternate([one.planes for one in passes], passes, DRY, wet, lever, 500, 1e-10, 1e-9)
+    tolerances = AlternationTolerances(500, 1e-10, 1e-9)
+    result = alternate([one.planes for one in passes], OffsetObservations(passes, DRY, wet), lever, tolerances)
     assert result.converged
     np.testing.assert_allclose(np.degrees(result.rotation_vector_rad - error), 0, atol=1e-5)
     np.testing.assert_allclose(result.lever_arm_correction_m, lever_error, atol=1e-6)
@@ -137,14 +154,14 @@ def test_offsets_are_turned_from_the_target_into_the_body(azimuth_deg):
     frame itself is the turned one, so X, Y change and the lever arm correction does not."""
     lever_error = np.array([0.05, 0.0, 0.03])
     made = straight_pass(6.0, 0, np.zeros(3), lever_error)
-    found = offsets([made[0]], DRY, made[1], np.eye(3), made[2], True)
+    found = patent_offsets(OffsetObservations([made[0]], DRY, made[1]), np.eye(3), made[2], True)
     np.testing.assert_allclose(found.body_m[[0, 2]], lever_error[[0, 2]], atol=2e-3)
     np.testing.assert_allclose(found.target_m[2], lever_error[2], atol=2e-3)
 
 
 def test_every_pair_of_faces_is_a_row_and_z_is_laser_minus_sonar():
     made = straight_pass(6.0, 0, np.zeros(3), np.array([0, 0, 0.04]))
-    found = offsets([made[0]], DRY, made[1], np.eye(3), made[2], True)
+    found = patent_offsets(OffsetObservations([made[0]], DRY, made[1]), np.eye(3), made[2], True)
     assert len(found.pairs) == len(DRY) * len(made[1])
     assert sum(pair["weight"] for pair in found.pairs) == pytest.approx(1.0)
     for pair in found.pairs:
@@ -154,6 +171,6 @@ def test_every_pair_of_faces_is_a_row_and_z_is_laser_minus_sonar():
 def test_missing_faces_are_named():
     made = straight_pass(6.0, 0, np.zeros(3), np.zeros(3))
     with pytest.raises(DegenerateGeometryError, match="laser sees no horizontal"):
-        offsets([made[0]], [], made[1], np.eye(3), made[2], True)
+        patent_offsets(OffsetObservations([made[0]], [], made[1]), np.eye(3), made[2], True)
     with pytest.raises(DegenerateGeometryError, match="no pass"):
-        look([], np.eye(3), made[2])
+        angle_step([], np.eye(3), made[2])

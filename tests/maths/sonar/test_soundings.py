@@ -9,7 +9,13 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pipeline.maths.sonar.ray_tracing import Cast
-from pipeline.maths.sonar.soundings import across_beam, beam_half_widths, points_in_mbes, receive_angle, traced
+from pipeline.maths.sonar.soundings import (
+    across_beam,
+    beam_half_widths,
+    points_in_mbes,
+    receive_angle,
+    refracted_points,
+)
 from pipeline.simulation.beams import directions_in_mbes, swing_rad
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.motion import Movement
@@ -83,7 +89,9 @@ def test_soundings_of_the_simulator_lie_where_they_were_made(recorded: float) ->
 
     def off_m(tilts: np.ndarray) -> np.ndarray:
         names = (made.mbes["two_way_time_s"], made.mbes["angle_rad"], tilts, made.mbes["sound_speed_m_s"])
-        found, valid = points_in_mbes(*names, 1500.0, np.array([0.02, 0.3, 0.1]))
+        found, valid = points_in_mbes(
+            *names, true_sound_speed_m_s=1500.0, projector_offset_m=np.array([0.02, 0.3, 0.1])
+        )
         assert valid.all()
         body = R_body_from_sensor(scenario.mbes.mount).apply(found) + lever_arm_m(scenario.mbes.mount)
         target = pose.position_target_m + np.einsum("nij,nj->ni", pose.R_target_from_body, body)
@@ -105,7 +113,7 @@ def test_where_cones_do_not_meet_there_is_no_point() -> None:
     assert valid.tolist() == [True, False, False, True, False]
     assert np.isfinite(found).all()
     # and so with the true speed: both sines grow
-    _, valid = points_in_mbes(np.full(5, 0.008), angles, tilts, np.full(5, SPEED), 1.01 * SPEED)
+    _, valid = points_in_mbes(np.full(5, 0.008), angles, tilts, np.full(5, SPEED), true_sound_speed_m_s=1.01 * SPEED)
     assert not valid.any()
 
 
@@ -175,7 +183,7 @@ def test_traced_through_water_of_one_speed_is_the_true_speed() -> None:
     n = len(angles)
     cast = Cast(np.array([0.0, 20.0]), np.array([1.01 * SPEED] * 2))
     R = np.repeat(UP[None], n, axis=0)
-    found = traced(points(angles, tilts), np.full(n, SPEED), R, np.full(n, 0.8), cast)
+    found = refracted_points(points(angles, tilts), np.full(n, SPEED), R, np.full(n, 0.8), cast)
     np.testing.assert_allclose(found, points(angles, tilts, true_sound_speed_m_s=1.01 * SPEED), atol=2e-6)
 
 
@@ -187,7 +195,7 @@ def test_tilted_rays_through_a_cast_end_where_the_ray_equation_says() -> None:
     angles, tilts = np.array([-65.0, -20.0, 0.0, 40.0, 62.0]), np.array([10.0, -10.0, 8.0, -0.75, -6.0])
     time_s = 2 * 7.0 / wrong
     rays, _ = points_in_mbes(np.full(5, time_s), np.radians(angles), np.radians(tilts), np.full(5, wrong))
-    found = traced(rays, np.full(5, wrong), np.repeat(UP[None], 5, axis=0), np.full(5, head), cast)
+    found = refracted_points(rays, np.full(5, wrong), np.repeat(UP[None], 5, axis=0), np.full(5, head), cast)
     k = float(cast.speed_at(np.array([head]))[0]) / wrong
     sines = [np.degrees(np.arcsin(k * np.sin(np.radians(one)))) for one in (angles, tilts)]
     bent = []

@@ -91,11 +91,11 @@ def test_errors_are_as_the_covariance_says(name: str) -> None:
     few, many = binom.ppf([0.0005, 0.9995], DRAWS, 0.95)
     inside, squared, statistics = [], [], []
     for _ in range(DRAWS):
-        found = frame_adjustment.adjust(*case.drawn(rng))
+        found = frame_adjustment.adjust_frames(*case.drawn(rng))
         statistics.append(found.squares)
         row, squares = [], []
         for number, sensor in enumerate(case.frames[1:], 1):
-            R, lever_arm, C = frame_adjustment.mounted_on(found, 0, number)
+            R, lever_arm, C = frame_adjustment.relative_mount(found, 0, number)
             e = error(case.world, sensor, R, lever_arm)
             row.append(np.abs(e) < 1.959964 * np.sqrt(np.diag(C)))
             squares.append(e @ np.linalg.solve(C, e))
@@ -128,9 +128,9 @@ def exact(case: Case) -> tuple[Survey, list[Frame]]:
 def test_without_errors_the_mounts_are_exact(name: str) -> None:
     """Marks, or a roll starboard down +, or a pitch bow up +: any slip of a sign turns the mount by degrees."""
     case = CASES[name]
-    found = frame_adjustment.adjust(*exact(case))
+    found = frame_adjustment.adjust_frames(*exact(case))
     for number, sensor in enumerate(case.frames[1:], 1):
-        R, lever_arm, _ = frame_adjustment.mounted_on(found, 0, number)
+        R, lever_arm, _ = frame_adjustment.relative_mount(found, 0, number)
         assert np.abs(error(case.world, sensor, R, lever_arm)).max() < 1e-10
     assert found.squares < 1e-9
     level = attitude_rotation(*case.world.attitude).as_matrix()
@@ -142,7 +142,7 @@ def test_without_errors_the_mounts_are_exact(name: str) -> None:
 def test_the_design_is_the_derivative_of_the_residuals(name: str) -> None:
     survey, frames = CASES[name].drawn(np.random.default_rng(3))
     survey = replace(survey, at_m=survey.at_m - PLACE)
-    poses = [frame_adjustment._start(survey, frame).moved(np.full(6, 0.02)) for frame in frames]
+    poses = [frame_adjustment._start(survey, frame).updated(np.full(6, 0.02)) for frame in frames]
     system = frame_adjustment._system(survey, frames, poses)
     for column in range(system.design.shape[1]):
         number, place = divmod(column, 6)
@@ -180,19 +180,21 @@ def test_a_shared_mark_ties_two_frames_whatever_the_survey_says() -> None:
     """Three marks shared by body and laser: however bad the survey, the two agree by their drawings."""
     marks = ("B1", "B2", "I1", "I4")
     case = Case(World(shared=tuple((mark, "body", "laser") for mark in marks)), 0.02, 0.0002)
-    _, _, C = frame_adjustment.mounted_on(frame_adjustment.adjust(*case.drawn(np.random.default_rng(1))), 0, 1)
+    adjusted = frame_adjustment.adjust_frames(*case.drawn(np.random.default_rng(1)))
+    _, _, C = frame_adjustment.relative_mount(adjusted, 0, 1)
     own = {f"L{k}": ON_BODY[mark] for k, mark in enumerate(marks)}
     apart = Case(World(frames={**EVERY.frames, "laser": own}), 0.02, 0.0002)
-    _, _, loose = frame_adjustment.mounted_on(frame_adjustment.adjust(*apart.drawn(np.random.default_rng(1))), 0, 1)
+    adjusted = frame_adjustment.adjust_frames(*apart.drawn(np.random.default_rng(1)))
+    _, _, loose = frame_adjustment.relative_mount(adjusted, 0, 1)
     assert np.all(np.diag(C) < np.diag(loose) / 400)
 
 
 def test_origin_and_heading_of_the_survey_do_not_matter() -> None:
     survey, frames = CASES["shared marks"].drawn(np.random.default_rng(2))
-    one = frame_adjustment.mounted_on(frame_adjustment.adjust(survey, frames), 0, 2)
+    one = frame_adjustment.relative_mount(frame_adjustment.adjust_frames(survey, frames), 0, 2)
     turn = Rotation.from_euler("z", 77.0, degrees=True).as_matrix()
     moved = Survey(survey.at_m @ turn.T + [5e5, 4e6, -3], survey.covariance)
-    other = frame_adjustment.mounted_on(frame_adjustment.adjust(moved, frames), 0, 2)
+    other = frame_adjustment.relative_mount(frame_adjustment.adjust_frames(moved, frames), 0, 2)
     for a, b, atol in zip(one, other, (1e-8, 1e-8, 1e-12), strict=True):
         np.testing.assert_allclose(a, b, atol=atol)
 
@@ -244,22 +246,22 @@ def test_false_alarms_are_as_rare_as_the_level() -> None:
     alarms = 0
     for _ in range(DRAWS):
         survey, frames = case.drawn(rng)
-        found = frame_adjustment.adjust(survey, frames)
+        found = frame_adjustment.adjust_frames(survey, frames)
         worst = data_snooping.mark_tests(found, frames)[0]
-        alarms += found.squares > data_snooping.limit(found.redundancy) or worst.ratio > 1
-    assert alarms <= binom.ppf(0.999, DRAWS, 2 * data_snooping.LEVEL)
+        alarms += found.squares > data_snooping.global_limit(found.redundancy) or worst.ratio > 1
+    assert alarms <= binom.ppf(0.999, DRAWS, 2 * data_snooping.SNOOPING_LEVEL)
 
 
 def test_a_marks_statistic_is_what_the_squares_fall_by_without_it() -> None:
     survey, frames = CASES["shared marks"].drawn(np.random.default_rng(17))
-    found = frame_adjustment.adjust(survey, frames)
+    found = frame_adjustment.adjust_frames(survey, frames)
     for test in data_snooping.mark_tests(found, frames):
         if test.frame == data_snooping.SURVEY:  # as if it had not been measured
             covariance = survey.covariance.copy()
             covariance[test.mark] *= 1e6
-            less = frame_adjustment.adjust(replace(survey, covariance=covariance), frames)
+            less = frame_adjustment.adjust_frames(replace(survey, covariance=covariance), frames)
         else:
-            less = frame_adjustment.adjust(survey, data_snooping._without(tuple(frames), test))
+            less = frame_adjustment.adjust_frames(survey, data_snooping._without(tuple(frames), test))
         assert found.squares - less.squares == pytest.approx(test.statistic, rel=0.02, abs=0.02)
         assert test.rank == 3
 

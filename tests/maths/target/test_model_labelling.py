@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.maths.target.labelling import Beams, label_points
+from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.labelling import LabelSettings, label_points
 from tests.support.targets import by_letters, members
 
 
@@ -96,7 +97,7 @@ def test_points_are_labelled_by_polygon_gate_and_margin(target):
         ]
     )
     origin = np.array([-5.0, 0.0, -0.5])
-    labels = label_points(target, points, beams_from(origin, points), 0.05, 0.03, np.radians(5))
+    labels = label_points(target, points, beams_from(origin, points), LabelSettings(0.05, 0.03, np.radians(5)))
     assert labels.face.tolist() == [
         numbers["P2"], -1, -1, numbers["P1-0"], -1, numbers["P3-0"], numbers["P1-0-top"],
     ]  # fmt: skip
@@ -108,7 +109,7 @@ def test_faces_are_seen_from_their_fronts_only_and_not_too_flat(target):
     top = np.array([[0.75, -1.75, -3.5]])
     for height, grazing_deg, good in ((-0.5, 5, True), (-0.5, 40, False), (-3.9, 5, False)):
         beams = beams_from(np.array([-5.0, -1.75, height]), top)
-        label = label_points(target, top, beams, 0.05, 0.03, np.radians(grazing_deg))
+        label = label_points(target, top, beams, LabelSettings(0.05, 0.03, np.radians(grazing_deg)))
         assert bool(label.face[0] >= 0) is good, (height, grazing_deg)
         assert bool(label.grazing[0]) is not good
 
@@ -117,8 +118,8 @@ def test_a_grazed_face_needs_its_margin_along_the_ray(target):
     """0.5 degrees at 6 m, grazing at 27: the footprint is 11 cm long, so 4 cm from the far edge is too near."""
     origin = np.array([-5.0, -1.75, -0.5])
     points = np.array([[0.75, -1.75, -3.5], [0.96, -1.75, -3.5]])
-    fine = label_points(target, points, beams_from(origin, points), 0.05, 0.03, 0.0)
-    wide = label_points(target, points, beams_from(origin, points, np.radians(0.25)), 0.05, 0.03, 0.0)
+    fine = label_points(target, points, beams_from(origin, points), LabelSettings(0.05, 0.03, 0.0))
+    wide = label_points(target, points, beams_from(origin, points, np.radians(0.25)), LabelSettings(0.05, 0.03, 0.0))
     assert (fine.face >= 0).tolist() == [True, True]
     assert (wide.face >= 0).tolist() == [True, False]
 
@@ -131,12 +132,12 @@ def test_noise_in_the_range_does_not_choose_the_points(target):
     points = np.column_stack([random.uniform(0, 1, 4000), random.uniform(-2.5, -1.5, 4000), np.full(4000, -3.5)])
     for half_width, longest_m in ((0.0, 0.014), (np.radians(0.25), 0.05)):
         beams = beams_from(origin, points, half_width)
-        on_it = label_points(target, points, beams, 0.05, 0.03, np.radians(5)).face == number
+        on_it = label_points(target, points, beams, LabelSettings(0.05, 0.03, np.radians(5))).face == number
         assert 300 < on_it.sum() < 2500
         for longer_m in (-longest_m, -longest_m / 3, longest_m / 3, longest_m):
             noisy = points + longer_m * beams.directions
             longer = replace(beams, ranges_m=beams.ranges_m + longer_m)
-            again = label_points(target, noisy, longer, 0.05, 0.03, np.radians(5)).face == number
+            again = label_points(target, noisy, longer, LabelSettings(0.05, 0.03, np.radians(5))).face == number
             np.testing.assert_array_equal(again, on_it, err_msg=str((half_width, longer_m)))
 
 
@@ -145,10 +146,11 @@ def test_an_echo_that_stands_on_the_corner_is_not_taken_wherever_its_beam_points
     corner = np.array([1.0, -1.5, -3.5])  # of the lowest southern block's top
     ray = np.array([[0.85, -1.7, -3.5]]) - origin  # the beam's axis meets the top well inside
     reach = np.linalg.norm(corner - origin) / np.linalg.norm(ray)
-    assert label_points(target, origin + ray, beams_from(origin, origin + ray), 0.05, 0.03, np.radians(5)).face[0] >= 0
+    limits = LabelSettings(0.05, 0.03, np.radians(5))
+    assert label_points(target, origin + ray, beams_from(origin, origin + ray), limits).face[0] >= 0
     echo = origin + reach * ray
     assert abs(echo[0, 2] + 3.5) < 0.05  # within the gate, and behind the margin
-    assert label_points(target, echo, beams_from(origin, echo), 0.05, 0.03, np.radians(5)).face[0] == -1
+    assert label_points(target, echo, beams_from(origin, echo), limits).face[0] == -1
 
 
 @pytest.mark.parametrize("e", [0.5, 0.4, 0.3])
@@ -158,7 +160,7 @@ def test_a_top_and_a_bottom_at_one_height_are_both_labelled(e):
     for number, face in enumerate(model.faces):
         middle = face.vertices_m.mean(axis=0)[None, :]
         ahead = Beams(-face.normal[None, :], np.ones(1))  # a ray from straight in front
-        assert label_points(model, middle, ahead, 0.05, 0.01, 0.1).face[0] == number, face.name
+        assert label_points(model, middle, ahead, LabelSettings(0.05, 0.01, 0.1)).face[0] == number, face.name
 
 
 def test_what_lies_behind_a_face_is_hidden():

@@ -1,0 +1,64 @@
+"""Rays of points in the target frame, and the footprints of finite beams on planes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Beams:
+    """Rays in the target frame.
+
+    Parameters
+    ----------
+    directions
+        Unit vectors (n, 3).
+    ranges_m
+        Measured ranges (n,).
+    half_widths
+        For finite beams the half widths' vectors across and along, (n, 3) each, for one metre of range: tan(half
+        width) · unit vector normal to the ray.
+    stray
+        The beam may stray by this many times the half width across.
+    """
+
+    directions: Array
+    ranges_m: Array
+    half_widths: tuple[Array, ...] = ()
+    stray: float = 0.0
+
+    @classmethod
+    def head_on(cls, count: int) -> "Beams":
+        """Return unknown rays (of averaged points): every face is taken to be seen from its front."""
+        return cls(np.zeros((count, 3)), np.zeros(count))
+
+    def corners(self, rows: NDArray[np.int64]) -> Iterator[Array]:
+        """Yield rays (n, 3) along the four corners of these beams, as far out as the beams may stray."""
+        across, along = (width[rows] for width in self.half_widths)
+        for side, end in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            yield self.directions[rows] + side * (1 + self.stray) * across + end * along
+
+    def spreads(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> tuple[Array, ...]:
+        """Return the half axes, (n, 3) m each, of the footprints on a plane.
+
+        Tilting a ray u by a small angle towards t moves its intersection with the plane by w = h - u (n · h) / (n · u),
+        h = range · angle · t: h itself plus what is needed along the ray to come back to the plane (n · w = 0). On a
+        face grazed at 10° the axis across the ray is six times longer than the beam is wide.
+
+        Parameters
+        ----------
+        rows
+            Numbers (n,) of the beams.
+        normal
+            Unit normal (3,) of the plane.
+        reached_m
+            Ranges (n,) at which the rays meet the plane.
+        """
+        directions = self.directions[rows]
+        slant, reached = (directions @ normal)[:, None], reached_m[:, None]
+        halves = [width[rows] for width in self.half_widths]
+        return tuple(reached * (h - directions * ((h @ normal)[:, None] / slant)) for h in halves)

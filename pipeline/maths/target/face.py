@@ -1,0 +1,150 @@
+"""A face of the target: a convex planar polygon, its edges, and where it meets others."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+HORIZONTAL_COSINE = 0.9998  # smallest |n_z| of a horizontal face: within 1.1°
+SAME_CORNER_M = 0.01  # corners nearer than this to each other are the same
+TOUCH_M = 0.005  # a corner nearer than this to a plane lies in it
+
+
+@dataclass(frozen=True)
+class Face:
+    """A convex planar polygon of the target.
+
+    Parameters
+    ----------
+    name, family
+        Names of the face and of its family.
+    normal, distance_m
+        Plane ``normal · x = distance_m`` with the normal (3,) outward, target frame.
+    vertices_m
+        Corners (k, 3), counter-clockwise about the normal.
+    sense
+        +1 where its normal is that of its family, -1 where it is the opposite.
+    offset_m
+        Distance from the plane of the family, along the family's normal.
+    seen
+        Where a sensor has to see it to use it: "dry" (the laser), "wet" (the sonar) or "both".
+    creases_m
+        Lines (2, 3) within it along which another face meets it.
+    """
+
+    name: str
+    family: str
+    normal: Array
+    distance_m: float
+    vertices_m: Array
+    sense: float = 1.0
+    offset_m: float = 0.0
+    seen: str = "both"
+    creases_m: tuple[Array, ...] = ()
+
+    @property
+    def level(self) -> bool:
+        """Return whether the face is horizontal."""
+        return bool(abs(self.normal[2]) > HORIZONTAL_COSINE)
+
+    @property
+    def width_m(self) -> float:
+        """Return how far the face reaches horizontally, along itself."""
+        across = np.array([-self.normal[1], self.normal[0]])
+        across = across / np.linalg.norm(across) if not self.level else np.array([0.0, 1.0])
+        return float(np.ptp(self.vertices_m[:, :2] @ across))
+
+    def inward_edges(self) -> tuple[Array, Array]:
+        """Return the inward unit vectors m (k, 3) of the edges, and their offsets (k,): m · x >= offset inside."""
+        edges = np.roll(self.vertices_m, -1, axis=0) - self.vertices_m
+        inward = np.cross(self.normal, edges)
+        inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+        return inward, np.sum(inward * self.vertices_m, axis=1)
+
+    def clearance(
+        self, points_m: Array, *spreads_m: Array, margin_m: float = 0.0, stray_m: Array | None = None
+    ) -> Array:
+        """Return the smallest distance (n,) of points in the plane from the polygon's edges, + inside.
+
+        A point counts with the whole parallelogram point ± spread_1 ± spread_2, so the margin lies along the direction
+        in which the footprint spreads. From every edge a margin is kept besides, or what the footprint may stray across
+        it where that is more. Creases count as edges, of both sides, along their length.
+
+        Parameters
+        ----------
+        points_m
+            Points (n, 3) that lie in the plane.
+        spreads_m
+            Half axes (n, 3) of the footprints in the plane.
+        margin_m
+            Margin from every edge.
+        stray_m
+            How far the footprints may stray (n, 3).
+        """
+
+        def reach(axis: Array) -> Array | float:
+            """Return how far the footprint and its margin go along a unit vector (3,)."""
+            spread = sum((np.abs(half_axis @ axis) for half_axis in spreads_m), start=np.zeros(1))
+            return spread + (margin_m if stray_m is None else np.maximum(np.abs(stray_m @ axis), margin_m))
+
+        inward, offsets = self.inward_edges()
+        smallest = np.full(len(points_m), np.inf)
+        for normal, offset in zip(inward, offsets, strict=True):
+            np.minimum(smallest, points_m @ normal - offset - reach(normal), out=smallest)
+        for start, end in self.creases_m:
+            half = np.linalg.norm(end - start) / 2
+            along = (end - start) / (2 * half)
+            across = np.cross(self.normal, along)
+            away = points_m - (start + end) / 2
+            aside, beyond = np.abs(away @ across) - reach(across), np.abs(away @ along) - half - reach(along)
+            np.minimum(smallest, np.maximum(aside, beyond), out=smallest)
+        return smallest
+
+    def meets(self, other: "Face") -> Array | None:
+        """Return the line (2, 3) along which another face meets this one within its edges; None where it does not."""
+        away = other.vertices_m @ self.normal - self.distance_m
+        ends = list(other.vertices_m[np.abs(away) < TOUCH_M])
+        for k, (start, end) in enumerate(zip(away, np.roll(away, -1), strict=True)):
+            if start * end < 0 and min(abs(start), abs(end)) >= TOUCH_M:
+                corner, next_corner = other.vertices_m[k], other.vertices_m[(k + 1) % len(away)]
+                ends.append(corner + (next_corner - corner) * start / (start - end))
+        if len(ends) != 2:
+            return None  # apart, touching in a point, or in one plane
+        line = ends[0] + np.linspace(0, 1, 41)[:, None] * (ends[1] - ends[0])
+        inside = np.flatnonzero(self.clearance(line) > SAME_CORNER_M)
+        return None if len(inside) < 2 else np.array([line[inside[0]], line[inside[-1]]])
+
+    def grid(self, step_m: float, lowest_m: float) -> Array:
+        """Return points (n, 3) about ``step_m`` apart on an upright face, above ``lowest_m``."""
+        low, high = self.vertices_m[:, 2].min(), self.vertices_m[:, 2].max()
+        across = np.array([-self.normal[1], self.normal[0], 0.0]) / np.hypot(*self.normal[:2])
+        up = np.cross(self.normal, across)
+        up *= np.sign(up[2])
+        along = self.vertices_m @ across
+        count = max(1, round(float(np.ptp(along)) / step_m))
+        columns = along.min() + (np.arange(count) + 0.5) / count * np.ptp(along)
+        heights = np.arange(max(low, lowest_m) + step_m / 2, high, step_m)
+        foot = self.distance_m * self.normal
+        rows = (heights - foot[2]) / up[2]
+        points = foot + np.repeat(columns, len(rows))[:, None] * across + np.tile(rows, count)[:, None] * up
+        return np.asarray(points[self.clearance(points) >= 0])
+
+    def same_corners(self, other: "Face") -> bool:
+        """Return whether the corners of both faces are the same, wherever they begin."""
+        away = np.linalg.norm(self.vertices_m[:, None] - other.vertices_m[None], axis=2)
+        same_count = len(self.vertices_m) == len(other.vertices_m)
+        return bool(same_count and np.all(away.min(axis=1) < SAME_CORNER_M))
+
+
+def plane_of(vertices_m: Array) -> tuple[Array, float]:
+    """Return the unit normal (3,) and the distance of a polygon (k, 3), counter-clockwise about the normal.
+
+    Newell's method: components of Σ v_i × v_{i+1}, twice the area of the polygon's shadow along each axis; right for
+    corners slightly off a plane too. The distance is the mean of normal · v.
+    """
+    after = np.roll(vertices_m, -1, axis=0)
+    shadows = np.sum((vertices_m - after)[:, [1, 2, 0]] * (vertices_m + after)[:, [2, 0, 1]], axis=0)
+    normal = shadows / np.linalg.norm(shadows) + 0.0
+    return normal, float(np.mean(vertices_m @ normal))

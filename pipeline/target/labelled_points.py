@@ -1,0 +1,146 @@
+"""Points of both sensors labelled by the faces of the target, batch by batch."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts.streams import Batch, Piece, xyz
+from pipeline.artefacts.to_tables import xyz_columns
+from pipeline.config.pool import Segment
+from pipeline.config.stage_settings import SonarBeams
+from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.target.beams import Beams
+from pipeline.maths.target.labelling import Labels, LabelSettings, hidden_in_part, label_points
+from pipeline.maths.target.model import TargetModel
+from pipeline.maths.target.near_planes import near_planes
+from pipeline.mount import Mounted
+from pipeline.target.search_results import LocatedTarget, ProvisionalMount
+from pipeline.target.sonar_beams import beams_in_target
+from pipeline.target.surface import ClosestSurface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LabellingContext:
+    """All that labelling needs beside the points.
+
+    Parameters
+    ----------
+    model, surface
+        The target by design.
+    target
+        Its pose.
+    mount
+        Provisional mount of the sensor that is calibrated.
+    trajectory
+        Poses of the body in the target frame.
+    settings
+        Settings of stage segment.
+    """
+
+    model: TargetModel
+    surface: ClosestSurface
+    target: LocatedTarget
+    mount: ProvisionalMount
+    trajectory: Trajectory
+    settings: Segment
+
+    def label_settings(self, sensor: str, gate_m: float) -> LabelSettings:
+        """Return which points of a sensor ("laser" or "mbes") a face takes."""
+        dry = sensor == "laser"
+        level_m, margin_m = self.model.water_level_m, self.settings.water_margin_m
+        return LabelSettings(
+            gate_m=gate_m,
+            margin_m=self.settings.margin_m,
+            min_grazing_rad=np.radians(self.settings.min_grazing_deg),
+            lowest_m=level_m + margin_m if dry else -np.inf,
+            highest_m=np.inf if dry else level_m - margin_m,
+            seen="dry" if dry else "wet",
+        )
+
+
+def label_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> Piece:
+    """Label laser points that stage georeference has placed; ``laser`` is the coarse mount."""
+    points = context.target.frame.points_from_pool(xyz(batch, "pool_m"))
+    return _label_laser(batch, points, laser.lever_arm_body_m, context)
+
+
+def label_calibrated_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> Piece:
+    """Place laser points with the provisional mount, and label them; ``laser`` is the coarse mount."""
+    mount = context.mount.total(laser)
+    body = xyz(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
+    points = context.trajectory.points_from_body(batch["t_ns"], body)
+    return _label_laser(batch, points, mount.lever_arm_body_m, context)
+
+
+def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: LabellingContext) -> Piece:
+    model = context.model
+    settings = context.label_settings("laser", context.target.gate_m)
+    dry = points[:, 2] > model.water_level_m + context.settings.water_margin_m / 2
+    near, planes = near_planes(model, points, settings.gate_m, dry, settings.seen)
+    points, t_ns = points[near], batch["t_ns"][near]
+    rays = points - context.trajectory.track_of_point(t_ns, lever_arm_m)
+    ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
+    rays /= ranges[:, None]
+    labels = label_points(model, points, Beams(rays, ranges), settings, planes)
+    on = np.flatnonzero(labels.face >= 0)
+    rows = near[on]
+    columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}
+    columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
+    columns |= xyz_columns("{}_target_m", points[on].T)
+    columns["cos_incidence"] = labels.cos_incidence[on]
+    counts = _counts("below or near the water line", dry, "near an edge", near, labels)
+    return Piece({"laser_labelled": columns}, counts)
+
+
+def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mbes: SonarBeams) -> Piece:
+    """Place soundings with the provisional mount, and label them.
+
+    Parameters
+    ----------
+    batch
+        Soundings in the mbes frame.
+    context
+        The target and the provisional mount.
+    coarse
+        Coarse mount of the sonar.
+    mbes
+        The sonar's settings, for its beams.
+    """
+    model, mount, trajectory = context.model, context.mount.total(coarse), context.trajectory
+    lever_arm_m = mount.lever_arm_body_m
+    sensor = xyz(batch, "mbes_m")
+    points = trajectory.points_from_body(batch["t_ns"], sensor @ mount.R_body_from_sensor.T + lever_arm_m)
+    settings = context.label_settings("mbes", context.mount.gate_m)
+    wet = points[:, 2] < model.water_level_m - context.settings.water_margin_m / 2
+    near, planes = near_planes(model, points, settings.gate_m, wet, settings.seen)
+    _, R_target_from_body = trajectory.poses_at(batch["t_ns"][near])
+    beams = beams_in_target(R_target_from_body, mount.R_body_from_sensor, sensor[near], mbes)
+    labels = label_points(model, points[near], beams, settings, planes)
+    on = np.flatnonzero(labels.face >= 0)
+    origins = trajectory.track_of_point(batch["t_ns"][near[on]], lever_arm_m)
+    first_met = partial(context.surface.first_met, origins)
+    hidden = hidden_in_part(model, labels.face[on], beams.corners(on), first_met)
+    on = on[~hidden]
+    rows = near[on]
+    names = ("t_ns", "pass", "ping", "beam", "x_mbes_m", "y_mbes_m", "z_mbes_m")
+    columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on]}
+    counts = _counts("above or near the water line", wet, "footprint near an edge", near, labels)
+    counts |= {"footprint partly on another face": int(hidden.sum()), "used": len(on)}
+    return Piece({"soundings_labelled": columns}, counts)
+
+
+def _counts(
+    other_side: str, own_side: NDArray[np.bool_], edge: str, near: NDArray[np.int64], labels: Labels
+) -> dict[str, int]:
+    """Return why points got no label, and how many have one."""
+    return {
+        other_side: int((~own_side).sum()),
+        "off every face": int(own_side.sum()) - len(near) + int(labels.off_surface.sum()),
+        edge: int(labels.near_edge.sum()),
+        "ray too flat": int(labels.grazing.sum()),
+        "used": int((labels.face >= 0).sum()),
+    }

@@ -1,0 +1,47 @@
+"""Tables of stage segment: the pose of the target, and the provisional mount."""
+
+import numpy as np
+import pandas as pd
+
+from pipeline.artefacts.to_tables import xyz_columns
+from pipeline.target.search_results import LocatedTarget, ProvisionalMount
+
+
+def target_pose_table(target: LocatedTarget) -> pd.DataFrame:
+    """Return the table ``target_pose`` (one row)."""
+    sigma, tilt_sigma = np.sqrt(np.diag(target.pose.covariance)), np.sqrt(np.diag(target.tilt.covariance))
+    row = {
+        "R_target_from_pool": target.frame.R_target_from_pool.ravel().tolist(),
+        "azimuth_correction_deg": np.degrees(target.azimuth_correction_rad),
+        # The correction turns the points onto the model: the target itself is tilted the other way.
+        "tilt_x_deg": -np.degrees(target.tilt.parameters[0]),
+        "tilt_y_deg": -np.degrees(target.tilt.parameters[1]),
+        "sigma_azimuth_deg": np.degrees(sigma[0]),
+        "sigma_tilt_x_deg": np.degrees(tilt_sigma[0]),
+        "sigma_tilt_y_deg": np.degrees(tilt_sigma[1]),
+        "rms_m": target.pose.rms_m,
+        "points": target.pose.count,
+        "agreement_m2": target.agreement_m2,
+        "rival_agreement_m2": target.rival_agreement_m2,
+        "rival": target.rival,
+        "ambiguous": target.ambiguous,
+        "gate_m": target.gate_m,
+        "within": target.within,
+    }
+    row |= xyz_columns("origin_{}_pool_m", target.frame.origin_pool_m) | xyz_columns("sigma_{}_m", sigma[1:])
+    return pd.DataFrame([row])
+
+
+def provisional_mount_table(mount: ProvisionalMount) -> pd.DataFrame:
+    """Return the table ``provisional_mount`` (one row)."""
+    row = {
+        "scale_m": mount.scale_m,
+        "gate_m": mount.gate_m,
+        "score": mount.score,
+        "rival_score": mount.rival_score,
+        "ambiguous": mount.ambiguous,
+        "within": mount.within,
+    }
+    row |= xyz_columns("rotation_{}_deg", np.degrees(mount.rotation_vector_rad))
+    row |= xyz_columns("lever_arm_{}_m", mount.lever_arm_correction_m)
+    return pd.DataFrame([row])

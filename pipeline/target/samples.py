@@ -1,0 +1,119 @@
+"""Samples of the points, with which the pose of the target and the mounts are searched."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts.sampling import Voxels, every_nth, points_above, voxel_means, voxel_sums
+from pipeline.artefacts.streams import Batch, Stream, xyz
+from pipeline.maths.geometry.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+VOXEL_M = 0.1  # laser points are averaged over cubes of this size
+SOUNDING_SAMPLE = 8_000  # soundings to search with
+LASER_SAMPLE = 2_000_000  # laser points, of which voxels are then made
+RAW_SAMPLE = 50_000  # of these taken singly
+
+
+@dataclass(frozen=True)
+class LaserSample:
+    """Dry laser points in the pool frame: means over voxels (n, 3) m, and a sample of the points themselves (k, 3) m.
+
+    Voxels are evenly dense, which a search wants, but biased where a face runs along their sides: each mean then lies
+    on its own side of the face. The pose itself comes from the points.
+    """
+
+    voxel_means_m: Array
+    points_m: Array
+
+
+@dataclass(frozen=True)
+class LaserPoses:
+    """Laser points with their poses in the pool frame: positions (n, 3), R (n, 3, 3); points_laser_m (n, 3)."""
+
+    positions_m: Array
+    R_pool_from_body: Array
+    points_laser_m: Array
+
+
+@dataclass(frozen=True)
+class SoundingSample:
+    """Soundings with their poses in the target frame: positions (n, 3), R (n, 3, 3); points_mbes_m (n, 3)."""
+
+    positions_m: Array
+    R_target_from_body: Array
+    points_mbes_m: Array
+
+
+def laser_sample(laser_pool: Stream, count: float, lowest_m: float) -> LaserSample:
+    """Return at most about two million laser points as voxels, and at most about fifty thousand as they are.
+
+    Parameters
+    ----------
+    laser_pool
+        Laser points in the pool frame.
+    count
+        Number of points in the stream.
+    lowest_m
+        Height in the pool frame below which points do not count.
+    """
+    points: list[Array] = []
+
+    def voxels() -> Iterator[Voxels]:
+        for sums, points_of_batch in laser_pool.fold(_voxels_and_points, count, lowest_m):
+            points.append(points_of_batch)
+            yield sums
+
+    return LaserSample(voxel_means(voxels()), np.concatenate(points))
+
+
+def _voxels_and_points(batch: Batch, count: float, lowest_m: float) -> tuple[Voxels, Array]:
+    sample = every_nth(batch, count / LASER_SAMPLE)
+    singles = every_nth(sample, count / RAW_SAMPLE)  # the same hash: a part of these
+    voxels = voxel_sums(points_above(sample, "pool_m", lowest_m), VOXEL_M)
+    return voxels, points_above(singles, "pool_m", lowest_m)
+
+
+def laser_poses(laser_pool: Stream, count: float, lowest_m: float, trajectory: Trajectory) -> LaserPoses:
+    """Return at most about fifty thousand of the points in the scanner's frame, with their poses.
+
+    Parameters
+    ----------
+    laser_pool
+        Laser points in the pool frame.
+    count
+        Number of points in the stream.
+    lowest_m
+        Height in the pool frame below which points do not count.
+    trajectory
+        Poses of the body in the pool frame.
+    """
+    pieces = list(laser_pool.fold(_points_of_scanner, count / RAW_SAMPLE, lowest_m))
+    t_ns, points = (np.concatenate([piece[k] for piece in pieces]) for k in range(2))
+    return LaserPoses(*trajectory.poses_at(t_ns), points)
+
+
+def _points_of_scanner(batch: Batch, one_in: float, lowest_m: float) -> tuple[NDArray[np.int64], Array]:
+    sample = every_nth(batch, one_in)
+    dry = sample["z_pool_m"] >= lowest_m
+    return sample["t_ns"][dry], xyz(sample, "laser_m", dry)
+
+
+def sounding_sample(soundings_pool: Stream, count: float, trajectory: Trajectory) -> SoundingSample:
+    """Return about eight thousand soundings with their poses.
+
+    Parameters
+    ----------
+    soundings_pool
+        Soundings in the pool frame.
+    count
+        Number of soundings in the stream.
+    trajectory
+        Poses of the body in the target frame.
+    """
+    pieces = list(soundings_pool.fold(every_nth, count / SOUNDING_SAMPLE))
+    t_ns = np.concatenate([piece["t_ns"] for piece in pieces])
+    points = np.column_stack([np.concatenate([piece[f"{axis}_mbes_m"] for piece in pieces]) for axis in "xyz"])
+    return SoundingSample(*trajectory.poses_at(t_ns), points)

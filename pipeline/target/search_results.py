@@ -1,0 +1,89 @@
+"""Results of the searches: the pose of the target, and the provisional mount of the sensor that is calibrated."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.maths.target.frame import TargetFrame
+from pipeline.maths.target.registration import Refinement
+from pipeline.mount import Mounted
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LocatedTarget:
+    """The pose of the target in the laser's points.
+
+    Parameters
+    ----------
+    frame
+        Rotation from the pool frame, and the origin in it.
+    azimuth_correction_rad
+        Turn from the configured azimuth, clockwise.
+    pose
+        Fit of the azimuth and the origin.
+    tilt
+        Fit of a rotation and a shift of the points at that pose.
+    agreement_m2, rival_agreement_m2
+        Area explained by this pose, and by the best rival.
+    rival
+        Name of the best rival.
+    ambiguous
+        The rival explains nearly as much.
+    gate_m
+        Distance from a face up to which points are labelled.
+    within
+        The pose lies within the limits of the search.
+    pose_sigmas
+        A-priori sigmas (4,) of the azimuth (rad) and the origin (m).
+    """
+
+    frame: TargetFrame
+    azimuth_correction_rad: float
+    pose: Refinement
+    tilt: Refinement
+    agreement_m2: float
+    rival_agreement_m2: float
+    rival: str
+    ambiguous: bool
+    gate_m: float
+    within: bool
+    pose_sigmas: Array
+
+
+@dataclass(frozen=True)
+class ProvisionalMount:
+    """The mount with which points are labelled, as a correction of the coarse mount.
+
+    Parameters
+    ----------
+    rotation_vector_rad, lever_arm_correction_m
+        Correction, (3,) each, body axes.
+    scale_m
+        Robust scale of the residuals.
+    gate_m
+        Distance from a face up to which points are labelled.
+    score, rival_score
+        Quality of this mount, and of the best other one.
+    ambiguous
+        The other one is nearly as good.
+    within
+        The correction lies within the limits of the search.
+    """
+
+    rotation_vector_rad: Array
+    lever_arm_correction_m: Array
+    scale_m: float
+    gate_m: float
+    score: float
+    rival_score: float
+    ambiguous: bool
+    within: bool
+
+    def total(self, coarse: Mounted) -> Mounted:
+        """Return the coarse mount with the correction applied."""
+        R_body_from_sensor = exp_so3(self.rotation_vector_rad) @ coarse.R_body_from_sensor
+        return Mounted(R_body_from_sensor, coarse.lever_arm_body_m + self.lever_arm_correction_m)
