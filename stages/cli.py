@@ -297,10 +297,10 @@ def coarse(
 ) -> int:
     """Coarse mounts from a survey of marks on bracket and instruments. Status 1 if the marks do not agree."""
     from pipeline.run.output_files import refuse_output
-    from stages.commands.coarse import coarse as coarse_of
+    from stages.commands.coarse import coarse_mounts
 
     refuse_output("--yaml", out, session, begins=b"agrees:")
-    said, agrees = coarse_of(file, session, out, write)
+    said, agrees = coarse_mounts(file, session, out, write)
     say(said, sys.stdout)
     return 0 if agrees else 1
 

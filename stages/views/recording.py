@@ -68,10 +68,10 @@ def record(run: Path, stage: str, tabs: Sequence[str]) -> bytes:
 
     model = target_of(read_settings(run).pool.target)
     layout = run_blueprint(tabs, model)
-    return recording_content(recording_id(run), layout, lambda recording: log(recording, stage, Tables(run)))
+    return recording_content(recording_id(run), layout, lambda recording: log_stage(recording, stage, Tables(run)))
 
 
-def log(recording: Any, stage: str, tables: Tables) -> None:
+def log_stage(recording: Any, stage: str, tables: Tables) -> None:
     """Log what a stage has to show into a recording.
 
     Parameters

@@ -13,7 +13,7 @@ from pipeline.atomic_files import write_bytes
 from pipeline.results.compare_text import comparison_text
 from pipeline.run.results import Tables, calibration
 from stages.views.blueprint import two_runs_blueprint
-from stages.views.recording import DOT_M, LASER, SONAR, log, recording_content, recording_id, text_document
+from stages.views.recording import DOT_M, LASER, SONAR, log_stage, recording_content, recording_id, text_document
 
 SOUNDINGS = 200_000  # of a run, on one target
 STAGES = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # in the target's frame
@@ -54,7 +54,7 @@ def save_two_runs(first: Path, second: Path, difference: dict[str, Any], path: P
     def draw(recording: Any) -> None:
         for name, run in (("a", first), ("b", second)):
             for stage in STAGES:
-                log(NestedRecording(recording, name), stage, Tables(run))
+                log_stage(NestedRecording(recording, name), stage, Tables(run))
         _on_one_target(recording, Tables(first), Tables(second))
         recording.log("tables/comparison", text_document(comparison_text(difference)), static=True)
 

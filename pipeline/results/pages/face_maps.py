@@ -53,7 +53,7 @@ def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) 
         inside = cells[of_family == name]
         flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
         size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
-        image = _grid(axis, flat[:, 0], flat[:, 1], 1000 * inside["mean_m"].to_numpy(), size, span) or image
+        image = _grid(axis, flat, 1000 * inside["mean_m"].to_numpy(), size, span) or image
         axis.set(title=name, aspect="equal")
         axis.set_xlabel("x, m (from above)" if name in level else "to the right, m")
         if name not in level:
@@ -95,8 +95,9 @@ def _panel_width(faces: pd.DataFrame, name: str) -> float:
     return float(np.clip((x if name in horizontal_families(faces) else np.hypot(x, y)) / 1.5, 0.8, 2.0))
 
 
-def _grid(axis: Axes, x: Array, y: Array, values: Array, size: float, span: float) -> Any:
+def _grid(axis: Axes, centres: Array, values: Array, size: float, span: float) -> Any:
     """Draw squares with these centres; where several lie over each other (block over block), their mean."""
+    x, y = centres[:, 0], centres[:, 1]
     if not len(x):
         axis.text(0.5, 0.5, "no points", transform=axis.transAxes, ha="center", color=QUIET)
         return None

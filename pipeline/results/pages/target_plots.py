@@ -64,7 +64,7 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
     for sensor, prefix, label, colour in CLOUDS[calibrated][: None if solved else -1]:  # else nothing is calibrated
         columns = [prefix + name for name in XYZ]
         cloud = residuals.loc[of_sensor[sensor] & ~level[face], columns].to_numpy()
-        _dots(above, cloud[:, 0], cloud[:, 1], colour, label)
+        _dots(above, cloud[:, :2], colour, label)
         if plane is None:
             continue
         chosen = of_sensor[sensor] & cut[face]
@@ -73,7 +73,7 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
         on_face, cloud = face[chosen][inside], cloud[inside]
         cloud[:, plane.along] += slope[on_face] * (plane.at - cloud[:, plane.axis])
         for axis, size in zip(others, (1.1, 2.2), strict=True):
-            _dots(axis, cloud[:, plane.along], cloud[:, 2], colour, label, size)
+            _dots(axis, cloud[:, [plane.along, 2]], colour, label, size)
         nearest.append(cloud[~level[on_face]][:, [plane.along, 2]])
     for points in corners:
         if np.ptp(points[:, 2]) > 0:
@@ -167,7 +167,7 @@ def distance_charts(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArra
         for sensor, prefix, label, colour in clouds:
             points = residuals[(residuals["sensor"] == sensor).to_numpy() & (family == name)]
             away = 1000 * points[prefix + "residual_m"].to_numpy()
-            _dots(axis, away, points[prefix + "z_target_m"].to_numpy(), colour, label)
+            _dots(axis, np.column_stack([away, points[prefix + "z_target_m"].to_numpy()]), colour, label)
             if len(away):
                 largest = max(largest, float(np.quantile(np.abs(away), 0.995)))
         axis.axvline(0, color=INK, linewidth=0.6)
@@ -178,9 +178,9 @@ def distance_charts(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArra
     return picture(figure, "distances of the points from the adjusted surfaces in millimetres, over the height")
 
 
-def _dots(axis: Axes, x: Any, y: Any, colour: str, label: str, size: float = 1.1) -> None:
-    step = max(1, -(-len(x) // DOTS))
-    axis.plot(x[::step], y[::step], "o", ms=size, mew=0, color=colour, label=label, rasterized=True)
+def _dots(axis: Axes, points: Array, colour: str, label: str, size: float = 1.1) -> None:
+    step = max(1, -(-len(points) // DOTS))
+    axis.plot(points[::step, 0], points[::step, 1], "o", ms=size, mew=0, color=colour, label=label, rasterized=True)
 
 
 def _legend(figure: Figure, axis: Axes) -> None:
