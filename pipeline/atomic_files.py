@@ -1,7 +1,7 @@
 """Files of a run folder: written whole or not at all, hashed once, removed safely.
 
-Whatever the disk refuses (full, read-only, not permitted, something in the way) is the user's to correct, so it becomes
-an :class:`~pipeline.errors.ArtefactError`; nothing else does.
+The user must correct what the disk refuses (full, read-only, not permitted, something in the way): such errors, and no
+others, become an :class:`~pipeline.errors.ArtefactError`.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ _REMEDIES = {
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Everything the operating system refuses inside becomes one line that names ``path`` and the remedy."""
+    """Turn errors of the operating system inside into an ArtefactError that names ``path`` and the remedy."""
     try:
         yield
     except OSError as error:
@@ -44,7 +44,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def _errno_in(message: str) -> int | None:
-    """pyarrow says the number in words.
+    """Return the number in a message of pyarrow; None without one.
 
     >>> _errno_in("Error writing bytes to file. Detail: [errno 28] No space left on device")
     28
@@ -54,12 +54,12 @@ def _errno_in(message: str) -> int | None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """UTF-8, and whole or not at all."""
+    """Write text as UTF-8, whole or not at all."""
     write_bytes(path, text.encode("utf-8"))
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Whole or not at all: written beside, on the disk, then renamed over. No link that lies in the way is followed."""
+    """Write a file whole or not at all: beside it, to the disk, then renamed over it. Links are not followed."""
     beside = path.with_name(path.name + ".new")
     with writing(path):
         try:
@@ -76,31 +76,33 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def remove(path: Path) -> None:
-    """A file, link or folder, whether it is there or not."""
+    """Remove a file, link or folder, if it exists."""
     with writing(path):
         if path.is_dir() and not path.is_symlink():
             try:
                 shutil.rmtree(path)
-            except OSError as error:  # it names what it cannot remove by its last name alone
+            except OSError as error:  # it holds only the last name of what cannot be removed
                 last = Path(error.filename).name if isinstance(error.filename, str) else path.name
-                place = path if last == path.name else f"{path} (its {last})"
-                raise OSError(error.errno, error.strerror, str(place)) from error
+                named = path if last == path.name else f"{path} (its {last})"
+                raise OSError(error.errno, error.strerror, str(named)) from error
         else:
             path.unlink(missing_ok=True)
 
 
-def settle(folder: Path) -> None:
-    """Have the disk hold a finished folder, with all its files, before a rename says that it is complete."""
+def flush_to_disk(folder: Path) -> None:
+    """Write a finished folder, with all its files, to the disk, before a rename marks it as complete."""
     with writing(folder):
-        for place, _, names in os.walk(folder, topdown=False):
+        for parent, _, names in os.walk(folder, topdown=False):
             for name in names:
-                _sync(os.path.join(place, name))
-            settle_names(Path(place))
+                _sync(os.path.join(parent, name))
+            flush_names(Path(parent))
 
 
-def settle_names(folder: Path) -> None:
-    """Have the disk hold the names in a folder, as after a rename. (Some network disks refuse: their server sees to
-    it.)"""
+def flush_names(folder: Path) -> None:
+    """Write the names in a folder to the disk, as after a rename.
+
+    Some network disks refuse this; their server does it.
+    """
     with contextlib.suppress(OSError):
         _sync(folder)
 
@@ -114,12 +116,12 @@ def _sync(path: str | Path) -> None:
 
 
 def read_regular(path: Path, most: int) -> bytes:
-    """A file's content, of at most ``most`` bytes and one more: a longer one is the caller's to refuse.
+    """Return a file's content, at most ``most`` + 1 bytes: the caller refuses a longer one.
 
     Raises
     ------
     OSError
-        It cannot be read, or is no regular file: a FIFO would be waited for without end, a device has no end.
+        The file cannot be read, or is no regular file: reading a FIFO may never return, a device may have no end.
     """
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(handle, "rb") as file:
@@ -129,14 +131,14 @@ def read_regular(path: Path, most: int) -> bytes:
 
 
 def read_json(path: Path) -> object:
-    """What a JSON file of a run folder says.
+    """Return the content of a JSON file of a run folder.
 
     Raises
     ------
     OSError
         As :func:`read_regular`.
     ValueError
-        It is no JSON, or nested too deeply.
+        The content is no JSON, too long, or nested too deeply.
     """
     content = read_regular(path, MOST_JSON_BYTES)
     if len(content) > MOST_JSON_BYTES:
@@ -149,20 +151,20 @@ def read_json(path: Path) -> object:
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A folder for the time being."""
+    """Make a temporary folder, which is removed at the end."""
     try:
-        place = tempfile.TemporaryDirectory(prefix="poolcal-")
+        temporary = tempfile.TemporaryDirectory(prefix="poolcal-")
     except OSError as error:
         raise ArtefactError(
             f"no temporary folder can be made ({error.strerror or error}); name one that can be written, with room: "
             "TMPDIR=/some/folder poolcal ..."
         ) from error
-    with place as name:
+    with temporary as name:
         yield Path(name)
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file's content; a file that cannot be read is an ArtefactError."""
+    """Return the SHA-256 of a file's content; a file that cannot be read is an ArtefactError."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

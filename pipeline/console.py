@@ -1,16 +1,13 @@
-"""What a run says while it works: a bar with rate and time left on a terminal, one plain line a stage elsewhere."""
+"""Lines for people: printed safely, with signs and plurals as they should be."""
 
 import sys
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from pipeline.errors import ArtefactError
 
-if TYPE_CHECKING:
-    pass
-
 
 def printable(text: str) -> str:
-    r"""Control characters escaped: names in files are other people's, and a terminal obeys them.
+    r"""Escape control characters: names in files are other people's, and a terminal obeys control characters.
 
     >>> printable("a\x1b[2Jb")
     'a\\x1b[2Jb'
@@ -19,8 +16,16 @@ def printable(text: str) -> str:
 
 
 def say(text: str, stream: TextIO) -> None:
-    """Print lines. A reader that has gone away is no reason to stop, nor a log that cannot be written: what could be
-    said of that would go there, too. An answer on standard output that cannot be written is an ArtefactError."""
+    """Print lines.
+
+    A reader that has gone away is no reason to stop, nor is a log that cannot be written: a complaint about that would
+    go to the same place.
+
+    Raises
+    ------
+    ArtefactError
+        The answer, which goes to standard output, cannot be written.
+    """
     lines = "\n".join(printable(line) for line in text.split("\n"))
     try:
         print(lines, file=stream, flush=True)
@@ -34,7 +39,7 @@ def say(text: str, stream: TextIO) -> None:
 
 
 def signed(value: float, digits: int) -> str:
-    """With its sign, and no minus before nothing.
+    """Return a number with its sign, and no minus before zero.
 
     >>> signed(-0.0004, 3), signed(-0.0006, 3)
     ('+0.000', '-0.001')
@@ -43,7 +48,7 @@ def signed(value: float, digits: int) -> str:
 
 
 def plural(number: int, noun: str) -> str:
-    """A count and what is counted, in whole words.
+    """Return a count and what is counted, in whole words.
 
     >>> plural(1, "file"), plural(2, "pass"), plural(3, "study"), plural(0, "day")
     ('1 file', '2 passes', '3 studies', '0 days')

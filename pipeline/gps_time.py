@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 NS = 1_000_000_000
 WEEK_NS = 604_800 * NS
+WEEK_S = WEEK_NS / NS
 GPS_EPOCH_UNIX_S = 315_964_800  # 1980-01-06 00:00:00 UTC as a Unix time
 ADJUSTED_STANDARD_OFFSET_S = 1_000_000_000  # LAS: "adjusted standard GPS time" is GPS seconds - 1e9
 
@@ -35,7 +36,7 @@ LEAP_SECONDS: tuple[tuple[int, int], ...] = (
 
 
 def gps_ns_from_unix_utc(seconds: NDArray[np.int64], nanoseconds: NDArray[np.int64]) -> NDArray[np.int64]:
-    """GPS nanoseconds from Unix UTC seconds and nanoseconds, with the leap seconds of that moment.
+    """Return GPS nanoseconds from Unix UTC seconds and nanoseconds, with the leap seconds of that instant.
 
     >>> int(gps_ns_from_unix_utc(np.array([1483228800]), np.array([0]))[0]) // NS - (1483228800 - GPS_EPOCH_UNIX_S)
     18
@@ -48,7 +49,7 @@ def gps_ns_from_unix_utc(seconds: NDArray[np.int64], nanoseconds: NDArray[np.int
 
 
 def unix_ns_from_gps(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Unix UTC nanoseconds from GPS nanoseconds: the inverse of :func:`gps_ns_from_unix_utc`."""
+    """Return Unix UTC nanoseconds from GPS nanoseconds: the inverse of :func:`gps_ns_from_unix_utc`."""
     starts = np.array([start + leap for start, leap in LEAP_SECONDS], dtype=np.int64)
     leaps = np.array([leap for _, leap in LEAP_SECONDS], dtype=np.int64)
     unix = np.asarray(t_ns, dtype=np.int64) + GPS_EPOCH_UNIX_S * NS
@@ -56,7 +57,7 @@ def unix_ns_from_gps(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def utc_text(t_ns: int) -> str:
-    """GPS nanoseconds as UTC, to the second.
+    """Return GPS nanoseconds as UTC text, to the second.
 
     >>> utc_text(1_462_608_018 * NS)
     '2026-05-12T08:00:00Z'
@@ -66,7 +67,7 @@ def utc_text(t_ns: int) -> str:
 
 
 def gps_ns_from_week_seconds(week: int | NDArray[np.int64], seconds: NDArray[np.float64]) -> NDArray[np.int64]:
-    """GPS nanoseconds from GPS week and seconds of week.
+    """Return GPS nanoseconds from GPS week and seconds of week.
 
     >>> int(gps_ns_from_week_seconds(1, np.array([0.25]))[0])
     604800250000000

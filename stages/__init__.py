@@ -13,20 +13,13 @@ LASER = ("ingest", "georeference", "segment", "fit_planes", "laser.adjust", "las
 
 
 def load(calibrated: "Calibrated" = "mbes") -> tuple[ModuleType, ...]:
-    """The modules of ORDER, or of LASER; late, for they import numpy and pandas."""
+    """Import and return the modules of ORDER, or of LASER; not before, for they import numpy and pandas."""
     return tuple(import_module(f"stages.{name}") for name in (ORDER if calibrated == "mbes" else LASER))
 
 
 def names_in(run: Path) -> tuple[str, ...]:
-    """The stages of what a run folder calibrates, by their folders' names; of no run folder the sonar's."""
-    from pipeline.run.settings import holds_run
+    """Return the names of a run folder's stages; those of ORDER if it is no run folder."""
+    from pipeline.run.settings import calibrated_in, holds_run
 
     of_laser = holds_run(run) and calibrated_in(run) == "laser"
     return tuple(name.rpartition(".")[2] for name in LASER) if of_laser else ORDER
-
-
-def calibrated_in(run: Path) -> "Calibrated":
-    """What the run in this folder calibrates."""
-    from pipeline.run.settings import read_settings
-
-    return read_settings(run).session.calibrated

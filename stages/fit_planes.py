@@ -19,7 +19,7 @@ from pipeline.artefacts.catalogue.target import (
 )
 from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import normals_of, trajectory_in_target
-from pipeline.artefacts.streams import Batch, Stream, xyz
+from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.artefacts.to_tables import direction_row, moments_table, plane_row
 from pipeline.config.pool import FitPlanes
 from pipeline.config.stage_settings import SensorMount
@@ -86,7 +86,7 @@ def _rows_by_key(batch: Batch) -> Iterator[tuple[Key, NDArray[np.int64]]]:
 
 def laser_moments(batch: Batch) -> dict[Key, PlaneMoments]:
     """Return the moments of a batch's laser points by pass and face."""
-    points = xyz(batch, "target_m")
+    points = point_array(batch, "target_m")
     return {key: PlaneMoments.of(points[rows]) for key, rows in _rows_by_key(batch)}
 
 
@@ -102,7 +102,7 @@ def sounding_moments(batch: Batch, trajectory: Trajectory, R_body_from_mbes: Arr
     R_body_from_mbes
         Coarse rotation (3, 3) of the sonar.
     """
-    points = xyz(batch, "mbes_m") @ R_body_from_mbes.T
+    points = point_array(batch, "mbes_m") @ R_body_from_mbes.T
     positions, R_target_from_body = trajectory.poses_at(batch["t_ns"])
     features = lift(R_target_from_body, positions, points)
     return {key: features[rows].T @ features[rows] for key, rows in _rows_by_key(batch)}

@@ -19,7 +19,7 @@ from pipeline.artefacts.catalogue.points import (
     TRAJECTORY,
 )
 from pipeline.artefacts.counts import by_reason, counts_table, why_none_used
-from pipeline.artefacts.streams import EMPTY, Batch, Chunk, Piece, Stream, xyz
+from pipeline.artefacts.streams import EMPTY_STREAM, Batch, BatchResult, Chunk, Stream, point_array
 from pipeline.artefacts.to_tables import poses_table, xyz_columns
 from pipeline.config.pool import Georeference
 from pipeline.config.stage_settings import LaserPlacement, SonarPlacement
@@ -58,8 +58,8 @@ class Inputs:
 class Outputs:
     poses: Annotated[pd.DataFrame, POSES]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
-    laser_pool: Annotated[Stream, LASER_POOL] = EMPTY
-    soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY
+    laser_pool: Annotated[Stream, LASER_POOL] = EMPTY_STREAM
+    soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY_STREAM
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     )
 
 
-def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> Piece:
+def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> BatchResult:
     """Place the points of one chunk in the pool frame, and keep those within the box round the target."""
     columns = chunk.columns
     t_ns = columns["t_ns"]
@@ -110,7 +110,7 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
         columns = {name: values[rows] for name, values in columns.items()}
         t_ns, number = columns["t_ns"], number[rows]
     if source == "laser_points":
-        sensor, pool = _laser(t_ns, xyz(columns, "m"), prepared, config)
+        sensor, pool = _laser(t_ns, point_array(columns, "m"), prepared, config)
         inside = np.ones(len(t_ns), dtype=bool)
     elif config.mbes is not None:
         sensor, pool, inside = _soundings(columns, prepared, config.mbes, config.target.water_level_m)
@@ -127,7 +127,7 @@ def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> 
         kept |= {name: columns[name][near] for name in ("ping", "beam")}
     frame, stream = ("laser", "laser_pool") if source == "laser_points" else ("mbes", "soundings_pool")
     kept |= xyz_columns(f"{{}}_{frame}_m", sensor[near].T) | xyz_columns("{}_pool_m", pool[near].T)
-    return Piece({stream: kept}, counts)
+    return BatchResult({stream: kept}, counts)
 
 
 def _laser(t_ns: NDArray[np.int64], points: Array, prepared: Prepared, config: Config) -> tuple[Array, Array]:

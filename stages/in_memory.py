@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.artefacts.schema import Artefact, Document, Raw
-from pipeline.artefacts.streams import EMPTY, MemoryPart, Stream
+from pipeline.artefacts.schema import Artefact, Document, RawFiles
+from pipeline.artefacts.streams import EMPTY_STREAM, MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.stage_settings import settings_by_name, stage_config
@@ -21,26 +21,42 @@ def calibrate_in_memory(
     until: str = "report",
     changed: Callable[[str, Any], Any] = lambda _, value: value,
 ) -> dict[str, Any]:
-    """Every artefact of the stages up to ``until``, by "owner/name"; ``raw``: canonical columns of ins, laser, mbes;
-    ``changed`` gives what the stages that follow get in an artefact's place."""
-    found: dict[str, Any] = {}
+    """Run the stages on columns in memory.
 
-    def given(marker: Any) -> Any:
-        if isinstance(marker, Raw):
-            there = getattr(session, marker.sensor) is not None
-            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if there else EMPTY
+    Parameters
+    ----------
+    session, pool
+        Settings.
+    raw : mapping
+        Canonical columns of ins, laser and mbes.
+    until : str
+        The last stage to run.
+    changed : callable
+        Function of an artefact's key and value: what the following stages get in its place.
+
+    Returns
+    -------
+    dict
+        Every artefact of these stages, by "owner/name".
+    """
+    artefacts: dict[str, Any] = {}
+
+    def input_of(marker: Any) -> Any:
+        if isinstance(marker, RawFiles):
+            present = getattr(session, marker.sensor) is not None
+            return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if present else EMPTY_STREAM
         if isinstance(marker, (Artefact, Document)):
-            return found[f"{marker.owner}/{marker.name}"]
+            return artefacts[f"{marker.owner}/{marker.name}"]
         return {"inputs": {}, "software": {}}
 
     settings = settings_by_name(pool, session)
     for stage in load(session.calibrated):
-        inputs = stage.Inputs(**{name: given(marker) for name, marker in declared(stage.Inputs).items()})
+        inputs = stage.Inputs(**{name: input_of(marker) for name, marker in declared(stage.Inputs).items()})
         outputs = run_in_memory(stage, inputs, stage_config(stage.Config, settings))
         for name, marker in declared(stage.Outputs).items():
             if isinstance(marker, (Artefact, Document)):
                 key = f"{marker.owner}/{marker.name}"
-                found[key] = changed(key, getattr(outputs, name))
+                artefacts[key] = changed(key, getattr(outputs, name))
         if name_of(stage) == until:
             break
-    return found
+    return artefacts

@@ -18,21 +18,29 @@ from pipeline.artefacts.catalogue.points import (
     SOUNDINGS,
     TRAJECTORY,
 )
-from pipeline.artefacts.schema import Raw
-from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream
+from pipeline.artefacts.schema import RawFiles
+from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream
 from pipeline.config.pool import Ingest, TargetPlace
 from pipeline.config.recording import Recordings
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, utc_text
-from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
-from pipeline.maths.geometry.passes import estimate_azimuth, find_passes, pass_of
-from pipeline.readers.file_summaries import Seen, counts_of, files_of, gaps_between, refuse_apart, refuse_empty, thinned
-
-Columns = dict[str, NDArray[Any]]
+from pipeline.readers.file_summaries import (
+    ChunkSummary,
+    Summaries,
+    files_table,
+    gaps_table,
+    ingest_counts_table,
+    refuse_disjoint_times,
+    refuse_empty_sensors,
+    thin_sigmas,
+)
+from pipeline.readers.track_tables import passes_table, pool_frame_table
 
 
 @dataclass(frozen=True)
 class Config:
+    """The settings on which the results depend."""
+
     target_place: TargetPlace
     ingest: Ingest
     recordings: Recordings
@@ -40,13 +48,17 @@ class Config:
 
 @dataclass(frozen=True)
 class Inputs:
-    ins: Annotated[Stream, Raw("ins")]
-    laser: Annotated[Stream, Raw("laser")]
-    mbes: Annotated[Stream, Raw("mbes")]
+    """Raw files by sensor."""
+
+    ins: Annotated[Stream, RawFiles("ins")]
+    laser: Annotated[Stream, RawFiles("laser")]
+    mbes: Annotated[Stream, RawFiles("mbes")]
 
 
 @dataclass(frozen=True)
 class Outputs:
+    """Tables and streams."""
+
     trajectory: Annotated[pd.DataFrame, TRAJECTORY]
     ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
     passes: Annotated[pd.DataFrame, PASSES]
@@ -54,59 +66,99 @@ class Outputs:
     files: Annotated[pd.DataFrame, FILES]
     gaps: Annotated[pd.DataFrame, GAPS]
     counts: Annotated[pd.DataFrame, INGEST_COUNTS]
-    laser_points: Annotated[Stream, LASER_POINTS] = EMPTY
-    soundings: Annotated[Stream, SOUNDINGS] = EMPTY
+    laser_points: Annotated[Stream, LASER_POINTS] = EMPTY_STREAM
+    soundings: Annotated[Stream, SOUNDINGS] = EMPTY_STREAM
 
 
 def prepare(inputs: Inputs, config: Config) -> None:
+    """Prepare nothing: chunks are independent of each other."""
     return None
 
 
-def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Piece:
+def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> BatchResult:
+    """Pass laser points and soundings on, and summarise a chunk.
+
+    Parameters
+    ----------
+    source : str
+        ins, laser or mbes.
+    chunk : Chunk
+        Rows of one raw file.
+    prepared, config
+        Not used.
+
+    Returns
+    -------
+    BatchResult
+        Its partial result is a ChunkSummary, which for ins holds all rows.
+    """
     t_ns = np.asarray(chunk.columns["t_ns"], dtype=np.int64) if chunk.columns else np.empty(0, np.int64)
     dropped = dict(chunk.dropped)
     if source == "ins":
-        accuracy, sigmas = not chunk.columns, thinned(chunk.sigmas)
-        epochs = sigmas.get("t_ns", t_ns) if accuracy else t_ns
-        return Piece({}, Seen(len(t_ns), dropped, epochs, dict(chunk.columns), sigmas, accuracy))
+        accuracy, sigmas = not chunk.columns, thin_sigmas(chunk.sigmas)
+        summary = ChunkSummary(
+            count=len(t_ns),
+            dropped=dropped,
+            epochs_ns=sigmas.get("t_ns", t_ns) if accuracy else t_ns,
+            trajectory=dict(chunk.columns),
+            sigmas=sigmas,
+            accuracy=accuracy,
+        )
+        return BatchResult({}, summary)
     if source == "laser":
-        return Piece({"laser_points": chunk.columns}, Seen(len(t_ns), dropped, _seconds(t_ns), {}))
+        return BatchResult({"laser_points": chunk.columns}, ChunkSummary(len(t_ns), dropped, _one_a_second(t_ns)))
     speed = np.asarray(chunk.columns["sound_speed_m_s"]) if len(t_ns) else np.empty(0)
     lowest, highest = (float(speed.min()), float(speed.max())) if len(speed) else (np.inf, -np.inf)
-    seen = Seen(
-        len(t_ns), dropped, np.unique(t_ns), {}, lowest_speed_m_s=lowest, highest_speed_m_s=highest
+    summary = ChunkSummary(
+        len(t_ns), dropped, np.unique(t_ns), lowest_speed_m_s=lowest, highest_speed_m_s=highest
     )
-    return Piece({"soundings": chunk.columns}, seen)
+    return BatchResult({"soundings": chunk.columns}, summary)
 
 
-def combine(prepared: None, partials: dict[str, list[tuple[str, Seen]]], config: Config) -> Outputs:
-    refuse_empty({sensor: seen for sensor, seen in partials.items() if sensor != "mbes" or config.recordings.mbes})
-    trajectory, backwards = _trajectory([seen.trajectory for _, seen in partials["ins"] if seen.count])
+def combine(prepared: None, partials: dict[str, list[tuple[str, ChunkSummary]]], config: Config) -> Outputs:
+    """Join the INS records, find the passes, and write the tables of files, gaps and counts.
+
+    Parameters
+    ----------
+    prepared
+        Not used.
+    partials : dict
+        By sensor: pairs of a part's name and the summary of one of its chunks.
+    config : Config
+        Settings.
+
+    Raises
+    ------
+    RawDataError
+        A sensor has no usable record, or none while the INS ran, or the azimuth of the target cannot be estimated.
+    """
+    recorded = {name: summaries for name, summaries in partials.items() if name != "mbes" or config.recordings.mbes}
+    refuse_empty_sensors(recorded)
+    trajectory, repeated = _trajectory([summary.trajectory for _, summary in partials["ins"] if summary.count])
     ins_t = trajectory["t_ns"].to_numpy()
     epochs = {
-        sensor: np.unique(np.concatenate([seen.epochs_ns for _, seen in partials[sensor]]))
+        sensor: np.unique(np.concatenate([summary.epochs_ns for _, summary in partials[sensor]]))
         for sensor in ("laser", "mbes")
         if partials[sensor]
     }
-    refuse_apart((ins_t[0], ins_t[-1]), {sensor: (t_ns[0], t_ns[-1]) for sensor, t_ns in epochs.items()})
-    sounded = "mbes" if "mbes" in epochs else "laser"  # by what passes are told
-    pool_frame, frame = _pool_frame(trajectory, config.target_place)
+    refuse_disjoint_times((ins_t[0], ins_t[-1]), {sensor: (t_ns[0], t_ns[-1]) for sensor, t_ns in epochs.items()})
+    calibrated = "mbes" if "mbes" in epochs else "laser"  # the sensor whose epochs bound the passes
+    pool_frame, frame = pool_frame_table(trajectory, config.target_place)
     max_gap_ns = round(config.ingest.max_gap_s * NS)
     sigmas, outside = _sigmas(partials["ins"], int(ins_t[0]), int(ins_t[-1]))
-    counts = counts_of(partials, {"ins": backwards}, outside)
     return Outputs(
         trajectory=trajectory,
         ins_sigmas=sigmas,
-        passes=_passes(trajectory, frame, epochs[sounded], max_gap_ns, config.ingest.reversal_m),
+        passes=passes_table(trajectory, frame, epochs[calibrated], max_gap_ns, config.ingest.reversal_m),
         pool_frame=pool_frame,
-        files=files_of(partials),
-        gaps=gaps_between({"ins": ins_t, sounded: epochs[sounded]}, max_gap_ns),
-        counts=counts,
+        files=files_table(partials),
+        gaps=gaps_table({"ins": ins_t, calibrated: epochs[calibrated]}, max_gap_ns),
+        counts=ingest_counts_table(partials, {"ins": repeated}, outside),
     )
 
 
-def _seconds(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The first moment of each second in which there is one, and the last of all."""
+def _one_a_second(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the first time in each second that has one, and the last of all."""
     if not len(t_ns):
         return t_ns
     ordered = np.sort(t_ns)
@@ -114,22 +166,22 @@ def _seconds(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.append(ordered[first], ordered[-1])
 
 
-def _trajectory(chunks: list[Columns]) -> tuple[pd.DataFrame, int]:
-    """All INS records in order of time; of equal times the first; how many that left out."""
+def _trajectory(chunks: list[dict[str, NDArray[Any]]]) -> tuple[pd.DataFrame, int]:
+    """Return all INS records in order of time, the first one of equal times; and how many were left out."""
     chunks = sorted(chunks, key=lambda columns: int(columns["t_ns"][0]))
     table = pd.DataFrame(
         {c.name: np.concatenate([columns[c.name] for columns in chunks]) for c in TRAJECTORY.columns}
     )
     order = np.argsort(table["t_ns"].to_numpy(), kind="stable")
     table = table.iloc[order]
-    keep = np.diff(table["t_ns"].to_numpy(), prepend=np.iinfo(np.int64).min // 2) > 0
-    return table[keep].reset_index(drop=True), int((~keep).sum())
+    kept = np.diff(table["t_ns"].to_numpy(), prepend=np.iinfo(np.int64).min // 2) > 0
+    return table[kept].reset_index(drop=True), int((~kept).sum())
 
 
-def _sigmas(pieces: list[tuple[str, Seen]], start: int, end: int) -> tuple[pd.DataFrame, int]:
-    """What the INS states of its accuracy while it ran, in order of time; and how many rows lie outside."""
-    for name in dict.fromkeys(name for name, seen in pieces if seen.accuracy):
-        times = np.concatenate([seen.epochs_ns for other, seen in pieces if other == name])
+def _sigmas(summaries: Summaries, start: int, end: int) -> tuple[pd.DataFrame, int]:
+    """Return the INS's own sigmas while it ran (``start`` to ``end``, ns), and the number of rows outside."""
+    for name in dict.fromkeys(name for name, summary in summaries if summary.accuracy):
+        times = np.concatenate([summary.epochs_ns for part, summary in summaries if part == name])
         if not len(times):
             raise RawDataError(f"{name}: no usable accuracy record; export it again, or take it out of ins.accuracy")
         if times.max() < start or times.min() > end:
@@ -138,75 +190,9 @@ def _sigmas(pieces: list[tuple[str, Seen]], start: int, end: int) -> tuple[pd.Da
                 f"accuracy {utc_text(int(times.min()))} to {utc_text(int(times.max()))}; give the one of this SBET"
             )
     names = [column.name for column in INS_SIGMAS.columns]
-    told = [seen.sigmas for _, seen in pieces if seen.sigmas]
-    if not told:
+    chunks = [summary.sigmas for _, summary in summaries if summary.sigmas]
+    if not chunks:
         return pd.DataFrame(columns=names), 0
-    table = pd.DataFrame(thinned({name: np.concatenate([one[name] for one in told]) for name in names}))
+    table = pd.DataFrame(thin_sigmas({name: np.concatenate([chunk[name] for chunk in chunks]) for name in names}))
     inside = table["t_ns"].between(start, end)
     return table[inside].reset_index(drop=True), int((~inside).sum())
-
-
-def _pool_frame(trajectory: pd.DataFrame, target: TargetPlace) -> tuple[pd.DataFrame, PoolFrame]:
-    origin = target.origin
-    place = (np.radians(origin.latitude_deg), np.radians(origin.longitude_deg), origin.height_m)
-    azimuth = target.azimuth_deg
-    if azimuth is None:
-        level = PoolFrame.at(*place, 0.0)
-        geodetic = (trajectory[name].to_numpy() for name in ("latitude_rad", "longitude_rad", "height_m"))
-        points = level.points_from_ecef(ecef_from_geodetic(*geodetic))
-        estimate = estimate_azimuth(points[:, 0], points[:, 1], trajectory["azimuth_rad"].to_numpy())
-        if estimate is None:
-            raise RawDataError(
-                "target.azimuth_deg is not given and the boat never had target.origin within 20 m to starboard; "
-                "give azimuth_deg, or check target.origin"
-            )
-        azimuth = float(np.degrees(estimate))
-    table = pd.DataFrame(
-        {
-            "latitude_deg": [origin.latitude_deg],
-            "longitude_deg": [origin.longitude_deg],
-            "height_m": [origin.height_m],
-            "azimuth_deg": [azimuth],
-            "azimuth_estimated": [target.azimuth_deg is None],
-        }
-    )
-    return table, PoolFrame.at(*place, float(np.radians(azimuth)))
-
-
-def _passes(
-    trajectory: pd.DataFrame, frame: PoolFrame, pings: NDArray[np.int64], max_gap_ns: int, reversal_m: float
-) -> pd.DataFrame:
-    t_ns = trajectory["t_ns"].to_numpy()
-    geodetic = (trajectory[name].to_numpy() for name in ("latitude_rad", "longitude_rad", "height_m"))
-    points = frame.points_from_ecef(ecef_from_geodetic(*geodetic))
-    passes = find_passes(t_ns, points[:, 1], pings, max_gap_ns, reversal_m)
-    if not passes:
-        raise RawDataError(
-            "session.yaml: ins and mbes never ran together for a second without a gap above "
-            f"{max_gap_ns / NS:g} s; check the logs, or raise ingest.max_gap_s"
-        )
-    starts, ends = (np.array(column, dtype=np.int64) for column in zip(*passes, strict=True))
-    number = pass_of(t_ns, starts, ends)
-    rows = []
-    for k, (start, end) in enumerate(passes):
-        inside = number == k
-        along, athwart = points[inside, 1], np.abs(points[inside, 0])
-        abeam = np.abs(along) <= athwart
-        seconds = (end - start) / NS
-        heading = trajectory["azimuth_rad"].to_numpy()[inside]
-        mean = np.arctan2(np.sin(heading).mean(), np.cos(heading).mean()) if inside.any() else np.nan
-        swing = np.sqrt(np.mean(np.angle(np.exp(1j * (heading - mean))) ** 2)) if inside.any() else np.nan
-        rows.append(
-            {
-                "pass": k,
-                "start_ns": start,
-                "end_ns": end,
-                "duration_s": seconds,
-                "length_m": float(along[-1] - along[0]) if inside.any() else np.nan,
-                "speed_m_s": abs(float(along[-1] - along[0])) / seconds if inside.any() else np.nan,
-                "azimuth_deg": float(np.degrees(mean)),
-                "heading_swing_deg": float(np.degrees(swing)),
-                "distance_m": float(np.median(athwart[abeam] if abeam.any() else athwart)) if inside.any() else np.nan,
-            }
-        )
-    return pd.DataFrame(rows)

@@ -16,7 +16,7 @@ from pipeline.artefacts.catalogue.target import (
 )
 from pipeline.artefacts.counts import counts_table, used, why_none_used
 from pipeline.artefacts.from_tables import trajectory_in_pool
-from pipeline.artefacts.streams import EMPTY, Chunk, Piece, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream
 from pipeline.artefacts.to_tables import faces_table
 from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SensorMount, SonarBeams
@@ -58,8 +58,8 @@ class Outputs:
     target_pose: Annotated[pd.DataFrame, TARGET_POSE]
     provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
     counts: Annotated[pd.DataFrame, SEGMENT_COUNTS]
-    laser_labelled: Annotated[Stream, LASER_LABELLED] = EMPTY
-    soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED] = EMPTY
+    laser_labelled: Annotated[Stream, LASER_LABELLED] = EMPTY_STREAM
+    soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED] = EMPTY_STREAM
 
 
 def prepare(inputs: Inputs, config: Config) -> LabellingContext:
@@ -93,7 +93,7 @@ def prepare(inputs: Inputs, config: Config) -> LabellingContext:
     )
 
 
-def run_batch(source: str, chunk: Chunk, prepared: LabellingContext, config: Config) -> Piece:
+def run_batch(source: str, chunk: Chunk, prepared: LabellingContext, config: Config) -> BatchResult:
     """Label the points of one chunk."""
     if source == "laser_pool":
         label = label_laser if config.mbes is not None else label_calibrated_laser

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.run.import_closure import imported
+from pipeline.run.import_closure import imported_modules
 from tests.support.roots import ROOT
 
 MOST_LINES_OF_A_MODULE, MEDIAN_LINES_OF_A_MODULE, MOST_LINES_OF_A_FUNCTION = 300, 110, 60
@@ -50,7 +50,7 @@ def test_no_module_needs_itself() -> None:
     """No circle of imports, those inside functions included."""
     sources = _sources()
     needs = {
-        module: {name if name in sources else name.rpartition(".")[0] for name in imported(ROOT, path, module)}
+        module: {name if name in sources else name.rpartition(".")[0] for name in imported_modules(ROOT, path, module)}
         for module, path in sources.items()
     }
     try:

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from pipeline.errors import ConfigError
-from pipeline.simulation.scenario import SCENARIOS, load_scenario
+from pipeline.simulation.scenario import SCENARIOS_FOLDER, load_scenario
 from tests.support.places import SMALL, result_of
 from tests.support.roots import ROOT
 
@@ -50,7 +50,7 @@ def test_the_wheel_has_every_file_of_the_program(wheel: Path) -> None:
 
 def test_a_scenario_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert load_scenario(Path("dock")) == load_scenario(SCENARIOS / "dock.yaml")
+    assert load_scenario(Path("dock")) == load_scenario(SCENARIOS_FOLDER / "dock.yaml")
     assert load_scenario(Path("dock")) != load_scenario(None)
     (tmp_path / "dock").write_text("name: mine\n")
     assert load_scenario(Path("dock")).name == "mine"

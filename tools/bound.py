@@ -33,9 +33,9 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config.pool import Segment
 from pipeline.gps_time import NS
-from pipeline.simulation.beams import directions_in_mbes, fan, swing_rad, transmit_tilts_rad
-from pipeline.simulation.ins import sigmas
-from pipeline.simulation.laser import direction
+from pipeline.simulation.beams import directions_in_mbes, fan_angles, swing_rad, transmit_tilts_rad
+from pipeline.simulation.ins import pose_sigmas
+from pipeline.simulation.laser import scan_directions
 from pipeline.simulation.mbes import CLOCK_RATE_ERROR, UPWARD_RAD
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.motion import Movement, R_level_from_body
@@ -130,11 +130,11 @@ class World:
         t_ns = start_ns + np.rint(number * (NS / s.point_rate_hz)).astype(np.int64)
         low, high = np.radians(s.field_deg)
         zenith = low + (high - low) * ((number * (s.line_rate_hz / s.point_rate_hz)) % 1.0)
-        along = direction(zenith, np.zeros(len(zenith)))
+        along = scan_directions(zenith, np.zeros(len(zenith)))
         ranges, plane, _ = self.hits("laser", k, t_ns, along[:, None])
         kept = np.flatnonzero((plane >= 0) & (ranges <= s.max_range_m))
-        turned = direction(zenith[kept] + np.pi / 2, np.zeros(len(kept)))
-        sideways = direction(np.full(len(kept), np.pi / 2), np.full(len(kept), np.pi / 2))
+        turned = scan_directions(zenith[kept] + np.pi / 2, np.zeros(len(kept)))
+        sideways = scan_directions(np.full(len(kept), np.pi / 2), np.full(len(kept), np.pi / 2))
         by_angle = np.radians(s.angle_sigma_deg) * ranges[kept, None]
         noise = [s.range_sigma_m * along[kept], by_angle * turned, by_angle * np.sin(zenith[kept])[:, None] * sideways]
         clean = np.full(len(kept), 1 - s.outlier_share)
@@ -148,7 +148,7 @@ class World:
         period_ns = (1 + CLOCK_RATE_ERROR) / s.ping_rate_hz * NS
         number = np.arange(round((end_ns - start_ns) / period_ns))
         pings = start_ns + np.rint((number + phase) * period_ns).astype(np.int64)
-        angles = fan(s).angles_rad
+        angles = fan_angles(s).angles_rad
         t_ns, angle = (values.ravel() for values in np.meshgrid(pings, angles, indexing="ij"))
         tilt = transmit_tilts_rad(s, angles, number).ravel()
         across, along = np.radians(s.beam_deg) / 2
@@ -236,8 +236,8 @@ def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_
     position = drift.horizontal_m, drift.horizontal_m, drift.vertical_m
     attitude = drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg
     kinds = (
-        (sigmas((white.position_m,) * 3, (white.attitude_deg,) * 3), 1 / scenario.ins.rate_hz, 0.0, 0.0),
-        (sigmas(position, attitude), KNOT_S, drift.time_constant_s, KNOT_S),
+        (pose_sigmas((white.position_m,) * 3, (white.attitude_deg,) * 3), 1 / scenario.ins.rate_hz, 0.0, 0.0),
+        (pose_sigmas(position, attitude), KNOT_S, drift.time_constant_s, KNOT_S),
     )
     blocks, priors, when = [], [], []
     for scale, spacing_s, constant_s, behind_s in kinds:

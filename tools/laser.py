@@ -60,10 +60,10 @@ def one(number: int) -> dict[str, Any]:
     """A row: errors and sigmas of the laser, of the sonar, and what is held with the usual limits."""
     from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
-    from pipeline.simulation.session import simulate
+    from pipeline.simulation.session import simulate_session
 
     scenario = parse(Scenario, scenario_of(number), "laser")
-    made = simulate(scenario, FIRST_SEED + number)
+    made = simulate_session(scenario, FIRST_SEED + number)
     alone = {name: value for name, value in made.session.items() if name != "mbes"}
     usual = calibrate(alone, made.pool | {"laser_fit": FIT}, made)
     wide = calibrate(alone, made.pool | {"laser_fit": FIT | {"hold_share": 1.0}, "verdict": WIDE}, made)
@@ -74,7 +74,7 @@ def one(number: int) -> dict[str, Any]:
     random, total = np.array(block["covariance"]), np.array(block["covariance_total"])
     row |= _columns("laser", error, random)
     # the sonar, in another session, on the laser as it was found
-    made = simulate(parse(Scenario, scenario_of(number), "laser"), SECOND_SEED + number)
+    made = simulate_session(parse(Scenario, scenario_of(number), "laser"), SECOND_SEED + number)
     session = dict(made.session)
     session["laser"] = session["laser"] | SURE | {"mount": block["mount"], "mount_covariance": total.tolist()}
     session["mbes"] = session["mbes"] | SURE | {"sound_speed_sigma_m_s": 0.0, "sound_speed_gradient_sigma_1_s": 0.0}

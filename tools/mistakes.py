@@ -118,13 +118,13 @@ def one(task: tuple[str, int]) -> dict[str, Any]:
     from pipeline.config.yaml_models import parse
     from pipeline.errors import PoolcalError
     from pipeline.simulation.scenario import Scenario
-    from pipeline.simulation.session import simulate
+    from pipeline.simulation.session import simulate_session
     from stages.in_memory import calibrate_in_memory
 
     name, seed = task
     scenario: dict[str, Any] = {"name": "mistake", **copy.deepcopy(THIN)}
     MISTAKES[name](scenario, {}, {})
-    made = simulate(parse(Scenario, scenario, name), seed)
+    made = simulate_session(parse(Scenario, scenario, name), seed)
     session, pool = copy.deepcopy(made.session), copy.deepcopy(made.pool)
     MISTAKES[name]({}, session, pool)
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}

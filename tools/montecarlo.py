@@ -150,11 +150,11 @@ def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
-    from pipeline.simulation.session import simulate
+    from pipeline.simulation.session import simulate_session
     from stages.in_memory import calibrate_in_memory
 
     scenario = parse(Scenario, scenario_of(campaign, number), campaign.name)
-    made = simulate(scenario, campaign.first_seed + number)
+    made = simulate_session(scenario, campaign.first_seed + number)
     found = calibrate_in_memory(
         parse(SessionConfig, made.session, "session"),
         parse(PoolConfig, made.pool, "pool"),

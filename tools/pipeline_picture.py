@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
-from pipeline.artefacts.schema import Artefact, Document, Raw
+from pipeline.artefacts.schema import Artefact, Document, RawFiles
 from pipeline.results.pages.rendering import INK, LASER, QUIET, SONAR, drawing_style
 from pipeline.run.stage_protocol import declared, name_of
 from stages import load
@@ -37,7 +37,7 @@ def picture(path: Path) -> None:
             inputs = declared(stage.Inputs).values()
             for owner in dict.fromkeys(m.owner for m in inputs if isinstance(m, (Artefact, Document))):
                 _arrow(axis, place[owner], y)
-            raw = [RAW[m.sensor] for m in inputs if isinstance(m, Raw)]
+            raw = [RAW[m.sensor] for m in inputs if isinstance(m, RawFiles)]
             if raw:
                 axis.annotate(
                     f"files of {', '.join(raw)}; session.yaml; the pool's config",

@@ -159,13 +159,13 @@ def one(task: Task) -> dict[str, Any]:
     from pipeline.config.yaml_models import parse
     from pipeline.maths.adjustment.mean_tests import standardised
     from pipeline.simulation.scenario import Scenario
-    from pipeline.simulation.session import simulate
+    from pipeline.simulation.session import simulate_session
     from stages.in_memory import calibrate_in_memory
 
     fault, kind, number = task
     seed = seed_of(task)
     scenario = scenario_of(kind, number)
-    made = simulate(parse(Scenario, scenario, kind), seed)
+    made = simulate_session(parse(Scenario, scenario, kind), seed)
 
     def again(turn_rad: Array) -> Raw:
         turned = copy.deepcopy(scenario)
@@ -173,7 +173,7 @@ def one(task: Task) -> dict[str, Any]:
         yaw, pitch, roll = Rotation.from_matrix(R_body_from_mbes).as_euler("ZXY", degrees=True)
         mount = {name: made.truth["mbes"]["mount"][name] for name in ("x_m", "y_m", "z_m")}
         turned["mbes"]["mount"] = mount | {"roll_deg": roll, "pitch_deg": pitch, "yaw_deg": yaw}
-        return dict(simulate(parse(Scenario, turned, kind), seed).mbes)
+        return dict(simulate_session(parse(Scenario, turned, kind), seed).mbes)
 
     world = World(number, dict(made.mbes), copy.deepcopy(made.pool), made.truth, again)
     expected = FAULTS[fault](world) if fault else ""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.adjustment.weighting import Observations, Weighting
 from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import laser_planes, trajectory_in_target
-from pipeline.artefacts.streams import Batch, xyz
+from pipeline.artefacts.streams import Batch, point_array
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.maths.adjustment.interval_sums import MOVING, Runs
 from pipeline.maths.adjustment.normal_equations import Body, pull_of
@@ -119,7 +119,11 @@ class Scene:
         start = axes @ trajectory.positions_m[record].T
         step = axes @ trajectory.positions_m[record + 1].T - start
         lever = axes @ (trajectory.R_frame_from_body[record] @ self.body.lever_arm("laser", state)).T
-        placed = xyz(sight.points, "target_m") if state.calibrated != "laser" else self._placed(sight.points, state)
+        placed = (
+            self._placed(sight.points, state)
+            if state.calibrated == "laser"
+            else point_array(sight.points, "target_m")
+        )
         points = axes @ placed.T
         r = points - sight.spread(start) - sight.share * sight.spread(step)
         v = points[2] - distance_m - self.height_of_face[sight.points["face"]]
@@ -127,7 +131,7 @@ class Scene:
         return r, v, laser_observations(r, sight.spread(lever), range_m, sigmas)
 
     def _see_sonar(self, sight: Sight, state: State, axes: Array, distance_m: float) -> tuple[Array, Array, Seen]:
-        points = xyz(sight.points, "mbes_m").T
+        points = point_array(sight.points, "mbes_m").T
         pings = Runs.of(sight.points["t_ns"])  # beams of a ping share their pose
         where, R_target_from_body = self.body.trajectory.poses_at(sight.points["t_ns"][pings.starts])
         R = R_target_from_body @ state.R_body_from_sensor
@@ -147,11 +151,11 @@ class Scene:
         numbered = {**batch, "row": np.arange(len(batch["t_ns"]))}
         seen = self.observe(sensor, numbered, state, drift, weighting)
         points = seen.points
-        own = xyz(points, f"{sensor}_m")
+        own = point_array(points, f"{sensor}_m")
         ranges = np.linalg.norm(own, axis=1)
         angle = receive_angle(own) if sensor == "mbes" else np.arcsin(own[:, 2] / ranges)
         if sensor != state.calibrated:
-            placed = coarse_placed = xyz(points, "target_m")
+            placed = coarse_placed = point_array(points, "target_m")
             coarse_residual = seen.v_m
         else:
             coarse = replace(self.coarse, surfaces=state.surfaces)
@@ -172,7 +176,7 @@ class Scene:
     def _placed(self, batch: Batch, state: State) -> Array:
         """Points of the sensor that is calibrated in the target frame, with the state's mount, (n, 3) m."""
         positions, R_target_from_body = self.body.trajectory.poses_at(batch["t_ns"])
-        body = xyz(batch, f"{state.calibrated}_m") @ state.R_body_from_sensor.T + state.lever_arm_m
+        body = point_array(batch, f"{state.calibrated}_m") @ state.R_body_from_sensor.T + state.lever_arm_m
         return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, body))
 
 

@@ -13,7 +13,7 @@ from pipeline.adjustment.observation_model import Scene
 from pipeline.adjustment.residual_tables import residuals_table, step_for
 from pipeline.adjustment.weighting import Observations, Weighting
 from pipeline.artefacts.catalogue.results import PATTERNS
-from pipeline.artefacts.streams import Batch, Stream, xyz
+from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.drift_test import against_other_passes
@@ -159,7 +159,7 @@ def _look(
 def _variables(sensor: str, seen: Observations) -> Iterator[tuple[str, Array | Integers]]:
     """What residuals are sorted by, and its value of each point (n,)."""
     batch = seen.points
-    own = xyz(batch, f"{sensor}_m")
+    own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
     yield "pass", batch["pass"].astype(np.int64)

@@ -1,1 +1,1 @@
-"""What stages write: schemas of tables and streams, their catalogue, and Parquet files of them."""
+"""Artefacts of the stages: schemas of tables and streams, their catalogue, and their Parquet files."""

@@ -1,4 +1,4 @@
-"""What several tables have in common: types, coordinates, recurring columns."""
+"""Types, coordinates and other columns that several tables share."""
 
 # fmt: off: the tables are laid out by hand
 import pyarrow as pa
@@ -11,13 +11,26 @@ I16, I32, I64, F32, F64, TEXT, BOOL = (
 FLOATS = pa.list_(pa.float64())
 
 
-def xyz(frame: str, unit: str = "m", stem: str = "", type_: pa.DataType = F64) -> tuple[Column, ...]:
+def coordinate_columns(frame: str, unit: str = "m", stem: str = "", type_: pa.DataType = F64) -> tuple[Column, ...]:
+    """Return the columns of x, y, z.
+
+    Parameters
+    ----------
+    frame : str
+        Frame of the coordinates.
+    unit : str
+        Their unit.
+    stem : str
+        First part of the columns' names.
+    type_ : DataType
+        Their type.
+    """
     return tuple(Column(f"{stem}{axis}_{frame}_{unit}", type_, unit, f"{axis} in frame {frame}") for axis in "xyz")
 
 
-def near(frame: str) -> tuple[Column, ...]:
-    """Coordinates near target or sensor, in single precision: within 16 m that is within half a micrometre."""
-    return xyz(frame, type_=F32)
+def float32_coordinates(frame: str) -> tuple[Column, ...]:
+    """Return the columns of x, y, z near target or sensor: single precision is exact to 0.5 µm within 16 m."""
+    return coordinate_columns(frame, type_=F32)
 
 
 ROTATION = tuple(

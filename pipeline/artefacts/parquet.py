@@ -20,14 +20,20 @@ PART_ROWS = 4_000_000  # a longer part of a stream is continued in the next file
 
 
 def to_arrow(columns: Mapping[str, Any] | pd.DataFrame, artefact: Artefact) -> pa.Table:
-    """Columns in the artefact's order and types. What does not fit without loss is a bug of the stage (TypeError)."""
+    """Return columns in the artefact's order and types.
+
+    Raises
+    ------
+    TypeError
+        A column is missing, unknown, or does not fit its type without loss: a bug of the stage.
+    """
     where = f"{artefact.owner}/{artefact.name}"
-    expected = [column.name for column in artefact.columns]
-    given = list(columns.keys())
-    if not given and not len(columns):
+    expected = {column.name for column in artefact.columns}
+    present = set(columns.keys())
+    if not present and not len(columns):
         return artefact.schema.empty_table()
-    if set(given) != set(expected):
-        missing, surplus = sorted(set(expected) - set(given)), sorted(set(given) - set(expected))
+    if present != expected:
+        missing, surplus = sorted(expected - present), sorted(present - expected)
         raise TypeError(f"{where}: missing columns {missing}, columns unknown to the artefact {surplus}")
     schema = artefact.schema
     return pa.Table.from_arrays([_to_array(columns[f.name], f, where) for f in schema], schema=schema)
@@ -56,7 +62,7 @@ def _to_array(values: Any, field: "pa.Field[Any]", where: str) -> "pa.Array[Any]
 
 
 def _writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
-    """Times and numbers as differences, floats byte by byte: then LZ4 makes little of them, quickly."""
+    """Return a writer that stores integers as differences and floats byte by byte, which LZ4 packs well and fast."""
     encodings = {}
     for field in schema:
         inner = field.type.value_type if pa.types.is_list(field.type) else field.type
@@ -69,12 +75,28 @@ def _writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
 
 
 def write_table(path: Path, table: pa.Table) -> None:
+    """Write a table to a file."""
     with writing(path), _writer(path, table.schema) as writer:
         writer.write_table(table, row_group_size=BATCH_ROWS)
 
 
 def read_table(path: Path, artefact: Artefact, columns: Sequence[str] = ()) -> pd.DataFrame:
-    """The table, or these columns of it, as pandas; a file that does not hold this artefact is an ArtefactError."""
+    """Read a table, or some of its columns.
+
+    Parameters
+    ----------
+    path : Path
+        The Parquet file.
+    artefact : Artefact
+        The table that it must hold.
+    columns : sequence of str
+        Columns to read; empty: all.
+
+    Raises
+    ------
+    ArtefactError
+        The file cannot be read, or holds another table.
+    """
     try:
         with pq.ParquetFile(path) as file:
             schema = file.schema_arrow
@@ -87,6 +109,7 @@ def read_table(path: Path, artefact: Artefact, columns: Sequence[str] = ()) -> p
 
 
 def from_arrow(table: pa.Table) -> pd.DataFrame:
+    """Return a table as pandas, by its columns alone."""
     return table.to_pandas(ignore_metadata=True, use_threads=False)
 
 
@@ -102,6 +125,7 @@ class PartWriter:
         self._file: pq.ParquetWriter | None = None
 
     def add(self, batch: Batch) -> None:
+        """Append the rows of a batch."""
         rows = len(next(iter(batch.values()))) if batch else 0
         if not rows:
             to_arrow(batch, self._artefact)  # checked all the same
@@ -112,6 +136,7 @@ class PartWriter:
             self._flush(self._group_rows())
 
     def close(self) -> None:
+        """Write the rows that wait, and close the file."""
         if self._rows_waiting:
             self._flush(self._rows_waiting)
         self._close_file()
@@ -151,19 +176,19 @@ class PartWriter:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         if error is None:
             self.close()
-        elif self._file is not None:  # nothing of this part is kept: only give the file back
+        elif self._file is not None:  # nothing of this part is kept: only the file is released
             with contextlib.suppress(OSError, pa.ArrowException):
                 self._file.close()
 
 
 def write_empty_part(folder: Path, artefact: Artefact) -> Path:
-    """A stream without any row is still a readable folder that tells its columns."""
+    """Write a file without rows, so that an empty stream is a readable folder too, and return its path."""
     path = folder / "part-00000-000.parquet"
     with writing(path), _writer(path, artefact.schema):
         pass
     return path
 
 
-def rows_of(path: Path) -> int:
-    """Rows of a Parquet file, from its footer."""
+def row_count(path: Path) -> int:
+    """Return the number of rows of a Parquet file, from its footer."""
     return int(pq.read_metadata(path).num_rows)

@@ -1,27 +1,41 @@
-"""Small, reproducible samples of streams for searching: never for a result."""
+"""Small, reproducible samples of streams for searches: never for a result."""
 
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import Batch, xyz
+from pipeline.artefacts.streams import Batch, point_array
 
-Array = NDArray[np.float64]
+_Array = NDArray[np.float64]
 KEY_BITS = 20
 
 
-Voxels = tuple[NDArray[np.int64], Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
+Voxels = tuple[NDArray[np.int64], _Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
 
 
-def points_above(batch: Batch, suffix: str, lowest_m: float) -> Array:
-    """A batch's points above ``lowest_m``, (n, 3) m."""
-    points = xyz(batch, suffix)
+def points_above(batch: Batch, suffix: str, lowest_m: float) -> _Array:
+    """Return a batch's points above a height.
+
+    Parameters
+    ----------
+    batch : Batch
+        Rows of a stream.
+    suffix : str
+        Frame and unit of the coordinates, such as "pool_m".
+    lowest_m : float
+        Least z, m.
+
+    Returns
+    -------
+    (n, 3) array
+    """
+    points = point_array(batch, suffix)
     return np.asarray(points[points[:, 2] >= lowest_m])
 
 
-def voxel_sums(points: Array, voxel_m: float) -> Voxels:
-    """Points (n, 3) summed by voxel."""
+def voxel_sums(points: _Array, voxel_m: float) -> Voxels:
+    """Sum points (n, 3) by voxels of edge ``voxel_m``."""
     cells = np.floor(points / voxel_m).astype(np.int64) + (1 << (KEY_BITS - 1))
     keys, inverse = np.unique(
         (cells[:, 0] << (2 * KEY_BITS)) | (cells[:, 1] << KEY_BITS) | cells[:, 2], return_inverse=True
@@ -29,26 +43,27 @@ def voxel_sums(points: Array, voxel_m: float) -> Voxels:
     return keys, _sums(inverse, len(keys), np.column_stack([np.ones(len(points)), points]))
 
 
-def voxel_means(partials: Iterable[Voxels]) -> Array:
-    """Mean points (n, 3) of the voxels that hold a fair share of points: lone outliers fall away."""
+def voxel_means(partials: Iterable[Voxels]) -> _Array:
+    """Return the mean points (n, 3) of voxels with at least 2 points and 2 % of a typical one's: outliers fall away."""
     keys, sums = np.empty(0, np.int64), np.empty((0, 4))
-    for more_keys, more_sums in partials:
-        keys, inverse = np.unique(np.concatenate([keys, more_keys]), return_inverse=True)
-        sums = _sums(inverse, len(keys), np.concatenate([sums, more_sums]))
+    for batch_keys, batch_sums in partials:
+        keys, inverse = np.unique(np.concatenate([keys, batch_keys]), return_inverse=True)
+        sums = _sums(inverse, len(keys), np.concatenate([sums, batch_sums]))
     if len(keys) == 0:
         return np.empty((0, 3))
     counts = np.sort(sums[:, 0])
     typical = counts[np.searchsorted(np.cumsum(counts), counts.sum() / 2)]  # half of all points lie in fuller voxels
-    fair = sums[:, 0] >= max(2.0, 0.02 * typical)
-    return np.asarray(sums[fair, 1:] / sums[fair, :1])
+    populated = sums[:, 0] >= max(2.0, 0.02 * typical)
+    return np.asarray(sums[populated, 1:] / sums[populated, :1])
 
 
-def _sums(group: NDArray[np.int64], groups: int, rows: Array) -> Array:
+def _sums(group: NDArray[np.int64], groups: int, rows: _Array) -> _Array:
+    """Return the sums of rows (n, c) by their group (n,), (groups, c)."""
     return np.column_stack([np.bincount(group, weights=column, minlength=groups) for column in rows.T])
 
 
-def every_nth(batch: Batch, one_in: float) -> Batch:
-    """About one in ``one_in`` rows, chosen by a hash of time and beam: the same rows whatever the batches are."""
+def sample_rows(batch: Batch, one_in: float) -> Batch:
+    """Return about one in ``one_in`` rows, chosen by a hash of time and beam: the same rows whatever the batches."""
     if one_in <= 1:
         return batch
     mixed = batch["t_ns"].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)

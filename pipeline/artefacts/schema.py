@@ -1,4 +1,4 @@
-"""What a table, a stream and a document are; their catalogue is :mod:`pipeline.artefacts`."""
+"""Descriptions of tables, streams and documents; :mod:`pipeline.artefacts.catalogue` holds them all."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,6 +8,8 @@ import pyarrow as pa
 
 @dataclass(frozen=True)
 class Column:
+    """A column of a table or stream; unit and meaning are stored in the Parquet schema."""
+
     name: str
     type: pa.DataType
     unit: str
@@ -16,6 +18,8 @@ class Column:
 
 @dataclass(frozen=True)
 class Artefact:
+    """A table or stream, and the stage (owner) that writes it."""
+
     owner: str
     name: str
     kind: Literal["table", "stream"]
@@ -35,7 +39,7 @@ class Artefact:
 
 
 @dataclass(frozen=True)
-class Raw:
+class RawFiles:
     """A stage input that is not a table of an earlier stage: the raw files of one sensor."""
 
     sensor: Literal["ins", "laser", "mbes"]
@@ -51,4 +55,4 @@ class Document:
 
 @dataclass(frozen=True)
 class Provenance:
-    """A stage input that says what the run is made from: digests of the raw files, and versions of the software."""
+    """A stage input: digests of the raw files, and versions of the software."""

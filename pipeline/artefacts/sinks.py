@@ -1,4 +1,4 @@
-"""Where the rows of output streams go: folders of Parquet parts, or memory."""
+"""Destinations of the rows of output streams: folders of Parquet parts, or memory."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,19 +15,30 @@ Written = Mapping[str, tuple[Part, ...]]
 
 
 class PartSink(Protocol):
-    """Takes the rows that one input part gives to the output streams."""
+    """Destination of the rows that one input part gives to the output streams."""
 
     def __enter__(self) -> Self: ...
     def __exit__(self, *error: Any) -> None: ...
-    def add(self, stream: str, batch: Batch) -> None: ...
-    def written(self) -> Written: ...
+
+    def add(self, stream: str, batch: Batch) -> None:
+        """Append the rows of a batch to an output stream."""
+        ...
+
+    def written(self) -> Written:
+        """Return the parts that were written, by stream."""
+        ...
 
 
 class Sink(Protocol):
-    """Opens the output for input part ``number``; ``empty`` stands in for a stream that got no row at all."""
+    """Destination of all output streams."""
 
-    def open(self, number: int) -> PartSink: ...
-    def empty(self, stream: str) -> tuple[Part, ...]: ...
+    def open(self, number: int) -> PartSink:
+        """Open the destination for the rows of input part ``number``."""
+        ...
+
+    def empty(self, stream: str) -> tuple[Part, ...]:
+        """Return the parts of a stream without any row."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -38,9 +49,11 @@ class FolderSink:
     streams: Mapping[str, Artefact]
 
     def open(self, number: int) -> PartSink:
+        """Open the destination for the rows of input part ``number``."""
         return _FolderPart(self, number)
 
     def empty(self, stream: str) -> tuple[Part, ...]:
+        """Write a file without rows for a stream, and return it as a part."""
         artefact = self.streams[stream]
         return (ParquetPart(write_empty_part(self.folder / artefact.name, artefact)),)
 
@@ -75,9 +88,11 @@ class MemorySink:
     streams: Mapping[str, Artefact]
 
     def open(self, number: int) -> PartSink:
+        """Open the destination for the rows of input part ``number``."""
         return _MemoryPart(self, number)
 
     def empty(self, stream: str) -> tuple[Part, ...]:
+        """Return no part."""
         return ()
 
 

@@ -18,64 +18,77 @@ from pipeline.errors import ArtefactError
 
 Batch = Mapping[str, np.ndarray]
 BATCH_ROWS = 131_072
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
-    """A table's columns as arrays; what is stored in single precision is computed with in double."""
+    """Return a table's columns as arrays, single precision as double."""
     arrays = {name: table[name].to_numpy() for name in table.column_names}
     return {name: a.astype(np.float64) if a.dtype == np.float32 else a for name, a in arrays.items()}
 
 
-def xyz(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarray:
-    """Points (n, 3) from the columns ``x_<suffix>``, ``y_…`` and ``z_…``; each axis lies together in memory."""
+def point_array(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarray:
+    """Return points (n, 3) from the columns ``x_<suffix>``, ``y_…`` and ``z_…``; each axis lies together in memory.
+
+    Parameters
+    ----------
+    batch : Batch
+        Rows of a stream.
+    suffix : str
+        Frame and unit, such as "pool_m".
+    rows : index
+        Rows to take; default: all.
+    """
     return np.array([batch[f"{axis}_{suffix}"][rows] for axis in "xyz"]).T
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """What a part yields: good rows as columns, how many records were left out, by reason, and what an INS says of its
-    own accuracy, at times of its own (columns of the table ins_sigmas). ``states``: of each good row numbers of what
-    its log says of it, by their name (readers/novatel.py: STATES)."""
+    """A batch of a part's rows, with the counts of rows that were left out, and an INS's own sigmas and states."""
 
-    columns: Batch
-    dropped: Mapping[str, int] = field(default_factory=dict)
-    sigmas: Batch = field(default_factory=dict)
-    states: Batch = field(default_factory=dict)
+    columns: Batch  # good rows
+    dropped: Mapping[str, int] = field(default_factory=dict)  # rows left out, by reason
+    sigmas: Batch = field(default_factory=dict)  # columns of the table ins_sigmas, at times of their own
+    states: Batch = field(default_factory=dict)  # by good row: the filter's state (readers/novatel.py: STATES)
 
 
 class Part(Protocol):
     """The unit of work. Parts are picklable and hold no open file."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name of the part, unique in its stream."""
+        ...
 
-    def chunks(self) -> Iterator[Chunk]: ...
+    def chunks(self) -> Iterator[Chunk]:
+        """Yield the rows, at most BATCH_ROWS at a time."""
+        ...
 
 
 @dataclass(frozen=True)
 class ParquetPart:
-    """One Parquet file of a stream in a run folder; ``columns``: these alone (None: all)."""
+    """One Parquet file of a stream in a run folder."""
 
     path: Path
-    columns: tuple[str, ...] | None = None
+    columns: tuple[str, ...] | None = None  # columns to read; None: all
 
     @property
     def name(self) -> str:
+        """Name of the file."""
         return self.path.name
 
     def chunks(self) -> Iterator[Chunk]:
+        """Yield the rows, at most BATCH_ROWS at a time."""
         for table in self._groups():
             for start in range(0, table.num_rows, BATCH_ROWS):
-                piece = table.slice(start, BATCH_ROWS)
-                yield Chunk(columns_of(piece))
+                yield Chunk(columns_of(table.slice(start, BATCH_ROWS)))
 
     def _groups(self) -> Iterator[pa.Table]:
         try:
-            wanted = None if self.columns is None else list(self.columns)
+            columns = None if self.columns is None else list(self.columns)
             with pq.ParquetFile(self.path) as file:
                 for group in range(file.num_row_groups):
-                    yield file.read_row_group(group, columns=wanted, use_threads=False)
+                    yield file.read_row_group(group, columns=columns, use_threads=False)
         except (OSError, pa.ArrowException) as error:
             raise ArtefactError(f"{self.path}: cannot be read ({error}); delete its folder and run again") from error
 
@@ -88,19 +101,22 @@ class MemoryPart:
     columns: Batch
 
     def chunks(self) -> Iterator[Chunk]:
+        """Yield the rows, at most BATCH_ROWS at a time."""
         rows = len(next(iter(self.columns.values())))
         for start in range(0, rows, BATCH_ROWS):
             yield Chunk({name: values[start : start + BATCH_ROWS] for name, values in self.columns.items()})
 
 
 class Mapper(Protocol):
-    """Applies a function to each item; results come back in order. ``executor.py`` has the parallel one."""
+    """The way in which a function is applied to many items; ``run/workers.py`` has the parallel one."""
 
-    def __call__(self, function: Callable[..., T], /, *items: Iterable[object]) -> Iterable[T]: ...
+    def __call__(self, function: Callable[..., _T], /, *items: Iterable[object]) -> Iterable[_T]:
+        """Apply a function to each item; results come back in order."""
+        ...
 
 
-def serial(function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]:
-    """The plainest mapper: one item after another, here."""
+def serial(function: Callable[..., _T], *items: Iterable[object]) -> Iterable[_T]:
+    """Apply a function to one item after another, in this process."""
     return map(function, *items)
 
 
@@ -112,32 +128,39 @@ class Stream:
     mapper: Mapper = serial
 
     def batches(self) -> Iterator[Batch]:
-        """All rows in order, batch by batch; never more than one batch in memory."""
+        """Yield all rows in order, batch by batch, with one batch in memory."""
         for part in self.parts:
             for chunk in part.chunks():
                 yield chunk.columns
 
-    def fold(self, function: Callable[..., T], *arguments: object) -> Iterator[T]:
-        """``function(batch, *arguments)`` of every batch, in order; parts run side by side.
+    def fold(self, function: Callable[..., _T], *arguments: object) -> Iterator[_T]:
+        """Yield ``function(batch, *arguments)`` of every batch, in order; parts are worked on in parallel.
 
-        Take the results one by one: together they may be many.
+        Take the results one by one: together they may not fit in memory.
+
+        Parameters
+        ----------
+        function : callable
+            Function of a batch and ``arguments``.
+        *arguments
+            Passed on to the function.
         """
         work = [(part, function, arguments) for part in self.parts]
         for results in self.mapper(_fold_part, work):
             yield from results
 
 
-EMPTY = Stream(())
+EMPTY_STREAM = Stream(())
 
 
-def _fold_part(work: tuple[Part, Callable[..., T], tuple[object, ...]]) -> list[T]:
+def _fold_part(work: tuple[Part, Callable[..., _T], tuple[object, ...]]) -> list[_T]:
     part, function, arguments = work
     return [function(chunk.columns, *arguments) for chunk in part.chunks()]
 
 
 @dataclass(frozen=True)
-class Piece:
-    """What a stage's ``run_batch`` makes of one chunk: rows for its output streams, and a small partial result."""
+class BatchResult:
+    """Result of a stage's ``run_batch`` on one chunk: rows for its output streams, and a small partial result."""
 
     streams: Mapping[str, Batch]
     partial: object

@@ -11,7 +11,7 @@ from pipeline.checking.findings import Finding
 from pipeline.console import plural
 from pipeline.gps_time import NS, WEEK_NS, utc_text
 from pipeline.maths.geometry.passes import pass_of, split_at_gaps
-from pipeline.readers.whole_days import whole_days
+from pipeline.readers.whole_days import whole_days_apart
 
 Times = NDArray[np.int64]
 LEAPS = {  # s
@@ -138,8 +138,8 @@ def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses
     if apart and weeks and fits(weeks * WEEK_NS):
         why = "check gps_week, and the GPS time flag of the export"
         return Offset(_amount(weeks * WEEK_NS), weeks > 0, why, weeks)
-    if apart and (days := whole_days((running[0][0], running[-1][1]), (int(t_ns[0]), int(t_ns[-1])), fits)):
-        return Offset(*days)
+    if apart and (days := whole_days_apart((running[0][0], running[-1][1]), (int(t_ns[0]), int(t_ns[-1])), fits)):
+        return Offset(days.amount, days.ahead, days.reason)
     leaps = [sign * leap * NS for leap in LEAPS for sign in (1, -1)] if apart or pauses else []
     for offset_ns in leaps:
         if fits(offset_ns):

@@ -16,7 +16,7 @@ from pipeline.artefacts.streams import Part
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.readers.las import LasPart
 from pipeline.readers.raw_file import opened, read_at, size_of
-from pipeline.readers.sbet import RECORD
+from pipeline.readers.sbet import SBET_RECORD
 
 POINTS = 4_000_000  # of a laser, over all its files
 STRETCH = 8_192  # points read at one place
@@ -84,9 +84,9 @@ def _pieces(file: BinaryIO, size: int, each: int, places: int, form: str) -> Ite
 
 def _cut(file: BinaryIO, start: int, count: int, form: str) -> Iterator[bytes]:
     if form == "sbet":
-        start, count = -(-start // RECORD) * RECORD, count // RECORD * RECORD
+        start, count = -(-start // SBET_RECORD) * SBET_RECORD, count // SBET_RECORD * SBET_RECORD
         data = read_at(file, start, count)
-        yield data[: len(data) // RECORD * RECORD]
+        yield data[: len(data) // SBET_RECORD * SBET_RECORD]
     elif form in TEXTS:
         data = read_at(file, start, count)
         first = data.find(b"\n") + 1 if start else 0

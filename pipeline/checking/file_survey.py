@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.sampling import every_nth
+from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Part
 from pipeline.atomic_files import temporary_folder
 from pipeline.checking.excerpts import excerpt, stretches
@@ -20,10 +20,10 @@ from pipeline.errors import ConfigError, RawDataError
 from pipeline.gps_time import NS
 from pipeline.readers import detect
 from pipeline.readers.dispatch import SensorSettings, raw_files, raw_parts
-from pipeline.readers.file_summaries import thinned
+from pipeline.readers.file_summaries import thin_sigmas
 from pipeline.readers.las import LasPart
 from pipeline.readers.rates import rate_hz
-from pipeline.readers.smrmsg import AccuracyPart
+from pipeline.readers.smrmsg import SmrmsgPart
 
 Columns = dict[str, NDArray[Any]]
 Times = NDArray[np.int64]
@@ -99,8 +99,8 @@ def _with_accuracy(
         return list(found), list(wrong)
     try:
         alone = ins.model_copy(update={"files": [_escaped(found[good].name)]})
-        parts = [part for part in raw_parts("ins", alone, folder) if isinstance(part, AccuracyPart)]
-        told = [thinned(chunk.sigmas) for part in parts for chunk in part.chunks()]
+        parts = [part for part in raw_parts("ins", alone, folder) if isinstance(part, SmrmsgPart)]
+        told = [thin_sigmas(chunk.sigmas) for part in parts for chunk in part.chunks()]
     except (RawDataError, ConfigError) as error:
         return list(found), [*wrong, str(error)]
     sigmas = _joined([one for one in told if one])
@@ -211,17 +211,17 @@ def _read(seen: Seen, parts: Sequence[Part], files: int) -> Seen:
             break
         dropped.update(chunk.dropped)
         rows = len(chunk.columns["t_ns"]) if chunk.columns else 0
-        sigmas += [thinned(chunk.sigmas)] if chunk.sigmas else []
+        sigmas += [thin_sigmas(chunk.sigmas)] if chunk.sigmas else []
         records += rows
         if rows:
             t_ns = chunk.columns["t_ns"]
             epochs.append(np.unique(t_ns if seen.sensor != "laser" else t_ns // TICK_NS * TICK_NS))
             while seen.sensor != "ins" and records / one_in > KEPT:
                 one_in *= 2
-            kept.append(dict(every_nth(chunk.columns, one_in)))
+            kept.append(dict(sample_rows(chunk.columns, one_in)))
             states += [dict(chunk.states)] if chunk.states else []
     times = np.unique(np.concatenate(epochs)) if epochs else np.empty(0, np.int64)
-    columns = dict(every_nth(_joined(kept), one_in)) if kept else {}
+    columns = dict(sample_rows(_joined(kept), one_in)) if kept else {}
     return replace(
         seen,
         records=records,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.sampling import every_nth
-from pipeline.artefacts.streams import xyz
+from pipeline.artefacts.sampling import sample_rows
+from pipeline.artefacts.streams import point_array
 from pipeline.checking.file_survey import Columns, Seen, Times
 from pipeline.checking.track import Track
 from pipeline.config.mount import Mount
@@ -52,7 +52,7 @@ def rows_of(files: Sequence[Seen], sensor: str, rows: int) -> Columns:
     if not pieces:
         return {}
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
-    return dict(every_nth(columns, max(1.0, len(columns["t_ns"]) / rows)))
+    return dict(sample_rows(columns, max(1.0, len(columns["t_ns"]) / rows)))
 
 
 def placeable(columns: Columns, track: Track) -> Columns:
@@ -70,7 +70,7 @@ def sample(
         return None
     if sensor == "laser":
         placed = session.laser.frame != "laser"
-        points = xyz(columns, "m")
+        points = point_array(columns, "m")
         if placed:
             points = track.frame.points_from_ecef(points)
         return Sample(sensor, columns["t_ns"], points, session.laser.mount, placed)

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import EMPTY, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 
@@ -19,7 +19,7 @@ class Calibrated:
     """Soundings, each with the face that it is on, and tables: the target's pose, the mount that the labels are by, and
     the adjustment's ``freed``; none where it got no farther."""
 
-    soundings: Stream = EMPTY
+    soundings: Stream = EMPTY_STREAM
     target_pose: pd.DataFrame | None = None
     provisional_mount: pd.DataFrame | None = None
     freed: pd.DataFrame | None = None

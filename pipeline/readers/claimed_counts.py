@@ -1,4 +1,4 @@
-"""How many records a file may claim to hold: a few bytes can stand for any number of points that are all the same.
+"""A bound on how many records a file may claim to hold: a few bytes can stand for any number of equal points.
 
 Without a bound a file of 2 MB keeps the program busy for hours, and fills the disk. Real points and records differ from
 each other, and take a byte each at least, however they are packed; points on a perfect grid go ten to a byte.
@@ -10,12 +10,25 @@ RECORDS_PER_BYTE = 16
 
 
 def refuse_claim(claimed: int, size: int, most: int | None, sensor: str, name: str) -> None:
-    """Refuse a file of ``size`` bytes that claims more than ``most`` (None: as many as its size makes likely).
+    """Refuse a file that claims more records than it can hold.
+
+    Parameters
+    ----------
+    claimed : int
+        Number of records that the file claims to hold.
+    size : int
+        Size of the file, bytes.
+    most : int or None
+        ``max_records`` of session.yaml; None: RECORDS_PER_BYTE records a byte.
+    sensor : str
+        ins, laser or mbes, for the message.
+    name : str
+        The file's path in the session folder, for the message.
 
     Raises
     ------
     RawDataError
-        It does.
+        The file claims more records than that, or a negative number.
     """
     if 0 <= claimed <= (RECORDS_PER_BYTE * size if most is None else most):
         return

@@ -1,4 +1,4 @@
-"""Points in a coordinate reference system -> ECEF of that system's own datum, metres (:mod:`pipeline.readers.datums`).
+"""Points in a coordinate reference system (CRS) -> ECEF of its own datum, metres (:mod:`pipeline.readers.datums`).
 
 A CRS of two axes, such as UTM, says nothing of heights: ``laser.heights: ellipsoidal`` must. Heights are then in the
 unit of the CRS's own axes (feet with feet), with degrees in metres. Heights above a geoid are refused.
@@ -15,80 +15,90 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.readers.datums import geocentric_of, horizontal_of, unfit, vertical_of
-from pipeline.readers.row_checks import Sieve
+from pipeline.readers.datums import geocentric_crs, height_system, horizontal_part, unusable_reason
+from pipeline.readers.row_checks import RowFilter
 
 Array = NDArray[np.float64]
-Transform = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
+ToEcef = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
 Box = tuple[float, float, float, float]
 ECEF = "EPSG:4978"
-LASER = "laser"
-AXES = ("x_m", "y_m", "z_m")
+LASER_FRAME = "laser"
+COORDINATES = ("x_m", "y_m", "z_m")
 DEGREE_M = 111_320.0  # along a meridian
 MARGIN_DEG = 1.0  # beyond a CRS's area of use, which is rounded
 ZONE_M = 1e6  # Gauss-Krueger eastings may begin with the number of their zone: 39 500 000
-ENOUGH = 100  # points by which lost digits are told from chance
+_LEAST_POINTS = 100  # with fewer points coordinates may be float32 numbers by chance
 
 
 @dataclass(frozen=True)
-class Frame:
+class LaserFrame:
     """``laser.frame`` and ``laser.heights`` of session.yaml."""
 
-    name: str = LASER
+    name: str = LASER_FRAME
     heights: str | None = None
 
 
 @dataclass(frozen=True)
-class Placing:
-    """A frame's way to ECEF; ``box``: its area of use in its own coordinates, west, south, east, north."""
+class FrameTransform:
+    """How coordinates in a frame become ECEF, and where the frame may be used."""
 
-    to_ecef: Transform
-    box: Box | None
+    to_ecef: ToEcef
+    box: Box | None  # area of use in the frame's own coordinates: west, south, east, north
     unit_m: float  # metres in one unit of x and y
     height_unit_m: float  # and of z
 
     def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Which points lie in the CRS's area of use."""
+        """Return which points lie in the CRS's area of use, (n,) bool."""
         if self.box is None:
             return np.ones(len(x), dtype=bool)
         west, south, east, north = self.box
-        good: NDArray[np.bool_] = (x >= west) & (x <= east) & (y >= south) & (y <= north)
-        return good
+        in_box: NDArray[np.bool_] = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+        return in_box
 
 
-def keep_placed(sieve: Sieve, frame: Frame, name: str) -> None:
-    """x_m, y_m, z_m in ``frame`` become ECEF; rows that have no place there are left out.
+def transform_to_ecef(rows: RowFilter, frame: LaserFrame, name: str) -> None:
+    """Transform columns x_m, y_m, z_m to ECEF, and leave out rows outside the frame's area of use.
+
+    Parameters
+    ----------
+    rows : RowFilter
+        Rows with coordinates in ``frame``; changed in place.
+    frame : LaserFrame
+        Frame of the coordinates.
+    name : str
+        The file's path in the session folder, for messages.
 
     Raises
     ------
     RawDataError
-        The coordinates have lost their digits: whole pieces of a file are numbers of single precision.
+        The coordinates have lost their digits (all are float32 numbers), or x and y are interchanged, or the zone's
+        digits before x are other ones than the CRS's.
     """
-    placing = placing_of(frame)
-    if frame.name != LASER:
-        _refuse_float32(sieve["x_m"], sieve["y_m"], 1.0 if placing is None else placing.unit_m, name)
-    if placing is None:
+    transform = frame_transform(frame)
+    if frame.name != LASER_FRAME:
+        _refuse_float32(rows["x_m"], rows["y_m"], 1.0 if transform is None else transform.unit_m, name)
+    if transform is None:
         return
-    inside = placing.inside(sieve["x_m"], sieve["y_m"])
+    inside = transform.inside(rows["x_m"], rows["y_m"])
     if len(inside) and not inside.any():
-        _refuse_misread(placing, sieve["x_m"], sieve["y_m"], name)
-    sieve.keep(inside, "outside the area of laser.frame")
-    moved = placing.to_ecef(*(sieve[axis] for axis in AXES))
-    sieve.columns |= dict(zip(AXES, moved, strict=True))
-    sieve.keep_finite()
+        _refuse_misread(transform, rows["x_m"], rows["y_m"], name)
+    rows.keep(inside, "outside the area of laser.frame")
+    ecef_m = transform.to_ecef(*(rows[axis] for axis in COORDINATES))
+    rows.columns |= dict(zip(COORDINATES, ecef_m, strict=True))
+    rows.keep_finite()
 
 
-def _refuse_misread(placing: Placing, x: Array, y: Array, name: str) -> None:
-    """Points of which none lies in the CRS's area, though all would if they were read otherwise."""
-    if np.all(placing.inside(y, x)):
+def _refuse_misread(transform: FrameTransform, x: Array, y: Array, name: str) -> None:
+    """Refuse points that would all lie in the CRS's area with x and y interchanged, or in another zone."""
+    if np.all(transform.inside(y, x)):
         raise RawDataError(
             f"{name}: its x and y are interchanged for laser.frame (x {x[0]:.3f}, y {y[0]:.3f}): x must be east or "
             "longitude, y north or latitude; export the points in that order"
         )
-    if placing.box is None or placing.unit_m != 1.0:
+    if transform.box is None or transform.unit_m != 1.0:
         return
-    millions = round(((placing.box[0] + placing.box[2]) / 2 - float(np.median(x))) / ZONE_M)
-    if np.all(placing.inside(x + millions * ZONE_M, y)):
+    millions = round(((transform.box[0] + transform.box[2]) / 2 - float(np.median(x))) / ZONE_M)
+    if np.all(transform.inside(x + millions * ZONE_M, y)):
         raise RawDataError(
             f"{name}: its x, such as {x[0]:.0f}, have other digits of a zone before them than laser.frame's, which "
             f"would be {x[0] + millions * ZONE_M:.0f}: name the CRS whose false easting is that of the points"
@@ -96,28 +106,27 @@ def _refuse_misread(placing: Placing, x: Array, y: Array, name: str) -> None:
 
 
 def _refuse_float32(x: Array, y: Array, unit_m: float, name: str) -> None:
-    """Whether all lie as near to a float32 as the rounding of a text or LAS brings them, where these lie far apart."""
-    near = (0.006 if unit_m == DEGREE_M else 0.0006) / unit_m
+    """Refuse coordinates that all lie within rounding of float32 numbers, where these lie far apart."""
+    rounding = (0.006 if unit_m == DEGREE_M else 0.0006) / unit_m
     for values in (x, y):
         singles = values.astype(np.float32)
-        apart = float(np.spacing(np.abs(singles).max(initial=0.0)))
-        few = len(values) < ENOUGH or values.min() == values.max()
-        if few or not apart > 10 * near or not np.all(np.abs(values - singles) <= near):
+        spacing = float(np.spacing(np.abs(singles).max(initial=0.0)))
+        too_few = len(values) < _LEAST_POINTS or values.min() == values.max()
+        if too_few or not spacing > 10 * rounding or not np.all(np.abs(values - singles) <= rounding):
             return
     raise RawDataError(f"{name}: its coordinates went through float32; export it again in double precision")
 
 
 @lru_cache(maxsize=8)
-def placing_of(frame: Frame) -> Placing | None:
-    """What turns x, y, z (or longitude, latitude, height) of ``frame`` into ECEF; None where nothing is to do.
+def frame_transform(frame: LaserFrame) -> FrameTransform | None:
+    """Return the transform of x, y, z (or longitude, latitude, height) to ECEF; None for laser and EPSG:4978.
 
     Raises
     ------
     ConfigError
-        The frame is no CRS, or its points cannot be placed beside an INS's, or its heights are above something else
-        than the ellipsoid.
+        The frame is no CRS, or its datum is not one of an INS's positions, or its heights are not ellipsoidal.
     """
-    if frame.name in (LASER, ECEF):
+    if frame.name in (LASER_FRAME, ECEF):
         return None
     from pyproj import CRS
     from pyproj.exceptions import ProjError
@@ -131,20 +140,20 @@ def placing_of(frame: Frame) -> Placing | None:
             f"{where}: no coordinate reference system is known by that name; write laser, or a CRS by its number, such "
             "as EPSG:4978 (ECEF) or EPSG:32651 (UTM zone 51 north)"
         ) from error
-    if (why := unfit(crs)) is not None:
-        raise ConfigError(f"{where}: {crs.name} {why}")
+    if (reason := unusable_reason(crs)) is not None:
+        raise ConfigError(f"{where}: {crs.name} {reason}")
     _refuse_other_heights(crs, frame, where)
-    level = horizontal_of(crs)
+    box = None if crs.is_geocentric else _box(horizontal_part(crs))
     try:
-        return Placing(_transform(crs), None if crs.is_geocentric else _box(level), _unit_m(crs), height_unit_m(crs))
+        return FrameTransform(to_ecef=_to_ecef(crs), box=box, unit_m=_unit_m(crs), height_unit_m=height_unit_m(crs))
     except ProjError as error:
         raise ConfigError(
             f"{where}: {crs.name} cannot be turned into ECEF here; export the points in EPSG:4978 or EPSG:4979"
         ) from error
 
 
-def _refuse_other_heights(crs: Any, frame: Frame, where: str) -> None:
-    vertical = vertical_of(crs)
+def _refuse_other_heights(crs: Any, frame: LaserFrame, where: str) -> None:
+    vertical = height_system(crs)
     if vertical is not None:
         raise ConfigError(
             f"{where}: {crs.name} has heights of {vertical}, above a geoid or the sea; export ellipsoidal heights, "
@@ -158,37 +167,37 @@ def _refuse_other_heights(crs: Any, frame: Frame, where: str) -> None:
 
 
 def _unit_m(crs: Any) -> float:
-    """Metres in one unit of x and y."""
+    """Return the metres in one unit of x and y; a degree counts as it does along a meridian."""
     factor = float(crs.axis_info[0].unit_conversion_factor)
-    return DEGREE_M * math.degrees(factor) if horizontal_of(crs).is_geographic else factor
+    return DEGREE_M * math.degrees(factor) if horizontal_part(crs).is_geographic else factor
 
 
 def height_unit_m(crs: Any) -> float:
-    """Metres in one unit of z: where the CRS has two axes the unit of these, with angles metres."""
+    """Return the metres in one unit of z: of a CRS of two axes their unit, and 1 where these are angles."""
     if len(crs.axis_info) == 3:
         return float(crs.axis_info[2].unit_conversion_factor)
     return 1.0 if crs.is_geographic else _unit_m(crs)
 
 
-def _transform(crs: Any) -> Transform:
-    """Coordinates in the CRS (x: east or longitude, y: north or latitude) -> ECEF of its own datum."""
+def _to_ecef(crs: Any) -> ToEcef:
+    """Return the function from coordinates (x: east or longitude, y: north or latitude) to ECEF of the CRS's datum."""
     from pyproj import Transformer
 
-    level = horizontal_of(crs)
-    solid = level if len(level.axis_info) == 3 else level.to_3d()
-    scale = height_unit_m(crs) / float(solid.axis_info[2].unit_conversion_factor)
-    way = Transformer.from_crs(solid, geocentric_of(crs), always_xy=True, allow_ballpark=False)
+    horizontal = horizontal_part(crs)
+    with_heights = horizontal if len(horizontal.axis_info) == 3 else horizontal.to_3d()
+    scale = height_unit_m(crs) / float(with_heights.axis_info[2].unit_conversion_factor)
+    transformer = Transformer.from_crs(with_heights, geocentric_crs(crs), always_xy=True, allow_ballpark=False)
 
-    def transform(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-        # PROJ writes into the arrays it is given, and marks what it cannot turn by inf
-        moved = way.transform(x, y, z * scale, inplace=False)
-        return np.asarray(moved[0]), np.asarray(moved[1]), np.asarray(moved[2])
+    def to_ecef(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        # without inplace=False PROJ writes into its arguments; coordinates that it cannot transform become inf
+        ecef_m = transformer.transform(x, y, z * scale, inplace=False)
+        return np.asarray(ecef_m[0]), np.asarray(ecef_m[1]), np.asarray(ecef_m[2])
 
-    return transform
+    return to_ecef
 
 
 def _box(crs: Any) -> Box | None:
-    """The area of use, widened a little; None where the CRS has none, or one across the date line."""
+    """Return the area of use, widened by MARGIN_DEG; None where the CRS has none, or one across the date line."""
     from pyproj import Transformer
 
     area = crs.area_of_use
@@ -196,8 +205,8 @@ def _box(crs: Any) -> Box | None:
         return None
     south, north = max(area.south - MARGIN_DEG, -90.0), min(area.north + MARGIN_DEG, 90.0)
     if crs.is_geographic:
-        turn = 360.0 if (area.west, area.east) == (-180.0, 180.0) else MARGIN_DEG  # of the whole earth, 190 degrees too
-        return area.west - turn, south, area.east + turn, north
+        margin = 360.0 if (area.west, area.east) == (-180.0, 180.0) else MARGIN_DEG  # the whole earth: 190 too
+        return area.west - margin, south, area.east + margin, north
     bounds = (max(area.west - MARGIN_DEG, -180.0), south, min(area.east + MARGIN_DEG, 180.0), north)
     flat = crs.to_2d()
     box = Transformer.from_crs(flat.geodetic_crs, flat, always_xy=True).transform_bounds(*bounds)

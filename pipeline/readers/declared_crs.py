@@ -1,65 +1,83 @@
-"""What a file itself says of its coordinate reference system, against what session.yaml says."""
+"""Comparison of the coordinate reference system that a file declares with that of session.yaml."""
 
 from typing import Any
 
 import numpy as np
 
 from pipeline.errors import RawDataError
-from pipeline.readers.crs import LASER, Array, Frame, height_unit_m
-from pipeline.readers.datums import geocentric_of, horizontal_of, is_satellites, vertical_of
+from pipeline.readers.crs import LASER_FRAME, Array, LaserFrame, height_unit_m
+from pipeline.readers.datums import geocentric_crs, height_system, horizontal_part, is_like_wgs84
 
 CLEARLY_ELSEWHERE_M = 1000.0
 
 
-def refuse_another(frame: Frame, declared: str, points: tuple[Array, Array, Array], name: str) -> None:
-    """Refuse a file whose own CRS (``declared``, WKT) is clearly another one than session.yaml's.
+def refuse_other_crs(frame: LaserFrame, declared: str, points: tuple[Array, Array, Array], name: str) -> None:
+    """Refuse a file that declares clearly another CRS than session.yaml.
 
-    It is where the points' middle lies more than 1 km elsewhere, or nowhere; where it is on an ellipsoid that no
-    satellite system has; where its heights are above a geoid, or in another unit. Two datums on the same ellipsoid
-    (NAD83 and WGS 84, say) place the same numbers alike here, whichever the session names: which of them the points are
-    in must be known, and be the INS's. What cannot be understood is not held against the file.
+    It does where the points' median lies more than 1 km elsewhere, or nowhere; where its ellipsoid is not one of
+    WGS 84, GRS 80 and CGCS2000; where its heights are above a geoid, or in another unit. Two datums on the same
+    ellipsoid (NAD83 and WGS 84, say) give the same ECEF coordinates here, whichever the session names: the user must
+    know the points' datum, which must be the INS's. A declaration that PROJ does not understand is ignored.
+
+    Parameters
+    ----------
+    frame : LaserFrame
+        Frame that session.yaml gives.
+    declared : str
+        CRS in the file, WKT; empty where there is none.
+    points : tuple of three (n,) arrays
+        Coordinates as they stand in the file.
+    name : str
+        The file's path in the session folder, for messages.
+
+    Raises
+    ------
+    RawDataError
+        The two systems contradict each other.
     """
-    if frame.name == LASER or not declared or not len(points[0]):
+    if frame.name == LASER_FRAME or not declared or not len(points[0]):
         return
     from pyproj import CRS
     from pyproj.exceptions import ProjError
 
     try:
-        own, given = CRS.from_user_input(declared), CRS.from_user_input(frame.name)
-        if horizontal_of(own).geodetic_crs is None:
+        file_crs, session_crs = CRS.from_user_input(declared), CRS.from_user_input(frame.name)
+        if horizontal_part(file_crs).geodetic_crs is None:
             return
-        middle = tuple(float(np.median(values)) for values in points)
-        one, other = _place_m(own, *middle), _place_m(given, *middle)
+        median = tuple(float(np.median(values)) for values in points)
+        positions_m = np.array([_position_m(file_crs, *median), _position_m(session_crs, *median)])
     except (ProjError, ValueError):
         return
-    says = f"{name}: says itself that its points are in {own.name}"
-    somewhere = np.isfinite([one, other]).all(axis=1)
-    if somewhere.any() and not (somewhere.all() and np.linalg.norm(one - other) <= CLEARLY_ELSEWHERE_M):
+    says = f"{name}: says itself that its points are in {file_crs.name}"
+    exists = np.isfinite(positions_m).all(axis=1)
+    if exists.any() and not (exists.all() and np.linalg.norm(np.diff(positions_m, axis=0)) <= CLEARLY_ELSEWHERE_M):
         raise RawDataError(
-            f"{says}, but laser.frame is {frame.name!r} ({given.name}); correct laser.frame, or export the points anew"
+            f"{says}, but laser.frame is {frame.name!r} ({session_crs.name}); correct laser.frame, or export the "
+            "points anew"
         )
-    ellipsoid = horizontal_of(own).ellipsoid
-    if not is_satellites(ellipsoid):
+    ellipsoid = horizontal_part(file_crs).ellipsoid
+    if not is_like_wgs84(ellipsoid):
         raise RawDataError(
-            f"{says}, on the ellipsoid {ellipsoid.name}, but laser.frame is {frame.name!r} ({given.name}); export the "
-            "points in the INS's datum"
+            f"{says}, on the ellipsoid {ellipsoid.name}, but laser.frame is {frame.name!r} ({session_crs.name}); "
+            "export the points in the INS's datum"
         )
-    vertical = vertical_of(own)
+    vertical = height_system(file_crs)
     if vertical is not None:
         raise RawDataError(f"{name}: says itself that its heights are {vertical}; export ellipsoidal heights")
-    if len(own.axis_info) == 3 and not np.isclose(height_unit_m(own), height_unit_m(given), rtol=1e-6):
+    units_m = height_unit_m(file_crs), height_unit_m(session_crs)
+    if len(file_crs.axis_info) == 3 and not np.isclose(*units_m, rtol=1e-6):
         raise RawDataError(
-            f"{name}: says itself that the unit of its heights is the {own.axis_info[2].unit_name}, but that of "
-            f"laser.frame ({given.name}) is {height_unit_m(given):g} m; export the heights in that unit"
+            f"{name}: says itself that the unit of its heights is the {file_crs.axis_info[2].unit_name}, but that of "
+            f"laser.frame ({session_crs.name}) is {units_m[1]:g} m; export the heights in that unit"
         )
 
 
-def _place_m(crs: Any, x: float, y: float, z: float) -> Array:
-    """A point in ECEF of the CRS's own datum; heights do not count, so that one in feet is no other place."""
+def _position_m(crs: Any, x: float, y: float, z: float) -> Array:
+    """Return a point in ECEF of the CRS's own datum, at height 0: a height in feet is no other place."""
     from pyproj import Transformer
 
-    level = horizontal_of(crs)
+    horizontal = horizontal_part(crs)
     if not crs.is_geocentric:
-        level, z = level.to_2d().to_3d(), 0.0
-    way = Transformer.from_crs(level, geocentric_of(crs), always_xy=True)
-    return np.array(way.transform(x, y, z))
+        horizontal, z = horizontal.to_2d().to_3d(), 0.0
+    transformer = Transformer.from_crs(horizontal, geocentric_crs(crs), always_xy=True)
+    return np.array(transformer.transform(x, y, z))

@@ -1,8 +1,8 @@
 """Native decoders in a process of their own, for damaged files that end the process instead of raising.
 
-What a worker writes to its standard output, native byte order: per batch an int64 count, then that many float64 of each
-column; at the end a count of 0. An error: -1, an int64 length, and so many bytes of UTF-8. Whatever else comes, or
-nothing, is a RawDataError of the file.
+A worker writes to its standard output, native byte order: per batch an int64 count, then that many float64 of each
+column; at the end a count of 0. An error is -1, an int64 length, and that many bytes of UTF-8. Any other output, or
+none, is a RawDataError of the file.
 """
 
 import struct
@@ -18,17 +18,34 @@ from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
 
-ADVICE = "copy or export it again"
-Numbers = tuple[NDArray[np.float64], ...]
+REMEDY = "copy or export it again"
+DecodedColumns = tuple[NDArray[np.float64], ...]
 
 
-def batches(program: Path, arguments: list[str], name: str, width: int, batch: int) -> Iterator[Numbers]:
-    """``width`` columns, batch by batch.
+def decoded_batches(program: Path, arguments: list[str], name: str, width: int, batch: int) -> Iterator[DecodedColumns]:
+    """Yield the columns that a worker decodes, batch by batch.
+
+    Parameters
+    ----------
+    program : Path
+        The worker's Python file.
+    arguments : list of str
+        Its command line.
+    name : str
+        The raw file's path in the session folder, for messages.
+    width : int
+        Number of columns.
+    batch : int
+        Largest number of rows in a batch.
+
+    Yields
+    ------
+    tuple of ``width`` (n,) arrays
 
     Raises
     ------
     RawDataError
-        The file is damaged: the worker says so, or dies of it.
+        The file is damaged: the worker reports an error, or ends without the final count.
     """
     with _started(program, arguments) as stream:
         while count := _count(stream, name, batch):
@@ -36,8 +53,16 @@ def batches(program: Path, arguments: list[str], name: str, width: int, batch: i
             yield tuple(numbers.reshape(width, count))
 
 
-def text(program: Path, arguments: list[str], name: str, most: int) -> str:
-    """A text of at most ``most`` bytes: its length as count, and so many bytes of UTF-8."""
+def decoded_text(program: Path, arguments: list[str], name: str, most: int) -> str:
+    """Return the text that a worker writes: an int64 length, and that many bytes of UTF-8.
+
+    Parameters
+    ----------
+    program, arguments, name
+        As for :func:`decoded_batches`.
+    most : int
+        Largest length of the text, bytes.
+    """
     with _started(program, arguments) as stream:
         return _exactly(stream, _count(stream, name, most), name).decode("utf-8", "replace")
 
@@ -60,12 +85,12 @@ def _count(stream: IO[bytes], name: str, most: int) -> int:
     if 0 <= count <= most:
         return int(count)
     (length,) = struct.unpack("=q", _exactly(stream, 8, name))
-    told = _exactly(stream, min(max(length, 0), 4096), name).decode("utf-8", "replace")
-    raise RawDataError(f"{name}: is damaged ({told}); {ADVICE}")
+    reason = _exactly(stream, min(max(length, 0), 4096), name).decode("utf-8", "replace")
+    raise RawDataError(f"{name}: is damaged ({reason}); {REMEDY}")
 
 
 def _exactly(stream: IO[bytes], count: int, name: str) -> bytes:
     data = stream.read(count)
     if len(data) < count:
-        raise RawDataError(f"{name}: is damaged: unpacking it ended the unpacking program; {ADVICE}")
+        raise RawDataError(f"{name}: is damaged: unpacking it ended the unpacking program; {REMEDY}")
     return data

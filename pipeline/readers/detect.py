@@ -29,11 +29,11 @@ from pipeline.readers.file_kind import (
     FileKind,
 )
 from pipeline.readers.float32_checks import through_float32
-from pipeline.readers.inertial_explorer_layout import names_line
+from pipeline.readers.inertial_explorer_layout import header_line_number
 from pipeline.readers.kongsberg_all_datagrams import is_datagram_header
 from pipeline.readers.r2sonic_packets import BTH0, OTHER_PACKETS, packet_size
 from pipeline.readers.raw_file import opened, size_of
-from pipeline.readers.table_columns import column_names
+from pipeline.readers.table_columns import csv_header
 
 HEAD_BYTES = 65_536  # of a file, by which its kind is known
 
@@ -75,7 +75,7 @@ def kind_of_bytes(head: bytes, size: int) -> FileKind:
         return R2SONIC_PACKETS
     if b"riegl" in head[:4096].lower() and b"rdb" in head[:4096].lower():
         return RDBX
-    if names_line(head) is not None:
+    if header_line_number(head) is not None:
         return INERTIAL_EXPLORER
     text = _is_text(head)
     if not text and (doubles := _kind_of_doubles(head, size)) is not None:
@@ -144,7 +144,7 @@ def _is_text(head: bytes) -> bool:
 def _kind_of_text(head: bytes) -> FileKind:
     lines = [line for line in head.decode("utf-8-sig", "replace").splitlines() if line.strip()]
     rows = [line for line in lines if not line.startswith(("#", "//"))]
-    if rows and column_names(rows[0]) is not None:
+    if rows and csv_header(rows[0]) is not None:
         return CSV
     if (unread_kind := unread_formats.kind_of_text("\n".join(lines))) is not None:
         return unread_kind

@@ -29,7 +29,7 @@ from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.errors import RawDataError
 from pipeline.readers import file_kind, openers
-from pipeline.readers.crs import placing_of
+from pipeline.readers.crs import frame_transform
 from pipeline.readers.detect import kind_of
 from pipeline.readers.session_files import SessionFile, files_matching
 
@@ -86,7 +86,7 @@ def raw_parts(sensor: Sensor, settings: SensorSettings, folder: Path) -> tuple[P
         Something is missing or wrong in session.yaml: ``gps_week``, ``laser.frame``, ``laser.heights``.
     """
     if isinstance(settings, Laser):
-        placing_of(openers.laser_frame(settings))
+        frame_transform(openers.laser_frame(settings))
     files = files_matching(folder, settings.files, f"{sensor}.files")
     for file in files:
         _refuse_other_format(file, sensor, settings)

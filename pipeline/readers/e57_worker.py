@@ -3,9 +3,9 @@
 libE57Format can die of a damaged file, or allocate what a damaged number claims. Here only this process dies, and
 :mod:`pipeline.readers.e57` says which file it was. It imports nothing of the project.
 
-FILE alone: a text, JSON, of what the scans are. With SCAN: its points as stored, batch by batch: seconds, the three
-coordinates, and whether point and time are marked as invalid; what the scan has not is 0. Both are written as
-:mod:`pipeline.readers.decoder_process` says.
+With FILE alone it writes JSON that describes the scans. With SCAN it writes that scan's points as stored, batch by
+batch: seconds, the three coordinates, and whether point and time are marked as invalid; a field that the scan lacks
+is 0. :mod:`pipeline.readers.decoder_process` describes the form of both.
 """
 
 import json
@@ -15,23 +15,23 @@ from typing import Any
 import numpy as np
 from pye57 import libe57
 
-MEMORY_BYTES = 1 << 30  # written to; the buffers of a batch need a hundredth
+_MEMORY_BYTES = 1 << 30  # written to; the buffers of a batch need a hundredth
 DESCRIBING_S = 60  # of computing; a millisecond is usual
 MAX_SCANS = 10_000
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-ALL = 100  # percent of checksums that are looked at
+_ALL_CHECKSUMS = 100  # percent of checksums that are verified
 
 
-def scans_of(image: Any) -> list[Any]:
+def _scan_nodes(image: Any) -> list[Any]:
     data = libe57.VectorNode(image.root().get("data3D"))
     if data.childCount() > MAX_SCANS:
         raise ValueError(f"{data.childCount()} scans")
     return [libe57.StructureNode(data.get(k)) for k in range(data.childCount())]
 
 
-def value(node: Any, *path: str, default: float) -> float:
-    """The number at a path of names below ``node``; ``default`` where there is none."""
+def _number_at(node: Any, *path: str, default: float) -> float:
+    """Return the number at a path of names below ``node``; ``default`` where there is none."""
     for name in path[:-1]:
         if not node.isDefined(name):
             return default
@@ -47,8 +47,8 @@ def value(node: Any, *path: str, default: float) -> float:
     return float(kinds[leaf.type()]())
 
 
-def points_of(scan: Any) -> tuple[Any, dict[str, Any], tuple[str, ...]]:
-    """A scan's points, their fields, and the three of the coordinates."""
+def _points_and_fields(scan: Any) -> tuple[Any, dict[str, Any], tuple[str, ...]]:
+    """Return a scan's points, their fields by name, and the names of the three coordinates."""
     points = libe57.CompressedVectorNode(scan.get("points"))
     prototype = libe57.StructureNode(points.prototype())
     fields = {prototype.get(k).elementName(): prototype.get(k) for k in range(prototype.childCount())}
@@ -56,37 +56,37 @@ def points_of(scan: Any) -> tuple[Any, dict[str, Any], tuple[str, ...]]:
     return points, fields, axes
 
 
-def is_single(node: Any) -> bool:
+def _is_single_precision(node: Any) -> bool:
     if node.type() != libe57.NodeType.E57_FLOAT:
         return False
     return bool(libe57.FloatNode(node).precision() == libe57.FloatPrecision.E57_SINGLE)
 
 
-def described(scan: Any) -> dict[str, Any]:
-    points, fields, axes = points_of(scan)
+def _description(scan: Any) -> dict[str, Any]:
+    points, fields, axes = _points_and_fields(scan)
     return {
         "points": points.childCount(),
         "timed": "timeStamp" in fields,
         "axes": "" if not axes else "cartesian" if axes is CARTESIAN else "spherical",
-        "single": any(is_single(fields[axis]) for axis in axes),
-        "start_s": value(scan, "acquisitionStart", "dateTimeValue", default=0.0),
-        "atomic": value(scan, "acquisitionStart", "isAtomicClockReferenced", default=0.0) != 0,
-        "rotation": [value(scan, "pose", "rotation", axis, default=float(axis == "w")) for axis in "wxyz"],
-        "translation": [value(scan, "pose", "translation", axis, default=0.0) for axis in "xyz"],
+        "single": any(_is_single_precision(fields[axis]) for axis in axes),
+        "start_s": _number_at(scan, "acquisitionStart", "dateTimeValue", default=0.0),
+        "atomic": _number_at(scan, "acquisitionStart", "isAtomicClockReferenced", default=0.0) != 0,
+        "rotation": [_number_at(scan, "pose", "rotation", axis, default=float(axis == "w")) for axis in "wxyz"],
+        "translation": [_number_at(scan, "pose", "translation", axis, default=0.0) for axis in "xyz"],
     }
 
 
-def describe(path: str) -> None:
-    image = libe57.ImageFile(path, "r", ALL)
+def _write_descriptions(path: str) -> None:
+    image = libe57.ImageFile(path, "r", _ALL_CHECKSUMS)
     root = image.root()
-    told = libe57.StringNode(root.get("coordinateMetadata")).value() if root.isDefined("coordinateMetadata") else ""
-    text = json.dumps({"crs": told, "scans": [described(scan) for scan in scans_of(image)]}).encode()
+    crs = libe57.StringNode(root.get("coordinateMetadata")).value() if root.isDefined("coordinateMetadata") else ""
+    text = json.dumps({"crs": crs, "scans": [_description(scan) for scan in _scan_nodes(image)]}).encode()
     sys.stdout.buffer.write(np.int64(len(text)).tobytes() + text)
 
 
-def unpack(path: str, number: int, batch: int) -> None:
-    image = libe57.ImageFile(path, "r", ALL)
-    points, fields, axes = points_of(scans_of(image)[number])
+def _write_points(path: str, number: int, batch: int) -> None:
+    image = libe57.ImageFile(path, "r", _ALL_CHECKSUMS)
+    points, fields, axes = _points_and_fields(_scan_nodes(image)[number])
     invalid = "cartesianInvalidState" if axes is CARTESIAN else "sphericalInvalidState"
     columns = np.zeros((6, batch))
     buffers = libe57.VectorSourceDestBuffer()
@@ -101,24 +101,24 @@ def unpack(path: str, number: int, batch: int) -> None:
     sys.stdout.buffer.write(np.int64(0).tobytes())
 
 
-def main(path: str, *numbers: str) -> None:
+def _main(path: str, *numbers: str) -> None:
     import resource
 
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_DATA, (_MEMORY_BYTES, _MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if numbers:
-        unpack(path, *(int(number) for number in numbers))
+        _write_points(path, *(int(number) for number in numbers))
     else:
         resource.setrlimit(resource.RLIMIT_CPU, (DESCRIBING_S, DESCRIBING_S))
-        describe(path)
+        _write_descriptions(path)
     sys.stdout.buffer.flush()
 
 
 if __name__ == "__main__":
     try:
-        main(*sys.argv[1:])
+        _main(*sys.argv[1:])
     except Exception as error:  # the parent makes one RawDataError of it
         words = str(error).partition("****")[0].strip()[:300]  # the library's own sources and lines follow
-        told = f"{type(error).__name__}: {words}".encode()
-        sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(told)).tobytes() + told)
+        text = f"{type(error).__name__}: {words}".encode()
+        sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(text)).tobytes() + text)
         sys.stdout.buffer.flush()

@@ -1,8 +1,9 @@
-"""The XML part of an E57 file, looked at before libE57Format opens the file.
+"""Checks of an E57 file's header and XML part, made before libE57Format opens the file.
 
-libE57Format's XML parser follows what the XML names: an external document type, external entities, and the schemas of
-``schemaLocation``. A file made for it could read other files of this computer and send them away. A file that has one
-of these is refused; no scanner writes them. They cannot be hidden by another encoding, for all but UTF-8 is refused.
+libE57Format's XML parser follows references in the XML: to an external document type, to external entities, and to the
+schemas of ``schemaLocation``. A file made for it could read other files of this computer and send them away. A file
+that has one of these is refused; no scanner writes them. Another encoding cannot hide them, because only UTF-8 is
+accepted.
 
 Header (little-endian): 8 u32 x 2 version, 16 u64 size of the file, 24 u64 where the XML part is, 32 u64 its length, 40
 u64 size of a page. Pages are of 1024 bytes, the last four of each a checksum. Where the XML part is counts checksums;
@@ -14,12 +15,12 @@ import struct
 from pathlib import Path
 
 from pipeline.errors import RawDataError
-from pipeline.readers.decoder_process import ADVICE
+from pipeline.readers.decoder_process import REMEDY
 from pipeline.readers.raw_file import opened, read_at, size_of
 
-HEADER = struct.Struct("<8s2I4Q")
+_HEADER = struct.Struct("<8s2I4Q")
 MAX_XML = 1 << 26
-PAGE, CONTENT = 1024, 1020
+_PAGE, _CONTENT = 1024, 1020
 FETCHING = re.compile(rb"<!DOCTYPE|<!ENTITY|schemaLocation", re.IGNORECASE)
 _QUOTED = rb"""\s*=\s*(?:"%s"|'%s')"""
 _ENCODING = rb"(?i:utf-8|us-ascii)"
@@ -30,8 +31,8 @@ DECLARATION = re.compile(
 )  # fmt: skip
 
 
-def check(path: Path, name: str) -> int:
-    """The file's size in bytes, where its header and its XML part can be trusted.
+def check_header_and_xml(path: Path, name: str) -> int:
+    """Check the file's header and XML part, and return its size in bytes.
 
     Raises
     ------
@@ -40,30 +41,30 @@ def check(path: Path, name: str) -> int:
     """
     with opened(path, name) as file:
         size = size_of(file)
-        _, _, _, claimed, start, length, page = HEADER.unpack(file.read(HEADER.size).ljust(HEADER.size, b"\0"))
+        _, _, _, claimed, start, length, page = _HEADER.unpack(file.read(_HEADER.size).ljust(_HEADER.size, b"\0"))
         if claimed > size:
-            raise RawDataError(f"{name}: is cut off: {size} of {claimed} bytes; {ADVICE}")
-        first, skipped = divmod(start, PAGE)
-        pages = -(-(skipped + length) // CONTENT)
-        sound = page == PAGE and HEADER.size <= start and skipped < CONTENT and 0 < length <= MAX_XML
-        if not sound or (first + pages) * PAGE > size:
-            raise RawDataError(f"{name}: its E57 header is damaged; {ADVICE}")
-        stored = read_at(file, first * PAGE, pages * PAGE)
-    content = b"".join(stored[at : at + CONTENT] for at in range(0, len(stored), PAGE))
+            raise RawDataError(f"{name}: is cut off: {size} of {claimed} bytes; {REMEDY}")
+        first, skipped = divmod(start, _PAGE)
+        pages = -(-(skipped + length) // _CONTENT)
+        sound = page == _PAGE and _HEADER.size <= start and skipped < _CONTENT and 0 < length <= MAX_XML
+        if not sound or (first + pages) * _PAGE > size:
+            raise RawDataError(f"{name}: its E57 header is damaged; {REMEDY}")
+        stored = read_at(file, first * _PAGE, pages * _PAGE)
+    content = b"".join(stored[at : at + _CONTENT] for at in range(0, len(stored), _PAGE))
     _refuse_fetching(content[skipped : skipped + length], name)
     return size
 
 
 def _refuse_fetching(xml: bytes, name: str) -> None:
-    found = FETCHING.search(xml)
-    if found is not None:
+    reference = FETCHING.search(xml)
+    if reference is not None:
         raise RawDataError(
-            f"{name}: its XML part has {found[0].decode()!r}, by which it could read other files of this computer and "
-            "send them away; no scanner writes that: find out where the file comes from, and export it again"
+            f"{name}: its XML part has {reference[0].decode()!r}, by which it could read other files of this computer "
+            "and send them away; no scanner writes that: find out where the file comes from, and export it again"
         )
     text = xml.removeprefix(b"\xef\xbb\xbf")
     if not _is_utf8(text) or (text.startswith(b"<?xml") and DECLARATION.match(text) is None):
-        raise RawDataError(f"{name}: its XML part is not in UTF-8, as E57 requires; {ADVICE}")
+        raise RawDataError(f"{name}: its XML part is not in UTF-8, as E57 requires; {REMEDY}")
 
 
 def _is_utf8(xml: bytes) -> bool:

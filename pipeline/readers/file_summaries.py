@@ -1,5 +1,7 @@
-"""What stage ingest has seen of the files: what it refuses at once, and its tables of files, gaps and counts."""
+"""Summaries of the raw files: refusals of sensors without data, and the tables of files, gaps and counts."""
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -10,109 +12,142 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.artefacts.catalogue.points import GAPS
+from pipeline.artefacts.counts import counts_table
 from pipeline.artefacts.streams import Batch
 from pipeline.console import plural
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, WEEK_NS, utc_text
 from pipeline.maths.geometry.passes import split_at_gaps
 from pipeline.readers.rates import rate_hz
-from pipeline.readers.whole_days import DAY_NS, whole_days
+from pipeline.readers.whole_days import DAY_NS, whole_days_apart
 
-Columns = dict[str, NDArray[Any]]
+_SPACING_NS = NS // 2  # of the sigmas that are kept
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What is kept of one chunk: counts, epochs (INS records or pings; of laser points one a second, and the last)."""
+class ChunkSummary:
+    """Counts and times of one chunk, and what an INS adds to them."""
 
-    count: int
-    dropped: dict[str, int]
-    epochs_ns: NDArray[np.int64]
-    trajectory: Columns
-    sigmas: Columns = field(default_factory=dict)  # of the INS, thinned
-    accuracy: bool = False  # of a file of sigmas alone
+    count: int  # good rows
+    dropped: dict[str, int]  # rows left out, by reason
+    epochs_ns: NDArray[np.int64]  # INS records or pings; of laser points the first in each second, and the last
+    trajectory: dict[str, NDArray[Any]] = field(default_factory=dict)  # columns of INS records
+    sigmas: dict[str, NDArray[Any]] = field(default_factory=dict)  # of the INS, thinned
+    accuracy: bool = False  # of a file that holds sigmas only
     lowest_speed_m_s: float = np.inf  # sound speeds recorded with the pings
     highest_speed_m_s: float = -np.inf
 
 
-def refuse_empty(partials: dict[str, list[tuple[str, Seen]]]) -> None:
-    for sensor, seen in partials.items():
-        if not sum(piece.count for _, piece in seen):
-            names = sorted({name.split("#")[0] for name, _ in seen})
-            reasons: dict[str, int] = {}
-            for _, piece in seen:
-                for reason, number in piece.dropped.items():
-                    reasons[reason] = reasons.get(reason, 0) + number
-            why = (
-                ", ".join(f"{number} x {reason}" for reason, number in sorted(reasons.items())) or "the files are empty"
-            )
-            advice = {
-                "ins": "log again after the INS has aligned, with INSPVA(S) on",
-                "laser": "export the scan again, with time stamps",
-                "mbes": "check that bathymetry was logged",
-            }[sensor]
-            raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {advice}")
+Summaries = Sequence[tuple[str, ChunkSummary]]  # with the name of each chunk's part: a file's, or file#stretch
+_REMEDIES = {
+    "ins": "log again after the INS has aligned, with INSPVA(S) on",
+    "laser": "export the scan again, with time stamps",
+    "mbes": "check that bathymetry was logged",
+}
 
 
-def _meet(ins: tuple[int, int], other: tuple[int, int], offset_ns: int) -> bool:
-    return ins[0] <= other[1] - offset_ns and other[0] - offset_ns <= ins[1]
+def refuse_empty_sensors(partials: Mapping[str, Summaries]) -> None:
+    """Refuse a session in which a sensor has no usable record, by a RawDataError; ``partials``: by sensor."""
+    for sensor, summaries in partials.items():
+        if not sum(summary.count for _, summary in summaries):
+            names = sorted({_file_name(name) for name, _ in summaries})
+            reasons: Counter[str] = Counter()
+            for _, summary in summaries:
+                reasons.update(summary.dropped)
+            counts = [f"{number} x {reason}" for reason, number in sorted(reasons.items())]
+            why = ", ".join(counts) or "the files are empty"
+            raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {_REMEDIES[sensor]}")
 
 
-def refuse_apart(ins: tuple[int, int], spans: dict[str, tuple[int, int]]) -> None:
+def _file_name(part_name: str) -> str:
+    return part_name.split("#")[0]
+
+
+def _overlap(ins: tuple[int, int], sensor: tuple[int, int], offset_ns: int) -> bool:
+    """Tell whether a sensor's times (first, last; ns), less an offset, overlap those of the INS."""
+    return ins[0] <= sensor[1] - offset_ns and sensor[0] - offset_ns <= ins[1]
+
+
+def refuse_disjoint_times(ins: tuple[int, int], spans: Mapping[str, tuple[int, int]]) -> None:
+    """Refuse sensors that have no time in common with the INS.
+
+    Parameters
+    ----------
+    ins : tuple of two ints
+        First and last time of the INS, GPS ns.
+    spans : mapping
+        The same by sensor.
+
+    Raises
+    ------
+    RawDataError
+        A sensor's times lie before or behind those of the INS; the message names a likely cause.
+    """
     for sensor, (first, last) in spans.items():
         start, end = ins
         if last < start or first > end:
-            apart = first - start
-            days = whole_days(ins, (first, last), partial(_meet, ins, (first, last)))
-            weeks = round(apart / WEEK_NS)
-            hint = "check the instruments' clocks and latency_s"
-            if days:
-                amount, ahead, why = days
-                hint = f"{sensor} is {amount} {'ahead of' if ahead else 'behind'} the INS: {why}"
-            elif weeks and _meet(ins, (first, last), weeks * WEEK_NS):
-                hint = f"they are {plural(abs(weeks), 'week')} apart: check gps_week"
-            elif abs(apart) > WEEK_NS / 2:
-                hint = f"they are {abs(apart) / DAY_NS:.0f} days apart: name files of one session"
             raise RawDataError(
                 f"session.yaml: no time overlap: ins {utc_text(start)} to {utc_text(end)}, "
-                f"{sensor} {utc_text(first)} to {utc_text(last)}; {hint}"
+                f"{sensor} {utc_text(first)} to {utc_text(last)}; {_likely_cause(ins, sensor, (first, last))}"
             )
 
 
-def files_of(partials: dict[str, list[tuple[str, Seen]]]) -> pd.DataFrame:
+def _likely_cause(ins: tuple[int, int], sensor: str, span: tuple[int, int]) -> str:
+    """Return why a sensor's times may lie apart from those of the INS, with the remedy."""
+    apart_ns = span[0] - ins[0]
+    days = whole_days_apart(ins, span, partial(_overlap, ins, span))
+    weeks = round(apart_ns / WEEK_NS)
+    if days:
+        return f"{sensor} is {days.amount} {'ahead of' if days.ahead else 'behind'} the INS: {days.reason}"
+    if weeks and _overlap(ins, span, weeks * WEEK_NS):
+        return f"they are {plural(abs(weeks), 'week')} apart: check gps_week"
+    if abs(apart_ns) > WEEK_NS / 2:
+        return f"they are {abs(apart_ns) / DAY_NS:.0f} days apart: name files of one session"
+    return "check the instruments' clocks and latency_s"
+
+
+def files_table(partials: Mapping[str, Summaries]) -> pd.DataFrame:
+    """Return the table ``files``: one row per raw file; ``partials``: summaries by sensor."""
     rows = []
-    for sensor, pieces in partials.items():
-        by_file: dict[str, list[Seen]] = {}
-        for name, seen in pieces:
-            by_file.setdefault(name.split("#")[0], []).append(seen)
-        for name, seen_list in by_file.items():
-            epochs = np.concatenate([seen.epochs_ns for seen in seen_list])
-            records = sum(seen.count for seen in seen_list)
-            accuracy = any(seen.accuracy for seen in seen_list)
-            if accuracy:
-                records = len(epochs)
-            rate = rate_hz(sensor, epochs, records)
-            rows.append(
-                {
-                    "sensor": "accuracy" if accuracy else sensor,
-                    "file": name,
-                    "records": records,
-                    "dropped": sum(sum(seen.dropped.values()) for seen in seen_list),
-                    "first_ns": int(epochs.min()) if len(epochs) else -1,
-                    "last_ns": int(epochs.max()) if len(epochs) else -1,
-                    "rate_hz": rate,
-                    "sound_speed_low_m_s": _finite(min(seen.lowest_speed_m_s for seen in seen_list)),
-                    "sound_speed_high_m_s": _finite(max(seen.highest_speed_m_s for seen in seen_list)),
-                }
-            )
+    for sensor, summaries in partials.items():
+        by_file: dict[str, list[ChunkSummary]] = {}
+        for name, summary in summaries:
+            by_file.setdefault(_file_name(name), []).append(summary)
+        rows += [_file_row(sensor, name, of_file) for name, of_file in by_file.items()]
     return pd.DataFrame(rows)
+
+
+def _file_row(sensor: str, name: str, summaries: Sequence[ChunkSummary]) -> dict[str, Any]:
+    epochs = np.concatenate([summary.epochs_ns for summary in summaries])
+    accuracy = any(summary.accuracy for summary in summaries)
+    records = len(epochs) if accuracy else sum(summary.count for summary in summaries)
+    return {
+        "sensor": "accuracy" if accuracy else sensor,
+        "file": name,
+        "records": records,
+        "dropped": sum(sum(summary.dropped.values()) for summary in summaries),
+        "first_ns": int(epochs.min()) if len(epochs) else -1,
+        "last_ns": int(epochs.max()) if len(epochs) else -1,
+        "rate_hz": rate_hz(sensor, epochs, records),
+        "sound_speed_low_m_s": _finite(min(summary.lowest_speed_m_s for summary in summaries)),
+        "sound_speed_high_m_s": _finite(max(summary.highest_speed_m_s for summary in summaries)),
+    }
 
 
 def _finite(value: float) -> float:
     return value if np.isfinite(value) else np.nan
 
 
-def gaps_between(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.DataFrame:
+def gaps_table(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.DataFrame:
+    """Return the table ``gaps``.
+
+    Parameters
+    ----------
+    epochs_ns : dict
+        Ascending times of records or pings by sensor, GPS ns.
+    max_gap_ns : int
+        Longest interval without a record that is no gap, ns.
+    """
     rows: list[dict[str, Any]] = []
     for sensor, t_ns in epochs_ns.items():
         stretches = split_at_gaps(t_ns, max_gap_ns)
@@ -121,31 +156,35 @@ def gaps_between(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd
     return pd.DataFrame(rows, columns=[column.name for column in GAPS.columns])
 
 
-def counts_of(
-    partials: dict[str, list[tuple[str, Seen]]], repeated: dict[str, int], sigmas_outside: int
+def ingest_counts_table(
+    partials: Mapping[str, Summaries], repeated: Mapping[str, int], sigmas_outside: int
 ) -> pd.DataFrame:
-    rows = []
-    for source, pieces in partials.items():
-        total: dict[str, int] = {"used": 0, "repeated time": repeated.get(source, 0)}
-        for _, seen in pieces:
-            total["used"] += seen.count
-            for reason, number in seen.dropped.items():
-                total[reason] = total.get(reason, 0) + number
-        total["used"] -= total["repeated time"]
-        if source == "ins" and sigmas_outside:
-            total["accuracy outside the INS's time"] = sigmas_outside
-        rows += [{"source": source, "reason": reason, "count": number} for reason, number in sorted(total.items())]
-    return pd.DataFrame(rows)
+    """Return the table ``counts`` of stage ingest.
+
+    Parameters
+    ----------
+    partials : mapping
+        Summaries by sensor.
+    repeated : mapping
+        By sensor: good rows that were left out later, because another file has a record of the same time.
+    sigmas_outside : int
+        Rows of INS sigmas at times without INS records.
+    """
+    counts: dict[str, list[tuple[str, Mapping[str, int]]]] = {}
+    for sensor, summaries in partials.items():
+        counts[sensor] = [(name, {"used": summary.count} | summary.dropped) for name, summary in summaries]
+        number = repeated.get(sensor, 0)
+        counts[sensor].append(("", {"used": -number, "repeated time": number}))
+    if sigmas_outside:
+        counts["ins"].append(("", {"accuracy outside the INS's time": sigmas_outside}))
+    return counts_table(counts)
 
 
-def thinned(sigmas: Batch) -> dict[str, NDArray[Any]]:
-    """In order of time, the first row of each half second."""
+def thin_sigmas(sigmas: Batch) -> dict[str, NDArray[Any]]:
+    """Return the first row of each half second, in order of time."""
     if not sigmas:
         return {}
     order = np.argsort(sigmas["t_ns"], kind="stable")
-    slot = sigmas["t_ns"][order] // SPACING_NS
-    kept = order[np.diff(slot, prepend=slot[:1] - 1) > 0]
+    half_second = sigmas["t_ns"][order] // _SPACING_NS
+    kept = order[np.diff(half_second, prepend=half_second[:1] - 1) > 0]
     return {name: values[kept] for name, values in sigmas.items()}
-
-
-SPACING_NS = NS // 2  # of the rows that are kept

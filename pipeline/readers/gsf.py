@@ -40,7 +40,7 @@ from pipeline.readers.gsf_pings import (
 from pipeline.readers.gsf_records import HEADER, PING, PROFILE, gsf_records
 from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import RepeatedPings
-from pipeline.readers.row_checks import Sieve
+from pipeline.readers.row_checks import RowFilter
 from pipeline.readers.sounding_chunks import (
     NO_TILT_DEG,
     beam_numbers,
@@ -133,7 +133,7 @@ class GsfPart:
     def _chunk(self, group: list[_NumberedPing], dropped: Counter[str]) -> Chunk:
         pings = [numbered.ping for numbered in group]
         counts = np.array([len(ping.angle_deg) for ping in pings])
-        sieve = Sieve(
+        rows = RowFilter(
             {
                 "t_ns": per_sounding([ping.t_ns for ping in pings], counts, np.int64),
                 "ping": per_sounding([numbered.number for numbered in group], counts, np.int64),
@@ -147,9 +147,9 @@ class GsfPart:
             },
             dropped,
         )
-        sieve.keep(sieve["usable"], "flagged as not usable")
-        sieve.keep(sieve["smooth"], "angles of the ping jump")
-        return checked_chunk(sieve, self.latency_s)
+        rows.keep(rows["usable"], "flagged as not usable")
+        rows.keep(rows["smooth"], "angles of the ping jump")
+        return checked_chunk(rows, self.latency_s)
 
 
 def _pings(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, GsfPing | None, bytes, float | None]]:

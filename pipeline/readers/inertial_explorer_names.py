@@ -2,10 +2,11 @@
 
 Names are those of the Waypoint Software User Manual, or as exports print them: ``Date`` is the date of ``GPSTime``
 (with the unit d it is the day of the week, as ``D`` is), ``CorrTime`` the GPS time corrected for the receiver's clock.
-``Project Name`` is one column. A name that lacks up to two letters at its end, cut off by the width of its column, is
-taken where one known name alone begins so. ``UT UT UTCTim`` over ``ho mi (sec)`` is one time in three columns.
+``Project Name`` is one column. A name may lack up to two letters at its end, cut off by the width of its column: it is
+completed where exactly one known name begins with it. ``UT UT UTCTim`` over ``ho mi (sec)`` is one time in three
+columns.
 
-Of units, of which some columns (Q) have none, each belongs to the name above it: the one that ends nearest.
+Some columns (Q) have no unit. Each unit belongs to the name above it, the one that ends nearest.
 """
 
 import re
@@ -17,89 +18,101 @@ import numpy as np
 
 from pipeline.errors import RawDataError
 
-LONGEST = 8192  # letters of the names, or of the units
-LEAST_NAMES, MOST_NAMES = 4, 300
+LONGEST = 8192  # letters of the line of names, or of units
+LEAST_NAMES, MOST_NAMES = 4, 300  # known names at least; names at most
 TITLES = {name.lower(): name for name in (
     "Week", "GPSTime", "GPSDate", "UTCTime", "UTCDate", "Latitude", "Longitude", "H-Ell", "H-MSL", "Undulation", "Roll",
     "Pitch", "Heading", "Q", "SDNorth", "SDEast", "SDHeight", "RollSD", "PitchSD", "HdngSD",
 )} | {"weekday": "D"}  # fmt: skip
-OTHERS = ("rollsep", "ptchsep", "hdngsep", "heave", "ambstatus", "seqnum", "project name", "x-ecef", "y-ecef", "z-ecef")
+_OTHER_NAMES = (
+    "rollsep", "ptchsep", "hdngsep", "heave", "ambstatus", "seqnum", "project name",
+    "x-ecef", "y-ecef", "z-ecef",
+)
 UNITLESS = frozenset({"q", "ambstatus", "seqnum", "ns", "project name"})
 TWO_WORDS = {("project", "name")}
 SYNONYMS = {"date": "gpsdate", "corrtime": "gpstime"}
-OWN = frozenset({"gpstime", "utctime", "h-ell", "h-msl"})  # of these at least one, of all names at least LEAST_NAMES
+_CHARACTERISTIC = frozenset({"gpstime", "utctime", "h-ell", "h-msl"})  # a header has at least one of these
 MOST_CUT, LEAST_LEFT = 2, 3  # letters that a name may lack, and those that it must have
-TIMES = ("gpstime", "utctime")
+TIME_COLUMNS = ("gpstime", "utctime")
 SPLIT_TIME = (("ho", "hr", "h", "hour", "hours"), ("mi", "min", "minutes"), ("sec", "s", "seconds"))
 DAY_OF_WEEK = "d"  # the unit
-ORDERS = ("mdy", "dmy", "ymd")
-THREE = ("dms", "hms", *ORDERS)  # units of three columns
+DATE_ORDERS = ("mdy", "dmy", "ymd")
+THREE_COLUMN_UNITS = ("dms", "hms", *DATE_ORDERS)  # units of three columns
 
 
 @dataclass(frozen=True)
-class Names:
-    """By column: its name here, as printed, its unit (bare, empty where it has none)."""
+class HeaderColumns:
+    """Names and units by column."""
 
-    names: tuple[str, ...]
-    printed: tuple[str, ...]
-    units: tuple[str, ...]
+    names: tuple[str, ...]  # known names in lower case, else the word itself
+    printed: tuple[str, ...]  # as they stand in the file
+    units: tuple[str, ...]  # without brackets; empty: none
 
 
-def column_names(line: str) -> list[str] | None:
-    """The names in lower case, where this line is one of Inertial Explorer's names."""
+def export_column_names(line: str) -> list[str] | None:
+    """Return the names in lower case; None where this is not a line of Inertial Explorer's names."""
     if len(line) > LONGEST:
         return None
     names = _known([word for word, _ in _words(line)])
     known = TITLES.keys() & set(names)
-    return names if len(known) >= LEAST_NAMES and known & OWN and len(names) <= MOST_NAMES else None
+    return names if len(known) >= LEAST_NAMES and known & _CHARACTERISTIC and len(names) <= MOST_NAMES else None
 
 
-def names_and_units(names: str, units: str | None, file: str) -> Names:
-    """``units``: the line below the names; None where there is none.
+def names_and_units(names: str, units: str | None, file: str) -> HeaderColumns:
+    """Read the header's two lines.
+
+    Parameters
+    ----------
+    names : str
+        The line of names.
+    units : str or None
+        The line below it; None: it has no units.
+    file : str
+        The file's path in the session folder, for messages.
 
     Raises
     ------
     RawDataError
-        Units that stand under no name, or of which it cannot be told to which name they belong.
+        Units stand under no name, or it cannot be told to which name they belong.
     """
     words = _words(names)
     printed = [word for word, _ in words]
     known = _known(printed)
-    told = [""] * len(words) if units is None else _units(names, words, known, units, file)
-    known = [_weekday(name, word, unit) for name, word, unit in zip(known, printed, told, strict=True)]
-    return _joined_times(Names(tuple(known), tuple(printed), tuple(told)))
+    column_units = [""] * len(words) if units is None else _units(names, words, units, file)
+    known = [_weekday(name, word, unit) for name, word, unit in zip(known, printed, column_units, strict=True)]
+    return _join_times(HeaderColumns(tuple(known), tuple(printed), tuple(column_units)))
 
 
 # --- names -----------------------------------------------------------------------------------------------------------
 def _words(line: str) -> list[tuple[str, int]]:
-    """The words as printed, and where each ends; of a list with commas what stands between them."""
+    """Return the words as printed, and where each ends; in a line with commas what stands between these."""
     if "," in line:
         return [(word.strip(), 0) for word in line.split(",")]
     words: list[tuple[str, int]] = []
-    for found in re.finditer(r"\S+", line.expandtabs()):
-        word = found.group()
+    for match in re.finditer(r"\S+", line.expandtabs()):
+        word = match.group()
         if words and (words[-1][0].lower(), word.lower()) in TWO_WORDS:
-            words[-1] = (f"{words[-1][0]} {word}", found.end())
+            words[-1] = (f"{words[-1][0]} {word}", match.end())
         else:
-            words.append((word, found.end()))
+            words.append((word, match.end()))
     return words
 
 
 def _known(printed: Sequence[str]) -> list[str]:
-    """Each word's known name, else the word itself, in lower case. What is written in full goes first."""
+    """Return each word's known name, else the word itself, in lower case; names written in full take precedence."""
     words = [re.sub(r"\.\d+$", "", word.lower()) for word in printed]  # GPSTime.1 is a second GPSTime
     full = set(words)
-    return [_meant(word, full) for word in words]
+    return [_full_name(word, full) for word in words]
 
 
-def _meant(word: str, full: set[str]) -> str:
-    if word in TITLES or word in OTHERS:
+def _full_name(word: str, full: set[str]) -> str:
+    if word in TITLES or word in _OTHER_NAMES:
         return word
     if word in SYNONYMS:
         return word if SYNONYMS[word] in full else SYNONYMS[word]
     longer = [
         name
-        for name in (*TITLES, *OTHERS, *SYNONYMS)
+        for name in (*TITLES, *_OTHER_NAMES, *SYNONYMS)
         if name.startswith(word) and len(word) >= LEAST_LEFT and len(name) - len(word) <= MOST_CUT
     ]
     if len(longer) != 1:
@@ -109,29 +122,30 @@ def _meant(word: str, full: set[str]) -> str:
 
 
 def _weekday(name: str, printed: str, unit: str) -> str:
-    """
+    """Return weekday for a column of the day of the week, else the name.
+
     >>> _weekday("gpsdate", "Date", "d"), _weekday("d", "D", "d"), _weekday("gpsdate", "Date", "mdy")
     ('weekday', 'weekday', 'gpsdate')
     """
     return "weekday" if unit == DAY_OF_WEEK and printed.lower() in ("d", "date", "day", "gpsdate") else name
 
 
-def _joined_times(given: Names) -> Names:
-    """A time whose hours and minutes stand in columns of their own before it becomes one, of the unit hms."""
-    names, printed, units = list(given.names), list(given.printed), list(given.units)
+def _join_times(header: HeaderColumns) -> HeaderColumns:
+    """Join a time with its hours and minutes in the two columns before it: one column of the unit hms."""
+    names, printed, units = list(header.names), list(header.printed), list(header.units)
     for k in range(len(names) - 1, 1, -1):
-        if names[k] not in TIMES:
+        if names[k] not in TIME_COLUMNS:
             continue
-        three = units[k - 2 : k + 1]
-        start = names[k - 1]  # of the name, over hours and minutes: UT UT UTCTim
+        last_units = units[k - 2 : k + 1]
+        start = names[k - 1]  # the name's beginning, over hours and minutes: UT UT UTCTim
         split = names[k - 2] == start and names[k].startswith(start) and start != names[k]
-        if _are_sixtieths(three) or (split and not any(three)):
+        if _are_sixtieths(last_units) or (split and not any(last_units)):
             names[k - 2 : k + 1] = [names[k]]
             printed[k - 2 : k + 1] = [printed[k]]
             units[k - 2 : k + 1] = ["hms"]
         elif split:
-            names[k] = printed[k].lower()  # whatever those units are: it is not known as a time
-    return Names(tuple(names), tuple(printed), tuple(units))
+            names[k] = printed[k].lower()  # its units are others: it is not known as a time
+    return HeaderColumns(tuple(names), tuple(printed), tuple(units))
 
 
 def _are_sixtieths(units: Sequence[str]) -> bool:
@@ -139,9 +153,10 @@ def _are_sixtieths(units: Sequence[str]) -> bool:
 
 
 # --- units -----------------------------------------------------------------------------------------------------------
-def _units(line: str, words: list[tuple[str, int]], known: list[str], below: str, file: str) -> list[str]:
-    """The unit of each name."""
-    if "," in line:
+def _units(names: str, words: list[tuple[str, int]], below: str, file: str) -> list[str]:
+    """Return the unit of each of the ``words`` in the line of names, from the line ``below`` it."""
+    known = _known([word for word, _ in words])
+    if "," in names:
         bare = [_bare(unit) for unit in below.split(",")]
         return (bare + [""] * len(words))[: len(words)]
     units = list(re.finditer(r"\([^()]*\)|\S+", below[:LONGEST].expandtabs()))
@@ -155,23 +170,25 @@ def _units(line: str, words: list[tuple[str, int]], known: list[str], below: str
     if by_place is None and by_count is None:
         raise RawDataError(f"{file}: its line of units does not stand under its names; export it with its own header")
     if by_place is not None and by_count is not None:
-        for name, word, one, other in zip(known, words, by_place, by_count, strict=True):
-            if name in TITLES and one != other:
+        for name, word, placed, counted in zip(known, words, by_place, by_count, strict=True):
+            if name in TITLES and placed != counted:
                 raise RawDataError(
-                    f"{file}: its units can be read in two ways: column {word[0]} has ({one}) by place, ({other}) by "
-                    "count; export it with its own header"
+                    f"{file}: its units can be read in two ways: column {word[0]} has ({placed}) by place, ({counted}) "
+                    "by count; export it with its own header"
                 )
     return by_place or by_count or []
 
 
 def _placed(units: Sequence[str], places: Sequence[int], count: int) -> list[str]:
-    found = [""] * count
+    """Return ``count`` units: these at their places, the others empty."""
+    all_units = [""] * count
     for place, unit in zip(places, units, strict=True):
-        found[place] = unit
-    return found
+        all_units[place] = unit
+    return all_units
 
 
 def _bare(unit: str) -> str:
+    """Return a unit in lower case without brackets; of three columns without separators."""
     unit = unit.strip().removeprefix("(").removesuffix(")").lower().replace("+/-", "")
     letters = re.sub(r"[\s/:]", "", unit)
-    return letters if letters in THREE else unit.strip()
+    return letters if letters in THREE_COLUMN_UNITS else unit.strip()

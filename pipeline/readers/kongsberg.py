@@ -15,7 +15,7 @@ from pipeline.errors import RawDataError
 from pipeline.gps_time import NS
 from pipeline.readers.kongsberg_arrays import COINCIDENT_TRANSMITTER, SectorSoundings, Transmitter
 from pipeline.readers.raw_file import opened
-from pipeline.readers.row_checks import Sieve
+from pipeline.readers.row_checks import RowFilter
 from pipeline.readers.sounding_chunks import (
     NO_TILT_DEG,
     beam_numbers,
@@ -129,20 +129,20 @@ class KongsbergPart(ABC):
         def joined(values: Callable[[KongsbergPing], NDArray[Any]]) -> NDArray[Any]:
             return np.concatenate([values(ping) for ping in pings])
 
-        axis, part_m, centre_m = joined(self._axes_and_positions).swapaxes(0, 1)
+        axis_mbes, part_mbes_m, centre_mbes_m = joined(self._axes_and_positions).swapaxes(0, 1)
         recorded = SectorSoundings(
             angle_rad=-np.radians(joined(lambda ping: ping.angle_deg)),
             tilt_rad=np.radians(joined(lambda ping: ping.sectors.tilt_deg[ping.sector])),
-            axis=axis,
-            part_m=part_m,
-            centre_m=centre_m,
+            axis_mbes=axis_mbes,
+            part_mbes_m=part_mbes_m,
+            centre_mbes_m=centre_mbes_m,
             two_way_time_s=joined(lambda ping: ping.two_way_time_s),
             sound_speed_m_s=per_sounding([ping.sound_speed_m_s for ping in pings], counts, np.float64),
         )
         angle_rad, tilt_rad, time_s = recorded.in_mbes(self.projector_offset_m)
         has_values = np.isfinite(recorded.angle_rad) & np.isfinite(recorded.two_way_time_s)
         delay_ns = joined(lambda ping: np.rint(ping.sectors.delay_s * NS).astype(np.int64)[ping.sector])
-        sieve = Sieve(
+        rows = RowFilter(
             {
                 "t_ns": per_sounding([ping.t_ns for ping in pings], counts, np.int64) + delay_ns,
                 "ping": per_sounding([ping.number for ping in pings], counts, np.int64),
@@ -157,10 +157,10 @@ class KongsbergPart(ABC):
             },
             dropped,
         )
-        sieve.keep(~sieve["extra"], "extra detection")
-        sieve.keep(~sieve["rejected"], "rejected detection")
-        sieve.keep(sieve["intersects"], "beam, fan and range do not meet")
-        return checked_chunk(sieve, self.latency_s)
+        rows.keep(~rows["extra"], "extra detection")
+        rows.keep(~rows["rejected"], "rejected detection")
+        rows.keep(rows["intersects"], "beam, fan and range do not meet")
+        return checked_chunk(rows, self.latency_s)
 
     def _axes_and_positions(self, ping: KongsbergPing) -> NDArray[Any]:
         """Return for each sounding (n, 3, 3): the axis of its transmitter, and the positions of part and centre."""

@@ -24,25 +24,25 @@ class Transmitter:
 
     Parameters
     ----------
-    axis
+    axis_mbes
         The array's own forward axis (3,).
-    centre_m
+    centre_mbes_m
         Its centre (3,).
-    parts_m
+    parts_mbes_m
         The parts of the array, by number: their positions from the centre (3,).
     """
 
-    axis: Array
-    centre_m: Array
-    parts_m: Mapping[int, Array] = field(default_factory=dict)
+    axis_mbes: Array
+    centre_mbes_m: Array
+    parts_mbes_m: Mapping[int, Array] = field(default_factory=dict)
 
-    def axis_and_positions(self, part: int, centre_m: Sequence[float] | None) -> Array:
+    def axis_and_positions(self, part: int, centre_mbes_m: Sequence[float] | None) -> Array:
         """Return rows (3, 3): the axis, the position of a part and that of the centre.
 
-        ``centre_m`` is session.yaml's, and replaces the transmitter's own; None: it has none.
+        ``centre_mbes_m`` is session.yaml's, and replaces the transmitter's own; None: it has none.
         """
-        centre = self.centre_m if centre_m is None else np.array(centre_m)
-        return np.array([self.axis, centre + self.parts_m.get(part, np.zeros(3)), centre])
+        centre = self.centre_mbes_m if centre_mbes_m is None else np.array(centre_mbes_m)
+        return np.array([self.axis_mbes, centre + self.parts_mbes_m.get(part, np.zeros(3)), centre])
 
 
 COINCIDENT_TRANSMITTER = Transmitter(np.array([0.0, 1.0, 0.0]), np.zeros(3))  # nothing is known, or nothing to be known
@@ -58,9 +58,9 @@ class SectorSoundings:
         Beam angles (n,), starboard +.
     tilt_rad
         The sectors' tilts (n,) in their transmitters' own frames.
-    axis
-        The transmitters' axes (n, 3) in ``mbes``.
-    part_m, centre_m
+    axis_mbes
+        The transmitters' forward axes (n, 3).
+    part_mbes_m, centre_mbes_m
         Positions (n, 3) in ``mbes`` of the part that sent and of its transmitter's centre.
     two_way_time_s, sound_speed_m_s
         Time from the part to the target and back to the receiver (n,), and speed at the head (n,).
@@ -68,9 +68,9 @@ class SectorSoundings:
 
     angle_rad: Array
     tilt_rad: Array
-    axis: Array
-    part_m: Array
-    centre_m: Array
+    axis_mbes: Array
+    part_mbes_m: Array
+    centre_mbes_m: Array
     two_way_time_s: Array
     sound_speed_m_s: Array
 
@@ -86,20 +86,20 @@ class SectorSoundings:
         ``projector_offset_m`` o, the time is (|x| + |x - o|) / speed, from which the range is then taken. The time of a
         path that is too short is NaN; a time of 0, which is no detection, stays 0.
         """
-        if not self.part_m.any() and not self.centre_m.any():
-            return self.angle_rad, tilt_in_mbes(self.angle_rad, self.tilt_rad, self.axis), self.two_way_time_s
-        t, q = self.part_m.copy(), np.zeros_like(self.part_m)
-        t[:, 1] -= self.centre_m[:, 1]
-        q[:, 1] = -self.centre_m[:, 1]
+        if not self.part_mbes_m.any() and not self.centre_mbes_m.any():
+            return self.angle_rad, tilt_in_mbes(self.angle_rad, self.tilt_rad, self.axis_mbes), self.two_way_time_s
+        t, q = self.part_mbes_m.copy(), np.zeros_like(self.part_mbes_m)
+        t[:, 1] -= self.centre_mbes_m[:, 1]
+        q[:, 1] = -self.centre_mbes_m[:, 1]
         path = self.two_way_time_s * self.sound_speed_m_s
         side = np.where(np.abs(self.angle_rad) > np.pi / 2, 1.0, -1.0)
         r, s = path / 2, np.sin(self.angle_rad)
-        p = np.sin(tilt_in_mbes(self.angle_rad, self.tilt_rad, self.axis))
+        p = np.sin(tilt_in_mbes(self.angle_rad, self.tilt_rad, self.axis_mbes))
         for _ in range(_ITERATIONS):
             x = r[:, None] * np.column_stack([s, p, side * np.sqrt(np.maximum(1 - s**2 - p**2, 0.0))])
             from_part, to_receiver = np.linalg.norm(x - t, axis=1), np.linalg.norm(x - q, axis=1)
             angle = _on_side(np.arcsin((x - t)[:, 0] / from_part), side)
-            along = from_part * np.sin(tilt_in_mbes(angle, self.tilt_rad, self.axis)) + t[:, 1]
+            along = from_part * np.sin(tilt_in_mbes(angle, self.tilt_rad, self.axis_mbes)) + t[:, 1]
             s, p = to_receiver * np.sin(self.angle_rad) / r, along / r
             r = r + (path - from_part - to_receiver) / 2
         offset_m = np.array(projector_offset_m or (0.0, 0.0, 0.0))

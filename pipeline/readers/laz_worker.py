@@ -3,22 +3,22 @@
 lazrs 0.8 can die of a damaged file (segmentation fault, failed allocation, panic) instead of raising. Here only this
 process dies, and :mod:`pipeline.readers.laz` says which file it was. It imports nothing of the project.
 
-It writes what :mod:`pipeline.readers.decoder_process` says.
+It writes batches in the form that :mod:`pipeline.readers.decoder_process` describes: GPS time, x, y, z.
 """
 
 import sys
 
 import numpy as np
 
-MEMORY_BYTES = 1 << 30  # written to; a batch and its chunks need a twentieth
+_MEMORY_BYTES = 1 << 30  # written to; a batch and its chunks need a twentieth
 
 
-def main(path: str, start: int, stop: int, batch: int) -> None:
+def _main(path: str, start: int, stop: int, batch: int) -> None:
     import resource
 
     import laspy
 
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_DATA, (_MEMORY_BYTES, _MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     wanted = laspy.DecompressionSelection
     selection = wanted.base() | wanted.XY_RETURNS_CHANNEL | wanted.Z | wanted.GPS_TIME
@@ -40,8 +40,8 @@ def main(path: str, start: int, stop: int, batch: int) -> None:
 
 if __name__ == "__main__":
     try:
-        main(sys.argv[1], *(int(word) for word in sys.argv[2:]))
+        _main(sys.argv[1], *(int(word) for word in sys.argv[2:]))
     except Exception as error:  # the parent makes one RawDataError of it
-        told = f"{type(error).__name__}: {error}".encode()
-        sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(told)).tobytes() + told)
+        text = f"{type(error).__name__}: {error}".encode()
+        sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(text)).tobytes() + text)
         sys.stdout.buffer.flush()

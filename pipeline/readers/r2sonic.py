@@ -32,7 +32,7 @@ from pipeline.gps_time import NS, gps_ns_from_unix_utc
 from pipeline.readers.r2sonic_packets import Sections, bare_packets, xtf_packets
 from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import RepeatedPings
-from pipeline.readers.row_checks import Sieve
+from pipeline.readers.row_checks import RowFilter
 from pipeline.readers.sounding_chunks import MAX_BEAMS, beam_numbers, checked_chunk, chunks_of_pings, per_sounding
 
 H0 = struct.Struct(">28xIII4xf20xf42xH")
@@ -150,7 +150,7 @@ def _chunk(pings: list[R2sonicPing], latency_s: float, dropped: Counter[str]) ->
     t_ns = gps_ns_from_unix_utc(seconds, nanoseconds)
     scale_s = per_sounding([ping.range_scale_s for ping in pings], counts, np.float64)
     angle_rad = np.concatenate([ping.angles_rad for ping in pings])
-    sieve = Sieve(
+    rows = RowFilter(
         {
             "t_ns": per_sounding(t_ns, counts, np.int64),
             "ping": per_sounding([ping.number for ping in pings], counts, np.int64),
@@ -162,4 +162,4 @@ def _chunk(pings: list[R2sonicPing], latency_s: float, dropped: Counter[str]) ->
         },
         dropped,
     )
-    return checked_chunk(sieve, latency_s)
+    return checked_chunk(rows, latency_s)

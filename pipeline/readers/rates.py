@@ -1,4 +1,4 @@
-"""How often a sensor tells something."""
+"""Record rates of sensors."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,24 @@ ONE_PING_NS = 4_000_000  # sectors of one ping are sent within milliseconds, and
 
 
 def rate_hz(sensor: str, epochs_ns: NDArray[np.int64], records: int) -> float:
-    """Records of an INS and pings of a sonar by their usual step, points of a laser by their number; NaN of too few.
+    """Return a sensor's rate: median of INS records and pings, mean of laser points; NaN of fewer than two epochs.
 
+    Parameters
+    ----------
+    sensor : str
+        ins, laser or mbes.
+    epochs_ns : (n,) array
+        Times of INS records, pings or (some) laser points, GPS ns.
+    records : int
+        Number of laser points.
+
+    Returns
+    -------
+    float
+        Hz.
+
+    Examples
+    --------
     >>> ping = np.array([0, 220_000, 440_000])
     >>> rate_hz("mbes", np.concatenate([ping, ping + NS // 10, ping + NS // 5]), 900)
     10.0

@@ -1,4 +1,4 @@
-"""Raw files as bytes: opening them, and looking into them without holding them in memory."""
+"""Raw files as bytes: opening them, and reading at any place without holding them in memory."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,12 +7,12 @@ from typing import BinaryIO
 
 from pipeline.errors import RawDataError
 
-BLOCK = 1 << 20
+_BLOCK = 1 << 20
 
 
 @contextmanager
 def opened(path: Path, name: str) -> Iterator[BinaryIO]:
-    """The file, open for reading bytes; whatever the operating system refuses is a RawDataError."""
+    """Open a file for reading bytes; an error of the operating system becomes a RawDataError."""
     try:
         with path.open("rb") as file:
             yield file
@@ -21,26 +21,41 @@ def opened(path: Path, name: str) -> Iterator[BinaryIO]:
 
 
 def size_of(file: BinaryIO) -> int:
-    """Size in bytes; the position is left at the start."""
+    """Return the size in bytes, and set the position to the start."""
     size = file.seek(0, 2)
     file.seek(0)
     return size
 
 
 def read_at(file: BinaryIO, offset: int, count: int) -> bytes:
-    """At most ``count`` bytes from ``offset``."""
+    """Return at most ``count`` bytes from ``offset``."""
     file.seek(offset)
     return file.read(count)
 
 
 def find(file: BinaryIO, pattern: bytes, start: int) -> int:
-    """Where ``pattern`` occurs first at or after ``start``; -1 where it does not. Looks farther bit by bit."""
+    """Find the first occurrence of a pattern, reading longer and longer blocks.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        The file.
+    pattern : bytes
+        The bytes to look for.
+    start : int
+        Byte at which to begin.
+
+    Returns
+    -------
+    int
+        Byte at or after ``start`` at which the pattern begins; -1 without one.
+    """
     count = 4096
     while True:
         block = read_at(file, start, count)
-        if (found := block.find(pattern)) >= 0:
-            return start + found
+        if (place := block.find(pattern)) >= 0:
+            return start + place
         if len(block) < count:
             return -1
         start += count - len(pattern) + 1
-        count = min(2 * count, BLOCK)
+        count = min(2 * count, _BLOCK)

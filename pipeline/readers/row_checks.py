@@ -65,7 +65,7 @@ def no_rows(names: tuple[str, ...], dropped: Counter[str]) -> Chunk:
 
 
 @dataclass
-class Sieve:
+class RowFilter:
     """Equally long columns that lose rows, test by test; each test's losses are counted under its reason."""
 
     columns: Columns
@@ -113,19 +113,19 @@ def latency_ns(latency_s: float) -> int:
     return round(latency_s * NS)
 
 
-def keep_possible_poses(sieve: Sieve) -> None:
+def keep_possible_poses(rows: RowFilter) -> None:
     """Keep the INS rows with a position on the earth and angles of an attitude; bring azimuths into [0, 2 pi).
 
     The column t_ns is not needed yet.
     """
-    sieve.keep_finite()
-    latitude, longitude = sieve["latitude_rad"], sieve["longitude_rad"]
+    rows.keep_finite()
+    latitude, longitude = rows["latitude_rad"], rows["longitude_rad"]
     on_earth = (latitude > -np.pi / 2) & (latitude < np.pi / 2) & (np.abs(longitude) <= 2 * np.pi)
-    sieve.keep(on_earth & ((latitude != 0) | (longitude != 0)), "no position")
-    sieve.keep(np.abs(sieve["height_m"]) < MAX_HEIGHT_M, "impossible height")
-    angles = (np.abs(sieve["roll_rad"]) <= np.pi) & (np.abs(sieve["pitch_rad"]) <= np.pi / 2)
-    sieve.keep(angles & (np.abs(sieve["azimuth_rad"]) <= 4 * np.pi), "impossible attitude")
-    sieve.columns["azimuth_rad"] = np.mod(sieve["azimuth_rad"], 2 * np.pi)
+    rows.keep(on_earth & ((latitude != 0) | (longitude != 0)), "no position")
+    rows.keep(np.abs(rows["height_m"]) < MAX_HEIGHT_M, "impossible height")
+    angles = (np.abs(rows["roll_rad"]) <= np.pi) & (np.abs(rows["pitch_rad"]) <= np.pi / 2)
+    rows.keep(angles & (np.abs(rows["azimuth_rad"]) <= 4 * np.pi), "impossible attitude")
+    rows.columns["azimuth_rad"] = np.mod(rows["azimuth_rad"], 2 * np.pi)
 
 
 def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dropped: Counter[str]) -> Columns:
@@ -142,28 +142,29 @@ def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dr
     """
     if not recorded or not len(t_ns):
         return {}
-    sieve = Sieve({"t_ns": t_ns} | {name: np.asarray(values, np.float64) for name, values in recorded.items()}, dropped)
-    good = np.ones(len(sieve), dtype=bool)
+    columns = {name: np.asarray(values, np.float64) for name, values in recorded.items()}
+    rows = RowFilter({"t_ns": t_ns} | columns, dropped)
+    good = np.ones(len(rows), dtype=bool)
     for name in recorded:
-        good &= (sieve[name] > 0) & (sieve[name] <= MAX_SIGMA[name.rpartition("_")[2]])
-    sieve.keep(good, "impossible accuracy")
-    return {name: sieve.columns.get(name, np.full(len(sieve), np.nan)) for name in SIGMA_COLUMNS}
+        good &= (rows[name] > 0) & (rows[name] <= MAX_SIGMA[name.rpartition("_")[2]])
+    rows.keep(good, "impossible accuracy")
+    return {name: rows.columns.get(name, np.full(len(rows), np.nan)) for name in SIGMA_COLUMNS}
 
 
-def keep_possible_soundings(sieve: Sieve) -> None:
+def keep_possible_soundings(rows: RowFilter) -> None:
     """Keep the soundings with a detection, and a travel time, angles and a sound speed that are possible."""
-    sieve.keep_finite()
-    speed = sieve["sound_speed_m_s"]
-    sieve.keep((speed >= MIN_SPEED_M_S) & (speed <= MAX_SPEED_M_S), "impossible sound speed")
-    sieve.keep(sieve["two_way_time_s"] != 0, "no detection")
-    time = sieve["two_way_time_s"]
-    sieve.keep((time > 0) & (time < MAX_TRAVEL_S), "impossible travel time")
-    sieve.keep(np.abs(sieve["angle_rad"]) <= MAX_ANGLE_RAD, "impossible angle")
-    sieve.keep(np.abs(sieve["transmit_tilt_rad"]) <= MAX_TILT_RAD, "impossible tilt")
+    rows.keep_finite()
+    speed = rows["sound_speed_m_s"]
+    rows.keep((speed >= MIN_SPEED_M_S) & (speed <= MAX_SPEED_M_S), "impossible sound speed")
+    rows.keep(rows["two_way_time_s"] != 0, "no detection")
+    time = rows["two_way_time_s"]
+    rows.keep((time > 0) & (time < MAX_TRAVEL_S), "impossible travel time")
+    rows.keep(np.abs(rows["angle_rad"]) <= MAX_ANGLE_RAD, "impossible angle")
+    rows.keep(np.abs(rows["transmit_tilt_rad"]) <= MAX_TILT_RAD, "impossible tilt")
 
 
 @dataclass
-class Order:
+class TimeOrder:
     """Keeps the INS records of one file in ascending order of time; records that step back are left out and counted."""
 
     name: str
@@ -171,17 +172,17 @@ class Order:
     records: int = 0
     backwards: int = 0
 
-    def keep(self, sieve: Sieve) -> None:
+    def keep(self, rows: RowFilter) -> None:
         """Keep the rows that are later than all rows before, in this batch and the ones before it."""
-        t_ns = sieve["t_ns"]
+        t_ns = rows["t_ns"]
         latest = np.maximum.accumulate(np.concatenate([[self.last_ns], t_ns]))
         earlier = t_ns < latest[:-1]
         self.records += len(t_ns)
         self.backwards += int(np.count_nonzero(earlier))
         self.last_ns = int(latest[-1])
         later = t_ns > latest[:-1]
-        sieve.keep(later | earlier, "repeated time")
-        sieve.keep(later[later | earlier], "time running backwards")
+        rows.keep(later | earlier, "repeated time")
+        rows.keep(later[later | earlier], "time running backwards")
 
     def check(self) -> None:
         """Raise RawDataError where more than MAX_BACKWARDS_SHARE of the records run backwards."""

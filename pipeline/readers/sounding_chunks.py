@@ -11,7 +11,7 @@ from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
 from pipeline.readers.row_checks import (
     MBES_COLUMNS,
-    Sieve,
+    RowFilter,
     chunk,
     keep_possible_soundings,
     latency_ns,
@@ -77,9 +77,9 @@ def beam_numbers(counts: NDArray[np.int64]) -> NDArray[np.int16]:
     return np.concatenate([np.arange(count, dtype=np.int16) for count in counts])
 
 
-def checked_chunk(sieve: Sieve, latency_s: float) -> Chunk:
+def checked_chunk(rows: RowFilter, latency_s: float) -> Chunk:
     """Return a chunk of the possible soundings, with the latency taken off their times."""
-    sieve.keep(possible_ns(sieve["t_ns"]), "impossible time (clock not set)")
-    keep_possible_soundings(sieve)
-    sieve.columns["t_ns"] = sieve["t_ns"] - latency_ns(latency_s)
-    return chunk(sieve.columns, MBES_COLUMNS, sieve.dropped)
+    rows.keep(possible_ns(rows["t_ns"]), "impossible time (clock not set)")
+    keep_possible_soundings(rows)
+    rows.columns["t_ns"] = rows["t_ns"] - latency_ns(latency_s)
+    return chunk(rows.columns, MBES_COLUMNS, rows.dropped)

@@ -1,4 +1,6 @@
-"""Tables, CSV or Parquet, for instruments whose own format is not read.
+"""Tables, CSV or Parquet, for instruments whose own format is not read: from a table's columns to canonical ones.
+
+:mod:`pipeline.readers.table_files` reads the columns that :mod:`pipeline.readers.table_columns` asks for.
 
 Columns by name (others are ignored; in CSV the first line that does not begin with # or // names them; separated by
 comma, semicolon or tab; numbers with a decimal point):
@@ -12,7 +14,7 @@ comma, semicolon or tab; numbers with a decimal point):
                   transmit_tilt_deg (along track, forward +) where the transmit fan is tilted: 0 without the column
 
 A CSV row of the wrong number of columns, and a last line without line end (it may be cut off), are left out and
-counted. A word where a number should be is refused, as are times and positions that have been stored as float32.
+counted. A file with a word where a number should be is refused, as are times and positions that were stored as float32.
 """
 
 from collections import Counter
@@ -27,15 +29,15 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Chunk
 from pipeline.gps_time import gps_ns_from_week_seconds
-from pipeline.readers.crs import Frame, keep_placed
+from pipeline.readers.crs import LaserFrame, transform_to_ecef
 from pipeline.readers.float32_checks import refuse_float32
 from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import (
     INS_COLUMNS,
     LASER_COLUMNS,
     MBES_COLUMNS,
-    Order,
-    Sieve,
+    RowFilter,
+    TimeOrder,
     chunk,
     keep_possible_poses,
     keep_possible_soundings,
@@ -44,9 +46,10 @@ from pipeline.readers.row_checks import (
     possible_ns,
     possible_week_time,
 )
-from pipeline.readers.table_columns import WHOLE, Sensor, batches
+from pipeline.readers.table_columns import WHOLE_NUMBERS, TableSensor
+from pipeline.readers.table_files import record_batches
 
-CANONICAL = {"ins": INS_COLUMNS, "laser": LASER_COLUMNS, "mbes": MBES_COLUMNS}
+_CANONICAL = {"ins": INS_COLUMNS, "laser": LASER_COLUMNS, "mbes": MBES_COLUMNS}
 
 
 @dataclass(frozen=True)
@@ -55,18 +58,19 @@ class TablePart:
 
     path: Path
     name: str
-    sensor: Sensor
-    frame: Frame
+    sensor: TableSensor
+    frame: LaserFrame
     latency_s: float
     max_records: int | None = None
 
     def chunks(self) -> Iterator[Chunk]:
+        """Yield the rows in canonical columns, batch by batch."""
         dropped: Counter[str] = Counter()
-        order = Order(self.name)
-        canonical = CANONICAL[self.sensor]
+        order = TimeOrder(self.name)
+        canonical = _CANONICAL[self.sensor]
         first = True
         with opened(self.path, self.name) as file:
-            for batch in batches(file, self.name, self.sensor, dropped, self.max_records):
+            for batch in record_batches(file, self.name, self.sensor, dropped, self.max_records):
                 columns = _numpy(batch, dropped)
                 if first:
                     refuse_float32(columns, self.name)
@@ -77,58 +81,61 @@ class TablePart:
         order.check()
 
     @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
-    def _chunk(self, columns: dict[str, NDArray[Any]], order: Order, dropped: Counter[str]) -> Chunk:
-        sieve = Sieve(columns, dropped)
-        _keep_timed(sieve, self.latency_s)
+    def _chunk(self, columns: dict[str, NDArray[Any]], order: TimeOrder, dropped: Counter[str]) -> Chunk:
+        rows = RowFilter(columns, dropped)
+        _keep_possible_times(rows, self.latency_s)
         if self.sensor == "ins":
-            _to_poses(sieve)
-            order.keep(sieve)
+            _to_poses(rows)
+            order.keep(rows)
         elif self.sensor == "laser":
-            sieve.keep_finite()
-            keep_placed(sieve, self.frame, self.name)
+            rows.keep_finite()
+            transform_to_ecef(rows, self.frame, self.name)
         else:
-            _to_soundings(sieve)
-        return chunk(sieve.columns, CANONICAL[self.sensor], dropped)
+            _to_soundings(rows)
+        return chunk(rows.columns, _CANONICAL[self.sensor], dropped)
 
 
 def _numpy(batch: pa.RecordBatch, dropped: Counter[str]) -> dict[str, NDArray[Any]]:
-    whole = batch.drop_null()
-    if whole.num_rows < batch.num_rows:
-        dropped["missing value"] += batch.num_rows - whole.num_rows
+    """Return the columns as arrays, without rows in which a value is missing."""
+    complete = batch.drop_null()
+    if complete.num_rows < batch.num_rows:
+        dropped["missing value"] += batch.num_rows - complete.num_rows
     columns = {}
-    for column in whole.schema.names:
-        values = whole[column].to_numpy(zero_copy_only=False)
-        columns[column] = values if column in WHOLE else values.astype(np.float64)
+    for column in complete.schema.names:
+        values = complete[column].to_numpy(zero_copy_only=False)
+        columns[column] = values if column in WHOLE_NUMBERS else values.astype(np.float64)
     return columns
 
 
-def _keep_timed(sieve: Sieve, latency_s: float) -> None:
-    """Column t_ns, latency taken off, in place of the table's own time."""
-    for column in WHOLE:
-        if column in sieve.columns and sieve[column].dtype.kind == "f":
-            sieve.keep(np.isfinite(sieve[column]) & (np.abs(sieve[column]) < 1e15), "not a whole number")
-            sieve.keep(sieve[column] == np.rint(sieve[column]), "not a whole number")
-    if "gps_ns" in sieve.columns:
-        sieve.keep(possible_ns(sieve["gps_ns"]), "impossible time")
-        t_ns = sieve["gps_ns"].astype(np.int64)
+def _keep_possible_times(rows: RowFilter, latency_s: float) -> None:
+    """Add column t_ns, less the latency, and leave out rows at impossible times."""
+    for column in WHOLE_NUMBERS:
+        if column in rows.columns and rows[column].dtype.kind == "f":
+            rows.keep(np.isfinite(rows[column]) & (np.abs(rows[column]) < 1e15), "not a whole number")
+            rows.keep(rows[column] == np.rint(rows[column]), "not a whole number")
+    if "gps_ns" in rows.columns:
+        rows.keep(possible_ns(rows["gps_ns"]), "impossible time")
+        t_ns = rows["gps_ns"].astype(np.int64)
     else:
-        sieve.keep(possible_week_time(sieve["gps_week"], sieve["seconds_of_week"]), "impossible time")
-        t_ns = gps_ns_from_week_seconds(sieve["gps_week"].astype(np.int64), sieve["seconds_of_week"])
-    sieve.columns["t_ns"] = t_ns - latency_ns(latency_s)
+        rows.keep(possible_week_time(rows["gps_week"], rows["seconds_of_week"]), "impossible time")
+        t_ns = gps_ns_from_week_seconds(rows["gps_week"].astype(np.int64), rows["seconds_of_week"])
+    rows.columns["t_ns"] = t_ns - latency_ns(latency_s)
 
 
-def _to_poses(sieve: Sieve) -> None:
+def _to_poses(rows: RowFilter) -> None:
+    """Add the canonical columns of the INS, radians, and leave out impossible rows."""
     for name in ("latitude", "longitude", "roll", "pitch", "heading"):
-        sieve.columns[f"{name}_rad"] = np.radians(sieve[f"{name}_deg"])
-    sieve.columns["azimuth_rad"] = sieve["heading_rad"]
-    keep_possible_poses(sieve)
+        rows.columns[f"{name}_rad"] = np.radians(rows[f"{name}_deg"])
+    rows.columns["azimuth_rad"] = rows["heading_rad"]
+    keep_possible_poses(rows)
 
 
-def _to_soundings(sieve: Sieve) -> None:
-    sieve.keep((sieve["beam"] >= 0) & (sieve["beam"] <= np.iinfo(np.int16).max), "impossible beam")
-    sieve.columns["angle_rad"] = np.radians(sieve["angle_deg"])
-    tilt_deg = sieve.columns.get("transmit_tilt_deg", np.zeros(len(sieve)))
-    sieve.columns["transmit_tilt_rad"] = np.radians(tilt_deg)
-    if "two_way_time_s" not in sieve.columns:
-        sieve.columns["two_way_time_s"] = 2 * sieve["range_m"] / sieve["sound_speed_m_s"]
-    keep_possible_soundings(sieve)
+def _to_soundings(rows: RowFilter) -> None:
+    """Add the canonical columns of the sonar, radians and seconds, and leave out impossible rows."""
+    rows.keep((rows["beam"] >= 0) & (rows["beam"] <= np.iinfo(np.int16).max), "impossible beam")
+    rows.columns["angle_rad"] = np.radians(rows["angle_deg"])
+    tilt_deg = rows.columns.get("transmit_tilt_deg", np.zeros(len(rows)))
+    rows.columns["transmit_tilt_rad"] = np.radians(tilt_deg)
+    if "two_way_time_s" not in rows.columns:
+        rows.columns["two_way_time_s"] = 2 * rows["range_m"] / rows["sound_speed_m_s"]
+    keep_possible_soundings(rows)

@@ -1,6 +1,10 @@
-"""Times that lie whole days apart: of an INS whose export has seconds of the day where those of the week should be."""
+"""Clocks of sensors that lie whole days apart.
+
+An INS export may have seconds of the day where those of the week should be.
+"""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from pipeline.console import plural
 from pipeline.gps_time import NS, WEEK_NS
@@ -8,27 +12,50 @@ from pipeline.gps_time import NS, WEEK_NS
 DAY_NS = 86_400 * NS
 
 
-def whole_days(
-    ins: tuple[int, int], other: tuple[int, int], fits: Callable[[int], bool]
-) -> tuple[str, bool, str] | None:
-    """How a sensor's clock stands to the INS's (amount, whether it is ahead, and why), where whole days less than a
-    week bring its times (first, last; ns) into those of the INS. ``fits``: whether it is within them with this offset
-    taken off.
+@dataclass(frozen=True)
+class WholeDays:
+    """How a sensor's clock stands to the INS's."""
 
+    amount: str  # such as "3 days"
+    ahead: bool  # the sensor's clock is ahead of the INS's
+    reason: str  # the likely cause and its remedy, for the message
+
+
+def whole_days_apart(
+    ins: tuple[int, int], sensor: tuple[int, int], fits: Callable[[int], bool]
+) -> WholeDays | None:
+    """Find the whole days, fewer than a week, by which a sensor's times must move to meet those of the INS.
+
+    Parameters
+    ----------
+    ins, sensor : tuple of two ints
+        First and last time, GPS ns.
+    fits : callable
+        Tells whether the sensor's times less an offset (ns) lie within those of the INS.
+
+    Returns
+    -------
+    WholeDays or None
+        None where no whole number of days makes them fit.
+
+    Examples
+    --------
     >>> sunday, wednesday = (36_000 * NS, 39_600 * NS), (3 * DAY_NS + 36_000 * NS, 3 * DAY_NS + 39_600 * NS)
-    >>> whole_days(sunday, wednesday, lambda offset_ns: offset_ns == 3 * DAY_NS)[:2]
+    >>> ahead = whole_days_apart(sunday, wednesday, lambda offset_ns: offset_ns == 3 * DAY_NS)
+    >>> ahead.amount, ahead.ahead
     ('3 days', True)
-    >>> whole_days(wednesday, sunday, lambda offset_ns: offset_ns == -3 * DAY_NS)
+    >>> behind = whole_days_apart(wednesday, sunday, lambda offset_ns: offset_ns == -3 * DAY_NS)
+    >>> behind.amount, behind.ahead, behind.reason
     ('3 days', False, 'check the clocks, and the dates that the files were exported with')
     """
-    nearest = round((sum(other) - sum(ins)) / (2 * DAY_NS))
+    nearest = round((sum(sensor) - sum(ins)) / (2 * DAY_NS))
     days = next((k for k in (nearest, nearest - 1, nearest + 1) if 0 < abs(k) < 7 and fits(k * DAY_NS)), 0)
     if not days:
         return None
-    why = "check the clocks, and the dates that the files were exported with"
+    reason = "check the clocks, and the dates that the files were exported with"
     if days > 0 and ins[0] // WEEK_NS == ins[1] // WEEK_NS and ins[1] % WEEK_NS < DAY_NS:
-        why = (
+        reason = (
             "the INS's times are all of a Sunday and seem to be seconds of the day; export GPSTime in seconds of the "
             "week, or with its date"
         )
-    return plural(abs(days), "day"), days > 0, why
+    return WholeDays(plural(abs(days), "day"), days > 0, reason)

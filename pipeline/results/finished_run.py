@@ -13,7 +13,7 @@ from pipeline.results.screen import summary
 from pipeline.run import manifest
 from pipeline.run.output_files import as_written
 from pipeline.run.results import agreeing, calibration
-from pipeline.run.settings import Settings, read_settings, refuse_other
+from pipeline.run.settings import Settings, read_settings, refuse_other_sensor
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class FinishedRun:
         """Return the run in a folder; raise ArtefactError unless all ``stages`` are complete and agree."""
         if not path.is_dir():
             raise ArtefactError(f"{path}: there is no such folder; name a run folder")
-        refuse_other(path, "mbes")
+        refuse_other_sensor(path, "mbes")
         for stage in stages:
-            if manifest.read(path / stage) is None:
+            if manifest.read_manifest(path / stage) is None:
                 raise ArtefactError(f"{path}: {stage} has no complete result; run poolcal run again")
         manifests = agreeing(path, stages)
         for stage in stages:

@@ -1,4 +1,4 @@
-"""Memory of the digests of large files: hashed again only where size or time of change differ."""
+"""Digests of large files, remembered: a file is hashed again only if its size or its time of change differ."""
 
 import json
 from collections.abc import Iterable
@@ -18,15 +18,15 @@ class Digests:
         self._known: dict[str, list[object]] = _read_memory(memory) if memory is not None else {}
 
     def of(self, paths: Iterable[Path]) -> list[str]:
-        """The digests of ``paths``, in their order; unknown files are hashed side by side."""
-        asked = [path.absolute() for path in paths]
-        marks = {path: _mark(path) for path in asked}
+        """Return the digests of ``paths``, in their order; unknown files are hashed side by side."""
+        absolute = [path.absolute() for path in paths]
+        marks = {path: _mark(path) for path in absolute}
         stale = [path for path, mark in marks.items() if self._known.get(str(path), [None])[1:] != mark]
         for path, digest in zip(stale, self.mapper(sha256, stale), strict=True):
             self._known[str(path)] = [digest, *marks[path]]
         if stale and self._memory is not None:
             write_text(self._memory, json.dumps(self._known, indent=0, sort_keys=True) + "\n")
-        return [str(self._known[str(path)][0]) for path in asked]
+        return [str(self._known[str(path)][0]) for path in absolute]
 
 
 def _mark(path: Path) -> list[object]:
@@ -38,7 +38,7 @@ def _mark(path: Path) -> list[object]:
 
 
 def _read_memory(path: Path) -> dict[str, list[object]]:
-    """A damaged memory is forgotten: it only saves time."""
+    """Return what is remembered: nothing if the memory is damaged, for it only saves time."""
     try:
         content = read_json(path)
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""A run folder: locked while in use, every stage swapped in whole, what it was made from in run.yaml."""
+"""A run folder: locked while in use; every stage is swapped in whole."""
 
 import contextlib
 import errno
@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
-from pipeline.atomic_files import remove, settle, settle_names, writing
+from pipeline.atomic_files import flush_names, flush_to_disk, remove, writing
 from pipeline.errors import ArtefactError
 from pipeline.run import manifest
 from pipeline.run.settings import RUN_YAML
@@ -18,13 +18,10 @@ LOCK = ".lock"
 DIGESTS = "digests.json"
 
 
-# --- run.yaml --------------------------------------------------------------------------------------------------------
-
-
 # --- the lock --------------------------------------------------------------------------------------------------------
 @contextlib.contextmanager
 def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
-    """Make ``run`` if need be, keep every other process out of it, and tidy up after a process that was killed."""
+    """Make ``run`` if need be, keep other processes out, and tidy up its ``stages`` after a process that was killed."""
     with writing(run):
         run.mkdir(parents=True, exist_ok=True)
         strangers = sorted(entry.name for entry in run.iterdir() if entry.name not in (LOCK, DIGESTS))
@@ -44,7 +41,7 @@ def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def reading(run: Path) -> Iterator[None]:
-    """Keep writers out while a run is checked. A folder that cannot be written needs no lock."""
+    """Keep writers out while a run is checked; a folder that cannot be written needs no lock."""
     try:
         file = _opened(run / LOCK, os.O_RDONLY)
     except OSError:
@@ -56,7 +53,7 @@ def reading(run: Path) -> Iterator[None]:
 
 
 def _opened(lock: Path, how: int) -> TextIO:
-    """A run folder may come from somebody else: no link is followed, and nothing but a regular file is opened."""
+    """Open the lock, but no link and no irregular file: a run folder may come from somebody else."""
     handle = os.open(lock, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
@@ -78,6 +75,7 @@ def _lock(file: TextIO, run: Path, how: int) -> None:
 
 # --- a stage's folder ------------------------------------------------------------------------------------------------
 def partial(stage: Path) -> Path:
+    """Return where a stage's files are written until they are complete."""
     return stage.with_name(stage.name + ".partial")
 
 
@@ -86,28 +84,32 @@ def _old(stage: Path) -> Path:
 
 
 def keeping(stage: Path) -> Path:
+    """Return where an accepted result is copied to before it is kept."""
     return stage.with_name(stage.name + ".keeping")
 
 
 def swap_in(stage: Path) -> None:
-    """The finished partial folder takes the stage's place. Killed at any step, :func:`recover` finds a whole result;
-    and so it does after a power cut, for the disk holds every file before the first rename."""
-    settle(partial(stage))
+    """Put the finished partial folder in the stage's place.
+
+    If the process is killed at any step, :func:`recover` finds a whole result. So it does after a power cut, for the
+    disk holds every file before the first rename.
+    """
+    flush_to_disk(partial(stage))
     with writing(stage):
         remove(_old(stage))
         if os.path.lexists(stage):
             stage.rename(_old(stage))
         partial(stage).rename(stage)
-        settle_names(stage.parent)
+        flush_names(stage.parent)
     remove(_old(stage))
 
 
 def recover(stage: Path) -> None:
-    """Bring a stage's folder into a whole state: the newest complete result stands, all else goes."""
+    """Bring a stage's folder into a whole state: keep the newest complete result, and remove all else."""
     with writing(stage):
         if not os.path.lexists(stage):
             for candidate in (partial(stage), _old(stage)):  # between the two renames: both are complete
-                if manifest.read(candidate) is not None:
+                if manifest.read_manifest(candidate) is not None:
                     candidate.rename(stage)
                     break
         remove(partial(stage))

@@ -1,4 +1,4 @@
-"""What is out of date in a run folder, and why: decided by content, never by times."""
+"""Which stages of a run folder are out of date, and why: decided by content, never by times."""
 
 import dataclasses
 import hashlib
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.config.stage_settings import plain_settings, stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
@@ -30,32 +30,45 @@ class Run:
     digests: Digests
     workers: Workers = SERIAL
     progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
-    raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # by sensor, as they were first asked for
+    raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # digests by sensor, as first computed
 
     def folder(self, stage: str) -> Path:
+        """Return the stage's folder."""
         return self.path / stage
 
 
 def out_of_date(this: Run, stage: ModuleType) -> list[str]:
-    """Why the stage has to be run; empty when its result is current."""
-    old = manifest.read(this.folder(name_of(stage)))
+    """Return the reasons why the stage has to be run; none if its result is current."""
+    old = manifest.read_manifest(this.folder(name_of(stage)))
     if old is None:
         return ["has no result yet"]
-    return manifest.reasons(old, key_of(this, stage), present(this, this.folder(name_of(stage)), old))
+    present = digests_now(this, this.folder(name_of(stage)), old)
+    return manifest.reasons_out_of_date(old, key_of(this, stage), present)
 
 
-def present(this: Run, where: Path, old: manifest.Manifest) -> dict[str, str | None]:
-    """The stage's files as they are now."""
-    there = [name for name in old.outputs if (where / name).is_file()]
-    found = dict(zip(there, this.digests.of(where / name for name in there), strict=True))
-    return {name: found.get(name) for name in old.outputs}
+def digests_now(this: Run, place: Path, old: manifest.Manifest) -> dict[str, str | None]:
+    """Return the digests of a stage's files as they are now.
+
+    Parameters
+    ----------
+    this
+        The run.
+    place
+        The stage's folder.
+    old
+        The manifest that names the files; a file that is gone has None.
+    """
+    present = [name for name in old.outputs if (place / name).is_file()]
+    digests = dict(zip(present, this.digests.of(place / name for name in present), strict=True))
+    return {name: digests.get(name) for name in old.outputs}
 
 
 def key_of(this: Run, stage: ModuleType) -> manifest.Key:
+    """Return everything that the stage's result would depend on, were it run now."""
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
     for marker in declared(stage.Inputs).values():
-        if isinstance(marker, Raw):
+        if isinstance(marker, RawFiles):
             raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):
             raw |= all_raw(this)
@@ -64,24 +77,26 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     config = plain_settings(vars(stage_config(stage.Config, this.settings.resolved())))
     if "svp" in (config.get("mbes") or {}):
         raw |= cast_digest(this)
-    return manifest.Key(config, raw, inputs, provenance.source_of(stage), provenance.versions())
+    return manifest.Key(config, raw, inputs, provenance.source_digests(stage), provenance.library_versions())
 
 
 def raw_of(this: Run, sensor: str) -> dict[str, str]:
-    """Digests of one sensor's files as this run first found them: the later stages were made from these, and the report
-    tells these, whatever happens to the files meanwhile."""
+    """Return the digests of one sensor's files as this run first found them.
+
+    The later stages were made from these, and the report names these, whatever happens to the files meanwhile.
+    """
     if sensor not in this.raw:
         this.raw[sensor] = raw_digests(this, sensor)
     return this.raw[sensor]
 
 
 def all_raw(this: Run) -> dict[str, str]:
-    """Digests of all files that the session was read from."""
+    """Return the digests of all files from which the session was read."""
     return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()} | cast_digest(this)
 
 
 def raw_digests(this: Run, sensor: str) -> dict[str, str]:
-    """Digest by file of one sensor, relative to the session folder, as the files are now."""
+    """Return one sensor's digests by file, relative to the session folder, as the files are now."""
     root, settings = this.settings.session_folder, getattr(this.settings.session, sensor)
     if settings is None:
         return {}
@@ -90,16 +105,16 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
     for name in names:
         if any("\udc80" <= letter <= "\udcff" for letter in name):  # Python's stand-ins for other bytes
             raise RawDataError(f"{name!a}: the file's name is not UTF-8; rename it")
-    found = dict(zip(names, this.digests.of(paths), strict=True))
+    digests = dict(zip(names, this.digests.of(paths), strict=True))
     first: dict[str, str] = {}
-    for name, digest in found.items():
+    for name, digest in digests.items():
         if first.setdefault(digest, name) != name and digest != EMPTY:
             raise RawDataError(f"{name}: is the same as {first[digest]}; list one of the two under {sensor}.files")
-    return found
+    return digests
 
 
 def cast_digest(this: Run) -> dict[str, str]:
-    """Digest of the file that the cast of sound speed came from; its depths are in the settings."""
+    """Return the digest of the file of the cast of sound speed, by name; its depths are in the settings."""
     used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
     if used is None:
         return {}
@@ -110,13 +125,14 @@ def cast_digest(this: Run) -> dict[str, str]:
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:
-    owner = manifest.read(this.folder(marker.owner))
-    found = manifest.artefact_digests(owner.outputs) if owner is not None else {}
+    owner = manifest.read_manifest(this.folder(marker.owner))
+    digests = manifest.artefact_digests(owner.outputs) if owner is not None else {}
     name = file_name(marker)
-    if name not in found:
+    if name not in digests:
         raise ArtefactError(f"{this.folder(marker.owner)}: has no complete {name}; run stage {marker.owner} first")
-    return found[name]
+    return digests[name]
 
 
 def file_name(marker: Artefact | Document) -> str:
+    """Return the name of an artefact's file, or of a stream's folder, in its stage's folder."""
     return f"{marker.name}.parquet" if isinstance(marker, Artefact) and marker.kind == "table" else marker.name

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON, CALIBRATION_YAML
-from pipeline.atomic_files import read_json, remove, settle, settle_names, write_bytes, writing
+from pipeline.atomic_files import flush_names, flush_to_disk, read_json, remove, write_bytes, writing
 from pipeline.run.folder import keeping, partial
 from pipeline.run.results import PAGE
 
@@ -28,11 +28,11 @@ def keep_accepted(stage: Path) -> Path | None:
     with writing(keeping(stage)):
         keeping(stage).mkdir()
     _copy(stage, keeping(stage))
-    settle(keeping(stage))
+    flush_to_disk(keeping(stage))
     kept = stage.with_name(f"{stage.name}.{max(numbers, default=0) + 1}")
     with writing(kept):
         keeping(stage).rename(kept)
-    settle_names(stage.parent)
+    flush_names(stage.parent)
     return kept
 
 

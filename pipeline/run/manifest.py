@@ -1,4 +1,4 @@
-"""A stage's manifest: what it was made from and what it made, and the reasons why that is out of date.
+"""A stage's manifest: what the result was made from, its files, and the reasons why it is out of date.
 
 A result is current when the same config section, the same input content, the same source of this program and the same
 versions of the libraries would be used again, and its files are still as they were written. Times are never compared.
@@ -19,7 +19,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Key:
-    """Everything a stage's result follows from."""
+    """Everything that a stage's result depends on."""
 
     config: Mapping[str, Any]  # by field of the stage's Config
     raw: Mapping[str, str]  # digest by raw file, relative to the session folder
@@ -30,6 +30,8 @@ class Key:
 
 @dataclass(frozen=True)
 class Manifest:
+    """What one run of a stage read and wrote."""
+
     stage: str
     key: Key
     outputs: Mapping[str, Mapping[str, Any]]  # sha256, bytes and, of tables and parts, rows, by file in the folder
@@ -39,12 +41,13 @@ class Manifest:
     wall_s: float
 
     def write(self, folder: Path) -> None:
+        """Write it into a stage's folder."""
         content = {"schema": SCHEMA, **asdict(self)}
         write_text(folder / NAME, json.dumps(content, indent=1, ensure_ascii=True) + "\n")
 
 
-def read(folder: Path) -> Manifest | None:
-    """The manifest in ``folder``; None when there is none, or none that makes sense."""
+def read_manifest(folder: Path) -> Manifest | None:
+    """Return the manifest in ``folder``; None if there is none, or none that makes sense."""
     try:
         content: Any = read_json(folder / NAME)
         if content.pop("schema") != SCHEMA:
@@ -52,7 +55,7 @@ def read(folder: Path) -> Manifest | None:
         manifest = Manifest(**content | {"key": Key(**content["key"])})
         plain = (manifest.key.config, manifest.key.raw, manifest.key.inputs, manifest.key.source, manifest.key.versions)
         good = all(isinstance(m, dict) for m in (*plain, manifest.rows, manifest.outputs))
-        good = good and all(isinstance(one, int) for one in manifest.rows.values()) and _are_counts(manifest.counts)
+        good = good and all(isinstance(rows, int) for rows in manifest.rows.values()) and _are_counts(manifest.counts)
         return manifest if good and all(_is_file(*item) for item in manifest.outputs.items()) else None
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
@@ -70,37 +73,47 @@ def _is_file(name: str, entry: Any) -> bool:
 
 
 def artefact_digests(outputs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """One digest for each table, document or stream; a stream's covers the names and digests of its parts.
+    """Return one digest for each table, document and stream; a stream's covers the names and digests of its parts.
 
     >>> sorted(artefact_digests({"a.parquet": {"sha256": "1"}, "s/part-00000-000.parquet": {"sha256": "2"}}))
     ['a.parquet', 's']
     """
     streams: dict[str, Any] = {}
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     for name, entry in sorted(outputs.items()):
         stream, _, part = name.rpartition("/")
         if stream:
             streams.setdefault(stream, hashlib.sha256()).update(f"{part} {entry['sha256']}\n".encode())
         else:
-            found[name] = str(entry["sha256"])
-    return found | {name: digest.hexdigest() for name, digest in streams.items()}
+            digests[name] = str(entry["sha256"])
+    return digests | {name: digest.hexdigest() for name, digest in streams.items()}
 
 
 def consistent(manifests: Mapping[str, Manifest]) -> bool:
-    """Whether each stage was made from what the others hold now."""
-    held = {name: artefact_digests(one.outputs) for name, one in manifests.items()}
+    """Return whether each stage was made from what the others hold now."""
+    present = {name: artefact_digests(result.outputs) for name, result in manifests.items()}
 
-    def holds(name: str, digest: str) -> bool:
+    def is_present(name: str, digest: str) -> bool:
         owner, _, artefact = name.partition("/")
-        found = held.get(owner, {})
-        return digest == found.get(f"{artefact}.parquet", found.get(artefact))
+        digests = present.get(owner, {})
+        return digest == digests.get(f"{artefact}.parquet", digests.get(artefact))
 
-    return all(holds(*item) for one in manifests.values() for item in one.key.inputs.items())
+    return all(is_present(*item) for result in manifests.values() for item in result.key.inputs.items())
 
 
 # --- reasons ---------------------------------------------------------------------------------------------------------
-def reasons(old: Manifest, key: Key, digests: Mapping[str, str | None]) -> list[str]:
-    """Why ``old`` is out of date; empty: it is current. ``digests``: its files as they are now (None: gone)."""
+def reasons_out_of_date(old: Manifest, key: Key, digests: Mapping[str, str | None]) -> list[str]:
+    """Return why a result is out of date; nothing if it is current.
+
+    Parameters
+    ----------
+    old
+        The result's manifest.
+    key
+        What a new result would depend on.
+    digests
+        By name, those of the result's files as they are now; None: gone.
+    """
     written = {name: entry["sha256"] for name, entry in old.outputs.items()}
     return [
         *_file_changes(written, digests, "its result ", "edited"),
@@ -140,7 +153,7 @@ def _shown(value: Any) -> str:
 
 
 def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested keys joined by dots.
+    """Join nested keys by dots.
 
     >>> flattened({"segment": {"margin_m": 0.05}})
     {'segment.margin_m': 0.05}

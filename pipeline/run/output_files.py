@@ -1,4 +1,4 @@
-"""Files that a command is told to write: none of them may replace anything of a run."""
+"""Files that a command writes where its options say: none of them may replace anything of a run."""
 
 import contextlib
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from pipeline.errors import ArtefactError, ConfigError
 
 @contextlib.contextmanager
 def as_written(run: Path) -> Iterator[None]:
-    """Where values are taken out of a run's calibration.json: one that somebody changed is an ArtefactError."""
+    """Turn an error in values of a run's calibration.json, which somebody changed then, into an ArtefactError."""
     try:
         yield
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
@@ -18,8 +18,19 @@ def as_written(run: Path) -> Iterator[None]:
 
 
 def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b"") -> None:
-    """A file of its kind, never among a run's results or a session's files (``runs``). One that is there is replaced if
-    it ``begins`` as we write it: a plan or a config never."""
+    """Refuse a file that must not be written; None is none.
+
+    Parameters
+    ----------
+    option
+        The option that names it, such as ``--html``: the file's name ends so.
+    file
+        The file.
+    runs
+        Folders with a run's results or a session's files, in which it must not lie.
+    begins
+        Only a file that begins so is replaced: what we wrote, and never a plan or a config.
+    """
     if file is None:
         return
     suffix = option.replace("--", ".")

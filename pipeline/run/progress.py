@@ -1,4 +1,4 @@
-"""What a run says while it works: a bar with rate and time left on a terminal, one plain line a stage elsewhere."""
+"""What a run prints while it works: a bar with rate and time left on a terminal, one plain line a stage elsewhere."""
 
 import contextlib
 import sys
@@ -8,16 +8,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TextIO
 
+from pipeline.console import say
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
-from pipeline.console import say
 
 MAX_REASONS = 3
 
 
 @dataclass
 class Progress:
-    """Counts rows as workers take them up; safe to call from any of them."""
+    """Print how far a run is; workers may call it side by side."""
 
     stream: TextIO = field(default_factory=lambda: sys.stderr)
     quiet: bool = False
@@ -26,11 +27,12 @@ class Progress:
     _bar: "Bar | None" = None
 
     def note(self, text: str) -> None:
+        """Print a line."""
         if not self.quiet:
             say(text, self.stream)
 
     def reasons(self, stage: str, reasons: Sequence[str]) -> None:
-        """Why a stage is run."""
+        """Print why a stage is run."""
         for reason in reasons[:MAX_REASONS]:
             self.note(f"{stage}: {reason}")
         if len(reasons) > MAX_REASONS:
@@ -38,7 +40,7 @@ class Progress:
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """One stage from its first row to its last; says at the end how long it took."""
+        """Show one stage from its first row to its last; print at the end how long it took."""
         self._rows, start = 0, time.perf_counter()
         with self._shown(name):
             yield
@@ -64,12 +66,13 @@ class Progress:
                 self._bar = None
 
     def begin(self, total: int | None) -> None:
-        """The streams are now mapped: count from here, towards ``total`` rows where that is known."""
+        """Count rows from here on, towards ``total`` where that is known: now the streams are mapped."""
         self._rows = 0
         if self._bar is not None:
             self._bar.reset(self._bar.task_ids[0], total=total, rate="")
 
     def advance(self, rows: int) -> None:
+        """Count rows that a worker has taken up."""
         with self._lock:
             self._rows += rows
             if self._bar is not None:

@@ -1,4 +1,4 @@
-"""What a result follows from beside its settings and inputs: files of this program, and versions of libraries.
+"""What a result depends on beside its settings and inputs: files of this program, and versions of libraries.
 
 Presets and scenarios (``configs/``) are not among them: what a preset says stands in the settings, value by value.
 """
@@ -11,9 +11,9 @@ from pathlib import Path
 from types import ModuleType
 
 import pipeline
-from pipeline.artefacts.schema import Raw
+from pipeline.artefacts.schema import RawFiles
 from pipeline.atomic_files import sha256
-from pipeline.run.import_closure import file_of, imported, reached
+from pipeline.run.import_closure import file_of_module, import_closure, imported_modules
 from pipeline.run.stage_protocol import declared
 
 LIBRARIES = (  # that can change a digit: they compute, or decode raw files, meshes or tables
@@ -22,42 +22,42 @@ LIBRARIES = (  # that can change a digit: they compute, or decode raw files, mes
 )  # fmt: skip
 ROOT = Path(pipeline.__file__).parent.parent
 CALLS = ("pipeline.run.stage_protocol",)  # calls every stage, and writes its streams
+READS = ("pipeline.readers.dispatch",)  # makes the parts of raw files that a stage is given
 CARRIES = ("pipeline/run/runner.py", "pipeline/run/workers.py")  # carry data in and out; what else they import does not
 
 
 @functools.cache
-def versions() -> dict[str, str]:
-    """Versions of Python, this program and the libraries that can change a digit."""
-    found = {"poolcal": pipeline.__version__, "python": platform.python_version()}
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python, this program and the libraries that can change a digit."""
+    versions = {"poolcal": pipeline.__version__, "python": platform.python_version()}
     for name in LIBRARIES:
         try:
-            found[name] = metadata.version(name)
+            versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            versions[name] = "not installed"
+    return versions
 
 
-def source_of(stage: ModuleType) -> dict[str, str]:
-    """Digests of the program's files that the stage can reach; the readers' too, where it is given raw files."""
-    raw = any(isinstance(marker, Raw) for marker in declared(stage.Inputs).values())
-    return dict(_source(ROOT, stage.__name__, Path(str(stage.__file__)), raw))
+def source_digests(stage: ModuleType) -> dict[str, str]:
+    """Return the digests of the program's files that the stage can reach; also of the readers, if it gets raw files."""
+    raw = any(isinstance(marker, RawFiles) for marker in declared(stage.Inputs).values())
+    return dict(_source_digests(ROOT, stage.__name__, Path(str(stage.__file__)), raw))
 
 
 @functools.cache
-def _source(root: Path, name: str, own: Path, raw: bool) -> dict[str, str]:
-    begin = [*CALLS, *(["pipeline.readers"] if raw else [])]
-    ours = file_of(root, name) == own
-    files = reached(root, [*([name] if ours else imported(root, own, name)), *begin])
-    found = {path.relative_to(root).as_posix(): path for path in files}
+def _source_digests(root: Path, name: str, own: Path, raw: bool) -> dict[str, str]:
+    ours = file_of_module(root, name) == own
+    begin = [*([name] if ours else imported_modules(root, own, name)), *CALLS, *(READS if raw else ())]
+    files = {path.relative_to(root).as_posix(): path for path in import_closure(root, begin)}
     if not ours:  # a stage from elsewhere
-        found[f"{own.parent.name}/{own.name}"] = own
-    found |= {file: root / file for file in CARRIES}
-    return {file: sha256(path) for file, path in sorted(found.items())}
+        files[f"{own.parent.name}/{own.name}"] = own
+    files |= {file: root / file for file in CARRIES}
+    return {file: sha256(path) for file, path in sorted(files.items())}
 
 
 @functools.cache
 def git_commit() -> str | None:
-    """The commit this program was checked out at, where git and a repository are there to tell."""
+    """Return the commit at which this program was checked out; None without git or a repository."""
     if not (ROOT / ".git").exists():
         return None
     command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]

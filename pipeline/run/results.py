@@ -1,4 +1,4 @@
-"""A finished run's tables and streams, read as they were written."""
+"""A finished run's tables, streams, calibration.json and recordings, read as they were written."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.artefacts.parquet import read_table, rows_of
+from pipeline.artefacts.parquet import read_table, row_count
 from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import ParquetPart, Stream
 from pipeline.atomic_files import read_json
@@ -17,39 +17,51 @@ from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run import manifest
 from pipeline.run.settings import read_settings
 
+PAGE = "report.html"
 
 @dataclass(frozen=True)
 class Tables:
-    """What lies in a run folder."""
+    """Tables and streams of a run folder."""
 
     run: Path
 
     def table(self, artefact: Artefact, *columns: str) -> pd.DataFrame:
-        """The table, or these columns of it."""
+        """Return the table, or these columns of it."""
         return read_table(self.run / artefact.owner / f"{artefact.name}.parquet", artefact, columns)
 
     def stream(self, artefact: Artefact, *columns: str) -> Stream:
+        """Return the stream, or these columns of it."""
         folder = self.run / artefact.owner / artefact.name
         return Stream(tuple(ParquetPart(path, columns or None) for path in sorted(folder.glob("part-*.parquet"))))
 
     def sample(self, artefact: Artefact, at_most: int, *columns: str) -> tuple[dict[str, np.ndarray], int]:
-        """These columns of evenly spaced rows of a stream, at most so many; and one in how many that is."""
+        """Return evenly spaced rows of a stream, and one in how many that is.
+
+        Parameters
+        ----------
+        artefact
+            The stream.
+        at_most
+            Number of rows.
+        columns
+            Their names.
+        """
         stream = self.stream(artefact, *columns)
-        total = sum(rows_of(part.path) for part in stream.parts if isinstance(part, ParquetPart))
-        step, seen = max(1, -(-total // at_most)), 0
+        total = sum(row_count(part.path) for part in stream.parts if isinstance(part, ParquetPart))
+        step, rows_before = max(1, -(-total // at_most)), 0
         pieces: list[dict[str, np.ndarray]] = []
         for batch in stream.batches():
             rows = len(next(iter(batch.values())))
-            first = -seen % step
+            first = -rows_before % step
             pieces.append({name: values[first::step].copy() for name, values in batch.items()})  # no view of all
-            seen += rows
+            rows_before += rows
         if not pieces:
             return {name: np.empty(0) for name in columns}, step
         return {name: np.concatenate([piece[name] for piece in pieces]) for name in columns}, step
 
 
 def calibration(run: Path) -> dict[str, Any]:
-    """RUN/report/calibration.json."""
+    """Return the content of RUN/report/calibration.json."""
     path = run / "report" / "calibration.json"
     if run.is_file():
         raise ConfigError(f"{run}: is a file; RUN is a run folder, and stands first")
@@ -64,31 +76,28 @@ def calibration(run: Path) -> dict[str, Any]:
 
 
 def recording_path(run: Path, stage: str) -> Path:
-    """Where a stage's recording lies."""
+    """Return where a stage's recording lies."""
     return run / stage / f"{stage}.rrd"
 
 
 def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
-    """The finished stages that follow from each other and from run.yaml, in order."""
+    """Return the manifests of the finished stages that follow from each other and from run.yaml, in order."""
     settings = plain_settings(read_settings(run).resolved())
-    found: dict[str, manifest.Manifest] = {}
+    manifests: dict[str, manifest.Manifest] = {}
     for stage in stages:
-        one = manifest.read(run / stage)
-        if one is not None and manifest.consistent(found | {stage: one}) and _as_set(one, settings):
-            found[stage] = one
-    return found
+        result = manifest.read_manifest(run / stage)
+        if result is not None and manifest.consistent(manifests | {stage: result}) and _is_as_set(result, settings):
+            manifests[stage] = result
+    return manifests
 
 
-def _as_set(one: manifest.Manifest, settings: Mapping[str, Any]) -> bool:
-    """Whether the stage ran with the settings in run.yaml."""
-    return all(name in settings and _covers(settings[name], value) for name, value in one.key.config.items())
+def _is_as_set(result: manifest.Manifest, settings: Mapping[str, Any]) -> bool:
+    """Return whether the stage ran with the settings in run.yaml."""
+    return all(name in settings and _covers(settings[name], value) for name, value in result.key.config.items())
 
 
 def _covers(setting: Any, used: Any) -> bool:
-    """Whether a stage that used so much of a setting used it as it is: a stage has some of a block's fields."""
+    """Return whether a stage used a setting as it is; of a block it may use only some fields."""
     if not (isinstance(setting, dict) and isinstance(used, dict)):
         return bool(setting == used)
     return all(name in setting and setting[name] == value for name, value in used.items())
-
-
-PAGE = "report.html"

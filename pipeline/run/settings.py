@@ -23,32 +23,40 @@ RUN_YAML = "run.yaml"
 
 @dataclass(frozen=True)
 class Settings:
-    """What a run is made from: both configs, checked, and where the raw files are."""
+    """What a run is made from: the settings of the pool and of the session, checked, and where the raw files are."""
 
     session_folder: Path
     pool: PoolConfig
     session: SessionConfig
 
     def resolved(self) -> dict[str, Any]:
-        """Every setting by the name under which a stage's Config asks for it."""
+        """Return every setting by the name under which a stage's Config asks for it."""
         return settings_by_name(self.pool, self.session)
 
     def as_json(self) -> dict[str, Any]:
-        """The same as plain values, defaults filled in."""
+        """Return the settings as plain values, defaults filled in."""
         return {**self.pool.model_dump(mode="json"), **self.session.model_dump(mode="json")}
 
 
-def load_settings(
-    session_folder: Path, config_path: Path, calibrated: Calibrated | None = "mbes"
-) -> Settings:
-    """Both YAML files, read and checked, for calibrating the sonar, or the laser by itself: of a session with both the
-    sonar is left out then. None: whatever the session can."""
+def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrated | None = "mbes") -> Settings:
+    """Read and check both YAML files.
+
+    Parameters
+    ----------
+    session_folder
+        The folder with session.yaml.
+    config_path
+        The pool's YAML file.
+    calibrated
+        "mbes" for the sonar; "laser" for the laser itself, which leaves the sonar out; None for either, as the session
+        has it.
+    """
     pool = load_pool(config_path)
     try:
         target_of(pool.target)
     except ConfigError as error:
         raise ConfigError(f"{config_path}: {error}") from error
-    refuse_faces(pool, config_path)
+    refuse_unknown_faces(pool, config_path)
     session = load_session(session_folder, with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
@@ -56,12 +64,12 @@ def load_settings(
         where = session_folder / "session.yaml"
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
-        refuse_cast(pool.target, session.mbes, session_folder / "session.yaml")
+        refuse_shallow_cast(pool.target, session.mbes, session_folder / "session.yaml")
     return Settings(session_folder.resolve(), pool, session)
 
 
-def refuse_faces(pool: PoolConfig, path: Path) -> None:
-    """Faces as built are faces of the target."""
+def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:
+    """Refuse faces as built that the target does not have; ``path`` names the pool's file."""
     names = [face.name for face in target_of(pool.target).faces]
     for name in pool.as_built.faces:
         if name not in names:
@@ -69,8 +77,18 @@ def refuse_faces(pool: PoolConfig, path: Path) -> None:
             raise ConfigError(f"{path}: as_built.faces: {name!r}: no face of this target; its faces are {known}")
 
 
-def refuse_cast(target: Target, mbes: Mbes, path: Path) -> None:
-    """A cast is of the water that the rays go through: at least of half the depth down to the target's lower end."""
+def refuse_shallow_cast(target: Target, mbes: Mbes, path: Path) -> None:
+    """Refuse a cast that is not of the water through which the rays go: of less than half the depth of the target.
+
+    Parameters
+    ----------
+    target
+        The target; its lower end is the depth.
+    mbes
+        The sonar's settings, with the cast.
+    path
+        session.yaml, for the message.
+    """
     if mbes.svp is None:
         return
     depth = target_of(target).depth_m
@@ -82,8 +100,8 @@ def refuse_cast(target: Target, mbes: Mbes, path: Path) -> None:
         )
 
 
-def refuse_folders(run: Path, session_folder: Path) -> None:
-    """Raw data and results never share a folder: a run folder is swapped and cleared. And a name must be text."""
+def refuse_shared_folder(run: Path, session_folder: Path) -> None:
+    """Refuse a run folder in or round the session's, for it is swapped and cleared, and names that are no text."""
     for path in (run, session_folder):
         try:
             str(path).encode()
@@ -95,12 +113,12 @@ def refuse_folders(run: Path, session_folder: Path) -> None:
 
 
 def holds_run(run: Path) -> bool:
-    """Whether it is a run folder."""
+    """Return whether it is a run folder."""
     return (run / RUN_YAML).is_file()
 
 
-def refuse_other(run: Path, calibrated: Calibrated) -> None:
-    """A run folder is the sonar's or the laser's, not both in turn. (Settings of an older program need not be read.)"""
+def refuse_other_sensor(run: Path, calibrated: Calibrated) -> None:
+    """Refuse a run folder with a calibration of the other sensor; settings of an older program need not be readable."""
     try:
         session = read_yaml(run / RUN_YAML)["session"] if holds_run(run) else None
     except (ConfigError, KeyError):
@@ -109,11 +127,12 @@ def refuse_other(run: Path, calibrated: Calibrated) -> None:
         return
     was = "laser" if session.get("mbes") is None else "mbes"
     if was != calibrated:
-        what = {"mbes": "the sonar", "laser": "the laser"}[was]
-        raise ArtefactError(f"{run}: holds a calibration of {what}; name another run folder")
+        noun = {"mbes": "the sonar", "laser": "the laser"}[was]
+        raise ArtefactError(f"{run}: holds a calibration of {noun}; name another run folder")
 
 
 def write_settings(run: Path, settings: Settings) -> None:
+    """Write run.yaml."""
     content = {
         "session_folder": str(settings.session_folder),
         "config": settings.pool.model_dump(mode="json"),
@@ -124,7 +143,7 @@ def write_settings(run: Path, settings: Settings) -> None:
 
 
 def read_settings(run: Path) -> Settings:
-    """What the run in this folder was made from."""
+    """Read run.yaml: what the run in this folder was made from."""
     path = run / RUN_YAML
     if not path.is_file():
         raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
@@ -134,3 +153,8 @@ def read_settings(run: Path) -> Settings:
         raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
     pool = parse(PoolConfig, content["config"], f"{path}: config")
     return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"))
+
+
+def calibrated_in(run: Path) -> Calibrated:
+    """Return the sensor that the run in this folder calibrates."""
+    return read_settings(run).session.calibrated

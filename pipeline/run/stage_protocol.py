@@ -1,4 +1,4 @@
-"""Calls a stage: what it declares, how its parts are mapped, what it must return. Touches no run folder.
+"""Call a stage: what it declares, how its parts are mapped, what it must return. No run folder is touched.
 
 A stage is a module with frozen dataclasses ``Config``, ``Inputs`` and ``Outputs``, each field annotated with its
 artefact, and either ``run(inputs, config) -> Outputs`` (all tables), or, over streams,
@@ -15,36 +15,37 @@ from types import ModuleType
 from typing import Any, get_type_hints
 
 from pipeline.artefacts.parquet import from_arrow, to_arrow
-from pipeline.artefacts.schema import Artefact, Document, Provenance, Raw
+from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.artefacts.sinks import MemorySink, Sink, Written
-from pipeline.artefacts.streams import EMPTY, Mapper, Part, Stream, serial
+from pipeline.artefacts.streams import EMPTY_STREAM, Mapper, Part, Stream, serial
 
-Marker = Artefact | Raw | Document | Provenance
+Marker = Artefact | RawFiles | Document | Provenance
 
 
 def name_of(stage: ModuleType) -> str:
-    """The stage's name: its module's last word."""
+    """Return the stage's name: its module's last word."""
     return stage.__name__.rpartition(".")[2]
 
 
 def declared(fields_of: type) -> dict[str, Marker]:
-    """What the fields of a stage's Inputs or Outputs are annotated with."""
-    found: dict[str, Marker] = {}
+    """Return the artefacts with which the fields of a stage's Inputs or Outputs are annotated."""
+    artefacts: dict[str, Marker] = {}
     for name, hint in get_type_hints(fields_of, include_extras=True).items():
         markers = [m() if m is Provenance else m for m in getattr(hint, "__metadata__", ())]
-        markers = [m for m in markers if isinstance(m, (Artefact, Raw, Document, Provenance))]
+        markers = [m for m in markers if isinstance(m, (Artefact, RawFiles, Document, Provenance))]
         if len(markers) != 1:
             raise TypeError(f"{fields_of.__module__}.{fields_of.__name__}.{name} must be annotated with one artefact")
-        found[name] = markers[0]
-    return found
+        artefacts[name] = markers[0]
+    return artefacts
 
 
 def is_stream(marker: Marker) -> bool:
-    return isinstance(marker, Raw) or (isinstance(marker, Artefact) and marker.kind == "stream")
+    """Return whether a field is a stream, and no table or document."""
+    return isinstance(marker, RawFiles) or (isinstance(marker, Artefact) and marker.kind == "stream")
 
 
 def sources(stage: ModuleType) -> tuple[str, ...]:
-    """The streams that are mapped, part by part; none for a stage of tables alone."""
+    """Return the streams that are mapped, part by part; none for a stage of tables alone."""
     if not hasattr(stage, "run_batch"):
         return ()
     streams = tuple(name for name, marker in declared(stage.Inputs).items() if is_stream(marker))
@@ -56,10 +57,25 @@ def evaluate(
     inputs: Any,
     config: Any,
     sink: Sink,
+    *,
     mapper: Mapper = serial,
     begin: Callable[[], None] = lambda: None,
 ) -> Any:
-    """The stage's Outputs, checked against their artefacts; ``begin`` is called before parts are mapped."""
+    """Return the stage's Outputs, checked against their artefacts.
+
+    Parameters
+    ----------
+    stage
+        Its module.
+    inputs, config
+        Its Inputs and Config.
+    sink
+        Takes the batches of its streams.
+    mapper
+        Maps a function over the parts.
+    begin
+        Is called before parts are mapped.
+    """
     if not hasattr(stage, "run_batch"):
         return _checked(stage, stage.run(inputs, config), {}, mapper)
     prepared = stage.prepare(inputs, config)
@@ -71,18 +87,26 @@ def evaluate(
     for source in sources(stage):
         stream: Stream = getattr(inputs, source)
         work = [
-            _Work(source, number, part, stage.run_batch, prepared, config, sink)
+            _Work(
+                source=source,
+                number=number,
+                part=part,
+                run_batch=stage.run_batch,
+                prepared=prepared,
+                config=config,
+                sink=sink,
+            )
             for number, part in enumerate(stream.parts)
         ]
         partials[source] = []
-        for part, (found, written) in zip(stream.parts, mapper(_run_part, work), strict=True):
-            partials[source] += [(part.name, partial) for partial in found]
+        for part, (results, written) in zip(stream.parts, mapper(_run_part, work), strict=True):
+            partials[source] += [(part.name, partial) for partial in results]
             for name, files in written.items():
                 if files and owner.setdefault(name, source) != source:
                     raise TypeError(f"{stage.__name__}: {owner[name]} and {source} both write {name}")
                 parts[name] += files
     result = stage.combine(prepared, partials, config)
-    streams = {name: Stream(tuple(found) or sink.empty(name), mapper) for name, found in parts.items()}
+    streams = {name: Stream(tuple(written_parts) or sink.empty(name), mapper) for name, written_parts in parts.items()}
     return _checked(stage, result, streams, mapper)
 
 
@@ -98,7 +122,7 @@ class _Work:
 
 
 def _run_part(work: _Work) -> tuple[list[object], Written]:
-    """One part from its first chunk to its last; a worker's whole task."""
+    """Run one part from its first chunk to its last: a worker's whole task."""
     partials = []
     with work.sink.open(work.number) as sink:
         for chunk in work.part.chunks():
@@ -110,7 +134,7 @@ def _run_part(work: _Work) -> tuple[list[object], Written]:
 
 
 def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], mapper: Mapper) -> Any:
-    """Tables in their artefacts' columns and types, exactly as they come back from a file; streams put in."""
+    """Return the outputs with tables exactly as they come back from a file, and with the streams put in."""
     if not isinstance(outputs, stage.Outputs):
         raise TypeError(f"{stage.__name__} must return its Outputs, not {type(outputs).__name__}")
     values: dict[str, Any] = dict(streams)
@@ -121,13 +145,23 @@ def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], map
                 raise TypeError(f"{stage.__name__}: {name} must be text, not {type(value).__name__}")
         elif isinstance(marker, Artefact) and marker.kind == "table":
             values[name] = from_arrow(to_arrow(value, marker))
-        elif name not in streams or value != EMPTY:
+        elif name not in streams or value != EMPTY_STREAM:
             raise TypeError(f"{stage.__name__}: stream {name} is filled from run_batch's pieces; leave it EMPTY")
     return dataclasses.replace(outputs, **values)
 
 
 def run_in_memory(stage: ModuleType, inputs: Any, config: Any, mapper: Mapper = serial) -> Any:
-    """The stage without any file: for simulated campaigns and tests."""
+    """Return the stage's Outputs without any file, for simulated campaigns and tests.
+
+    Parameters
+    ----------
+    stage
+        Its module.
+    inputs, config
+        Its Inputs and Config.
+    mapper
+        Maps a function over the parts.
+    """
     outputs = declared(stage.Outputs)
     streams = {name: marker for name, marker in outputs.items() if isinstance(marker, Artefact) and is_stream(marker)}
-    return evaluate(stage, inputs, config, MemorySink(streams), mapper)
+    return evaluate(stage, inputs, config, MemorySink(streams), mapper=mapper)

@@ -1,4 +1,4 @@
-"""Checks a run folder against its manifests: everything that was read and written is hashed again."""
+"""Check a run folder against its manifests: everything that was read and written is hashed again."""
 
 import dataclasses
 from collections.abc import Iterator, Sequence
@@ -8,14 +8,24 @@ from types import ModuleType
 from pipeline.errors import PoolcalError
 from pipeline.run import folder, manifest
 from pipeline.run.digests import Digests
-from pipeline.run.freshness import Run, key_of, present
+from pipeline.run.freshness import Run, digests_now, key_of
 from pipeline.run.settings import RUN_YAML, read_settings
 from pipeline.run.stage_protocol import name_of
 from pipeline.run.workers import SERIAL, Workers
 
 
-def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
-    """Read and hash again everything a run read and wrote; what is not as recorded."""
+def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
+    """Hash again everything that a run read and wrote; return what is not as recorded, a line each.
+
+    Parameters
+    ----------
+    stages
+        The modules of the run's stages.
+    run_folder
+        The run folder; it is only read.
+    workers
+        For hashing side by side.
+    """
     settings = read_settings(run_folder)
     with folder.reading(run_folder):
         this = Run(run_folder, settings, Digests(None, workers.here), workers)
@@ -23,7 +33,7 @@ def verify(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SE
 
 
 def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
-    old = manifest.read(this.folder(name_of(stage)))
+    old = manifest.read_manifest(this.folder(name_of(stage)))
     if old is None:
         yield "has no complete result"
         return
@@ -33,7 +43,7 @@ def _problems(this: Run, stage: ModuleType) -> Iterator[str]:
         yield str(error)
         return
     recorded = dataclasses.replace(now, config=old.key.config, source=old.key.source, versions=old.key.versions)
-    yield from manifest.reasons(old, recorded, present(this, this.folder(name_of(stage)), old))
+    yield from manifest.reasons_out_of_date(old, recorded, digests_now(this, this.folder(name_of(stage)), old))
     where = this.folder(name_of(stage))
     for path in sorted(where.rglob("*.parquet")):
         if path.relative_to(where).as_posix() not in old.outputs:

@@ -1,7 +1,7 @@
 """Where parts are worked on: in this thread, in threads side by side, or on a dask.distributed cluster.
 
-A cluster's workers must see the session and the run folder under the same paths, and run one BLAS thread each, which
-is what dask's own worker command sees to.
+A cluster's workers must see the session and the run folder under the same paths, and run one BLAS thread each: dask's
+own worker command does so.
 
 Threads, not processes: numpy, pyarrow and laspy release the interpreter's lock, nothing is copied between workers, and
 nothing is left behind when the program is killed. Results come back in order, so they never depend on the workers.
@@ -25,7 +25,7 @@ _inside = threading.local()
 
 
 class Stopped(Exception):
-    """Ends the work on a part whose run has failed or been interrupted elsewhere; never reaches the caller."""
+    """The run has failed or was interrupted elsewhere, so the work on this part ends; never reaches the caller."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Workers:
 
     @property
     def here(self) -> Mapper:
-        """For small work on files that only this machine is sure to see."""
+        """Return the map for small work on files that only this machine is sure to see."""
         return self.map if self.local else serial
 
     def map(self, function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]:
-        """``function`` of each item, in order. Called from inside a worker it works there and then: no deadlock."""
+        """Yield ``function`` of each item, in order; a worker calls it itself, so workers never wait in turn."""
         if self.executor is None or getattr(_inside, "worker", False):
             return map(function, *items)
         return self._ordered(self.executor, function, zip(*items, strict=True))
@@ -66,10 +66,10 @@ class Workers:
             self._abandon(waiting)
 
     def _abandon(self, waiting: deque[Future[T]]) -> None:
-        """Cancel what has not begun, tell what has begun to stop, and wait until it has.
+        """Cancel what has not begun, stop what has begun, and wait until it has stopped.
 
-        A cluster cannot be told to stop: there all that was sent out (twice the workers, no more) is waited for, so
-        that nothing writes into a folder that is being removed or made anew.
+        A cluster cannot be stopped: all that was sent out (twice the workers, no more) is waited for, so that nothing
+        writes into a folder that is being removed or made anew.
         """
         if not waiting:
             return
@@ -96,13 +96,13 @@ SERIAL = Workers(1)
 
 
 def default_jobs() -> int:
-    """The processors this process may use, at most four: more rarely help a disk."""
+    """Return the number of processors that this process may use, at most four: more rarely help a disk."""
     return max(1, min(4, len(os.sched_getaffinity(0))))
 
 
 @contextlib.contextmanager
 def workers(jobs: int | None = None, address: str | None = None) -> Iterator[Workers]:
-    """Workers for the time of a run: threads here, or the cluster whose scheduler listens at ``address``."""
+    """Make workers for the time of a run: threads here, or the cluster whose scheduler listens at ``address``."""
     if address is not None:
         yield from _cluster(address)
         return

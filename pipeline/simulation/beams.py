@@ -1,6 +1,6 @@
-"""A fan of beams: the angles a head records, the tilts it transmits at, and what beams of finite width measure.
+"""A fan of beams: the angles a head records, its transmit tilts, and ranges of beams of finite width.
 
-Where a beam looks is found by turning: a transmit fan tilted by τ consists of the ray (0, sin τ, -cos τ) swung round
+Directions follow from rotations: a transmit fan tilted by τ consists of the ray (0, sin τ, -cos τ) swung round
 the transmitting array, the y axis, to starboard by ψ; its component along the receiving array, the x axis, is then
 cos τ sin ψ. The receive beam at the angle θ hears the ray of which that is sin θ.
 """
@@ -14,36 +14,53 @@ from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import MbesScenario
 from pipeline.simulation.site import Floats
 
-LEAST_WEIGHT = 0.3  # this share of a beam must meet something, else there is no detection
+LEAST_WEIGHT = 0.3  # share of a beam that must meet something; with less there is no detection
 LONGEST_STEP = 60_000  # section A2: of 65535
 
 
 @dataclass(frozen=True)
-class Fan:
-    """Angles as a BTH0 packet holds them: evenly from first to last (A0), or first plus whole steps (A2)."""
+class FanAngles:
+    """Angles of a fan as a BTH0 packet holds them: evenly from first to last (A0), or first plus whole steps (A2)."""
 
-    first_rad: float  # exact in float32, as the last
+    first_rad: float  # a float32 number, as the last
     last_rad: float
     angles_rad: Floats
     steps: NDArray[np.uint16] | None = None  # A2 only; the first is 0
     step_scale_rad: float = 0.0
 
 
-def fan(scenario: MbesScenario) -> Fan:
-    """The recorded angles of all pings, port to starboard; equidistant: even in tan(angle), as on a flat floor."""
+def fan_angles(scenario: MbesScenario) -> FanAngles:
+    """Return the recorded angles, the same in all pings, port to starboard.
+
+    "equidistant" angles are even in tan(angle), as on a flat floor.
+    """
     half = np.radians(scenario.sector_deg) / 2
     first, last = float(np.float32(-half)), float(np.float32(half))
     if scenario.spacing == "equi_angle":
-        return Fan(first, last, np.linspace(first, last, scenario.beams))
-    wished = np.arctan(np.linspace(-np.tan(half), np.tan(half), scenario.beams)) - first
-    scale = float(np.float32(np.diff(wished).max() / LONGEST_STEP))
-    steps = np.diff(np.rint(wished / scale), prepend=0.0).astype(np.uint16)
-    return Fan(first, last, first + np.cumsum(steps.astype(np.float64)) * scale, steps, scale)
+        return FanAngles(first, last, np.linspace(first, last, scenario.beams))
+    equidistant = np.arctan(np.linspace(-np.tan(half), np.tan(half), scenario.beams)) - first
+    scale = float(np.float32(np.diff(equidistant).max() / LONGEST_STEP))
+    steps = np.diff(np.rint(equidistant / scale), prepend=0.0).astype(np.uint16)
+    return FanAngles(first, last, first + np.cumsum(steps.astype(np.float64)) * scale, steps, scale)
 
 
 def transmit_tilts_rad(scenario: MbesScenario, angles_rad: Floats, pings: NDArray[np.int64]) -> Floats:
-    """(p, b): the recorded tilt, forward +, of pings by their numbers and of beams by their recorded angles; a sector's
-    to_deg is its own."""
+    """Return the recorded transmit tilts.
+
+    Parameters
+    ----------
+    scenario : MbesScenario
+        Its sectors reach up to and including their to_deg.
+    angles_rad : (b,) array
+        Recorded angles of the beams.
+    pings : (p,) array
+        Numbers of the pings.
+
+    Returns
+    -------
+    (p, b) array
+        Tilts, forward +, rad.
+    """
     angles_deg = np.degrees(angles_rad)
     of_beam = np.zeros(len(angles_rad))
     for sector in reversed(scenario.sectors):
@@ -53,21 +70,36 @@ def transmit_tilts_rad(scenario: MbesScenario, angles_rad: Floats, pings: NDArra
 
 
 def swing_rad(sine: Floats, tilt_rad: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """ψ of the ray of a fan tilted by ``tilt_rad`` whose starboard component is ``sine``, and whether there is one;
-    of rays that look down (the widest fan of a scenario is 170°)."""
+    """Return the swing ψ of the ray of a tilted fan that has a given starboard component.
+
+    The ray looks down: the widest fan of a scenario is 170°.
+
+    Parameters
+    ----------
+    sine : (p, b) array
+        Starboard component of the ray's unit vector.
+    tilt_rad : (p, b) array
+        Tilt τ of the fan, forward +.
+
+    Returns
+    -------
+    swing : (p, b) array
+        ψ, to starboard, rad; 0 where there is no such ray.
+    exists : (p, b) array of bool
+    """
     sideways = sine / np.cos(tilt_rad)
-    there = np.abs(sideways) < 1
-    return np.arcsin(np.where(there, sideways, 0.0)), there
+    exists = np.abs(sideways) < 1
+    return np.arcsin(np.where(exists, sideways, 0.0)), exists
 
 
 def directions_in_mbes(swing: Floats, tilt_rad: Floats) -> Floats:
-    """(..., 3) unit vectors: the ray (0, sin τ, -cos τ) swung round y."""
+    """Return unit vectors (..., 3) in the mbes frame: the ray (0, sin τ, -cos τ) swung round y by ψ."""
     along = np.cos(tilt_rad)
     forward = np.broadcast_to(np.sin(tilt_rad), swing.shape)
     return np.stack([np.sin(swing) * along, forward, -np.cos(swing) * along], axis=-1)
 
 
-class Beams:
+class BeamBundles:
     """Beams as bundles of rays over their -3 dB width, weighted with a Gaussian pattern."""
 
     def __init__(self, scenario: MbesScenario, caster: RayCaster, water_level_m: float) -> None:
@@ -87,12 +119,27 @@ class Beams:
     def paths(
         self, origins_m: Floats, R_target_from_mbes: Floats, swing: Floats, tilt_rad: Floats
     ) -> tuple[Floats, Floats]:
-        """Half the sound's path of (p, b) beams by ψ and τ, inf where nothing answers; and the axes' directions.
+        """Return half the sound's path of each beam, and the directions of the beams' axes.
 
-        A beam that lies on one plane entirely is phase detected: its axis's range. Else its echo is the mean of what
-        its parts meet: rays off by parts of the receive width in θ and of the transmit width in τ. (From
-        sin θ = cos τ sin ψ: dψ = √(1 + l²) dθ + l sin ψ dτ with l = tan τ / cos ψ.) Origins (p, 3) and
-        R_target_from_mbes (p, 3, 3) are per ping, directions (p, b, 3).
+        A beam that lies entirely on one plane is phase detected, with the range along its axis. Any other beam's range
+        is the weighted mean over its rays, which differ by parts of the receive width in θ and of the transmit width in
+        τ. (From sin θ = cos τ sin ψ: dψ = √(1 + l²) dθ + l sin ψ dτ with l = tan τ / cos ψ.)
+
+        Parameters
+        ----------
+        origins_m : (p, 3) array
+            Acoustic centre in the target frame, by ping.
+        R_target_from_mbes : (p, 3, 3) array
+            Attitude by ping.
+        swing, tilt_rad : (p, b) arrays
+            ψ and τ of the beams' axes, rad.
+
+        Returns
+        -------
+        paths : (p, b) array
+            m; inf without a detection.
+        directions : (p, b, 3) array
+            Unit vectors in the target frame.
         """
         pings, beams = swing.shape
         lean = (np.tan(tilt_rad) / np.cos(swing))[..., None]
@@ -113,6 +160,7 @@ class Beams:
         return detected, directions.reshape(*shape, 3)[:, :, self.axis]
 
     def _detect(self, paths: Floats, wet: NDArray[np.bool_], surfaces: NDArray[np.int64]) -> Floats:
+        """Return the detected path (p, b) from those of all rays (p, b, rays), inf without a detection."""
         axis = slice(self.axis, self.axis + 1)
         one_plane = np.all(wet & (surfaces == surfaces[..., axis]), axis=-1)
         weights = self.weights * wet

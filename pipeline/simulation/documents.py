@@ -11,59 +11,82 @@ from pipeline.simulation.mounts import R_body_from_sensor, coarse_error, coarse_
 from pipeline.simulation.scenario import Scenario
 
 INS_SUFFIX = {"inspvas": "gps", "inspva": "gps", "inspvasa": "asc", "inspvaa": "asc", "sbet": "sbet"}
-Text = dict[str, Any]
+_Text = dict[str, Any]
 
 
-def session_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
-    """session.yaml. Sigmas are those put in; where one is zero it is left out, so that the default holds."""
+def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
+    """Return the content of session.yaml.
+
+    Its sigmas are those of the simulated noise; one that is zero is left out, so that the default holds.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    movement : Movement
+        The vessel's movement, for the GPS weeks.
+    seed : int
+        Seed of the coarse mounts' errors.
+    """
     ins, laser, mbes = scenario.ins, scenario.laser, scenario.mbes
     first_ns = movement.ins_runs_ns(0)[0]
-    about_ins: Text = {"files": [f"ins/*.{INS_SUFFIX[ins.format]}"]}
-    about_ins["format"] = "sbet" if ins.format == "sbet" else "novatel"
+    ins_block: _Text = {"files": [f"ins/*.{INS_SUFFIX[ins.format]}"]}
+    ins_block["format"] = "sbet" if ins.format == "sbet" else "novatel"
     if ins.format == "sbet":
-        about_ins["gps_week"] = first_ns // WEEK_NS
+        ins_block["gps_week"] = first_ns // WEEK_NS
     if scenario.declare_sigmas:
-        about_ins |= {"drift": ins.drift.model_dump(), "white": ins.white.model_dump()}
-    about_laser: Text = {"files": [f"laser/*.{laser.format}"], "format": "las"}
+        ins_block |= {"drift": ins.drift.model_dump(), "white": ins.white.model_dump()}
+    laser_block: _Text = {"files": [f"laser/*.{laser.format}"], "format": "las"}
     if laser.time == "week_seconds":
-        about_laser["gps_week"] = movement.starts_ns[0] // WEEK_NS
-    about_laser |= {"frame": laser.frame, "mount": coarse_mount(laser, seed).model_dump()}
-    about_laser["latency_s"] = laser.latency_declared_s
-    about_mbes: Text = {
+        laser_block["gps_week"] = movement.starts_ns[0] // WEEK_NS
+    laser_block |= {"frame": laser.frame, "mount": coarse_mount(laser, seed).model_dump()}
+    laser_block["latency_s"] = laser.latency_declared_s
+    mbes_block: _Text = {
         "files": [f"mbes/*.{mbes.format}"],
         "format": "table" if mbes.format == "parquet" else "r2sonic",
         "mount": coarse_mount(mbes, seed).model_dump(),
         "sound_speed_m_s": mbes.sound_speed_true_m_s if mbes.give_true_sound_speed else None,
     }
     if mbes.give_projector_offset:
-        about_mbes["projector_offset_m"] = list(mbes.projector_offset_m)
-    about_mbes["latency_s"] = mbes.latency_declared_s
+        mbes_block["projector_offset_m"] = list(mbes.projector_offset_m)
+    mbes_block["latency_s"] = mbes.latency_declared_s
     if scenario.declare_sigmas:
-        about_laser |= _sigmas(laser.range_sigma_m, laser.angle_sigma_deg)
-        about_mbes |= _sigmas(mbes.range_sigma_m, mbes.angle_sigma_deg) | {"beam_deg": list(mbes.beam_deg)}
+        laser_block |= _sigmas(laser.range_sigma_m, laser.angle_sigma_deg)
+        mbes_block |= _sigmas(mbes.range_sigma_m, mbes.angle_sigma_deg) | {"beam_deg": list(mbes.beam_deg)}
     name = f"{scenario.start_utc[:10]}_{scenario.name}"
-    return {"name": name, "ins": about_ins, "laser": about_laser, "mbes": about_mbes}
+    return {"name": name, "ins": ins_block, "laser": laser_block, "mbes": mbes_block}
 
 
-def _sigmas(range_m: float, angle_deg: float) -> Text:
-    given = {"range_sigma_m": range_m, "angle_sigma_deg": angle_deg}
-    return {key: value for key, value in given.items() if value > 0}
+def _sigmas(range_m: float, angle_deg: float) -> _Text:
+    sigmas = {"range_sigma_m": range_m, "angle_sigma_deg": angle_deg}
+    return {key: value for key, value in sigmas.items() if value > 0}
 
 
-def pool_text(scenario: Scenario, movement: Movement) -> Text:
-    """pool.yaml: the design, standing where the surveyor believes it to stand."""
-    around, target = scenario.surroundings, scenario.target.model_dump(mode="json")
-    if any(around.origin_error_m):
-        believed = np.array([around.origin_error_m])
-        latitude, longitude, height = (float(v[0]) for v in movement.site.geodetic_from_target(believed))
+def pool_text(scenario: Scenario, movement: Movement) -> _Text:
+    """Return the content of pool.yaml: the design of the target, at the position that the survey gave."""
+    surroundings, target = scenario.surroundings, scenario.target.model_dump(mode="json")
+    if any(surroundings.origin_error_m):
+        surveyed = np.array([surroundings.origin_error_m])
+        latitude, longitude, height = (float(v[0]) for v in movement.site.geodetic_from_target(surveyed))
         degrees = {"latitude_deg": float(np.degrees(latitude)), "longitude_deg": float(np.degrees(longitude))}
         target["origin"] = degrees | {"height_m": height}
-    target["azimuth_deg"] = scenario.azimuth_deg + around.azimuth_error_deg if around.give_azimuth else None
+    azimuth_deg = scenario.azimuth_deg + surroundings.azimuth_error_deg
+    target["azimuth_deg"] = azimuth_deg if surroundings.give_azimuth else None
     return {"target": target}
 
 
-def truth_text(scenario: Scenario, movement: Movement, seed: int) -> Text:
-    """What a calibration should find, and what was done to the data."""
+def truth_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
+    """Return the truth: true mounts, errors of the coarse mounts, and all settings of the scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    movement : Movement
+        The vessel's movement, for the times of the passes.
+    seed : int
+        Seed of the session.
+    """
     mbes, mount = scenario.mbes, scenario.mbes.mount
     error: Mount = coarse_error(mbes, seed)
     return {

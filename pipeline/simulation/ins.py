@@ -1,4 +1,4 @@
-"""What the INS records: its true pose, Gauss-Markov drift through the whole session, and white noise."""
+"""Records of the INS: the true poses, Gauss-Markov drift through the whole session, and white noise."""
 
 from itertools import pairwise
 
@@ -13,23 +13,41 @@ from pipeline.simulation.scenario import InsScenario
 from pipeline.simulation.site import Floats
 
 Columns = dict[str, np.ndarray]
-NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
+_POSE_COLUMNS = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
 
 
 def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Columns, list[int]]:
-    """The canonical raw columns, and the first row of each pass (and of the end)."""
+    """Simulate the records of the INS.
+
+    Parameters
+    ----------
+    scenario : InsScenario
+        Rate and errors.
+    movement : Movement
+        True poses.
+    seed : int
+        Seed of the session.
+
+    Returns
+    -------
+    columns : Columns
+        Canonical raw columns.
+    first_rows : list of int
+        First row of each pass, and the number of rows.
+    """
     times = [_epochs(scenario.rate_hz, *movement.ins_runs_ns(k)) for k in movement.passes]
     t_ns = np.concatenate(times)
-    errors = drift(scenario.drift, t_ns, generator(seed, "ins_drift")) + white(scenario, len(t_ns), seed)
+    errors = gauss_markov_drift(scenario.drift, t_ns, generator(seed, "ins_drift"))
+    errors = errors + white_noise(scenario, len(t_ns), seed)
     rows = np.concatenate([[0], np.cumsum([len(t) for t in times])])
-    columns: Columns = {"t_ns": t_ns} | {name: np.empty(len(t_ns)) for name in NAMES}
+    columns: Columns = {"t_ns": t_ns} | {name: np.empty(len(t_ns)) for name in _POSE_COLUMNS}
     for k in movement.passes:
         part = slice(rows[k], rows[k + 1])
         pose = movement.pose(k, times[k])
         east_north_up = errors[:3, part].T
         shift_target = movement.site.R_level_from_target.inv().apply(east_north_up)
         position = movement.site.geodetic_from_target(pose.position_target_m + shift_target)
-        for name, values in zip(NAMES[:3], position, strict=True):
+        for name, values in zip(_POSE_COLUMNS[:3], position, strict=True):
             columns[name][part] = values
         columns["roll_rad"][part] = pose.roll_rad + errors[3, part]
         columns["pitch_rad"][part] = pose.pitch_rad + errors[4, part]
@@ -38,29 +56,58 @@ def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Co
 
 
 def _epochs(rate_hz: float, start_ns: int, end_ns: int) -> Times:
-    """Epochs from start to before end at whole multiples of the record interval in GPS time, as receivers give them."""
+    """Return epochs from start to before end, whole multiples of the interval in GPS time, as receivers give them."""
     interval_ns = round(NS / rate_hz)
     return np.arange(-(-start_ns // interval_ns), -(-end_ns // interval_ns), dtype=np.int64) * interval_ns
 
 
-def sigmas(position_m: tuple[float, float, float], attitude_deg: tuple[float, float, float]) -> Floats:
-    """(6, 1): east, north, up in m; roll, pitch, azimuth in rad."""
+def pose_sigmas(position_m: tuple[float, float, float], attitude_deg: tuple[float, float, float]) -> Floats:
+    """Return sigmas (6, 1) of east, north, up in m and of roll, pitch, azimuth in rad."""
     return np.concatenate([position_m, np.radians(attitude_deg)])[:, None]
 
 
-def white(scenario: InsScenario, count: int, seed: int) -> Floats:
-    """(6, count) independent errors of each record."""
+def white_noise(scenario: InsScenario, count: int, seed: int) -> Floats:
+    """Return independent errors of the records.
+
+    Parameters
+    ----------
+    scenario : InsScenario
+        Their sigmas.
+    count : int
+        Number of records.
+    seed : int
+        Seed of the session.
+
+    Returns
+    -------
+    (6, count) array
+        East, north, up in m; roll, pitch, azimuth in rad.
+    """
     position, attitude = scenario.white.position_m, scenario.white.attitude_deg
     noise = generator(seed, "ins_white").standard_normal((6, count))
-    return sigmas((position,) * 3, (attitude,) * 3) * noise
+    return pose_sigmas((position,) * 3, (attitude,) * 3) * noise
 
 
-def drift(scenario: Drift, t_ns: Times, random: np.random.Generator) -> Floats:
-    """(6, n) first-order Gauss-Markov errors; the process goes on through gaps.
+def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator) -> Floats:
+    """Return first-order Gauss-Markov errors; the process goes on through gaps.
 
     x(t + dt) = f x(t) + sqrt(1 - f²) sigma w, f = exp(-dt / tau): stationary from the first record on.
+
+    Parameters
+    ----------
+    scenario : Drift
+        Sigmas and time constant.
+    t_ns : (n,) array
+        Times of the records, GPS ns.
+    random : Generator
+        Random numbers.
+
+    Returns
+    -------
+    (6, n) array
+        East, north, up in m; roll, pitch, azimuth in rad.
     """
-    scale = sigmas(
+    scale = pose_sigmas(
         (scenario.horizontal_m, scenario.horizontal_m, scenario.vertical_m),
         (scenario.roll_pitch_deg, scenario.roll_pitch_deg, scenario.heading_deg),
     )

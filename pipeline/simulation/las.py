@@ -11,11 +11,23 @@ from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.scenario import LaserScenario
 
-CHUNK = 1_000_000
+_CHUNK = 1_000_000
 
 
 def write_las(path: Path, laser: Columns, scenario: LaserScenario, day: date) -> None:
-    """One file. The creation date is the session's day: the same session gives the same bytes."""
+    """Write one file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    laser : Columns
+        Points.
+    scenario : LaserScenario
+        Format, scale, kind of times.
+    day : date
+        Creation date: the session's day, so that the same session gives the same bytes.
+    """
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = np.full(3, scenario.scale_m), np.zeros(3)
     if scenario.frame != "laser" and len(laser["t_ns"]):
@@ -25,8 +37,8 @@ def write_las(path: Path, laser: Columns, scenario: LaserScenario, day: date) ->
     weekly = scenario.time == "week_seconds"
     header.global_encoding.gps_time_type = GpsTimeType.WEEK_TIME if weekly else GpsTimeType.STANDARD
     with laspy.open(path, mode="w", header=header, do_compress=scenario.format == "laz") as file:
-        for start in range(0, len(laser["t_ns"]), CHUNK):
-            part = {name: values[start : start + CHUNK] for name, values in laser.items()}
+        for start in range(0, len(laser["t_ns"]), _CHUNK):
+            part = {name: values[start : start + _CHUNK] for name, values in laser.items()}
             points = laspy.ScaleAwarePointRecord.zeros(len(part["t_ns"]), header=header)
             points.x, points.y, points.z = part["x_m"], part["y_m"], part["z_m"]
             t_ns = part["t_ns"] % WEEK_NS if weekly else part["t_ns"] - ADJUSTED_STANDARD_OFFSET_S * NS

@@ -1,4 +1,4 @@
-"""What the laser scanner records: lines athwart to starboard, in the scanner's own frame."""
+"""Records of the laser scanner: lines athwart to starboard, in the scanner's own frame."""
 
 import numpy as np
 
@@ -7,31 +7,50 @@ from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
 from pipeline.simulation.random_streams import generator
-from pipeline.simulation.raycast import RayCaster
+from pipeline.simulation.raycast import Pool
 from pipeline.simulation.scenario import LaserScenario
 from pipeline.simulation.site import Floats
 
-CHUNK = 200_000
-SHORTEST_M = 0.5
+_CHUNK = 200_000
+_SHORTEST_M = 0.5
 BELOW_WATER_M = 0.3
 
 
-def direction(zenith_rad: Floats, azimuth_rad: Floats) -> Floats:
-    """(n, 3): sin t cos p, sin t sin p, cos t in the scanner's frame; p = 0 is starboard."""
+def scan_directions(zenith_rad: Floats, azimuth_rad: Floats) -> Floats:
+    """Return unit vectors (n, 3): sin t cos p, sin t sin p, cos t in the scanner's frame; p = 0 is starboard."""
     return np.stack(
         [np.sin(zenith_rad) * np.cos(azimuth_rad), np.sin(zenith_rad) * np.sin(azimuth_rad), np.cos(zenith_rad)], axis=1
     )
 
 
 def record_laser(
-    scenario: LaserScenario, movement: Movement, caster: RayCaster, water_level_m: float, seed: int
+    scenario: LaserScenario, movement: Movement, pool: Pool, seed: int
 ) -> tuple[Columns, list[int]]:
-    """The canonical raw columns, and the first row of each pass (and of the end)."""
+    """Simulate the records of the laser scanner.
+
+    Parameters
+    ----------
+    scenario : LaserScenario
+        The scanner, its mount and its errors.
+    movement : Movement
+        True poses.
+    pool : Pool
+        What its rays meet.
+    seed : int
+        Seed of the session.
+
+    Returns
+    -------
+    columns : Columns
+        Canonical raw columns.
+    first_rows : list of int
+        First row of each pass, and the number of rows.
+    """
     pieces = [(np.empty(0, dtype=np.int64), np.empty((3, 0)))]
     rows = [0]
     for k in movement.passes:
-        scan = _Pass(scenario, movement, caster, water_level_m, seed, k)
-        pieces += [scan.chunk(start) for start in range(0, scan.count, CHUNK)]
+        scan = _LaserPass(scenario, movement, pool, seed, k)
+        pieces += [scan.chunk(start) for start in range(0, scan.count, _CHUNK)]
         rows.append(sum(len(t) for t, _ in pieces))
     columns: Columns = {"t_ns": np.concatenate([t for t, _ in pieces])}
     for axis, name in enumerate(("x_m", "y_m", "z_m")):
@@ -39,43 +58,41 @@ def record_laser(
     return columns, rows
 
 
-class _Pass:
+class _LaserPass:
     """One pass; chunks must be taken in order, as they share the generators."""
 
-    def __init__(
-        self, scenario: LaserScenario, movement: Movement, caster: RayCaster, water_level_m: float, seed: int, k: int
-    ) -> None:
-        self.scenario, self.movement, self.k = scenario, movement, k
-        self.caster, self.water_level_m = caster, water_level_m
+    def __init__(self, scenario: LaserScenario, movement: Movement, pool: Pool, seed: int, k: int) -> None:
+        self.scenario, self.movement, self.pool, self.k = scenario, movement, pool, k
         self.start_ns, end_ns = movement.sensors_run_ns(k)
         self.count = int((end_ns - self.start_ns) / NS * scenario.point_rate_hz)
         self.R_body_from_laser = R_body_from_sensor(scenario.mount)
         self.random = {name: generator(seed, f"laser_{name}", k) for name in ("range", "angle", "outlier", "water")}
 
     def chunk(self, start: int) -> tuple[Times, Floats]:
-        """Recorded times (m,) and points (3, m) of the rays from number ``start`` on."""
-        s = self.scenario
-        number = np.arange(start, min(start + CHUNK, self.count))
-        t_ns = self.start_ns + np.rint(number * (NS / s.point_rate_hz)).astype(np.int64)
-        low, high = np.radians(s.field_deg)
-        zenith = low + (high - low) * ((number * (s.line_rate_hz / s.point_rate_hz)) % 1.0)
-        ranges = self._true_ranges(t_ns, direction(zenith, np.zeros(len(number))))
-        ranges = ranges + s.range_sigma_m * self.random["range"].standard_normal(len(number))
-        angles = np.radians(s.angle_sigma_deg) * self.random["angle"].standard_normal((len(number), 2))
+        """Return recorded times (m,) and points (3, m) of the rays from number ``start`` on, at most _CHUNK of them."""
+        scenario = self.scenario
+        number = np.arange(start, min(start + _CHUNK, self.count))
+        t_ns = self.start_ns + np.rint(number * (NS / scenario.point_rate_hz)).astype(np.int64)
+        low, high = np.radians(scenario.field_deg)
+        zenith = low + (high - low) * ((number * (scenario.line_rate_hz / scenario.point_rate_hz)) % 1.0)
+        ranges = self._true_ranges(t_ns, scan_directions(zenith, np.zeros(len(number))))
+        ranges = ranges + scenario.range_sigma_m * self.random["range"].standard_normal(len(number))
+        angles = np.radians(scenario.angle_sigma_deg) * self.random["angle"].standard_normal((len(number), 2))
         dice = self.random["outlier"].random((len(number), 2))
-        ranges = np.where(dice[:, 0] < s.outlier_share, SHORTEST_M + dice[:, 1] * (s.max_range_m - SHORTEST_M), ranges)
-        kept = np.isfinite(ranges) & (ranges <= s.max_range_m) & (ranges > SHORTEST_M / 2)
-        points = ranges[kept] * direction(zenith[kept] + angles[kept, 0], angles[kept, 1]).T
-        return t_ns[kept] + round(s.latency_s * NS), points
+        random_ranges = _SHORTEST_M + dice[:, 1] * (scenario.max_range_m - _SHORTEST_M)
+        ranges = np.where(dice[:, 0] < scenario.outlier_share, random_ranges, ranges)
+        kept = np.isfinite(ranges) & (ranges <= scenario.max_range_m) & (ranges > _SHORTEST_M / 2)
+        points = ranges[kept] * scan_directions(zenith[kept] + angles[kept, 0], angles[kept, 1]).T
+        return t_ns[kept] + round(scenario.latency_s * NS), points
 
     def _true_ranges(self, t_ns: Times, direction_laser: Floats) -> Floats:
-        """Ranges to what stands above the water; at the water nothing, or now and then something just beyond it."""
+        """Return ranges (n,) to what stands above the water, inf: none; some rays meet the water, just beyond it."""
         pose = self.movement.pose(self.k, t_ns)
         direction_body = self.R_body_from_laser.apply(direction_laser)
         directions = np.einsum("nij,nj->ni", pose.R_target_from_body, direction_body)
         origins = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(self.scenario.mount)
-        ranges, _ = self.caster.cast(origins, directions)
-        height = self.water_level_m - origins[:, 2]
+        ranges, _ = self.pool.caster.cast(origins, directions)
+        height = self.pool.water_level_m - origins[:, 2]
         down = directions[:, 2] < -1e-9
         to_water = np.divide(height, directions[:, 2], out=np.full(len(height), np.inf), where=down)
         dice = self.random["water"].random((len(t_ns), 2))

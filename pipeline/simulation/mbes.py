@@ -1,44 +1,52 @@
-"""What the sonar records: two-way times and angles of beams of finite width, with the echoes nobody wants."""
-
-from dataclasses import dataclass
+"""Records of the sonar: two-way times and angles of beams of finite width, with unwanted echoes."""
 
 import numpy as np
 
 from pipeline.gps_time import NS
-from pipeline.simulation.beams import Beams, directions_in_mbes, fan, swing_rad, transmit_tilts_rad
+from pipeline.simulation.beams import BeamBundles, directions_in_mbes, fan_angles, swing_rad, transmit_tilts_rad
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
 from pipeline.simulation.random_streams import generator
-from pipeline.simulation.raycast import RayCaster
+from pipeline.simulation.raycast import Pool
 from pipeline.simulation.scenario import MbesScenario
 from pipeline.simulation.site import Floats
 
 RAYS_AT_ONCE = 400_000
 CLOCK_RATE_ERROR = 3.7e-5  # the sonar's own clock: pings never fall into step with the INS
-SHORTEST_M = 0.5
+_SHORTEST_M = 0.5
 UPWARD_RAD = np.radians(-30.0)  # beams above this may get the water surface's echo
-
-
-@dataclass(frozen=True)
-class Pool:
-    """What the sonar needs to know of the world."""
-
-    caster: RayCaster
-    water_level_m: float
-    corner_lines: Floats  # (n, 4): x, y, lowest z, highest z
 
 
 def record_mbes(
     scenario: MbesScenario, movement: Movement, pool: Pool, seed: int
 ) -> tuple[Columns, Columns]:
-    """Detections (canonical raw columns), and all pings (t_ns, ping, pass)."""
-    angles = fan(scenario).angles_rad
+    """Simulate the records of the sonar.
+
+    Parameters
+    ----------
+    scenario : MbesScenario
+        The sonar, its mount and its errors.
+    movement : Movement
+        True poses.
+    pool : Pool
+        What its beams meet.
+    seed : int
+        Seed of the session.
+
+    Returns
+    -------
+    detections : Columns
+        Canonical raw columns.
+    pings : Columns
+        Columns t_ns, ping, pass of every ping.
+    """
+    angles = fan_angles(scenario).angles_rad
     parts: list[Columns] = []
     pings: list[Columns] = []
     first = 1000
     for k in movement.passes:
-        sonar = _Pass(scenario, movement, pool, angles, seed, k, first)
+        sonar = _SonarPass(scenario, movement, pool, angles, seed=seed, k=k, first_ping=first)
         batch = max(1, RAYS_AT_ONCE // (len(angles) * sonar.beams.rays))
         parts += [sonar.detections(slice(i, i + batch)) for i in range(0, max(len(sonar.t_ns), 1), batch)]
         pings.append({"t_ns": sonar.recorded_ns, "ping": sonar.ping, "pass": np.full(len(sonar.ping), k)})
@@ -47,11 +55,19 @@ def record_mbes(
     return columns, {name: np.concatenate([part[name] for part in pings]) for name in pings[0]}
 
 
-class _Pass:
+class _SonarPass:
     """One pass; batches of pings must be taken in order, as they share the generators."""
 
     def __init__(
-        self, scenario: MbesScenario, movement: Movement, pool: Pool, angles_rad: Floats, seed: int, k: int, first: int
+        self,
+        scenario: MbesScenario,
+        movement: Movement,
+        pool: Pool,
+        angles_rad: Floats,
+        *,
+        seed: int,
+        k: int,
+        first_ping: int,
     ) -> None:
         self.scenario, self.movement, self.pool, self.k, self.angles_rad = scenario, movement, pool, k, angles_rad
         start_ns, end_ns = movement.sensors_run_ns(k)
@@ -62,51 +78,51 @@ class _Pass:
         kept = generator(seed, "mbes_drop", k).random(self.count) >= scenario.dropped_ping_share
         self.t_ns: Times = t_ns[kept]
         self.recorded_ns: Times = self.t_ns + round(scenario.latency_s * NS)
-        self.ping = first + np.flatnonzero(kept).astype(np.int64)
-        self.beams = Beams(scenario, pool.caster, pool.water_level_m)
+        self.ping = first_ping + np.flatnonzero(kept).astype(np.int64)
+        self.beams = BeamBundles(scenario, pool.caster, pool.water_level_m)
         self.R_body_from_mbes = R_body_from_sensor(scenario.mount).as_matrix()
         names = ("range", "angle", "outlier", "surface", "corner")
         self.random = {name: generator(seed, f"mbes_{name}", k) for name in names}
 
     def detections(self, part: slice) -> Columns:
-        """The canonical raw columns of some pings; beams without echo are left out."""
-        s, t_ns = self.scenario, self.t_ns[part]
+        """Return the canonical raw columns of some pings, without beams that have no echo."""
+        scenario, t_ns = self.scenario, self.t_ns[part]
         shape = (len(t_ns), len(self.angles_rad))
         pose = self.movement.pose(self.k, t_ns)
-        origins = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(s.mount)
+        origins = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(scenario.mount)
         R_target_from_mbes = pose.R_target_from_body @ self.R_body_from_mbes
-        steered = self.angles_rad + np.radians(s.angle_sigma_deg) * self.random["angle"].standard_normal(shape)
-        tilts = transmit_tilts_rad(s, self.angles_rad, self.ping[part])
+        steered = self.angles_rad + np.radians(scenario.angle_sigma_deg) * self.random["angle"].standard_normal(shape)
+        tilts = transmit_tilts_rad(scenario, self.angles_rad, self.ping[part])
         # Both arrays are flat: they are steered with the recorded sound speed, sin(true) = k sin(recorded).
-        k = s.sound_speed_true_m_s / s.sound_speed_recorded_m_s
+        k = scenario.sound_speed_true_m_s / scenario.sound_speed_recorded_m_s
         true_tilts = np.arcsin(k * np.sin(tilts))
-        swing, looks = swing_rad(k * np.sin(steered), true_tilts)
+        swing, exists = swing_rad(k * np.sin(steered), true_tilts)
         paths, directions = self._bent(origins, R_target_from_mbes, swing, true_tilts)
         paths = self._corners(paths, origins, directions)
-        paths = paths + s.range_sigma_m * self.random["range"].standard_normal(shape)
+        paths = paths + scenario.range_sigma_m * self.random["range"].standard_normal(shape)
         paths = self._surface(paths, origins, directions)
         dice = self.random["outlier"].random((*shape, 2))
-        anything = SHORTEST_M + dice[..., 1] * (s.max_range_m - SHORTEST_M)
-        paths = np.where(dice[..., 0] < s.outlier_share, anything, paths)
-        ping, beam = np.nonzero(np.isfinite(paths) & looks & (paths > 0.1) & (paths <= s.max_range_m))
+        random_paths = _SHORTEST_M + dice[..., 1] * (scenario.max_range_m - _SHORTEST_M)
+        paths = np.where(dice[..., 0] < scenario.outlier_share, random_paths, paths)
+        ping, beam = np.nonzero(np.isfinite(paths) & exists & (paths > 0.1) & (paths <= scenario.max_range_m))
         return {
             "t_ns": self.recorded_ns[part][ping],
             "ping": self.ping[part][ping],
             "beam": beam.astype(np.int16),
-            "two_way_time_s": 2 * paths[ping, beam] / s.sound_speed_true_m_s,
+            "two_way_time_s": 2 * paths[ping, beam] / scenario.sound_speed_true_m_s,
             "angle_rad": self.angles_rad[beam],
             "transmit_tilt_rad": tilts[ping, beam],
-            "sound_speed_m_s": np.full(len(ping), float(np.float32(s.sound_speed_recorded_m_s))),
+            "sound_speed_m_s": np.full(len(ping), float(np.float32(scenario.sound_speed_recorded_m_s))),
         }
 
     def _bent(
         self, origins: Floats, R_target_from_mbes: Floats, swing: Floats, tilts: Floats
     ) -> tuple[Floats, Floats]:
-        """Paths and directions as of straight beams; where the sound speed changes with depth, of bent ones.
+        """Return paths and directions of straight beams; where the sound speed changes with depth, of bent ones.
 
         With dc/d(depth) = g a ray curves upward by g/c per metre across itself, so the chord to where it arrives after
         r lies r g / 2c nearer to the vertical; and on the way down sound is on the average g · depth / 2 faster. The
-        part of "up" across the ray is laid on two directions, in which its ψ and its τ grow.
+        part of "up" across the ray is split into the two directions in which its ψ and its τ grow.
         """
         gradient, speed = self.scenario.sound_speed_gradient_1_s, self.scenario.sound_speed_true_m_s
         paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
@@ -116,21 +132,21 @@ class _Pass:
         sideways = np.einsum("pi,pbi->pb", up, directions_in_mbes(swing + np.pi / 2, np.zeros_like(tilts)))
         ahead = np.einsum("pi,pbi->pb", up, directions_in_mbes(swing, tilts + np.pi / 2))
         turn = gradient / (2 * speed) * np.where(np.isfinite(paths), paths, 0.0)
-        turned = swing + turn * sideways / np.cos(tilts), tilts + turn * ahead
-        paths, directions = self.beams.paths(origins, R_target_from_mbes, *turned)
+        swing, tilts = swing + turn * sideways / np.cos(tilts), tilts + turn * ahead
+        paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
         depths = -directions[..., 2] * np.where(np.isfinite(paths), paths, 0.0)
         return paths * (1 - gradient * depths / (2 * speed)), directions
 
     def _corners(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
-        """Near an inner corner the corner itself answers: the nearest point of its line within the beam."""
-        s = self.scenario
+        """Replace echoes near an inner corner by the corner's: the nearest point of its line within the beam."""
+        scenario = self.scenario
         dice = self.random["corner"].random(paths.shape)
-        ping, beam = np.nonzero(np.isfinite(paths) & (dice < s.corner_share))
+        ping, beam = np.nonzero(np.isfinite(paths) & (dice < scenario.corner_share))
         hits = origins[ping] + paths[ping, beam, None] * directions[ping, beam]
-        half = paths[ping, beam] * np.radians(s.beam_deg[0]) / 2
+        half = paths[ping, beam] * np.radians(scenario.beam_deg[0]) / 2
         result = paths.copy()
         for x, y, low, high in self.pool.corner_lines:
-            near = np.hypot(hits[:, 0] - x, hits[:, 1] - y) < s.corner_reach_m
+            near = np.hypot(hits[:, 0] - x, hits[:, 1] - y) < scenario.corner_reach_m
             near &= (hits[:, 2] > low) & (hits[:, 2] < high)
             start = origins[ping[near]]
             height = np.clip(start[:, 2], hits[near, 2] - half[near], hits[near, 2] + half[near])
@@ -139,7 +155,7 @@ class _Pass:
         return result
 
     def _surface(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
-        """Echoes of the water surface: along the beam if it rises enough to meet it, else from straight above."""
+        """Replace some paths by echoes of the water surface: along the beam if it meets it, else straight above."""
         dice = self.random["surface"].random(paths.shape)
         chosen = (dice < self.scenario.surface_share) & (directions[..., 2] > np.sin(UPWARD_RAD))
         depth = np.broadcast_to((self.pool.water_level_m - origins[:, 2])[:, None], paths.shape)

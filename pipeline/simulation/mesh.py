@@ -1,7 +1,7 @@
-"""Target and pool as planar polygons, built from the letters a, b, c, e or from the faces given; and their triangles.
+"""Target and pool as planar polygons, built from the letters a, b, c, e or from a list of faces; and their triangles.
 
-Of the letters: origin in the centre of the wall's front face; x into the wall, y along it ("north" is +y), z up. A
-block on side s = ±1 is the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
+With letters the origin is the centre of the wall's front face; x runs into the wall, y along it ("north" is +y), z up.
+A block on side s = ±1 is the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
 """
 
 from dataclasses import dataclass
@@ -14,18 +14,20 @@ from pipeline.config.target import Faces, Letters, Target
 from pipeline.simulation.scenario import Surroundings
 from pipeline.simulation.site import Floats
 
-SIDES = {"south": -1.0, "north": 1.0}
-BEHIND_M = 30.0  # the floor reaches this far toward the vessel
+_SIDES = {"south": -1.0, "north": 1.0}
+_BEHIND_M = 30.0  # the floor reaches this far toward the vessel
 
 
 @dataclass(frozen=True)
-class Polygon:
+class FacePolygon:
+    """A planar face."""
+
     name: str
     vertices_m: Floats  # (k, 3), seen from outside counter-clockwise
 
 
 def block_bases_m(target: Letters, side: str) -> list[float]:
-    """Heights of the blocks' bases: the low side's first at first_base_m, the other side's stagger_m above it."""
+    """Return heights of blocks' bases: the low side's first at first_base_m, the other side's stagger_m above it."""
     first = -target.a / 2 if target.first_base_m is None else target.first_base_m
     stagger = target.e if target.stagger_m is None else target.stagger_m
     count = int(target.a / (2 * target.e) + 1e-9) if target.blocks_per_side is None else target.blocks_per_side
@@ -33,24 +35,36 @@ def block_bases_m(target: Letters, side: str) -> list[float]:
     return [lowest + 2 * target.e * k for k in range(count)]
 
 
-def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = True) -> list[Polygon]:
-    """Side faces, top and bottom over a footprint (k, 2) that runs counter-clockwise seen from above."""
+def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = True) -> list[FacePolygon]:
+    """Return side faces, top and bottom of a prism.
+
+    Parameters
+    ----------
+    name : str
+        First part of the faces' names.
+    corners : (k, 2) array
+        Footprint, counter-clockwise seen from above, m.
+    low_m, high_m : float
+        Heights of bottom and top.
+    caps : bool
+        Whether top and bottom are wanted.
+    """
     def at(height_m: float) -> Floats:
         return np.column_stack([corners, np.full(len(corners), height_m)])
 
     low, high = at(low_m), at(high_m)
     after = np.roll(np.arange(len(corners)), -1)
-    faces = [Polygon(f"{name}_{k}", np.array([low[k], low[n], high[n], high[k]])) for k, n in enumerate(after)]
-    return faces + ([Polygon(f"{name}_top", high), Polygon(f"{name}_bottom", low[::-1])] if caps else [])
+    faces = [FacePolygon(f"{name}_{k}", np.array([low[k], low[n], high[n], high[k]])) for k, n in enumerate(after)]
+    return faces + ([FacePolygon(f"{name}_top", high), FacePolygon(f"{name}_bottom", low[::-1])] if caps else [])
 
 
-def target_polygons(target: Target) -> list[Polygon]:
-    """The faces given; or the wall as a box back to the pool's wall, and the blocks."""
+def target_polygons(target: Target) -> list[FacePolygon]:
+    """Return the listed faces; or, with letters, the wall as a box back to the pool's wall, and the blocks."""
     if isinstance(target, Faces):
-        return [Polygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
+        return [FacePolygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
     a, half, c, e = target.a, target.b / 2, target.c, target.e
     polygons = prism("wall", np.array([[0, -half], [c, -half], [c, half], [0, half]]), -a / 2, a / 2)
-    for side, s in SIDES.items():
+    for side, s in _SIDES.items():
         footprint = np.array([[0, s * half], [c, s * half], [c, s * (half + c)]])
         footprint = footprint if s > 0 else footprint[::-1]
         for k, base in enumerate(block_bases_m(target, side)):
@@ -58,8 +72,8 @@ def target_polygons(target: Target) -> list[Polygon]:
     return polygons
 
 
-def extents(target: Target) -> Floats:
-    """(3, 2): least and greatest x, y, z of the target's faces."""
+def target_extents(target: Target) -> Floats:
+    """Return least and greatest x, y, z of the target's faces, (3, 2), m."""
     if isinstance(target, Letters):
         half = target.b / 2 + target.c
         return np.array([[0.0, target.c], [-half, half], [-target.a / 2, target.a / 2]])
@@ -67,25 +81,25 @@ def extents(target: Target) -> Floats:
     return np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
 
 
-def pool_polygons(target: Target, surroundings: Surroundings) -> list[Polygon]:
-    """Back wall (of the patent's target the plane x = c) and floor."""
-    (_, c), _, (low, high) = extents(target)
+def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygon]:
+    """Return back wall (with letters the plane x = c) and floor."""
+    (_, c), _, (low, high) = target_extents(target)
     reach = surroundings.half_length_m
     floor, top = low - surroundings.floor_gap_m, high + surroundings.wall_above_m
     wall = np.array([[c, -reach, floor], [c, -reach, top], [c, reach, top], [c, reach, floor]])
-    ground = np.array([[-BEHIND_M, -reach, floor], [c, -reach, floor], [c, reach, floor], [-BEHIND_M, reach, floor]])
-    return [Polygon("back_wall", wall)] * surroundings.back_wall + [Polygon("floor", ground)]
+    ground = np.array([[-_BEHIND_M, -reach, floor], [c, -reach, floor], [c, reach, floor], [-_BEHIND_M, reach, floor]])
+    return [FacePolygon("back_wall", wall)] * surroundings.back_wall + [FacePolygon("floor", ground)]
 
 
 def corner_lines(target: Target) -> Floats:
-    """Inner corners with the back wall, (n, 4): x, y, lowest z, highest z; of the patent's target alone.
+    """Return inner corners with the back wall, (n, 4): x, y, lowest z, highest z; none without letters.
 
-    Slanted faces meet it at y = ±(b/2 + c); in the gaps between blocks the wall's sides do at y = ±b/2.
+    Slanted faces meet the back wall at y = ±(b/2 + c); in the gaps between blocks the wall's sides do at y = ±b/2.
     """
     if isinstance(target, Faces):
         return np.empty((0, 4))
     lines = []
-    for side, s in SIDES.items():
+    for side, s in _SIDES.items():
         bases = block_bases_m(target, side)
         lines += [(target.c, s * (target.b / 2 + target.c), base, base + target.e) for base in bases]
         lines += [(target.c, s * target.b / 2, base + target.e, base + 2 * target.e) for base in bases[:-1]]
@@ -105,9 +119,9 @@ class Mesh:
 
 
 def build_mesh(target: Target, surroundings: Surroundings) -> Mesh:
-    """Everything a ray may meet but the water."""
+    """Return the triangles of target and pool, without the water."""
     tilt = Rotation.from_euler("XY", surroundings.tilt_deg, degrees=True)
-    polygons = [Polygon(p.name, tilt.apply(p.vertices_m)) for p in target_polygons(target)]
+    polygons = [FacePolygon(p.name, tilt.apply(p.vertices_m)) for p in target_polygons(target)]
     polygons += pool_polygons(target, surroundings)
     triangles: list[tuple[int, int, int]] = []
     planes: list[Floats] = []

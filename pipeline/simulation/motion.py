@@ -17,8 +17,8 @@ SECOND_PERIOD = 0.37
 
 
 @dataclass(frozen=True)
-class Pose:
-    """The INS's true poses at n moments."""
+class TruePoses:
+    """The INS's true poses at n epochs."""
 
     position_target_m: Floats  # (n, 3)
     R_target_from_body: Floats  # (n, 3, 3)
@@ -49,38 +49,48 @@ class Movement:
         self.margin_ns, gap_ns = round(track.margin_s * NS), round(track.gap_s * NS)
         length_ns = round(2 * self.half_length_m / self.speed_m_s * NS)
         passes = range(len(track.distances_m))
-        first_ns = start_ns(scenario) + self.margin_ns
+        first_ns = session_start_ns(scenario) + self.margin_ns
         self.starts_ns = [first_ns + k * (length_ns + 2 * self.margin_ns + gap_ns) for k in passes]
         self.ends_ns = [start + length_ns for start in self.starts_ns]
         self.phases_rad = [generator(seed, "motion", k).uniform(0, 2 * np.pi, (6, 2)) for k in passes]
 
     @property
     def passes(self) -> range:
+        """Numbers of the passes."""
         return range(len(self.distances_m))
 
     def sensors_run_ns(self, k: int) -> tuple[int, int]:
-        """When laser and sonar run in pass ``k``; with ``log_between_passes`` until the next one begins."""
+        """Return when laser and sonar run in pass ``k``; with ``log_between_passes`` until the next one begins."""
         goes_on = self.between and k + 1 < len(self.starts_ns)
         return self.starts_ns[k], self.starts_ns[k + 1] if goes_on else self.ends_ns[k]
 
     def ins_runs_ns(self, k: int) -> tuple[int, int]:
-        """When the INS is logged for pass ``k``: the sensors' time and the margins."""
+        """Return when the INS is logged for pass ``k``: the sensors' time and the margins."""
         start, end = self.sensors_run_ns(k)
         before = 0 if self.between and k > 0 else self.margin_ns
         after = 0 if end != self.ends_ns[k] else self.margin_ns
         return start - before, end + after
 
-    def pose(self, k: int, t_ns: Times) -> Pose:
-        """True poses in (or after) pass ``k``."""
+    def pose(self, k: int, t_ns: Times) -> TruePoses:
+        """Return true poses in (or after) pass ``k`` at times (n,), GPS ns."""
         x, y, z, roll, pitch, azimuth = self._states(k, t_ns)
         position = np.stack([x, y, z], axis=1)
         latitude, longitude, height = self.site.geodetic_from_target(position)
         R_target_from_level = self.site.R_target_from_level(latitude, longitude)
         R_target_from_body = R_target_from_level @ R_level_from_body(roll, pitch, azimuth)
-        return Pose(position, R_target_from_body, latitude, longitude, height, roll, pitch, azimuth % (2 * np.pi))
+        return TruePoses(
+            position_target_m=position,
+            R_target_from_body=R_target_from_body,
+            latitude_rad=latitude,
+            longitude_rad=longitude,
+            height_m=height,
+            roll_rad=roll,
+            pitch_rad=pitch,
+            azimuth_rad=azimuth % (2 * np.pi),
+        )
 
     def _states(self, k: int, t_ns: Times) -> Floats:
-        """(6, n): x, y, z, roll, pitch, azimuth; a smooth change-over to the next pass after the margin."""
+        """Return x, y, z, roll, pitch, azimuth, (6, n), with a smooth transition to the next pass after the margin."""
         states = self._pass_states(k, t_ns)
         if not (self.between and k + 1 < len(self.starts_ns)):
             return states
@@ -108,10 +118,19 @@ class Movement:
 
 
 def R_level_from_body(roll_rad: Floats, pitch_rad: Floats, azimuth_rad: Floats) -> Floats:
-    """(n, 3, 3) Rz(-azimuth) Rx(pitch) Ry(roll), multiplied out: scipy takes ten times as long.
+    """Return Rz(-azimuth) Rx(pitch) Ry(roll), multiplied out: scipy takes ten times as long.
 
-    Columns: where starboard, bow and mast point in east, north, up. Starboard goes down with roll, the bow up with
-    pitch.
+    The columns are the directions of starboard, bow and mast in east, north, up. Starboard goes down with roll, the bow
+    up with pitch.
+
+    Parameters
+    ----------
+    roll_rad, pitch_rad, azimuth_rad : (n,) arrays
+        Attitude.
+
+    Returns
+    -------
+    (n, 3, 3) array
     """
     sr, cr, sp, cp = np.sin(roll_rad), np.cos(roll_rad), np.sin(pitch_rad), np.cos(pitch_rad)
     sa, ca = np.sin(azimuth_rad), np.cos(azimuth_rad)
@@ -121,7 +140,7 @@ def R_level_from_body(roll_rad: Floats, pitch_rad: Floats, azimuth_rad: Floats) 
     return np.stack([np.stack(axis, axis=-1) for axis in (starboard, bow, mast)], axis=-1)
 
 
-def start_ns(scenario: Scenario) -> int:
-    """The session's first moment, GPS."""
+def session_start_ns(scenario: Scenario) -> int:
+    """Return the start of the session, GPS ns."""
     unix_s = round((datetime.fromisoformat(scenario.start_utc) - datetime(1970, 1, 1)).total_seconds())
     return int(gps_ns_from_unix_utc(np.array([unix_s]), np.array([0]))[0])

@@ -10,16 +10,17 @@ from pipeline.simulation.site import Floats
 
 
 def R_body_from_sensor(mount: Mount) -> Rotation:
+    """Return the rotation from the sensor's frame to the body: Rz(yaw) Rx(pitch) Ry(roll)."""
     return Rotation.from_euler("ZXY", [mount.yaw_deg, mount.pitch_deg, mount.roll_deg], degrees=True)
 
 
 def lever_arm_m(mount: Mount) -> Floats:
-    """(3,) the sensor's origin in the body frame."""
+    """Return the sensor's origin in the body frame, (3,), m."""
     return np.array([mount.x_m, mount.y_m, mount.z_m])
 
 
 def coarse_error(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
-    """Coarse minus true: as given, or of the given sizes with random signs."""
+    """Return coarse minus true mount: the scenario's, or its sizes with random signs."""
     if scenario.coarse_error is not None:
         return scenario.coarse_error
     noise = "coarse" if isinstance(scenario, MbesScenario) else "coarse_laser"
@@ -30,6 +31,6 @@ def coarse_error(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
 
 
 def coarse_mount(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
-    """What session.yaml says."""
+    """Return the mount in session.yaml: true mount and coarse error."""
     true, error = scenario.mount.model_dump(), coarse_error(scenario, seed).model_dump()
     return Mount(**{name: round(true[name] + error[name], 12) for name in true})

@@ -16,29 +16,31 @@ LONG_HEADER = np.dtype(
         ("receiver_status", "<u4"), ("reserved", "<u2"), ("software", "<u2"),
     ]
 )
-BODY = np.dtype(
+_BODY = np.dtype(
     [
         ("week", "<u4"), ("seconds", "<f8"), ("latitude", "<f8"), ("longitude", "<f8"), ("height", "<f8"),
         ("north", "<f8"), ("east", "<f8"), ("up", "<f8"), ("roll", "<f8"), ("pitch", "<f8"), ("azimuth", "<f8"),
         ("status", "<i4"),
     ]
 )
-NUMBERS = {"inspva": 507, "inspvas": 508}
-ALIGNING, GOOD = 1, 3
-STATUS_NAMES = {ALIGNING: "INS_ALIGNING", GOOD: "INS_SOLUTION_GOOD"}
+_MESSAGE_IDS = {"inspva": 507, "inspvas": 508}
+_ALIGNING, _GOOD = 1, 3
+STATUS_NAMES = {_ALIGNING: "INS_ALIGNING", _GOOD: "INS_SOLUTION_GOOD"}
 FINE_STEERING = 180
 RADIUS_M = 6_378_137.0
 
 
 @dataclass(frozen=True)
 class Velocities:
+    """Velocities of the INS, (n,) each, m/s."""
+
     north: np.ndarray
     east: np.ndarray
     up: np.ndarray
 
 
 def velocities(ins: Columns) -> Velocities:
-    """Velocities over about a second, from the positions (to a few mm/s; nobody calibrates with them)."""
+    """Return velocities over about a second, from the positions (to a few mm/s; no calibration uses them)."""
     t_ns = ins["t_ns"]
     half = np.searchsorted(t_ns, t_ns[0] + NS // 2) if len(t_ns) else 0
     row = np.arange(len(t_ns))
@@ -50,35 +52,35 @@ def velocities(ins: Columns) -> Velocities:
     return Velocities(north * RADIUS_M, east * RADIUS_M * np.cos(ins["latitude_rad"]), up)
 
 
-def bodies(ins: Columns) -> np.ndarray:
-    """INSPVA(S) message bodies, degrees, status good."""
-    body = np.zeros(len(ins["t_ns"]), BODY)
+def inspva_bodies(ins: Columns) -> np.ndarray:
+    """Return INSPVA(S) message bodies, degrees, status good."""
+    body = np.zeros(len(ins["t_ns"]), _BODY)
     body["week"], body["seconds"] = ins["t_ns"] // WEEK_NS, ins["t_ns"] % WEEK_NS / NS
     speed = velocities(ins)
     body["north"], body["east"], body["up"] = speed.north, speed.east, speed.up
     for name in ("latitude", "longitude", "roll", "pitch", "azimuth"):
         body[name] = np.degrees(ins[f"{name}_rad"])
-    body["height"], body["status"] = ins["height_m"], GOOD
+    body["height"], body["status"] = ins["height_m"], _GOOD
     return body
 
 
 def aligning_bodies(first_ns: int, seconds: float) -> np.ndarray:
-    """What an INS that is still aligning logs, once a second: no position, latitude -90."""
+    """Return message bodies of an aligning INS, once a second before ``first_ns``: no position, latitude -90."""
     count = int(seconds)
     t_ns = first_ns - NS * np.arange(count, 0, -1, dtype=np.int64)
-    body = np.zeros(count, BODY)
+    body = np.zeros(count, _BODY)
     body["week"], body["seconds"] = t_ns // WEEK_NS, t_ns % WEEK_NS / NS
-    body["latitude"], body["height"], body["status"] = -90.0, -6_356_752.3142, ALIGNING
+    body["latitude"], body["height"], body["status"] = -90.0, -6_356_752.3142, _ALIGNING
     return body
 
 
 def crc32(data: bytes) -> int:
-    """NovAtel's CRC: the usual polynomial, but started from zero and not inverted."""
+    """Return NovAtel's CRC: the usual polynomial, but started from zero and not inverted."""
     return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def novatel_bytes(body: np.ndarray, form: str) -> bytes:
-    """Records of the form inspvas, inspva (binary), inspvasa or inspvaa (ASCII)."""
+    """Return records of the form inspvas, inspva (binary), inspvasa or inspvaa (ASCII)."""
     if form in ("inspvasa", "inspvaa"):
         return b"".join(_ascii(record, form) for record in body)
     header = _headers(body, form)
@@ -86,7 +88,7 @@ def novatel_bytes(body: np.ndarray, form: str) -> bytes:
     inside = body.tobytes()
     records = []
     for k in range(len(body)):
-        record = bare[k * stride : (k + 1) * stride] + inside[k * BODY.itemsize : (k + 1) * BODY.itemsize]
+        record = bare[k * stride : (k + 1) * stride] + inside[k * _BODY.itemsize : (k + 1) * _BODY.itemsize]
         records.append(record + crc32(record).to_bytes(4, "little"))
     return b"".join(records)
 
@@ -94,7 +96,7 @@ def novatel_bytes(body: np.ndarray, form: str) -> bytes:
 def _headers(body: np.ndarray, form: str) -> np.ndarray:
     header = np.zeros(len(body), SHORT_HEADER if form == "inspvas" else LONG_HEADER)
     header["sync"] = (0xAA, 0x44, 0x13 if form == "inspvas" else 0x12)
-    header["length"], header["id"] = BODY.itemsize, NUMBERS[form]
+    header["length"], header["id"] = _BODY.itemsize, _MESSAGE_IDS[form]
     header["week"], header["ms"] = body["week"], np.rint(body["seconds"] * 1000)
     if form == "inspva":
         header["header_length"], header["port"], header["time_status"] = LONG_HEADER.itemsize, 0x20, FINE_STEERING

@@ -4,17 +4,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.gps_time import GPS_EPOCH_UNIX_S, LEAP_SECONDS, NS
-from pipeline.simulation.beams import Fan
+from pipeline.simulation.beams import FanAngles
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.scenario import MbesScenario
 
-XTF_RECORD = 256  # XTF ping header, its first 14 bytes being the packet header
+_XTF_PING_HEADER_BYTES = 256  # XTF ping header, its first 14 bytes being the packet header
 PHASE_DETECT, MAGNITUDE_DETECT = 0b1011, 0b0111  # nibbles as a real head sets them
 MAGNITUDE_BELOW_RAD = np.radians(20.0)
 
 
 def utc_from_gps_ns(t_ns: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Unix seconds and nanoseconds (UTC) of GPS times: the leap seconds of that moment are taken off."""
+    """Return Unix seconds and nanoseconds (UTC) of GPS times, with the leap seconds of that instant."""
     starts = np.array([(start - GPS_EPOCH_UNIX_S + leap) * NS for start, leap in LEAP_SECONDS], dtype=np.int64)
     leaps = np.array([leap for _, leap in LEAP_SECONDS], dtype=np.int64)
     leap = leaps[np.maximum(np.searchsorted(starts, t_ns, side="right") - 1, 0)]
@@ -22,7 +22,7 @@ def utc_from_gps_ns(t_ns: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray
 
 
 def packet_dtype(scenario: MbesScenario) -> np.dtype[np.void]:
-    """One packet of the scenario's number of beams and sections."""
+    """Return the layout of a packet with the scenario's number of beams and its sections."""
     n, pad = scenario.beams, scenario.beams % 2
     section = [("name", "S2"), ("size", ">u2")]
     h0 = np.dtype(
@@ -46,8 +46,22 @@ def packet_dtype(scenario: MbesScenario) -> np.dtype[np.void]:
     return np.dtype([*start, ("H0", h0), ("R0", scaled), angles, *intensity, ("G0", g0), ("Q0", q0)])
 
 
-def packets(mbes: Columns, pings: Columns, fan: Fan, scenario: MbesScenario) -> np.ndarray:
-    """Packets of some pings; beams that detected nothing have range 0. Ranges use the 16 bits of section R0 fully."""
+def bth0_packets(mbes: Columns, pings: Columns, fan: FanAngles, scenario: MbesScenario) -> np.ndarray:
+    """Return the packets of some pings.
+
+    Beams without detection have range 0. Ranges use all 16 bits of section R0.
+
+    Parameters
+    ----------
+    mbes : Columns
+        Detections of these pings.
+    pings : Columns
+        Times and numbers of the pings.
+    fan : FanAngles
+        Recorded angles.
+    scenario : MbesScenario
+        The sonar.
+    """
     dtype = packet_dtype(scenario)
     packet = np.zeros(len(pings["t_ns"]), dtype)
     packet["magic"], packet["size"] = b"BTH0", dtype.itemsize
@@ -88,7 +102,7 @@ def _fill_head(head: np.ndarray, pings: Columns, scenario: MbesScenario) -> None
 
 
 def _quality(angles_rad: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Flag nibbles, beam 0 the topmost: amplitude detections near the middle of the fan, phase outside."""
+    """Return flag nibbles, beam 0 the topmost: amplitude detections near the middle of the fan, phase outside."""
     nibbles = np.where(np.abs(angles_rad) < MAGNITUDE_BELOW_RAD, MAGNITUDE_DETECT, PHASE_DETECT).astype(np.uint32)
     nibbles = np.pad(nibbles, (0, -len(nibbles) % 8)).reshape(-1, 8)
     flags: NDArray[np.uint32] = np.bitwise_or.reduce(nibbles << np.arange(28, -1, -4, dtype=np.uint32), axis=1)
@@ -96,9 +110,9 @@ def _quality(angles_rad: NDArray[np.float64]) -> NDArray[np.uint32]:
 
 
 def xtf_bytes(packet: np.ndarray, name: str) -> bytes:
-    """An XTF file with the packets as records of type 65 (R2Sonic bathymetry), padded to 64 bytes."""
+    """Return an XTF file with the packets as records of type 65 (R2Sonic bathymetry), padded to 64 bytes."""
     inside = packet.dtype.itemsize
-    length = -(-(XTF_RECORD + inside) // 64) * 64
+    length = -(-(_XTF_PING_HEADER_BYTES + inside) // 64) * 64
     record = np.zeros(
         len(packet),
         np.dtype(
@@ -108,7 +122,7 @@ def xtf_bytes(packet: np.ndarray, name: str) -> bytes:
                     "half_sound_speed", "packet",
                 ],
                 "formats": ["<u2", "u1", "<u4", "<u2", "u1", "u1", "u1", "u1", "u1", "u1", "<u4", "<f4", packet.dtype],
-                "offsets": [0, 2, 10, 14, 16, 17, 18, 19, 20, 21, 28, 36, XTF_RECORD],
+                "offsets": [0, 2, 10, 14, 16, 17, 18, 19, 20, 21, 28, 36, _XTF_PING_HEADER_BYTES],
                 "itemsize": length,
             }
         ),

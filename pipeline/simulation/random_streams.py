@@ -1,4 +1,4 @@
-"""Random numbers: one generator for each purpose, so that switching one source off leaves all others as they were."""
+"""Random numbers: one generator for each purpose, so that without one noise source all others stay the same."""
 
 import numpy as np
 
@@ -10,5 +10,17 @@ PURPOSES = (
 
 
 def generator(seed: int, purpose: str, index: int = 0) -> np.random.Generator:
-    """The generator of one purpose in one pass; draws come out the same however they are divided into batches."""
+    """Return the generator of one purpose in one pass.
+
+    Its numbers are the same however they are drawn in batches.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the session.
+    purpose : str
+        One of PURPOSES.
+    index : int
+        Number of the pass.
+    """
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PURPOSES.index(purpose), index)))

@@ -1,4 +1,6 @@
-"""What a ray meets: open3d finds the triangle (float32), its plane gives the range (float64)."""
+"""Ray casting: open3d finds the triangle (float32), its plane gives the range (float64)."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +10,7 @@ from pipeline.simulation.site import Floats
 
 
 class RayCaster:
-    """Rays against a mesh."""
+    """Intersection of rays with a mesh."""
 
     def __init__(self, mesh: Mesh) -> None:
         import open3d as o3d  # late: a second to import
@@ -19,20 +21,43 @@ class RayCaster:
         self._scene.add_triangles(
             self._tensor(mesh.vertices_m.astype(np.float32)), self._tensor(np.ascontiguousarray(mesh.triangles))
         )
-        self._none = self._scene.INVALID_ID
+        self._no_triangle = self._scene.INVALID_ID
 
     def cast(self, origins_m: Floats, directions: Floats) -> tuple[Floats, NDArray[np.int64]]:
-        """Range (inf: nothing met) and number of the plane (-1) for (n, 3) origins and unit directions.
+        """Find where rays first meet the mesh.
 
         range = (distance - normal · origin) / (normal · direction) in the plane of the triangle that is met first.
+
+        Parameters
+        ----------
+        origins_m : (n, 3) array
+            Target frame, m.
+        directions : (n, 3) array
+            Unit vectors, target frame.
+
+        Returns
+        -------
+        ranges : (n,) array
+            m; inf: nothing met.
+        surfaces : (n,) array
+            Number of the plane; -1: nothing met.
         """
         rays = np.concatenate([origins_m, directions], axis=1, dtype=np.float32)
         triangle = self._scene.cast_rays(self._tensor(rays))["primitive_ids"].numpy()
-        met = triangle != self._none
-        index = np.where(met, triangle, 0).astype(np.int64)
+        hit = triangle != self._no_triangle
+        index = np.where(hit, triangle, 0).astype(np.int64)
         normals = self.mesh.normals[index]
-        toward = np.einsum("ij,ij->i", normals, directions)
-        away = self.mesh.distances_m[index] - np.einsum("ij,ij->i", normals, origins_m)
-        met &= np.abs(toward) > 1e-9
-        ranges = np.divide(away, toward, out=np.full(len(rays), np.inf), where=met)
-        return ranges, np.where(met, self.mesh.surfaces[index], -1)
+        approach = np.einsum("ij,ij->i", normals, directions)
+        heights = self.mesh.distances_m[index] - np.einsum("ij,ij->i", normals, origins_m)
+        hit &= np.abs(approach) > 1e-9
+        ranges = np.divide(heights, approach, out=np.full(len(rays), np.inf), where=hit)
+        return ranges, np.where(hit, self.mesh.surfaces[index], -1)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """What the sensors' rays may meet, in the target frame."""
+
+    caster: RayCaster
+    water_level_m: float
+    corner_lines: Floats  # (n, 4): x, y, lowest z, highest z of inner corners

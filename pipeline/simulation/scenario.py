@@ -1,4 +1,4 @@
-"""A scenario: what a simulated pool session is like. The defaults of all keys are "the default scenario"."""
+"""Scenarios: the settings of a simulated pool session. The defaults of all keys are "the default scenario"."""
 
 from datetime import datetime
 from pathlib import Path
@@ -26,22 +26,22 @@ from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
-SCENARIOS = CONFIGS / "scenarios"
+SCENARIOS_FOLDER = CONFIGS / "scenarios"
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1, le=20)]
 STEEPEST_TILT_DEG = 45.0
-Tilt = Annotated[float, Field(ge=-STEEPEST_TILT_DEG, le=STEEPEST_TILT_DEG)]
+_Tilt = Annotated[float, Field(ge=-STEEPEST_TILT_DEG, le=STEEPEST_TILT_DEG)]
 
 
-def _moment(text: str) -> str:
-    moment = datetime.fromisoformat(text)
-    if moment.tzinfo is not None or not 2000 <= moment.year < 2070:
+def _utc(text: str) -> str:
+    instant = datetime.fromisoformat(text)
+    if instant.tzinfo is not None or not 2000 <= instant.year < 2070:
         raise ValueError("must be a UTC moment without zone, such as 2026-05-12T08:00:00, from 2000 to 2069")
     return text
 
 
 class Surroundings(Model):
-    """The pool round the target, and how far the pool's config is from the target as it stands."""
+    """The pool round the target, and errors of the target's build and of its position in pool.yaml."""
 
     half_length_m: Annotated[float, Field(gt=0, le=200)] = 15.0  # back wall and floor reach this far along y
     floor_gap_m: NotNegative = 0.3  # the floor lies this much below the target's foot
@@ -54,14 +54,14 @@ class Surroundings(Model):
 
 
 class Wave(Model):
-    """One coordinate's unrest: 3/4 of the amplitude at the period, 1/4 at 0.37 of it; phases are random."""
+    """The waves of one coordinate: 3/4 of the amplitude at the period, 1/4 at 0.37 of it; phases are random."""
 
     amplitude: NotNegative
     period_s: Positive
 
 
 class Motion(Model):
-    """How the vessel moves about its track (amplitudes in m and deg)."""
+    """The vessel's movement about its track (amplitudes in m and deg)."""
 
     surge: Wave = Wave(amplitude=0.03, period_s=8.0)
     sway: Wave = Wave(amplitude=0.06, period_s=9.0)
@@ -74,7 +74,7 @@ class Motion(Model):
     heading_offset_deg: Angle = 0.0  # heading minus the target's azimuth
 
 
-class Track(Model):
+class TrackScenario(Model):
     """Passes along the target, in the direction of its +y axis."""
 
     distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # from wall
@@ -87,6 +87,8 @@ class Track(Model):
 
 
 class InsScenario(Model):
+    """The INS: rate, noise and files."""
+
     rate_hz: Annotated[float, Field(ge=1, le=1000)] = 200.0
     white: White = White()
     drift: Drift = Drift(horizontal_m=0.0, vertical_m=0.0, roll_pitch_deg=0.0, heading_deg=0.0)
@@ -96,6 +98,8 @@ class InsScenario(Model):
 
 
 class LaserScenario(Model):
+    """The laser scanner: mount, rates, noise and files."""
+
     mount: Mount = Mount(roll_deg=0.35, pitch_deg=-0.22, yaw_deg=0.41, x_m=0.21, y_m=0.48, z_m=1.10)  # the truth
     coarse_angle_deg: NotNegative = 0.0  # error of each angle in session.yaml, its sign random
     coarse_lever_m: NotNegative = 0.0  # the same of the lever arm
@@ -117,6 +121,8 @@ class LaserScenario(Model):
 
 
 class MbesScenario(Model):
+    """The sonar: mount, beams, noise, sound speed and files."""
+
     mount: Mount = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.30, y_m=0.20, z_m=-2.01)  # the truth
     coarse_angle_deg: NotNegative = 0.8  # error of each coarse angle, its sign random
     coarse_lever_m: NotNegative = 0.08  # the same of the coarse lever arm
@@ -126,7 +132,7 @@ class MbesScenario(Model):
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
     spacing: Literal["equi_angle", "equidistant"] = "equi_angle"  # section A0 or A2
     sectors: TransmitSectors = ()  # tilts of the transmit fan by receive angle; none: no tilt
-    ping_tilts_deg: Annotated[tuple[Tilt, ...], Field(max_length=16)] = ()  # added to all sectors', in turn by ping
+    ping_tilts_deg: Annotated[tuple[_Tilt, ...], Field(max_length=16)] = ()  # added to all sectors', in turn by ping
     max_range_m: Annotated[float, Field(ge=1, le=500)] = 15.0
     range_sigma_m: NotNegative = 0.008
     angle_sigma_deg: NotNegative = 0.06
@@ -164,7 +170,7 @@ class MbesScenario(Model):
                 f"format = {self.format}: the sonar's own packets hold no transmit tilt, which sectors and "
                 "ping_tilts_deg give; write format: parquet"
             )
-        tilts = [one.tilt_deg + more for one in self.sectors for more in self.ping_tilts_deg]
+        tilts = [sector.tilt_deg + tilt_deg for sector in self.sectors for tilt_deg in self.ping_tilts_deg]
         steepest = max(tilts, key=abs, default=0.0)
         if abs(steepest) > STEEPEST_TILT_DEG:
             raise ValueError(f"sectors and ping_tilts_deg add up to {steepest}°: at most 45° is possible")
@@ -172,15 +178,17 @@ class MbesScenario(Model):
 
 
 class Scenario(Model):
+    """A simulated session."""
+
     name: Annotated[str, Field(min_length=1, max_length=200)] = "default"
-    start_utc: Annotated[str, AfterValidator(_moment)] = "2026-05-12T08:00:00"
+    start_utc: Annotated[str, AfterValidator(_utc)] = "2026-05-12T08:00:00"
     declare_sigmas: bool = True  # false: session.yaml says nothing of noise, drift and beam width
     target: Target = Letters(
         a=8.0, b=3.0, c=1.0, e=0.5, azimuth_deg=0.0,
         origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0),
     )
     surroundings: Surroundings = Surroundings()
-    track: Track = Track()
+    track: TrackScenario = TrackScenario()
     motion: Motion = Motion()
     ins: InsScenario = InsScenario()
     laser: LaserScenario = LaserScenario()
@@ -202,7 +210,7 @@ class Scenario(Model):
 
     @property
     def half_length_m(self) -> float:
-        """A pass runs from -y to +y of this; as it is, 2 m beyond the target."""
+        """Half the length of a pass, which runs from -y to +y of this; by default 2 m beyond the target."""
         target = self.target
         if isinstance(target, Letters):
             reach_m = target.b / 2 + target.c
@@ -212,13 +220,24 @@ class Scenario(Model):
 
     @property
     def azimuth_deg(self) -> float:
+        """Azimuth of the target."""
         assert self.target.azimuth_deg is not None  # checked above
         return self.target.azimuth_deg
 
 
 def load_scenario(path: Path | None) -> Scenario:
-    """A scenario from YAML, keys left out at their defaults; ``None`` is the default scenario. A single word that is no
-    file names one of configs/scenarios."""
+    """Read a scenario from YAML; keys that are left out have their defaults.
+
+    Parameters
+    ----------
+    path : Path or None
+        The file; a single word that is no file names one of configs/scenarios; None: the default scenario.
+
+    Raises
+    ------
+    ConfigError
+        There is no such scenario, or its content is not valid.
+    """
     if path is None:
         return Scenario()
     if path.name == str(path) and not path.suffix and not path.is_file():
@@ -226,9 +245,10 @@ def load_scenario(path: Path | None) -> Scenario:
         if path.name not in names:
             known = ", ".join(names)
             raise ConfigError(f"--scenario {path}: is neither a file nor the name of a scenario; these are {known}")
-        path = SCENARIOS / f"{path.name}.yaml"
+        path = SCENARIOS_FOLDER / f"{path.name}.yaml"
     return parse(Scenario, with_mesh(read_yaml(path), path), str(path))
 
 
 def scenario_names() -> list[str]:
-    return sorted(path.stem for path in SCENARIOS.glob("*.yaml"))
+    """Return the names of configs/scenarios."""
+    return sorted(path.stem for path in SCENARIOS_FOLDER.glob("*.yaml"))

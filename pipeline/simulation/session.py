@@ -14,18 +14,18 @@ import numpy as np
 import yaml
 
 from pipeline.errors import ConfigError
-from pipeline.simulation.beams import fan
+from pipeline.simulation.beams import fan_angles
 from pipeline.simulation.documents import INS_SUFFIX, pool_text, session_text, truth_text
 from pipeline.simulation.georeferenced import laser_in_ecef
 from pipeline.simulation.ins import Columns, record_ins
 from pipeline.simulation.las import write_las
 from pipeline.simulation.laser import record_laser
-from pipeline.simulation.mbes import Pool, record_mbes
+from pipeline.simulation.mbes import record_mbes
 from pipeline.simulation.mesh import build_mesh, corner_lines
 from pipeline.simulation.motion import Movement
-from pipeline.simulation.novatel import aligning_bodies, bodies, novatel_bytes
-from pipeline.simulation.r2sonic_packets import packets, xtf_bytes
-from pipeline.simulation.raycast import RayCaster
+from pipeline.simulation.novatel import aligning_bodies, inspva_bodies, novatel_bytes
+from pipeline.simulation.r2sonic_packets import bth0_packets, xtf_bytes
+from pipeline.simulation.raycast import Pool, RayCaster
 from pipeline.simulation.sbet import sbet_bytes
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.tables import write_soundings
@@ -33,10 +33,10 @@ from pipeline.simulation.tables import write_soundings
 
 @dataclass(frozen=True)
 class SimulatedSession:
-    """What the instruments recorded, as canonical raw columns, and the texts that go with it."""
+    """Records of the instruments as canonical raw columns, and the documents that go with them."""
 
     ins: Columns  # t_ns, latitude_rad, longitude_rad, height_m, roll_rad, pitch_rad, azimuth_rad
-    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF if so asked
+    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF if the scenario says so
     mbes: Columns  # t_ns, ping, beam, two_way_time_s, angle_rad, transmit_tilt_rad, sound_speed_m_s; detections only
     session: dict[str, Any]  # session.yaml
     pool: dict[str, Any]  # pool.yaml
@@ -46,26 +46,56 @@ class SimulatedSession:
     pings: Columns  # every ping: t_ns, ping, pass
 
 
-def simulate(scenario: Scenario, seed: int) -> SimulatedSession:
-    """One session. The same scenario and seed give the same numbers; each noise source has its own generator."""
+def simulate_session(scenario: Scenario, seed: int) -> SimulatedSession:
+    """Simulate one session.
+
+    The same scenario and seed give the same numbers; each noise source has its own generator.
+
+    Raises
+    ------
+    ConfigError
+        The seed is negative.
+    """
     if seed < 0:
         raise ConfigError(f"seed = {seed}: must not be negative; choose another seed")
     movement = Movement(scenario, seed)
     caster = RayCaster(build_mesh(scenario.target, scenario.surroundings))
-    water_level_m = scenario.target.water_level_m
+    pool = Pool(caster, scenario.target.water_level_m, corner_lines(scenario.target))
     ins, ins_rows = record_ins(scenario.ins, movement, seed)
-    laser, laser_rows = record_laser(scenario.laser, movement, caster, water_level_m, seed)
+    laser, laser_rows = record_laser(scenario.laser, movement, pool, seed)
     if scenario.laser.frame != "laser":
         laser = laser_in_ecef(laser, ins, scenario.laser)
-    pool = Pool(caster, water_level_m, corner_lines(scenario.target))
     mbes, pings = record_mbes(scenario.mbes, movement, pool, seed)
-    session, design = session_text(scenario, movement, seed), pool_text(scenario, movement)
-    truth = truth_text(scenario, movement, seed)
-    return SimulatedSession(ins, laser, mbes, session, design, truth, ins_rows, laser_rows, pings)
+    return SimulatedSession(
+        ins=ins,
+        laser=laser,
+        mbes=mbes,
+        session=session_text(scenario, movement, seed),
+        pool=pool_text(scenario, movement),
+        truth=truth_text(scenario, movement, seed),
+        ins_rows=ins_rows,
+        laser_rows=laser_rows,
+        pings=pings,
+    )
 
 
 def write_session(simulated: SimulatedSession, folder: Path, scenario: Scenario) -> None:
-    """Write the session folder, and the truth beside it. A folder under that name is complete or not there at all."""
+    """Write the session folder, and the truth beside it. A folder under that name is complete or not there at all.
+
+    Parameters
+    ----------
+    simulated : SimulatedSession
+        The session.
+    folder : Path
+        The session folder; it must not exist, or be empty.
+    scenario : Scenario
+        The session's scenario, which names the formats.
+
+    Raises
+    ------
+    ConfigError
+        The folder exists, or cannot be written.
+    """
     _refuse_existing(folder)
     partial = folder.with_name(f".{folder.name}.partial")
     beside = folder.with_name(f".{folder.name}.truth.json.partial")
@@ -85,12 +115,32 @@ def write_session(simulated: SimulatedSession, folder: Path, scenario: Scenario)
 
 
 def truth_path(folder: Path) -> Path:
-    """OUT.truth.json beside (never inside) the session folder OUT."""
+    """Return OUT.truth.json beside (never inside) the session folder OUT."""
     return folder.with_name(folder.name + ".truth.json")
 
 
 def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> dict[str, Any]:
-    """Simulate and write a session; what was written, and the seconds it took."""
+    """Simulate and write a session.
+
+    Parameters
+    ----------
+    folder : Path
+        The session folder; it must not exist, or be empty.
+    scenario_path : Path or None
+        The scenario's YAML file or name; None: the default scenario.
+    seed : int
+        Seed of all random numbers.
+
+    Returns
+    -------
+    dict
+        Paths and numbers of records that were written, and the seconds it took.
+
+    Raises
+    ------
+    ConfigError
+        The scenario, the seed or the folder cannot be used.
+    """
     begin = time.perf_counter()
     folder = Path(os.path.abspath(folder))
     scenario = load_scenario(scenario_path)
@@ -99,7 +149,7 @@ def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> d
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"{folder.parent}: cannot be made ({error.strerror}); choose another folder") from error
-    simulated = simulate(scenario, seed)
+    simulated = simulate_session(scenario, seed)
     write_session(simulated, folder, scenario)
     return {
         "session": folder,
@@ -147,14 +197,14 @@ def _write_ins(simulated: SimulatedSession, folder: Path, scenario: Scenario) ->
             path.write_bytes(sbet_bytes(ins))
             continue
         before = aligning_bodies(int(ins["t_ns"][0]), scenario.ins.aligning_s if k == 0 else 0.0)
-        path.write_bytes(novatel_bytes(np.concatenate([before, bodies(ins)]), form))
+        path.write_bytes(novatel_bytes(np.concatenate([before, inspva_bodies(ins)]), form))
 
 
 def _write_mbes(mbes: Columns, pings: Columns, path: Path, scenario: Scenario) -> None:
     if scenario.mbes.format == "parquet":
         write_soundings(path, mbes)
         return
-    packet = packets(mbes, pings, fan(scenario.mbes), scenario.mbes)
+    packet = bth0_packets(mbes, pings, fan_angles(scenario.mbes), scenario.mbes)
     path.write_bytes(xtf_bytes(packet, path.name) if scenario.mbes.format == "xtf" else packet.tobytes())
 
 

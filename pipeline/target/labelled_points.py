@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import Batch, Piece, xyz
+from pipeline.artefacts.streams import Batch, BatchResult, point_array
 from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
@@ -62,21 +62,21 @@ class LabellingContext:
         )
 
 
-def label_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> Piece:
+def label_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
     """Label laser points that stage georeference has placed; ``laser`` is the coarse mount."""
-    points = context.target.frame.points_from_pool(xyz(batch, "pool_m"))
+    points = context.target.frame.points_from_pool(point_array(batch, "pool_m"))
     return _label_laser(batch, points, laser.lever_arm_body_m, context)
 
 
-def label_calibrated_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> Piece:
+def label_calibrated_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
     """Place laser points with the provisional mount, and label them; ``laser`` is the coarse mount."""
     mount = context.mount.total(laser)
-    body = xyz(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
+    body = point_array(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
     points = context.trajectory.points_from_body(batch["t_ns"], body)
     return _label_laser(batch, points, mount.lever_arm_body_m, context)
 
 
-def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: LabellingContext) -> Piece:
+def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: LabellingContext) -> BatchResult:
     model = context.model
     settings = context.label_settings("laser", context.target.gate_m)
     dry = points[:, 2] > model.water_level_m + context.settings.water_margin_m / 2
@@ -93,10 +93,10 @@ def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: Label
     columns |= xyz_columns("{}_target_m", points[on].T)
     columns["cos_incidence"] = labels.cos_incidence[on]
     counts = _counts("below or near the water line", dry, "near an edge", near, labels)
-    return Piece({"laser_labelled": columns}, counts)
+    return BatchResult({"laser_labelled": columns}, counts)
 
 
-def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mbes: SonarBeams) -> Piece:
+def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mbes: SonarBeams) -> BatchResult:
     """Place soundings with the provisional mount, and label them.
 
     Parameters
@@ -112,7 +112,7 @@ def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mb
     """
     model, mount, trajectory = context.model, context.mount.total(coarse), context.trajectory
     lever_arm_m = mount.lever_arm_body_m
-    sensor = xyz(batch, "mbes_m")
+    sensor = point_array(batch, "mbes_m")
     points = trajectory.points_from_body(batch["t_ns"], sensor @ mount.R_body_from_sensor.T + lever_arm_m)
     settings = context.label_settings("mbes", context.mount.gate_m)
     wet = points[:, 2] < model.water_level_m - context.settings.water_margin_m / 2
@@ -130,7 +130,7 @@ def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mb
     columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on]}
     counts = _counts("above or near the water line", wet, "footprint near an edge", near, labels)
     counts |= {"footprint partly on another face": int(hidden.sum()), "used": len(on)}
-    return Piece({"soundings_labelled": columns}, counts)
+    return BatchResult({"soundings_labelled": columns}, counts)
 
 
 def _counts(

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.sampling import Voxels, every_nth, points_above, voxel_means, voxel_sums
-from pipeline.artefacts.streams import Batch, Stream, xyz
+from pipeline.artefacts.sampling import Voxels, points_above, sample_rows, voxel_means, voxel_sums
+from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.maths.geometry.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -70,8 +70,8 @@ def laser_sample(laser_pool: Stream, count: float, lowest_m: float) -> LaserSamp
 
 
 def _voxels_and_points(batch: Batch, count: float, lowest_m: float) -> tuple[Voxels, Array]:
-    sample = every_nth(batch, count / LASER_SAMPLE)
-    singles = every_nth(sample, count / RAW_SAMPLE)  # the same hash: a part of these
+    sample = sample_rows(batch, count / LASER_SAMPLE)
+    singles = sample_rows(sample, count / RAW_SAMPLE)  # the same hash: a part of these
     voxels = voxel_sums(points_above(sample, "pool_m", lowest_m), VOXEL_M)
     return voxels, points_above(singles, "pool_m", lowest_m)
 
@@ -96,9 +96,9 @@ def laser_poses(laser_pool: Stream, count: float, lowest_m: float, trajectory: T
 
 
 def _points_of_scanner(batch: Batch, one_in: float, lowest_m: float) -> tuple[NDArray[np.int64], Array]:
-    sample = every_nth(batch, one_in)
+    sample = sample_rows(batch, one_in)
     dry = sample["z_pool_m"] >= lowest_m
-    return sample["t_ns"][dry], xyz(sample, "laser_m", dry)
+    return sample["t_ns"][dry], point_array(sample, "laser_m", dry)
 
 
 def sounding_sample(soundings_pool: Stream, count: float, trajectory: Trajectory) -> SoundingSample:
@@ -113,7 +113,7 @@ def sounding_sample(soundings_pool: Stream, count: float, trajectory: Trajectory
     trajectory
         Poses of the body in the target frame.
     """
-    pieces = list(soundings_pool.fold(every_nth, count / SOUNDING_SAMPLE))
+    pieces = list(soundings_pool.fold(sample_rows, count / SOUNDING_SAMPLE))
     t_ns = np.concatenate([piece["t_ns"] for piece in pieces])
     points = np.column_stack([np.concatenate([piece[f"{axis}_mbes_m"] for piece in pieces]) for axis in "xyz"])
     return SoundingSample(*trajectory.poses_at(t_ns), points)

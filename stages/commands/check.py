@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pipeline.artefacts.streams import EMPTY
+from pipeline.artefacts.streams import EMPTY_STREAM
 from pipeline.checking import rendering
 from pipeline.checking.check_session import examine
 from pipeline.checking.trial_calibration import Calibrated, Raw
@@ -15,22 +15,33 @@ from pipeline.errors import PoolcalError
 from pipeline.readers.casts import with_cast
 from pipeline.report.cast_checks import in_words
 from pipeline.run.settings import load_settings
+from stages.commands.answer import print_answer
 from stages.in_memory import calibrate_in_memory
 
 WITHOUT_CONFIG = "Target, mounts and soundings were not checked: give the pool's YAML file with --config."
 
 
-def check(session: Path, config: Path | None, as_json: bool) -> tuple[str, bool]:
-    """What the screen says, and whether something is wrong."""
+def command(session: Path, config: Path | None, as_json: bool) -> int:
+    """Print the findings; 1 if something is wrong.
+
+    Parameters
+    ----------
+    session
+        Folder with session.yaml and the raw files.
+    config
+        The pool's YAML file; None: target, mounts and soundings are not checked.
+    as_json
+        Print JSON, for programs.
+    """
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     found = examine(session, content, pool, _calibrated)
     if as_json:
-        return rendering.as_json(found), found.faulty
+        return print_answer(rendering.as_json(found), not found.faulty)
     used = None if content.mbes is None else content.mbes.svp_from
     cast = "" if used is None else f"mbes.svp: {in_words(used)}\n\n"
     unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"
-    return f"{cast}{rendering.text(found)}{unasked}", found.faulty
+    return print_answer(f"{cast}{rendering.text(found)}{unasked}", not found.faulty)
 
 
 def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrated:
@@ -43,4 +54,4 @@ def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrate
     with suppress(PoolcalError):
         calibrate_in_memory(session, pool, raw, "adjust", kept)
     tables = (found.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
-    return Calibrated(found.get("segment/soundings_labelled", EMPTY), *tables)
+    return Calibrated(found.get("segment/soundings_labelled", EMPTY_STREAM), *tables)

@@ -12,10 +12,12 @@ from pipeline.config.marks import load_marks
 from pipeline.config.mount import Mount
 from pipeline.config.yaml_models import parse
 from pipeline.mount import mount_of
+from pipeline.run.output_files import refuse_output
+from stages.commands.answer import print_answer
 
 
-def coarse_mounts(file: Path, session: Path, out: Path | None, write: bool) -> tuple[str, bool]:
-    """Return the text for the screen, and whether the marks agree.
+def command(file: Path, session: Path, out: Path | None, write: bool) -> int:
+    """Print the mounts, and write them into session.yaml; 1 if the marks do not agree.
 
     Parameters
     ----------
@@ -24,10 +26,11 @@ def coarse_mounts(file: Path, session: Path, out: Path | None, write: bool) -> t
     session
         The session's folder.
     out
-        A YAML file to write everything to.
+        A YAML file to write everything to; None: none.
     write
         Whether to write the mounts into session.yaml if the marks agree.
     """
+    refuse_output("--yaml", out, session, begins=b"agrees:")
     text, content = read_session(session)
     path = session / "session.yaml"
     settings = {name: content[name]["mount"] for name in SENSORS if "mount" in content[name]}
@@ -42,4 +45,4 @@ def coarse_mounts(file: Path, session: Path, out: Path | None, write: bool) -> t
         lines.append(write_mounts(session, text, content, blocks) if write else f"{path}: not written (--no-write)")
         missing = [name for name in SENSORS if name not in present and name not in blocks]
         lines += [f"But {name} still has no mount there." for name in missing]
-    return "\n".join(lines), assessment.agrees
+    return print_answer("\n".join(lines), assessment.agrees)

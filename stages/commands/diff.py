@@ -1,32 +1,75 @@
-"""Two runs set beside each other, for ``poolcal diff`` and ``view``."""
+"""``poolcal diff``: two runs compared, on the screen, as JSON, as a page and as a recording."""
 
+import json
+import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pipeline.atomic_files import write_text, writing
+from pipeline.console import say
+from pipeline.results.compare import run_difference
+from pipeline.results.compare_text import comparison_text
+from pipeline.results.finished_run import FinishedRun
+from pipeline.results.mount_difference import Tolerances, is_moved
+from pipeline.run.output_files import refuse_output
 from stages import ORDER
 
 
-def comparison(
-    first: Path, second: Path, tolerance_deg: float | None = None, tolerance_mm: float | None = None
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class DiffOutputs:
+    """In which forms the comparison is wanted, beside lines on the screen."""
+
+    as_json: bool  # in their place
+    html: Path | None
+    rrd: Path | None
+
+
+def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutputs) -> int:
+    """Compare two runs.
+
+    Parameters
+    ----------
+    first, second
+        Run folders.
+    tolerances
+        A larger difference of the mount is a no, significant or not.
+    outputs
+        Forms of the comparison.
+
+    Returns
+    -------
+    int
+        1: the mounts differ, or cannot be compared.
+    """
+    difference = compare_runs(first, second, tolerances)
+    for option, file in (("--html", outputs.html), ("--rrd", outputs.rrd)):
+        refuse_output(option, file, first, second)
+    if outputs.html is not None:
+        from pipeline.results.pages.comparison import comparison_page
+
+        write_text(outputs.html, comparison_page(difference))
+    if outputs.rrd is not None:
+        write_two_runs(first, second, difference, outputs.rrd)
+    text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else comparison_text(difference)
+    say(text, sys.stdout)
+    return 1 if is_moved(difference) else 0
+
+
+def compare_runs(first: Path, second: Path, tolerances: Tolerances) -> dict[str, Any]:
     """Return the difference of two run folders, of :func:`pipeline.results.compare.run_difference`.
 
     Parameters
     ----------
     first, second
         The run folders.
-    tolerance_deg, tolerance_mm
-        Differences of an angle and of a lever arm's component that are tolerated.
+    tolerances
+        Larger differences of the mount are listed.
     """
-    from pipeline.results.compare import run_difference
-    from pipeline.results.finished_run import FinishedRun
-    from pipeline.results.mount_difference import Tolerances
-
-    tolerances = Tolerances(tolerance_deg, tolerance_mm)
     return run_difference(FinishedRun.read(first, ORDER), FinishedRun.read(second, ORDER), tolerances)
 
 
-def save_pair(first: Path, second: Path, difference: dict[str, Any], path: Path) -> None:
+def write_two_runs(first: Path, second: Path, difference: dict[str, Any], path: Path) -> None:
     """Write a recording of two run folders.
 
     Parameters
@@ -34,11 +77,10 @@ def save_pair(first: Path, second: Path, difference: dict[str, Any], path: Path)
     first, second
         The run folders.
     difference
-        Their difference, of :func:`comparison`.
+        Their difference, of :func:`compare_runs`.
     path
         The recording's file.
     """
-    from pipeline.atomic_files import writing
     from stages.views.two_runs import save_two_runs
 
     with writing(path):

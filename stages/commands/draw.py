@@ -1,232 +1,127 @@
-"""What people look at, drawn from a run's files: the recordings as stages finish, the report's page after the verdict.
+"""Draw what people look at, from a run's files: the report's page, and a recording of each stage.
 
-Drawing needs heavy libraries and cannot share the interpreter with itself. A process of its own
-(:mod:`stages.commands.draw_process`) loads them while the stages run, in the time these leave. It prepares recordings
-of finished stages, and keeps them: nothing is written before the verdict, so that pictures never take the room that a
-stage needs. Then it is told to draw, writes, and answers with what went wrong.
+Drawing begins when the answer is on the screen. Processes of their own draw (:mod:`stages.commands.draw_worker`): a
+crash in a library that draws, or a lack of memory, ends one of them and not the run.
 """
 
 import contextlib
 import json
 import os
-import signal
 import subprocess
 import sys
-import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any
 
-from pipeline.artefacts.streams import Mapper, serial
-from pipeline.atomic_files import write_bytes
-from pipeline.errors import PoolcalError
 from pipeline.results.pages.currency import is_page_outdated
-from pipeline.run import folder, manifest
+from pipeline.run import folder
 from pipeline.run.results import PAGE, agreeing, recording_path
 from pipeline.run.settings import read_settings
 from stages import ORDER, names_in
+from stages.commands.one_drawing import RECORDINGS, DrawingFailure, draw_one, kind_of_drawing
 
-RECORDINGS = "recordings"
-PATIENCE_S, ENDING_S = 600, 10
-PREPARE, DRAW = "prepare", "draw"
-TOO_EARLY = ORDER[:1]  # what follows the first stage needs every processor as well
-BESIDE_THE_PAGE = ORDER[-2:]  # recordings for which the page would have to wait
 DECIDES = "angle_iterate"  # on which tabs there are
-ALLOCATION = {  # one thread, for the process is to fork; one allocator, and large pages where the system has them
-    "OPENBLAS_NUM_THREADS": "1",
-    "ARROW_DEFAULT_MEMORY_POOL": "system",
-    "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",
-}
+WORKER = [sys.executable, "-P", "-m", "stages.commands.draw_worker"]  # -P: no code of the working folder is run
 
 
 @dataclass(frozen=True)
-class Failure:
-    """What could not be drawn, and why; ``trace``: of a bug."""
+class Drawings:
+    """What is wanted: the report's page, the stages' recordings."""
 
-    what: str
-    reason: str
-    trace: str = ""
+    report: bool
+    recordings: bool
 
-    @classmethod
-    def of(cls, what: str, error: Exception) -> "Failure":
-        expected = isinstance(error, (PoolcalError, OSError))
-        trace = "" if expected else "".join(traceback.format_exception(error)).rstrip()
-        first = str(error).partition("\n")[0]
-        return cls(what, f"{type(error).__name__}: {first}", trace)
+    @property
+    def kinds(self) -> list[str]:
+        """Return the names of what is wanted, as messages name them."""
+        return [kind for kind, wanted in ((PAGE, self.report), (RECORDINGS, self.recordings)) if wanted]
 
 
-class Painters:
-    """What is to be drawn, and the process that loads what it takes and draws; without one, this process draws."""
+def draw_missing(run: Path, wanted: Drawings, jobs: int = 1) -> list[DrawingFailure]:
+    """Draw what is not drawn yet, or not as the run is now.
 
-    def __init__(self, report: bool, recordings: bool, beside: bool = False) -> None:
-        self._wanted = [what for what, wanted in ((PAGE, report), (RECORDINGS, recordings)) if wanted]
-        self._beside = beside and bool(self._wanted)
-        self._process: subprocess.Popen[str] | None = None
-        self._finished: list[str] = []
+    Parameters
+    ----------
+    run
+        A run folder; its results are only read.
+    wanted
+        What is to be drawn.
+    jobs
+        With one, this process draws; with two or three, one worker process; with more two, one of which draws the page,
+        which takes longer than all recordings. Each loads the libraries anew.
 
-    def begin(self, run: Path, stage: str) -> None:
-        """Have a finished stage's recording prepared while others run. If that fails, :meth:`draw` does it again.
-
-        The process is started when the files have been read and placed: that needs every processor, what follows less.
-        """
-        self._finished.append(stage)
-        if not self._beside or stage in TOO_EARLY:
-            return
-        if self._process is None:
-            try:
-                self._process = _start(self._wanted)
-            except OSError:  # no room for another process
-                self._beside = False
-                return
-        names = [name for name in self._finished if name not in BESIDE_THE_PAGE]
-        self._finished.clear()
-        if RECORDINGS in self._wanted and names:
-            _tell(self._process, PREPARE, run, names)
-
-    def draw(self, run: Path) -> list[Failure]:
-        """Draw what is not drawn yet. A finished result is never touched; what could not be drawn comes back."""
-        if not self._wanted:
+    Returns
+    -------
+    list
+        What could not be drawn, at most one entry a kind.
+    """
+    if not wanted.kinds:
+        return []
+    try:
+        read_settings(run)  # never lock, and so make, a folder that is no run's
+        if not missing_drawings(run, wanted):
             return []
-        try:
-            read_settings(run)  # never lock, and so make, a folder that is no run's
-            if not self._missing(run):
-                return []
-            with folder.locked(run, ORDER):
-                missing = self._missing(run)
-                if self._process is None or not missing:
-                    return paint(run, missing)
-                return _drawn_by(self._process, run, missing)
-        except Exception as error:
-            return [Failure.of(" and ".join(self._wanted), error)]
-
-    def _missing(self, run: Path) -> list[str]:
-        """Names of what is not drawn yet: the page, or stages; of stages that agree with each other alone."""
-        stages = names_in(run)
-        page = [PAGE] if PAGE in self._wanted and is_page_outdated(run, stages) else []
-        if RECORDINGS not in self._wanted:
-            return page
-        done = agreeing(run, stages)
-        if DECIDES in done and not recording_path(run, DECIDES).is_file():
-            return page + list(done)  # with its result the tabs may come or go, and every recording names them
-        return page + [stage for stage in done if not recording_path(run, stage).is_file()]
-
-    def close(self) -> None:
-        if self._process is not None:
-            if self._process.poll() is None:
-                os.killpg(self._process.pid, signal.SIGKILL)  # with its copies: they are a group of their own
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.communicate(timeout=ENDING_S)
+        with folder.locked(run, ORDER):
+            return _draw_all(run, missing_drawings(run, wanted), jobs // 2)
+    except Exception as error:
+        return [DrawingFailure.of(" and ".join(wanted.kinds), error)]
 
 
-def _start(wanted: Sequence[str]) -> "subprocess.Popen[str]":
-    """-P: nothing in the folder one happens to stand in is code of this program."""
-    command = [sys.executable, "-P", "-m", "stages.commands.draw_process", str(os.getpid()), *wanted]
+def missing_drawings(run: Path, wanted: Drawings) -> list[str]:
+    """Return what is not drawn yet: the page's name, and names of stages, of those alone that agree with each other."""
+    stages = names_in(run)
+    page = [PAGE] if wanted.report and is_page_outdated(run, stages) else []
+    if not wanted.recordings:
+        return page
+    done = agreeing(run, stages)
+    if DECIDES in done and not recording_path(run, DECIDES).is_file():
+        return page + list(done)  # with its result the tabs may come or go, and every recording names them
+    return page + [stage for stage in done if not recording_path(run, stage).is_file()]
+
+
+def _draw_all(run: Path, names: Sequence[str], processes: int) -> list[DrawingFailure]:
+    """Draw page and recordings side by side where there may be two processes, and else one after the other."""
+    failures = None
+    if processes and names:
+        by_kind = [[name for name in names if kind_of_drawing(name) == kind] for kind in (PAGE, RECORDINGS)]
+        shares = [share for share in by_kind if share] if processes > 1 else [list(names)]
+        with contextlib.suppress(OSError):  # where no process can be started, this one draws
+            failures = _drawn_by_workers(run.absolute(), shares)
+    if failures is None:
+        failures = [failure for name in names if (failure := draw_one(run, name)) is not None]
+    return list({failure.kind: failure for failure in reversed(failures)}.values())
+
+
+def _drawn_by_workers(run: Path, shares: Sequence[Sequence[str]]) -> list[DrawingFailure]:
+    """Draw each share in a process of its own; return the failures.
+
+    Ctrl-C reaches this process alone, which then kills the others. A file is written whole or not at all.
+    """
+    with contextlib.ExitStack() as stack:
+        workers = []
+        for share in shares:
+            workers.append(stack.enter_context(_started([*WORKER, str(run), *share])))
+            stack.callback(workers[-1].kill)  # before it is waited for; once it has answered, its work is done
+        return [failure for worker, share in zip(workers, shares, strict=True) for failure in _answer(worker, share)]
+
+
+def _started(command: Sequence[str]) -> "subprocess.Popen[str]":
+    pipe = subprocess.PIPE
     return subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, text=True, env=_environment()
+        command, stdin=pipe, stdout=pipe, encoding="utf-8", errors="replace", start_new_session=True, env=_environment()
     )
 
 
+def _answer(worker: "subprocess.Popen[str]", share: Sequence[str]) -> list[DrawingFailure]:
+    assert worker.stdout is not None
+    last = worker.stdout.read().rstrip().rpartition("\n")[2]
+    if not last:
+        return [DrawingFailure(" and ".join(dict.fromkeys(map(kind_of_drawing, share))), "its process has ended")]
+    return [DrawingFailure(**failure) for failure in json.loads(last)]
+
+
 def _environment() -> dict[str, str]:
-    """With the program's own root first, for where it was not installed."""
-    root = str(Path(__file__).parent.parent)
+    """Return this process's environment, with the program's own root first, for where it was not installed."""
+    root = str(Path(__file__).parents[2])
     path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-    return os.environ | {"PYTHONPATH": path} | ALLOCATION
-
-
-def _tell(process: "subprocess.Popen[str]", order: str, run: Path, names: Sequence[str]) -> None:
-    assert process.stdin is not None
-    with contextlib.suppress(BrokenPipeError):  # it has ended: there will be no answer
-        print(json.dumps([order, str(run.absolute()), names]), file=process.stdin, flush=True)
-
-
-def _drawn_by(process: "subprocess.Popen[str]", run: Path, names: Sequence[str]) -> list[Failure]:
-    _tell(process, DRAW, run, names)
-    what = " and ".join(dict.fromkeys(RECORDINGS if name in ORDER else name for name in names))
-    try:
-        answer, _ = process.communicate(timeout=PATIENCE_S)
-    except subprocess.TimeoutExpired:
-        return [Failure(what, f"not done within {PATIENCE_S} s")]
-    told = answer.rpartition("\n")[2]
-    return [Failure(**one) for one in json.loads(told)] if told else [Failure(what, "its process has ended")]
-
-
-@contextlib.contextmanager
-def painters(report: bool, recordings: bool, beside: bool) -> Iterator[Painters]:
-    """Painters for the time of a run; ``beside``: as a process of its own."""
-    found = Painters(report, recordings, beside)
-    try:
-        yield found
-    finally:
-        found.close()
-
-
-# --- drawing ---------------------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Prepared:
-    """A recording, the manifest of the stage that is shown, and the tabs in which it is shown."""
-
-    shown: bytes
-    tabs: tuple[str, ...]
-    recording: bytes
-
-    @classmethod
-    def of(cls, run: Path, stage: str) -> "Prepared":
-        from stages.views.blueprint import tabs_of
-        from stages.views.recording import record
-
-        tabs = tabs_of(run)
-        shown = (run / stage / manifest.NAME).read_bytes()
-        return cls(shown, tabs, record(run, stage, tabs))
-
-    def still(self, run: Path, stage: str) -> bool:
-        """Whether it shows the stage as it is now."""
-        from stages.views.blueprint import tabs_of
-
-        return self.shown == (run / stage / manifest.NAME).read_bytes() and self.tabs == tabs_of(run)
-
-
-def paint(
-    run: Path, names: Sequence[str], mapper: Mapper = serial, prepared: Mapping[str, Prepared] | None = None
-) -> list[Failure]:
-    """Draw the page, its pictures through ``mapper``, and stages' recordings; what went wrong."""
-    failed: list[Failure] = []
-    pictures = None
-    if PAGE in names:
-        with _noting(failed, PAGE):
-            pictures = _pictures(run, mapper)
-    with _noting(failed, RECORDINGS):
-        for stage in names:
-            if stage != PAGE:
-                _write_recording(run, stage, (prepared or {}).get(stage))
-    if pictures is not None:
-        with _noting(failed, PAGE):
-            _write_page(run, pictures)
-    return failed
-
-
-@contextlib.contextmanager
-def _noting(failed: list[Failure], what: str) -> Iterator[None]:
-    try:
-        yield
-    except Exception as error:
-        failed.append(Failure.of(what, error))
-
-
-def _pictures(run: Path, mapper: Mapper) -> Iterable[Any]:
-    from pipeline.results.pages.plots import draw_picture, picture_names
-
-    return mapper(partial(draw_picture, run), picture_names(run))
-
-
-def _write_page(run: Path, pictures: Iterable[Any]) -> None:
-    from pipeline.results.pages.report import write_report_page
-
-    write_report_page(run, names_in(run), pictures)
-
-
-def _write_recording(run: Path, stage: str, ready: Prepared | None) -> None:
-    if ready is None or not ready.still(run, stage):
-        ready = Prepared.of(run, stage)
-    write_bytes(recording_path(run, stage), ready.recording)
+    return os.environ | {"PYTHONPATH": path}

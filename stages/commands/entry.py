@@ -17,8 +17,6 @@ INTERRUPTED = 130  # what typer makes of Ctrl-C
 STOPPED = "poolcal: interrupted; what was complete is kept"
 SPEAKERS = ("typer", "click", "rich")  # print the help by themselves
 interrupts: list[int] = []
-
-
 WANTED = {  # what an option that is left out must name
     "--config": "--config FILE: the pool's YAML file, which says where the target is; begin with configs/defaults.yaml",
     "--run": "--run RUN: the folder for the results, outside the session folder",
@@ -27,7 +25,7 @@ WANTED = {  # what an option that is left out must name
 
 
 def _usage(error: typer.TyperException) -> str:
-    """A command line that cannot be meant: what is wrong with it, and where its help is."""
+    """Say what is wrong with a command line, and where its help is."""
     command = getattr(getattr(error, "ctx", None), "command_path", "poolcal")
     option = next(iter(getattr(getattr(error, "param", None), "opts", ())), "")
     words = " ".join(error.format_message().split()).rstrip(".")
@@ -37,7 +35,7 @@ def _usage(error: typer.TyperException) -> str:
 
 
 def status_of(command: Callable[[], Any], debug: bool) -> int:
-    """The exit status of a command; nothing is raised. ``debug``: show the traceback of bad input as well."""
+    """Return the exit status of a command; nothing is raised. ``debug``: show the traceback of bad input as well."""
     try:
         status = int(command() or 0)
         if status == INTERRUPTED:
@@ -64,7 +62,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
 
 
 def _raised_in(error: BaseException) -> str:
-    """The name of the module that raised it."""
+    """Return the name of the module that raised it."""
     frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
     return str(frames[-1].f_globals.get("__name__", "")) if frames else ""
 
@@ -73,13 +71,19 @@ def _refusal(error: OSError) -> str:
     return f"standard output: cannot be written ({error.strerror}); make room, or send it elsewhere"
 
 
+def raise_if_interrupted() -> None:
+    """Raise KeyboardInterrupt after a Ctrl-C that came where Python ignores it (in a clean-up, say)."""
+    if interrupts:
+        raise KeyboardInterrupt
+
+
 def _interrupted(number: int, _: object) -> None:
     interrupts.append(number)
     raise KeyboardInterrupt
 
 
-def prepare() -> None:
-    """Before anything is said: Ctrl-C is noted, closed streams lead nowhere, and every letter can be written."""
+def prepare_process() -> None:
+    """Before anything is printed: note Ctrl-C, let closed streams lead nowhere, and have every letter written."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupted)
     for name in ("stdout", "stderr"):
@@ -91,8 +95,8 @@ def prepare() -> None:
             reconfigure(errors="backslashreplace")
 
 
-def leave(status: int) -> None:
-    """End the process. What cannot be written any more is given up here, without Python's own complaint."""
+def end_process(status: int) -> None:
+    """End the process; give up what cannot be written any more, without Python's own complaint."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

@@ -10,7 +10,7 @@ from pipeline.run.results import calibration
 
 
 def write(session: Path, run: Path) -> str:
-    """An accepted result into SESSION/session.yaml; what was done, in words."""
+    """Write an accepted result into SESSION/session.yaml; return what was done, in words."""
     result = calibration(run)
     block = result["laser"]
     origin = mount_origin("fine", run / "report" / "calibration.json", held=list(result["held"]))

@@ -14,14 +14,30 @@ from pipeline.mount import mount_of
 from pipeline.planning import assessment
 from pipeline.planning.assessment import Answer, Outlook, shares_of_limits
 from pipeline.planning.prediction import Setting
+from pipeline.run.output_files import refuse_output
 from pipeline.run.settings import load_settings
 from pipeline.text_table import text_table
+from stages.commands.answer import print_answer
 
 WORSE = 1.05  # a sigma that grows by less is the same
 
 
-def plan(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path | None) -> tuple[str, bool]:
-    """What the screen says, and whether the passes will do."""
+def command(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path | None) -> int:
+    """Print a plan's assessment; 1 if the passes will not do.
+
+    Parameters
+    ----------
+    file
+        The plan.
+    session
+        Folder with session.yaml.
+    pool_file
+        The pool's YAML file.
+    out, rrd
+        Files for the prediction as YAML and for a recording of it; None: none.
+    """
+    refuse_output("--yaml", out, session, begins=b"given:")
+    refuse_output("--rrd", rrd, session)
     settings = load_settings(session, pool_file)
     pool, wanted = settings.pool, assessment.load_plan(file, settings.session)
     answer = assessment.judge(wanted, pool, settings.session)
@@ -33,7 +49,7 @@ def plan(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path
             save_plan(answer, said, rrd)
     if out is not None:
         write_text(out, yaml.safe_dump(assessment.as_plain(answer), sort_keys=False))
-    return said, assessment.is_enough(answer, pool.verdict)
+    return print_answer(said, assessment.is_enough(answer, pool.verdict))
 
 
 def table(answer: Answer, limits: Verdict) -> str:

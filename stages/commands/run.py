@@ -1,7 +1,6 @@
-"""A whole run: stages, answer, pictures."""
+"""``poolcal run``: all stages, the answer, the drawings."""
 
-from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.config.session import Calibrated
@@ -9,27 +8,57 @@ from pipeline.run import runner
 from pipeline.run.progress import Progress
 from pipeline.run.workers import workers
 from stages import load
-from stages.commands.answer import answer_of, say_failures, say_where
-from stages.commands.draw import Painters, painters
+from stages.commands.answer import print_result, say_failures, say_where
+from stages.commands.draw import Drawings, draw_missing
+from stages.commands.entry import raise_if_interrupted
 
 
-def calibrate(
-    calibrated: Calibrated,
-    session: Path,
-    config: Path,
-    run: Path,
-    after: Callable[[Painters, Path, str], None],
-    jobs: int | None,
-    executor: str | None,
-    wanted: tuple[bool, bool],
-    overwrite: bool = False,
-) -> int:
-    """The exit status; ``after`` each stage; ``wanted``: the report's page, the recordings; ``overwrite``: also another
-    session's run."""
-    with workers(jobs, executor) as pool, painters(*wanted, pool.jobs > 1) as drawing:
-        finished = partial(after, drawing, run)
-        runner.run(load(calibrated), session, config, run, pool, Progress(), finished, calibrated, overwrite)
-        status = answer_of(run)
-        say_failures(drawing.draw(run), "; the calibration is complete")
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is worked on: in this process and its threads, or on a cluster; what is drawn; what may be replaced."""
+
+    jobs: int | None
+    executor: str | None  # address of a dask scheduler
+    drawings: Drawings
+    overwrite: bool  # also another session's run
+
+
+def command(session: Path, config: Path, run: Path, calibrated: Calibrated, options: RunOptions) -> int:
+    """Calibrate a session.
+
+    Parameters
+    ----------
+    session
+        Folder with session.yaml and the raw files.
+    config
+        The pool's YAML file.
+    run
+        Folder for the results.
+    calibrated
+        The sensor that is calibrated.
+    options
+        How the run is worked on.
+
+    Returns
+    -------
+    int
+        0: accepted, 1: rejected.
+    """
+    with workers(options.jobs, options.executor) as pool:
+        runner.run(
+            load(calibrated),
+            session,
+            config,
+            run,
+            workers=pool,
+            progress=Progress(),
+            finished=lambda _: raise_if_interrupted(),
+            calibrated=calibrated,
+            overwrite=options.overwrite,
+        )
+        status = print_result(run)
+        jobs = pool.jobs
+    say_failures(draw_missing(run, options.drawings, jobs), "; the calibration is complete")
+    raise_if_interrupted()
     say_where(run)
     return status

@@ -1,8 +1,8 @@
-"""A simulated session's result beside its truth: the demo's last word.
+"""``poolcal compare``: a simulated session's result beside its truth.
 
 The rotation's error is the vector ε in R_true = Exp(ε) · R_body_from_mbes, about the body's axes, which is also what
-the covariance speaks of. The answer is yes when the calibration was accepted and each of the six errors of the result
-is within LIMIT sigmas; a method without sigmas is held to LIMIT times the verdict's largest allowed ones.
+the covariance is of. The answer is yes if the calibration was accepted and each of the result's six errors is within
+LIMIT sigmas; for a method without sigmas the largest that the verdict allows stand in their place.
 """
 
 from pathlib import Path
@@ -22,13 +22,19 @@ from pipeline.run.output_files import as_written
 from pipeline.run.results import calibration
 from pipeline.run.settings import read_settings
 from pipeline.text_table import text_table
+from stages.commands.answer import print_answer
 
 LIMIT = 4.0
 Array = NDArray[np.float64]
 
 
-def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
-    """The table for people, and whether the result stands up to the truth."""
+def command(run: Path, truth_path: Path) -> int:
+    """Print a run's result beside the truth in a file; 1 if it was rejected, or does not stand up to the truth."""
+    return print_answer(*compare_with_truth(run, truth_path))
+
+
+def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
+    """Return the table for people, and whether the result was accepted and stands up to the truth."""
     result, settings = calibration(run), read_settings(run)
     R_true, lever_arm_true_m = read_truth(truth_path)
     chosen = settings.pool.result
@@ -56,7 +62,7 @@ def compare(run: Path, truth_path: Path) -> tuple[str, bool]:
 
 
 def _refuse_damaged(result: dict[str, Any], chosen: str) -> None:
-    """Any of the errors that damaged values end in, before anything is computed from them."""
+    """Raise one of the errors in which damaged values end, before anything is computed from them."""
     for values in (result["methods"][chosen], *result["methods"].values()):
         if values["R_body_from_mbes"] is not None and values["lever_arm_m"] is not None:
             R = np.array(values["R_body_from_mbes"], dtype=np.float64).reshape(3, 3)
@@ -76,7 +82,7 @@ def _error_cells(error: Array | None) -> list[str]:
 
 
 def read_truth(path: Path) -> tuple[Array, Array]:
-    """True rotation and lever arm of the sonar, from the simulator's file."""
+    """Return rotation R_body_from_mbes (3, 3) and lever arm (3,), m, body, from the simulator's file."""
     try:
         content: Any = read_json(path)
         mbes = content["mbes"]
@@ -89,7 +95,20 @@ def read_truth(path: Path) -> tuple[Array, Array]:
 
 
 def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) -> Array | None:
-    """What is still wrong: rotation vector in degrees and lever arm in metres, true minus found; None: no result."""
+    """Return what is still wrong, true minus calibrated; None if there is no result.
+
+    Parameters
+    ----------
+    values
+        A method's block of calibration.json.
+    R_true, lever_arm_true_m
+        R_body_from_mbes (3, 3) and lever arm (3,), m, body.
+
+    Returns
+    -------
+    array
+        (6,): rotation vector about the body's axes in degrees, and lever arm in m.
+    """
     if values["R_body_from_mbes"] is None or values["lever_arm_m"] is None:
         return None
     error = mount_error(R_true, lever_arm_true_m, np.array(values["R_body_from_mbes"]), np.array(values["lever_arm_m"]))

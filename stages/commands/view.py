@@ -4,28 +4,44 @@ from pathlib import Path
 
 from pipeline.atomic_files import temporary_folder
 from pipeline.errors import ConfigError
+from pipeline.results.mount_difference import Tolerances
 from pipeline.run.settings import read_settings
 from stages import ORDER
 from stages.commands.answer import say_failures
-from stages.commands.diff import comparison, save_pair
-from stages.commands.draw import Painters
+from stages.commands.diff import compare_runs, write_two_runs
+from stages.commands.draw import Drawings, draw_missing
 from stages.views.recording import recordings_of
 from stages.views.viewer import show_recordings
 
 
-def view(first: Path, second: Path | None, stage: str | None) -> int:
-    """The exit status, once the viewer is closed; ``stage``: of one run, that stage's recording alone."""
+def command(first: Path, second: Path | None, stage: str | None) -> int:
+    """Open the viewer, until it is closed.
+
+    Parameters
+    ----------
+    first
+        A run folder.
+    second
+        Another, to be shown beside it.
+    stage
+        Show only that stage's recording; None: all. Not with two runs.
+
+    Returns
+    -------
+    int
+        0, or 1 after an error in the viewer.
+    """
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
         read_settings(first)
-        say_failures(Painters(report=False, recordings=True).draw(first))
+        say_failures(draw_missing(first, Drawings(report=False, recordings=True)))
         copy = f"copy {first}/*/*.rrd to a machine with one, or open {first}/report/report.html"
         return show_recordings(recordings_of(first, stage), copy)
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
     with temporary_folder() as place:
         path = place / "pair.rrd"
-        save_pair(first, second, comparison(first, second), path)
+        write_two_runs(first, second, compare_runs(first, second, Tolerances()), path)
         copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
         return show_recordings([path], copy)

@@ -11,7 +11,7 @@ from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS, SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import laser_planes, rotation_vector_deg, trajectory_in_target
-from pipeline.artefacts.streams import xyz
+from pipeline.artefacts.streams import point_array
 from pipeline.maths.geometry.planes import fit_plane
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.patent.lifted_moments import plane_moments
@@ -39,7 +39,7 @@ def log(recording: Any, tables: Tables) -> None:
         SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", "face", *(f"{axis}_mbes_m" for axis in "xyz")
     )
     positions, R_target_from_body = trajectory.poses_at(columns["t_ns"].astype(np.int64))
-    body = xyz(columns, "mbes_m") @ mount.R_body_from_sensor.T
+    body = point_array(columns, "mbes_m") @ mount.R_body_from_sensor.T
     family = faces["family"].to_numpy()[columns["face"].astype(int)]
     laser = laser_planes(tables.table(PLANES))
     lifted = families_of(faces, tables.table(SOUNDING_MOMENTS))

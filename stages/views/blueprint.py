@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.artefacts.catalogue.patent import ITERATIONS
-from pipeline.artefacts.parquet import rows_of
+from pipeline.artefacts.parquet import row_count
 from pipeline.maths.target.model import ROLES, TargetModel
 from pipeline.run.settings import read_settings
 from pipeline.target.design import target_of
@@ -31,7 +31,7 @@ def tabs_of(run: Path) -> tuple[str, ...]:
         return overview, left, quality
     steps = run / ITERATIONS.owner / f"{ITERATIONS.name}.parquet"
     families = {family.name for family in target_of(settings.pool.target).families}
-    if not families.issuperset(ROLES) or (steps.is_file() and not rows_of(steps)):
+    if not families.issuperset(ROLES) or (steps.is_file() and not row_count(steps)):
         return overview, change, left, quality
     return TABS
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.artefacts.catalogue.points import LASER_POOL, PASSES, POSES, SOUNDINGS_POOL
-from pipeline.artefacts.streams import xyz
+from pipeline.artefacts.streams import point_array
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.run.results import Tables
 from stages.views.recording import DOT_M, GREY, MOST_POINTS, SONAR
@@ -31,5 +31,5 @@ def log(recording: Any, tables: Tables) -> None:
         ("soundings", SOUNDINGS_POOL, SONAR),
     ):
         columns, step = tables.sample(artefact, MOST_POINTS, *(f"{axis}_pool_m" for axis in "xyz"))
-        cloud = rr.Points3D(xyz(columns, "pool_m").astype(np.float32), radii=DOT_M, colors=colour)
+        cloud = rr.Points3D(point_array(columns, "pool_m").astype(np.float32), radii=DOT_M, colors=colour)
         recording.log(f"pool/{name}", cloud, rr.AnyValues(one_in=step), static=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, TARGET_POSE
 from pipeline.artefacts.from_tables import family_names, target_frame
-from pipeline.artefacts.streams import xyz
+from pipeline.artefacts.streams import point_array
 from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
 from stages.views.recording import COLOURS, DOT_M, MOST_POINTS
@@ -25,7 +25,7 @@ def log(recording: Any, tables: Tables) -> None:
     laser, step = tables.sample(
         LASER_LABELLED, MOST_POINTS, "face", *(f"{axis}_target_m" for axis in "xyz")
     )
-    points, family = xyz(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
+    points, family = point_array(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
     for name, colour in styles_of_families(family_names(faces), COLOURS).items():
         corners = [np.reshape(c, (-1, 3)) for c in faces.loc[family_of == name, "vertices_target_m"]]
         outlines = [np.vstack([one, one[:1]]).astype(np.float32) for one in corners]

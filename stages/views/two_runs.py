@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.target import SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.from_tables import trajectory_in_target
-from pipeline.artefacts.streams import xyz
+from pipeline.artefacts.streams import point_array
 from pipeline.atomic_files import write_bytes
 from pipeline.results.compare_text import comparison_text
 from pipeline.run.results import Tables, calibration
@@ -74,7 +74,7 @@ def _on_one_target(recording: Any, first: Tables, second: Tables) -> None:
         columns, step = tables.sample(SOUNDINGS_LABELLED, SOUNDINGS, "t_ns", *axes)
         trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
         positions, R_target_from_body = trajectory.poses_at(columns["t_ns"].astype(np.int64))
-        body = xyz(columns, "mbes_m") @ rotation.T + lever_arm
+        body = point_array(columns, "mbes_m") @ rotation.T + lever_arm
         points = (positions + np.einsum("nij,nj->ni", R_target_from_body, body)).astype(np.float32)
         cloud = rr.Points3D(points, radii=DOT_M, colors=colour)
         recording.log(f"both/{name}", cloud, rr.AnyValues(one_in=step), static=True)

@@ -9,7 +9,7 @@ import pytest
 from pipeline.adjustment.ins_drift import drift_of, told
 from pipeline.config.session import Drift, Ins
 from pipeline.config.yaml_models import parse
-from pipeline.readers.file_summaries import thinned
+from pipeline.readers.file_summaries import thin_sigmas
 
 NS = 1_000_000_000
 INS: dict[str, Any] = {"files": ["a"], "format": "novatel"}
@@ -91,7 +91,7 @@ def test_what_is_not_told_is_the_sessions() -> None:
 def test_two_rows_a_second_are_kept() -> None:
     t_ns = np.arange(0, 10 * NS, NS // 200) + 7
     order = np.random.default_rng(0).permutation(len(t_ns))
-    kept = thinned({"t_ns": t_ns[order], "up_m": t_ns[order] / NS})
+    kept = thin_sigmas({"t_ns": t_ns[order], "up_m": t_ns[order] / NS})
     assert kept["t_ns"].tolist() == [7 + k * NS // 2 for k in range(20)]
     assert kept["up_m"].tolist() == [t / NS for t in kept["t_ns"].tolist()]
-    assert thinned({}) == {}
+    assert thin_sigmas({}) == {}

@@ -13,12 +13,12 @@ import pytest
 
 import pipeline
 from stages import ORDER
-from stages.cli import _go_on, call
-from stages.commands.draw import Painters
+from stages.cli import call
+from stages.commands.entry import raise_if_interrupted
 from tests.support.roots import ROOT
 from tests.support.toy_run import Pool
 
-COMMANDS = ("simulate", "run", "stage", "verify", "view", "diff", "history", "plan", "coarse", "compare")
+COMMANDS = ("simulate", "run", "stage", "verify", "view", "diff", "history", "check", "plan", "coarse", "compare")
 TOY = [sys.executable, str(ROOT / "tests" / "support" / "toy_poolcal.py")]
 
 
@@ -84,7 +84,6 @@ def test_bad_usage_is_one_line(
     words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("stages.cli.load", lambda *_: ())
     assert call(words) == 2
     out, err = capsys.readouterr()
     assert said in err
@@ -271,14 +270,10 @@ def test_an_interrupt_that_a_library_made_an_error_of(
 
 def test_an_interrupt_that_python_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the clean-up after a lock, say: nothing comes of it there, so the run ends after the stage."""
-    drawn: list[str] = []
-    drawing = Painters(report=False, recordings=False)
-    monkeypatch.setattr(drawing, "begin", lambda _, stage: drawn.append(stage))
-    _go_on(drawing, Path("run"), "ingest")
+    raise_if_interrupted()
     monkeypatch.setattr("stages.commands.entry.interrupts", [2])
     with pytest.raises(KeyboardInterrupt):
-        _go_on(drawing, Path("run"), "georeference")
-    assert drawn == ["ingest"]
+        raise_if_interrupted()
 
 
 # --- streams that cannot be written ----------------------------------------------------------------------------------
@@ -315,7 +310,7 @@ def test_no_temporary_folder_is_one_line(
 
     monkeypatch.setattr(tempfile, "tempdir", None)
     monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: [str(tmp_path / "none")])
-    monkeypatch.setattr("stages.cli.comparison", lambda *_: {})
+    monkeypatch.setattr("stages.commands.view.compare_runs", lambda *_: {})
     assert call(["view", str(tmp_path), str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert said.startswith("poolcal: no temporary folder can be made")

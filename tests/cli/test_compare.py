@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run.settings import load_settings, write_settings
-from stages.commands.truth import compare, errors_of, read_truth
+from stages.commands.truth import compare_with_truth, errors_of, read_truth
 from tests.support.toy_run import Pool
 
 EPSILON_DEG, LEVER_ERROR_M = np.array([0.01, -0.02, 0.03]), np.array([0.001, -0.002, 0.003])
@@ -65,7 +65,7 @@ def test_the_error_is_the_covariances_epsilon(found: Path) -> None:
 
 
 def test_one_screen_of_numbers(found: Path) -> None:
-    text, good = compare(found, _truth(found))
+    text, good = compare_with_truth(found, _truth(found))
     assert good
     assert len(text.splitlines()) <= 30
     assert max(map(len, text.splitlines())) <= 100
@@ -82,12 +82,12 @@ def test_beyond_four_sigma_is_a_no(found: Path) -> None:
     result = _result(found)
     result["methods"]["adjustment"]["sigma"]["lever_arm_m"] = [0.001, 0.001, 0.0007]
     _write(found, result)
-    assert not compare(found, _truth(found))[1]
+    assert not compare_with_truth(found, _truth(found))[1]
 
 
 def test_a_rejected_calibration_is_a_no(found: Path) -> None:
     _write(found, _result(found) | {"verdict": "rejected", "reasons": ["weak geometry"]})
-    text, good = compare(found, _truth(found))
+    text, good = compare_with_truth(found, _truth(found))
     assert not good
     assert "weak geometry" in text
 
@@ -96,7 +96,7 @@ def test_a_rejected_calibration_is_a_no(found: Path) -> None:
 def test_another_result_is_held_to_the_verdicts_limits(pool: Pool, found: Path, method: str, good: bool) -> None:
     pool.config.write_text(pool.config.read_text() + f"result: {method}\n")
     write_settings(found, load_settings(pool.session, pool.config))
-    text, answer = compare(found, _truth(found))
+    text, answer = compare_with_truth(found, _truth(found))
     assert answer is good
     assert "largest sigma allowed" in text
 
@@ -107,7 +107,7 @@ def test_what_is_no_truth(found: Path, content: str | None) -> None:
     if content is not None:
         _truth(found).write_text(content)
     with pytest.raises(ConfigError, match=r"truth\.json"):
-        compare(found, _truth(found))
+        compare_with_truth(found, _truth(found))
 
 
 @pytest.mark.parametrize(
@@ -126,10 +126,10 @@ def test_a_crafted_result_is_one_line(found: Path, place: str | None, value: obj
         result["methods"]["adjustment"][place] = value
     _write(found, result)
     with pytest.raises(ArtefactError, match=r"calibration\.json is not as poolcal writes it"):
-        compare(found, _truth(found))
+        compare_with_truth(found, _truth(found))
 
 
 def test_reasons_that_are_no_words(found: Path) -> None:
     _write(found, _result(found) | {"reasons": [1]})
     with pytest.raises(ArtefactError, match="not as poolcal writes it"):
-        compare(found, _truth(found))
+        compare_with_truth(found, _truth(found))

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from stages import ORDER
-from stages.commands.draw import Painters
+from stages.commands.draw import Drawings, draw_missing
 from tests.support.places import Place, Told, digests, poolcal, simulate
 
 
@@ -58,6 +58,6 @@ def drawn(undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFacto
     """The undisturbed run with its page and recordings. Nobody changes it."""
     run = tmp_path_factory.mktemp("drawn") / "水池 <b>1</b>"
     shutil.copytree(undisturbed[0], run)
-    assert Painters(report=True, recordings=True).draw(run) == []
+    assert draw_missing(run, Drawings(report=True, recordings=True)) == []
     assert sorted(path.stem for path in run.glob("*/*.rrd")) == sorted(ORDER)
     return run

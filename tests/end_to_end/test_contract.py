@@ -10,7 +10,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from pipeline.simulation.scenario import load_scenario
-from pipeline.simulation.session import simulate as simulate_in_memory
+from pipeline.simulation.session import simulate_session as simulate_in_memory
 from tests.support.places import Place, Told, poolcal, result_of
 from tests.support.tables import place_soundings, write_tables
 

@@ -1,4 +1,4 @@
-"""Drawing: beside a run, and never in the way of a calibration."""
+"""Drawing: after the answer, and never in the way of a calibration."""
 
 import errno
 import os
@@ -6,50 +6,38 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import stages.commands.draw_process
+import stages.commands.draw
 import stages.views.recording
-from pipeline.artefacts.streams import serial
 from pipeline.run.folder import locked
 from stages import ORDER
-from stages.commands.draw import Painters, Prepared, paint, painters
-from stages.views.blueprint import tabs_of
-from tests.support.effort import often
+from stages.commands.draw import Drawings, draw_missing
 from tests.support.places import Place, digests, poolcal
 from tests.support.recordings import points, read
+from tests.support.roots import ROOT
 
-MARK = f"STARTED_BY_TEST_{os.getpid()}"
-
-
-@pytest.fixture(autouse=True)
-def marked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(MARK, "yes")
-
-
-def painting() -> list[Path]:
-    """The processes that draw, of those started by these tests, wherever they hang."""
-    return [place for place in Path("/proc").glob("[0-9]*") if _draws(place)]
-
-
-def assert_all_end() -> None:
-    """What was told to end takes a moment."""
-    deadline = time.monotonic() + 10
-    while painting() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert not painting()
+TELLING = """import sys
+print("begun", file=sys.stderr, flush=True)
+from pathlib import Path
+from stages.commands.draw_worker import main
+main(Path(sys.argv[1]), sys.argv[2:])
+"""
+PROGRAM = f"""import sys
+from stages.cli import main
+from stages.commands import draw
+draw.WORKER = [sys.executable, "-c", {TELLING!r}]
+main()
+"""
+BOTH = Drawings(report=True, recordings=True)
+RECORDINGS = Drawings(report=False, recordings=True)
 
 
-def _draws(process: Path) -> bool:
-    try:
-        words, given = (process / "cmdline").read_bytes(), (process / "environ").read_bytes()
-    except OSError:  # gone, or not ours
-        return False
-    return b"stages.commands.draw_process" in words and MARK.encode() in given
+def drawn_in(run: Path) -> list[str]:
+    return sorted(path.stem for path in run.glob("*/*.rrd"))
 
 
 def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,19 +57,27 @@ def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], m
         assert digests(place.run) == right
 
 
-def test_painters_beside_the_run(place: Place, right: dict[str, str], drawn: Path) -> None:
-    """With two workers the pictures come from processes of their own: the same ones, and no process stays behind."""
-    told = poolcal(*place.words()[:-1], 2, "--report", "--recordings")
+@pytest.mark.parametrize("jobs", [2, 4])
+def test_processes_of_their_own_draw_the_same(done: Place, right: dict[str, str], drawn: Path, jobs: int) -> None:
+    """Whether one draws all, or one the page and one the recordings."""
+    told = poolcal(*done.words()[:-1], jobs, "--report", "--recordings")
     assert told.status == 0
     assert told.complaints == []
-    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
-    one, other = (re.findall("<img .*?>", (run / "report" / "report.html").read_text()) for run in (place.run, drawn))
+    assert drawn_in(done.run) == sorted(ORDER)
+    one, other = (re.findall("<img .*?>", (run / "report" / "report.html").read_text()) for run in (done.run, drawn))
     assert one == other
     assert len(one) == 7
-    assert digests(place.run) == right
-    assert_all_end()
-    here, there = (read(run, "adjust")["/after/P2"] for run in (place.run, drawn))
+    assert digests(done.run) == right
+    here, there = (read(run, "adjust")["/after/P2"] for run in (done.run, drawn))
     np.testing.assert_array_equal(points(here), points(there))
+
+
+def test_a_process_that_dies_is_said(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages.commands.draw, "WORKER", [sys.executable, "-c", "import os; os.abort()"])
+    (failure,) = draw_missing(done.run, BOTH, jobs=2)
+    assert (failure.kind, failure.reason) == ("report.html and recordings", "its process has ended")
+    assert [failure.kind for failure in draw_missing(done.run, BOTH, jobs=4)] == ["recordings", "report.html"]
+    assert drawn_in(done.run) == []
 
 
 def test_nothing_is_started_where_nothing_is_to_be_drawn(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -90,153 +86,71 @@ def test_nothing_is_started_where_nothing_is_to_be_drawn(done: Place, monkeypatc
     assert poolcal(*done.words()[:-1], 2, "--report", "--recordings").complaints == []
 
 
-def test_recordings_are_prepared_as_stages_finish_and_written_after_the_verdict(done: Place) -> None:
-    """So that they never take the room on the disk that a stage needs."""
-    with painters(report=True, recordings=True, beside=True) as found:
-        for stage in ORDER:
-            found.begin(done.run, stage)
-        time.sleep(2.0)  # long enough to have prepared some
-        assert not list(done.run.glob("*/*.rrd"))
-        assert not (done.run / "report" / "report.html").exists()
-        assert found.draw(done.run) == []
-    assert sorted(path.stem for path in done.run.glob("*/*.rrd")) == sorted(ORDER)
-    assert (done.run / "report" / "report.html").is_file()
-
-
-def test_what_was_prepared_is_written_only_beside_the_tables_that_it_shows(done: Place) -> None:
-    shown = (done.run / "ingest" / "manifest.json").read_bytes()
-    tabs = tabs_of(done.run)
-    current, stale = Prepared(shown, tabs, b"prepared"), Prepared(shown + b" ", tabs, b"of tables that are gone")
-    other = Prepared(shown, tabs[1:], b"beside tabs that are gone")
-    assert paint(done.run, ["ingest", "offsets"], prepared={"ingest": current, "offsets": stale}) == []
-    assert (done.run / "ingest" / "ingest.rrd").read_bytes() == b"prepared"
-    assert "/curves/turns/angles" in read(done.run, "offsets")
-    (done.run / "ingest" / "ingest.rrd").unlink()
-    assert paint(done.run, ["ingest"], prepared={"ingest": other}) == []
-    assert "/quality/attitude/roll" in read(done.run, "ingest")
-
-
-def test_what_fails_while_stages_run_is_drawn_after_them(place: Place) -> None:
-    with painters(report=False, recordings=True, beside=True) as found:
-        found.begin(place.run, "georeference")  # not there yet
-        assert place.calibrate().status == 0
-        assert found.draw(place.run) == []
-    assert sorted(path.stem for path in place.run.glob("*/*.rrd")) == sorted(ORDER)
-
-
-def test_a_painter_that_dies_is_said(done: Place) -> None:
-    with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(done.run, "adjust")
-        assert found._process is not None
-        found._process.kill()
-        failed = found.draw(done.run)
-    assert_all_end()
-    assert [(one.what, one.trace) for one in failed] == [("report.html and recordings", "")]
-    assert not list(done.run.rglob("*.new"))
-    assert not list(done.run.rglob("*.partial"))
-
-
-@pytest.mark.parametrize("wait_s", often([0.3], [0.0, 0.3, 1.0]))
-def test_without_its_copies_it_draws_all_the_same(done: Place, wait_s: float) -> None:
-    """They may be killed at any moment, by a system short of memory: while they load, or with a picture half done."""
-    with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(done.run, "georeference")
-        deadline = time.monotonic() + 60
-        while len(copies := _children(found)) < 2 and time.monotonic() < deadline:
-            time.sleep(0.005)
-        time.sleep(wait_s)
-        for copy in copies:
-            os.kill(copy, signal.SIGKILL)
-        assert found.draw(done.run) == []
-    assert (done.run / "report" / "report.html").is_file()
-    assert sorted(path.stem for path in done.run.glob("*/*.rrd")) == sorted(ORDER)
-
-
-@pytest.mark.parametrize("wait_s", often([0.001], [0.0, 0.001, 0.01]))
-def test_a_painter_killed_while_it_forks_leaves_nothing(done: Place, wait_s: float) -> None:
-    with painters(report=True, recordings=True, beside=True) as found:
-        found.begin(done.run, "georeference")
-        assert found._process is not None
-        deadline = time.monotonic() + 60
-        while not _children(found) and time.monotonic() < deadline:
-            pass
-        time.sleep(wait_s)
-        found._process.kill()
-        assert [one.trace for one in found.draw(done.run)] == [""]
-    assert_all_end()
-
-
-def test_no_shared_memory_no_copies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where a pool of processes cannot be made the process draws alone."""
-
-    def none(*_: object, **__: object) -> None:
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    monkeypatch.setattr(stages.commands.draw_process, "ProcessPoolExecutor", none)
-    assert stages.commands.draw_process._others() is serial
-
-
-def _children(found: Painters) -> list[int]:
-    assert found._process is not None
-    place = Path(f"/proc/{found._process.pid}/task/{found._process.pid}/children")
-    return [int(word) for word in place.read_text().split()]
-
-
-def test_nothing_stays_behind_of_a_killed_run(place: Place) -> None:
-    command = [Path(sys.executable).with_name("poolcal"), *map(str, place.words()[:-1]), "2"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        deadline = time.monotonic() + 60
-        while len(painting()) < 3 and time.monotonic() < deadline:  # loaded, and with its copies
-            time.sleep(0.01)
-        assert len(painting()) == 3
-        process.kill()
-    assert_all_end()
-
-
-def test_nothing_in_the_working_directory_is_run(place: Place) -> None:
-    """Neither code nor settings of a folder that came from somewhere."""
-    for name in ("numpy.py", "rerun.py", "matplotlib.py"):
-        (place.folder / name).write_text("open('run by mistake', 'w').write('x')\n")
-    (place.folder / "matplotlibrc").write_text("text.usetex: True\n")
-    command = [Path(sys.executable).with_name("poolcal"), *map(str, place.words()[:-1]), "2"]
-    done = subprocess.run(command, cwd=place.folder, capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 0
-    assert "not drawn" not in done.stderr
-    assert (place.run / "report" / "report.html").is_file()
-    assert len(list(place.run.glob("*/*.rrd"))) == len(ORDER)
-    assert not (place.folder / "run by mistake").exists()
-
-
-def test_a_full_disk_is_one_line_and_no_stump(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-
-    def full(_: int) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    failed = Painters(report=False, recordings=True).draw(done.run)
-    assert [one.trace for one in failed] == [""]
-    assert "make room" in failed[0].reason
-    assert not [path for path in done.run.rglob("*") if path.suffix in (".rrd", ".new", ".partial")]
-
-
-@pytest.mark.thorough
-def test_no_room_for_another_process(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_room_for_another_process(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     def none(*_: object, **__: object) -> None:
         raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
 
     monkeypatch.setattr(subprocess, "Popen", none)
-    assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").complaints == []
-    assert (place.run / "report" / "report.html").is_file()
+    assert draw_missing(done.run, BOTH, jobs=2) == []
+    assert (done.run / "report" / "report.html").is_file()
+    assert drawn_in(done.run) == sorted(ORDER)
+
+
+@pytest.mark.parametrize(("end", "status"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+def test_nothing_stays_behind_of_a_run_that_ends_while_it_draws(done: Place, end: signal.Signals, status: int) -> None:
+    """Every process that it started holds its standard error open: that ends when the last of them has ended."""
+    calibration = (done.run / "report" / "calibration.json").read_bytes()
+    command = [sys.executable, "-c", PROGRAM, *map(str, done.words()[:-1]), "4"]
+    quiet, pipe = subprocess.DEVNULL, subprocess.PIPE
+    with subprocess.Popen(command, cwd=ROOT, start_new_session=True, stdout=quiet, stderr=pipe, text=True) as process:
+        assert process.stderr is not None
+        assert "begun\n" in iter(process.stderr.readline, "")
+        os.killpg(process.pid, end)  # as a terminal does it
+        said = process.stderr.read()
+    assert process.returncode == status
+    assert "Traceback" not in said
+    if end == signal.SIGINT:
+        assert said.splitlines()[-1] == "poolcal: interrupted; what was complete is kept"
+    assert (done.run / "report" / "calibration.json").read_bytes() == calibration
+    for stage in drawn_in(done.run):
+        assert read(done.run, stage)
+    assert draw_missing(done.run, BOTH) == []
+    assert drawn_in(done.run) == sorted(ORDER)
+
+
+def test_nothing_in_the_working_directory_is_run(done: Place) -> None:
+    """Neither code nor settings of a folder that came from somewhere."""
+    for name in ("numpy.py", "rerun.py", "matplotlib.py", "json.py"):
+        (done.folder / name).write_text("open('run by mistake', 'w').write('x')\n")
+    (done.folder / "matplotlibrc").write_text("text.usetex: True\n")
+    command = [Path(sys.executable).with_name("poolcal"), *map(str, done.words()[:-1]), "2"]
+    told = subprocess.run(command, cwd=done.folder, capture_output=True, text=True, check=False, timeout=120)
+    assert told.returncode == 0
+    assert "not drawn" not in told.stderr
+    assert (done.run / "report" / "report.html").is_file()
+    assert drawn_in(done.run) == sorted(ORDER)
+    assert not (done.folder / "run by mistake").exists()
+
+
+def test_a_full_disk_is_one_line_and_no_stump(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    (failure,) = draw_missing(done.run, RECORDINGS)
+    assert failure.trace == ""
+    assert "make room" in failure.reason
+    assert not [path for path in done.run.rglob("*") if path.suffix in (".rrd", ".new", ".partial")]
 
 
 def test_nothing_missing_nothing_said(done: Place) -> None:
     """A folder that is in use, or that cannot be written, is looked at all the same."""
     assert done.calibrate("--recordings").status == 0
     with locked(done.run, ORDER):
-        assert Painters(report=False, recordings=True).draw(done.run) == []
+        assert draw_missing(done.run, RECORDINGS) == []
         (done.run / "adjust" / "adjust.rrd").unlink()
-        (failed,) = Painters(report=False, recordings=True).draw(done.run)
-    assert "is in use" in failed.reason
+        (failure,) = draw_missing(done.run, RECORDINGS)
+    assert "is in use" in failure.reason
 
 
 def test_a_mistyped_run_is_refused_and_not_made(place: Place) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.gps_time import NS, WEEK_NS
 from pipeline.simulation.scenario import load_scenario
-from pipeline.simulation.session import simulate as simulate_in_memory
+from pipeline.simulation.session import simulate_session as simulate_in_memory
 from tests.support.effort import often
 from tests.support.files import ie_files
 from tests.support.places import Place, errors, poolcal, result_of, sigmas, simulate

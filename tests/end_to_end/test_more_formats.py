@@ -11,7 +11,7 @@ from pyproj import CRS, Transformer
 from pipeline.gps_time import NS, unix_ns_from_gps
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import SimulatedSession
-from pipeline.simulation.session import simulate as simulate_in_memory
+from pipeline.simulation.session import simulate_session as simulate_in_memory
 from tests.end_to_end.test_formats import run, same
 from tests.support.files import e57_files, sonar_files
 from tests.support.places import Place, edit, result_of, simulate

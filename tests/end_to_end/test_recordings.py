@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 
 import stages.views.recording
 from stages import ORDER
-from stages.commands.draw import Painters
+from stages.commands.draw import Drawings, draw_missing
 from stages.views.blueprint import tabs_of
 from tests.support.places import Told, poolcal
 from tests.support.recordings import Chunks, points, read, rows_in, text
@@ -166,7 +166,7 @@ def test_one_scene_a_run_and_sound_files(drawn: Path) -> None:
 def test_drawn_once_and_again_when_gone(drawn: Path) -> None:
     written = {path: path.stat().st_mtime_ns for path in drawn.glob("*/*.rrd")}
     (drawn / "segment" / "segment.rrd").unlink()
-    assert Painters(report=True, recordings=True).draw(drawn) == []
+    assert draw_missing(drawn, Drawings(report=True, recordings=True)) == []
     changed = [path.stem for path, when in written.items() if path.stat().st_mtime_ns != when]
     assert changed == ["segment"]
     assert not list(drawn.rglob("*.partial"))
@@ -178,7 +178,7 @@ def test_a_sample_says_so(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(georeference, "MOST_POINTS", 1000)
     (drawn / "georeference" / "georeference.rrd").unlink()
-    assert Painters(report=False, recordings=True).draw(drawn) == []
+    assert draw_missing(drawn, Drawings(report=False, recordings=True)) == []
     (chunk,) = read(drawn, "georeference")["/pool/laser"]
     (step,) = chunk.column("one_in").to_pylist()[0]
     total = rows_in(drawn / "georeference" / "laser_pool")
@@ -198,7 +198,7 @@ def test_words_stay_words(undisturbed: tuple[Path, Told], tmp_path: Path) -> Non
     names = table["file"].to_pylist()
     changed = table.set_column(table.schema.get_field_index("file"), table.schema.field("file"), [[name, *names[1:]]])
     pq.write_table(changed, path)
-    assert Painters(report=False, recordings=True).draw(run) == []
+    assert draw_missing(run, Drawings(report=False, recordings=True)) == []
     written = text(read(run, "ingest"), "/tables/files")
     fence = written.split("text\n")[0]
     assert set(fence) == {"`"}
@@ -215,7 +215,7 @@ def test_without_a_result_nothing_is_shown_as_calibrated(undisturbed: tuple[Path
     table = pq.read_table(path)
     place = table.schema.get_field_index("value")
     pq.write_table(table.set_column(place, table.schema.field("value"), [[float("nan")] * len(table)]), path)
-    assert Painters(report=False, recordings=True).draw(run) == []
+    assert draw_missing(run, Drawings(report=False, recordings=True)) == []
     found = read(run, "adjust")
     assert "/before/P2" in found
     assert not [name for name in found if name.startswith("/after")]
@@ -352,11 +352,11 @@ def test_recordings_drawn_before_know_the_tabs_of_now(undisturbed: tuple[Path, T
     """Where the iteration has lost its result, no recording offers its tab any more."""
     run = tmp_path / "run"
     shutil.copytree(undisturbed[0], run)
-    assert Painters(report=False, recordings=True).draw(run) == []
+    assert draw_missing(run, Drawings(report=False, recordings=True)) == []
     before = (run / "ingest" / "ingest.rrd").read_bytes()
     path = run / "angle_iterate" / "iterations.parquet"
     pq.write_table(pq.read_table(path).slice(0, 0), path)
     (run / "angle_iterate" / "angle_iterate.rrd").unlink()
-    assert Painters(report=False, recordings=True).draw(run) == []
+    assert draw_missing(run, Drawings(report=False, recordings=True)) == []
     assert tabs_of(run) == ("Overview", "Before and after", "Residuals", "Quality")
     assert (run / "ingest" / "ingest.rrd").read_bytes() != before

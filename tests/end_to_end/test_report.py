@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from stages import ORDER
-from stages.commands.draw import Painters
+from stages.commands.draw import Drawings, draw_missing
 from tests.support.effort import often
 from tests.support.pages import Page, assert_self_contained
 from tests.support.places import Place, Told, digests, poolcal, result_of
@@ -167,7 +167,7 @@ def test_drawn_again_only_with_cause(done: Place) -> None:
     assert done.calibrate("--report").status == 0
     assert path.stat().st_mtime_ns == written
     path.unlink()
-    assert Painters(report=True, recordings=False).draw(done.run) == []
+    assert draw_missing(done.run, Drawings(report=True, recordings=False)) == []
     assert path.read_bytes() == before  # the same run, the same page
     done.edit_config("ingest", max_gap_s=4.9)  # changes no pass here, and no input of the report
     assert done.calibrate("--report").status == 0

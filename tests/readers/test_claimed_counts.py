@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.readers import e57, las, table_columns
+from pipeline.readers import e57_scans, las, table_columns
 from pipeline.readers.claimed_counts import RECORDS_PER_BYTE, refuse_claim
 from pipeline.readers.dispatch import raw_parts
 from tests.readers.test_e57 import POINTS, START_S, TIMES
@@ -60,7 +60,7 @@ def refused(kind: str, path: Path, words: str, **more: Any) -> None:
 
 def test_more_than_the_size_makes_likely(small: tuple[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     kind, path = small
-    monkeypatch.setattr(las, "unpack", lambda *given: pytest.fail("unpacked"))
+    monkeypatch.setattr(las, "decompressed_points", lambda *given: pytest.fail("unpacked"))
     monkeypatch.setattr(pq.ParquetFile, "iter_batches", lambda *given, **more: pytest.fail("unpacked"))
     refused(kind, path, rf"more than 16 a byte.*write laser\.max_records: {COUNT}")
     refused(kind, path, rf"laser\.max_records is {COUNT - 1}", max_records=COUNT - 1)
@@ -80,13 +80,13 @@ def test_all_scans_of_an_e57_count_together(tmp_path: Path) -> None:
     with pytest.raises(RawDataError, match=r"a\.e57: claims 6 records in \d+ bytes, laser\.max_records is 5"):
         read("laser", path, "e57", max_records=5)
     assert rows(read("laser", path, "e57", max_records=6)[0]) == 6
-    assert len(e57.scans_of(path, "a.e57")[0]) == 2
+    assert len(e57_scans.read_scans(path, "a.e57")[0]) == 2
 
 
 @pytest.mark.parametrize("sensor", ["ins", "mbes"])
 def test_the_other_sensors_tables(sensor: str, tmp_path: Path) -> None:
-    names = table_columns.INS if sensor == "ins" else (*table_columns.MBES, "range_m")
-    columns = {name: np.full(COUNT, 5 if name in table_columns.WHOLE else 5.0) for name in names}
+    names = table_columns.INS_TABLE_COLUMNS if sensor == "ins" else (*table_columns.MBES_TABLE_COLUMNS, "range_m")
+    columns = {name: np.full(COUNT, 5 if name in table_columns.WHOLE_NUMBERS else 5.0) for name in names}
     pq.write_table(pa.table({"gps_ns": np.full(COUNT, TIME)} | columns), tmp_path / "a.parquet", compression="zstd")
     (part,) = raw_parts(sensor, build.settings(sensor, ["a.parquet"], "table"), tmp_path)  # type: ignore[arg-type]
     with pytest.raises(RawDataError, match=rf"a\.parquet: claims .* write {sensor}\.max_records"):

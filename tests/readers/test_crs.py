@@ -9,7 +9,7 @@ from pyproj import CRS
 
 from pipeline.config.session import Laser
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.readers.crs import Frame, placing_of
+from pipeline.readers.crs import LaserFrame, frame_transform
 from tests.support.files.build import MOUNT, read, rows
 from tests.support.files.e57_files import Scan, write
 
@@ -122,8 +122,8 @@ def test_las_and_e57_the_same_way(tmp_path: Path) -> None:
 
 def test_feet_with_feet() -> None:
     """Heights have the unit of the CRS's axes; Texas, central zone, in both units."""
-    placing = placing_of(Frame("EPSG:2277", "ellipsoidal"))
-    metres = placing_of(Frame("EPSG:32139", "ellipsoidal"))  # the same zone in metres
+    placing = frame_transform(LaserFrame("EPSG:2277", "ellipsoidal"))
+    metres = frame_transform(LaserFrame("EPSG:32139", "ellipsoidal"))  # the same zone in metres
     assert placing is not None
     assert metres is not None
     place = np.array([[700_000.0], [3_100_000.0], [120.0]])
@@ -252,5 +252,5 @@ def test_a_centimetre_is_fine_enough(frame: str, scale: float, tmp_path: Path) -
 
 def test_an_old_way_of_writing_a_crs_warns_of_nothing(recwarn: pytest.WarningsRecorder) -> None:
     """The user sees one line at most, and none of the library's."""
-    assert placing_of(Frame("+init=epsg:32651", "ellipsoidal")) is not None
+    assert frame_transform(LaserFrame("+init=epsg:32651", "ellipsoidal")) is not None
     assert not recwarn

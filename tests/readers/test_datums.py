@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.maths.geometry.geodesy import ecef_from_geodetic
-from pipeline.readers.crs import Frame, placing_of
+from pipeline.readers.crs import LaserFrame, frame_transform
 from tests.readers.test_crs import las, placed, table
 from tests.support.files.build import read, rows
 
@@ -48,7 +48,7 @@ def gauss_krueger(place: tuple[float, float, float], flattening: float, meridian
 
 
 def moved(frame: str, point: tuple[float, float, float]) -> np.ndarray:
-    placing = placing_of(Frame(frame, "ellipsoidal"))
+    placing = frame_transform(LaserFrame(frame, "ellipsoidal"))
     assert placing is not None
     return np.array(placing.to_ecef(*(np.array([value]) for value in point)))[:, 0]
 
@@ -177,7 +177,7 @@ def test_geocentric_points_stay(frame: str) -> None:
 def test_the_ellipsoids_differ_by_a_tenth_of_a_millimetre() -> None:
     """The INS's latitudes go through WGS 84's ellipsoid, points of CGCS2000 through their own."""
     latitudes = np.linspace(-89.0, 89.0, 179)
-    placing = placing_of(Frame("EPSG:4490", "ellipsoidal"))
+    placing = frame_transform(LaserFrame("EPSG:4490", "ellipsoidal"))
     assert placing is not None
     longitudes, heights = np.full(179, 120.1), np.full(179, 12.0)
     own = np.stack(placing.to_ecef(longitudes, latitudes, heights), axis=1)
@@ -228,8 +228,8 @@ def test_depths() -> None:
     third = 'AXIS["depth",down,LENGTHUNIT["metre",1]]'
     wkt = f'GEOGCRS["x",{datum},CS[ellipsoidal,3],{axes.format(degree)},{third}]'
     with pytest.raises(ConfigError, match=r"axes that run north, east, down.*east, north and up"):
-        placing_of(Frame(wkt))
-    assert placing_of(Frame(wkt.replace("down", "up"))) is not None
+        frame_transform(LaserFrame(wkt))
+    assert frame_transform(LaserFrame(wkt.replace("down", "up"))) is not None
 
 
 def test_other_meridians_and_no_meridians(tmp_path: Path) -> None:

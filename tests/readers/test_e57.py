@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.config.session import Laser
 from pipeline.errors import RawDataError
-from pipeline.readers import e57
+from pipeline.readers import e57_scans
 from pipeline.readers.dispatch import raw_parts
 from tests.support.files.build import MOUNT, read, rows
 from tests.support.files.e57_files import Scan, edited, write
@@ -91,7 +91,7 @@ def test_many_points_come_in_batches(file: Path, monkeypatch: pytest.MonkeyPatch
     count = 2500
     columns = {name: np.arange(count) * 0.001 for name in POINTS} | {"timeStamp": np.arange(count) * 1e-4}
     write(file, Scan(columns, START_S))
-    monkeypatch.setattr(e57, "BATCH_ROWS", 1000)
+    monkeypatch.setattr(e57_scans, "BATCH_ROWS", 1000)
     (part,) = raw_parts("laser", Laser(files=[file.name], format="e57", mount=MOUNT), file.parent)
     chunks = list(part.chunks())
     assert [len(chunk.columns["t_ns"]) for chunk in chunks] == [1000, 1000, 500]
@@ -198,5 +198,5 @@ def test_end_of_the_worker_is_an_error_of_the_file(
 ) -> None:
     worker = tmp_path / "worker.py"
     worker.write_text(program)
-    monkeypatch.setattr(e57, "WORKER", worker)
+    monkeypatch.setattr(e57_scans, "E57_WORKER", worker)
     _refused(file, "is damaged")

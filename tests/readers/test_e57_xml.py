@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import RawDataError
-from pipeline.readers import e57
+from pipeline.readers import e57_scans
 from tests.support.files.build import read, rows
 from tests.support.files.e57_files import Scan, edited, write
 
@@ -78,13 +78,13 @@ def test_nothing_is_fetched(
     address, paths = asked
     file.write_bytes(hostile(content, kind, address.encode(), str(file.parent / "secret.txt").encode()))
     started: list[object] = []
-    monkeypatch.setattr(e57, "text", lambda *given: started.append(given))
-    monkeypatch.setattr(e57, "batches", lambda *given: started.append(given))
+    monkeypatch.setattr(e57_scans, "decoded_text", lambda *given: started.append(given))
+    monkeypatch.setattr(e57_scans, "decoded_batches", lambda *given: started.append(given))
     words = "(DOCTYPE|ENTITY|[sS]chemaLocation).*other files of this computer.*where the file comes from"
     with pytest.raises(RawDataError, match=rf"a\.e57: its XML part has .*{words}") as error:
         read("laser", file, "e57")
     with pytest.raises(RawDataError, match="other files of this computer"):
-        e57.points(file, "a.e57", 0)
+        e57_scans.stored_points(file, "a.e57", 0)
     assert "SECRET" not in str(error.value)
     assert "\n" not in str(error.value)
     assert not started

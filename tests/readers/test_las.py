@@ -285,7 +285,7 @@ def test_cut_at_each_tenth(compress, tenth: int, file: Path) -> None:  # type: i
 def test_stretches_are_the_whole(compress, stretch: int, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
     file.write_bytes(compress(las(some(100))))
     whole, _ = read("laser", file, "las")
-    monkeypatch.setattr(reader, "STRETCH", stretch)
+    monkeypatch.setattr(reader, "STRETCH_POINTS", stretch)
     parts = raw_parts("laser", build.settings("laser", [file.name], "las"), file.parent)
     assert len(parts) == -(-100 // stretch)
     assert len({part.name for part in parts}) == len(parts)
@@ -296,7 +296,7 @@ def test_stretches_are_the_whole(compress, stretch: int, file: Path, monkeypatch
 
 
 def test_stretches_of_a_cut_file_count_its_loss_once(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader, "STRETCH", 20)
+    monkeypatch.setattr(reader, "STRETCH_POINTS", 20)
     file.write_bytes(las(some(50), claimed=90))
     columns, dropped = read("laser", file, "las")
     assert rows(columns) == 50

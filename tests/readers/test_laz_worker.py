@@ -58,7 +58,7 @@ def test_stretches_of_one_file_are_its_points_in_order(
     content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = np.concatenate([chunk.columns["t_ns"] for chunk in read(tmp_path / "a.laz", content)])
-    monkeypatch.setattr("pipeline.readers.las.STRETCH", 70_001)
+    monkeypatch.setattr("pipeline.readers.las.STRETCH_POINTS", 70_001)
     settings = Laser(files=["a.laz"], format="las", mount=LEVEL)
     parts = raw_parts("laser", settings, tmp_path)
     assert [part.name for part in parts] == ["a.laz#0", "a.laz#1"]
@@ -111,7 +111,7 @@ def test_end_of_the_worker_is_an_error_of_the_file(
 ) -> None:
     worker = tmp_path / "worker.py"
     worker.write_text(program)
-    monkeypatch.setattr(laz, "WORKER", worker)
+    monkeypatch.setattr(laz, "LAZ_WORKER", worker)
     with pytest.raises(RawDataError, match=r"a\.laz: is damaged"):
         read(tmp_path / "a.laz", content)
 

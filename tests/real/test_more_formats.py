@@ -13,7 +13,7 @@ import pytest
 
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, unix_ns_from_gps
-from pipeline.readers import e57, kmall
+from pipeline.readers import e57_scans, kmall
 from pipeline.readers.gsf_pings import GsfScales, decode_gsf_ping
 from pipeline.readers.gsf_records import PING, gsf_records
 from pipeline.readers.kmall_datagrams import kmall_datagrams
@@ -171,18 +171,18 @@ def _attitude(data: Path) -> tuple[np.ndarray, np.ndarray]:
 
 # --- E57 -------------------------------------------------------------------------------------------------------------
 def test_e57_coordinates(data: Path) -> None:
-    ((scan,), _) = e57.scans_of(data / BUNNY, BUNNY)
-    (numbers,) = e57.points(data / BUNNY, BUNNY, 0)
+    ((scan,), _) = e57_scans.read_scans(data / BUNNY, BUNNY)
+    (numbers,) = e57_scans.stored_points(data / BUNNY, BUNNY, 0)
     assert scan.points == len(numbers[0]) == 30_571
-    x, y, z = e57.placed(numbers, scan)
+    x, y, z = e57_scans.file_coordinates(numbers, scan)
     assert (x[0], y[0], z[0]) == pytest.approx((-0.07063, 0.04015, 0.001226), abs=1e-12)
     assert not numbers[4].any()
 
 
 def test_e57_pose(data: Path) -> None:
-    ((scan,), _) = e57.scans_of(data / MOVED, MOVED)
-    (numbers,) = e57.points(data / MOVED, MOVED, 0)
-    places = np.stack(e57.placed(numbers, scan), axis=1)
+    ((scan,), _) = e57_scans.read_scans(data / MOVED, MOVED)
+    (numbers,) = e57_scans.stored_points(data / MOVED, MOVED, 0)
+    places = np.stack(e57_scans.file_coordinates(numbers, scan), axis=1)
     assert places.tolist() == [[4, 5, 6], [5, 5, 6], [4, 6, 6], [5, 6, 6]]
 
 

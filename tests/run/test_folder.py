@@ -14,7 +14,7 @@ import pytest
 
 from pipeline.artefacts import parquet
 from pipeline.errors import ArtefactError, ConfigError
-from pipeline.run.verify import verify
+from pipeline.run.verify import problems_of_run
 from pipeline.run.workers import workers
 from tests.support.toy_run import Pool
 
@@ -202,7 +202,7 @@ def test_a_folder_with_other_things_is_left_alone(pool: Pool) -> None:
 # --- verify ----------------------------------------------------------------------------------------------------------
 def test_verify_finds_nothing_in_a_whole_run(pool: Pool) -> None:
     pool.run()
-    assert verify(pool.stages, pool.run_folder) == []
+    assert problems_of_run(pool.stages, pool.run_folder) == []
 
 
 def test_verify_reads_everything_again(pool: Pool) -> None:
@@ -210,7 +210,7 @@ def test_verify_reads_everything_again(pool: Pool) -> None:
     np.ones(5000).tofile(pool.session / "laser" / "0.bin")
     (pool.run_folder / "sift" / "means.parquet").write_bytes(b"")
     (pool.run_folder / "tell" / "manifest.json").unlink()
-    found = verify(pool.stages, pool.run_folder)
+    found = problems_of_run(pool.stages, pool.run_folder)
     assert found == [
         "take: laser/0.bin changed", "sift: its result means.parquet was edited", "tell: has no complete result",
     ]  # fmt: skip
@@ -222,7 +222,7 @@ def test_verify_notices_a_part_slipped_in_and_settings_rewritten(pool: Pool) -> 
     shutil.copy(near / "part-00000-000.parquet", near / "part-00009-000.parquet")
     text = (pool.run_folder / "run.yaml").read_text()
     (pool.run_folder / "run.yaml").write_text(text.replace("margin_m: 0.05", "margin_m: 0.06"))
-    found = verify(pool.stages, pool.run_folder)
+    found = problems_of_run(pool.stages, pool.run_folder)
     assert found == [
         "sift: near/part-00009-000.parquet is not its own", "sift: segment is not as in run.yaml",
     ]  # fmt: skip
@@ -231,7 +231,7 @@ def test_verify_notices_a_part_slipped_in_and_settings_rewritten(pool: Pool) -> 
 def test_verify_of_missing_raw_files(pool: Pool) -> None:
     pool.run()
     shutil.rmtree(pool.session)
-    assert "take: laser/0.bin is gone" in verify(pool.stages, pool.run_folder)
+    assert "take: laser/0.bin is gone" in problems_of_run(pool.stages, pool.run_folder)
 
 
 def test_two_runs_at_once_end_as_one_error_and_one_result(pool: Pool) -> None:

@@ -11,7 +11,7 @@ from pipeline.atomic_files import remove
 from pipeline.errors import ArtefactError
 from pipeline.run import manifest
 from pipeline.run.results import calibration
-from pipeline.run.verify import verify
+from pipeline.run.verify import problems_of_run
 from tests.support.limits import limited
 from tests.support.toy_run import Pool
 
@@ -32,7 +32,7 @@ def test_a_lock_that_is_a_link_is_not_followed(pool: Pool, tmp_path: Path) -> No
     with pytest.raises(ArtefactError, match=r"\.lock: cannot be written .*remove the symbolic link"):
         pool.run()
     assert mine.read_text() == "two years of work"
-    assert verify(pool.stages, pool.run_folder) == []  # which only reads
+    assert problems_of_run(pool.stages, pool.run_folder) == []  # which only reads
     lock.unlink()
     lock.symlink_to(tmp_path / "new")
     with pytest.raises(ArtefactError, match=r"\.lock: cannot be written"):
@@ -44,7 +44,7 @@ def test_fifos_are_not_waited_for(pool: Pool) -> None:
     pool.run()
     (pool.run_folder / ".lock").unlink()
     os.mkfifo(pool.run_folder / ".lock")
-    assert verify(pool.stages, pool.run_folder) == []
+    assert problems_of_run(pool.stages, pool.run_folder) == []
     with pytest.raises(ArtefactError, match=r"\.lock: cannot be written .*move what is in the way"):
         pool.run()
     (pool.run_folder / ".lock").unlink()
@@ -55,7 +55,7 @@ def test_fifos_are_not_waited_for(pool: Pool) -> None:
     (pool.run_folder / "run.yaml").unlink()
     os.mkfifo(pool.run_folder / "run.yaml")
     with pytest.raises(ArtefactError, match="so it is no run folder"):
-        verify(pool.stages, pool.run_folder)
+        problems_of_run(pool.stages, pool.run_folder)
 
 
 @pytest.mark.parametrize("content", ["[" * 100_000, "{" * 100_000, "\0", '"' + "a" * 100, "1e999", "[]"])
@@ -83,7 +83,7 @@ def test_a_manifest_with_other_types_in_it_only_costs_a_rerun(pool: Pool, change
     pool.run()
     path = pool.run_folder / "take" / "manifest.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
-    assert manifest.read(path.parent) is None
+    assert manifest.read_manifest(path.parent) is None
     assert pool.run() == ["take"]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pipeline.run import provenance, runner
-from pipeline.run.import_closure import reached
+from pipeline.run.import_closure import import_closure
 from stages import load
 from tests.support import toys
 from tests.support.roots import ROOT
@@ -39,14 +39,14 @@ def is_stale(copy: Path, monkeypatch: pytest.MonkeyPatch, stage: str, changed: s
     here = ModuleType(module.__name__)
     vars(here).update(Inputs=module.Inputs, __file__=str(copy / Path(str(module.__file__)).relative_to(ROOT)))
     monkeypatch.setattr(provenance, "ROOT", copy)
-    provenance._source.cache_clear()
-    before = provenance.source_of(here)
+    provenance._source_digests.cache_clear()
+    before = provenance.source_digests(here)
     text = (copy / changed).read_bytes()
     (copy / changed).write_bytes(text + b"\n# a comma\n")
-    provenance._source.cache_clear()
-    after = provenance.source_of(here)
+    provenance._source_digests.cache_clear()
+    after = provenance.source_digests(here)
     (copy / changed).write_bytes(text)
-    provenance._source.cache_clear()
+    provenance._source_digests.cache_clear()
     assert {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)} <= {changed}
     return before != after
 
@@ -60,6 +60,7 @@ def is_stale(copy: Path, monkeypatch: pytest.MonkeyPatch, stage: str, changed: s
         ("ingest", "pipeline/maths/geometry/rotations.py"),  # imported by geodesy.py, by nothing of ingest
         ("ingest", "pipeline/readers/detect.py"),  # the runner hands the readers' parts to it
         ("ingest", "pipeline/readers/laz_worker.py"),  # a program: imported by nobody
+        ("ingest", "pipeline/readers/e57_worker.py"),
         ("ingest", "pipeline/readers/las.py"),
         ("ingest", "pipeline/artefacts/parquet.py"),
         ("ingest", "pipeline/run/runner.py"),
@@ -85,6 +86,11 @@ def test_what_a_stage_can_reach_makes_it_stale(
         ("ingest", "pipeline/report/verdict.py"),
         ("ingest", "pipeline/maths/adjustment/normal_equations.py"),
         ("ingest", "stages/adjust.py"),
+        ("ingest", "pipeline/readers/casts.py"),  # the cast's depths are in the settings
+        ("ingest", "pipeline/config/load.py"),  # as are all that it loads
+        ("ingest", "pipeline/run/manifest.py"),
+        ("report", "pipeline/run/results.py"),
+        ("report", "pipeline/run/progress.py"),
         ("georeference", "pipeline/readers/las.py"),  # its inputs tell whether that made a difference
         ("adjust", "stages/laser/adjust.py"),
         ("report", "pipeline/results/pages/report.html"),
@@ -95,12 +101,60 @@ def test_what_it_cannot_reach_does_not(copy: Path, monkeypatch: pytest.MonkeyPat
     assert not is_stale(copy, monkeypatch, stage, changed)
 
 
+BASE = {  # reached by every stage: the schemas of tables, the models of the settings, and what carries rows in and out
+    "pipeline", "pipeline/artefacts", "pipeline/artefacts/catalogue", "pipeline/config", "pipeline/maths",
+    "pipeline/maths/geometry", "pipeline/run", "stages",
+}  # fmt: skip
+FIT = {"pipeline/maths/patent", "pipeline/maths/target"}
+ADJUST = FIT | {
+    "pipeline/adjustment", "pipeline/maths/adjustment", "pipeline/maths/sonar", "pipeline/planning", "pipeline/target",
+}  # fmt: skip
+REPORT = FIT | {
+    "pipeline/adjustment", "pipeline/maths/adjustment", "pipeline/report", "pipeline/results", "pipeline/target",
+}  # fmt: skip
+ROOMS = {  # folders of which a stage reaches some file, beside BASE
+    "ingest": {"pipeline/readers", "pipeline/maths/sonar"},
+    "georeference": {"pipeline/target", "pipeline/maths/sonar", "pipeline/maths/target"},
+    "segment": {"pipeline/target", "pipeline/maths/sonar", "pipeline/maths/target"},
+    "fit_planes": {"pipeline/maths/patent"},
+    "angle_iterate": FIT,
+    "offsets": FIT,
+    "adjust": ADJUST,
+    "report": REPORT,
+    "laser.adjust": ADJUST | {"stages/laser"},
+    "laser.report": REPORT | {"stages/laser", "pipeline/maths/sonar"},
+}
+MODULES = {  # of these folders, no more than these files
+    "pipeline/run": {"__init__.py", "runner.py", "stage_protocol.py", "workers.py"},
+    "pipeline/results": {"__init__.py", "screen.py"},  # the verdict in words
+    "pipeline/planning": {"__init__.py", "observability.py", "prediction.py"},
+    "stages": {"__init__.py"},
+}
+
+
+@pytest.mark.parametrize("stage", ROOMS)
+def test_a_stage_reaches_what_it_computes_with_and_no_more(stage: str) -> None:
+    (module,) = {m.__name__: m for m in (*load(), *load("laser")) if m.__name__ == f"stages.{stage}"}.values()
+    files = [Path(name) for name in provenance.source_digests(module)]
+    assert {path.parent.as_posix() for path in files} == BASE | ROOMS[stage]
+    own = {f"{stage.rpartition('.')[2]}.py"} | ({"adjust.py"} if stage == "laser.adjust" else set())
+    for folder, names in MODULES.items():
+        assert {path.name for path in files if path.parent.as_posix() == folder} - own <= names
+    assert not {path.as_posix() for path in files} & {"pipeline/config/load.py", "pipeline/readers/casts.py"}
+    assert all(path.suffix == ".py" for path in files)
+    words = {"ingest", "adjust", "laser.adjust", "report", "laser.report"}  # write numbers with their nouns into tables
+    assert (Path("pipeline/console.py") in files) == (stage in words)
+
+
 def test_imports_are_followed_as_python_follows_them(tmp_path: Path) -> None:
     """Relative ones, those in functions and of packages; none that the type checker alone sees, none of a library."""
+    modules = ("always", "up", "typed", "real", "started", "loaded", "unreached", "folder/face")
     files = {
         "stages/__init__.py": "def load():\n    import pipeline.loaded\n",
         "stages/one.py": "from typing import TYPE_CHECKING\nfrom pipeline import near\nimport numpy\n"
+        "PROGRAM = 'program.py', 'none.py'\n"
         "if TYPE_CHECKING:\n    import pipeline.typed\nelse:\n    import pipeline.real\n",
+        "stages/program.py": "import pipeline.started\n",
         "pipeline/__init__.py": "from . import always\n",
         "pipeline/near.py": "def late():\n    from pipeline.folder.deep import thing\n",
         "pipeline/folder/__init__.py": "from pipeline.folder import face\n"
@@ -108,24 +162,22 @@ def test_imports_are_followed_as_python_follows_them(tmp_path: Path) -> None:
         "pipeline/folder/deep.py": "from ..up import other\n",
         "pipeline/folder/data.json": "{}",
         "numpy/__init__.py": "import pipeline.loaded\n",
-    } | {f"pipeline/{name}.py": "" for name in ("always", "up", "typed", "real", "loaded", "unreached", "folder/face")}
+    } | {f"pipeline/{name}.py": "" for name in modules}
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    found = {path.relative_to(tmp_path).as_posix() for path in reached(tmp_path, ["stages.one"])}
+    found = {path.relative_to(tmp_path).as_posix() for path in import_closure(tmp_path, ["stages.one"])}
     left = ("pipeline/typed.py", "pipeline/loaded.py", "pipeline/unreached.py", "numpy/__init__.py")
     assert found == files.keys() - set(left)
 
 
-def test_programs_lie_in_folders_that_are_taken_whole() -> None:
-    """What is started by its path, or imported by a name made at run time, no syntax tree shows."""
-    for path in (ROOT / "pipeline").rglob("*.py"):
-        text = path.read_text(encoding="utf-8")
-        if "__main__" in text or "import_module(" in text or "__import__(" in text:
-            assert path.relative_to(ROOT).as_posix().startswith("pipeline/readers/"), path
+def test_no_import_is_hidden() -> None:
+    """What is imported by a name made at run time no syntax tree shows."""
     for stage in (*load(), *load("laser")):
-        for name in provenance.source_of(stage):
-            assert name == "stages/__init__.py" or "import_module(" not in (ROOT / name).read_text(encoding="utf-8")
+        for name in provenance.source_digests(stage):
+            text = (ROOT / name).read_text(encoding="utf-8")
+            assert name == "stages/__init__.py" or "import_module(" not in text, name
+            assert "__import__(" not in text, name
 
 
 def test_every_module_that_a_stage_has_loaded_is_in_its_key() -> None:
@@ -139,7 +191,7 @@ def test_every_module_that_a_stage_has_loaded_is_in_its_key() -> None:
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
         loaded = {Path(name).relative_to(ROOT).as_posix() for name in json.loads(done.stdout)}
         assert len(loaded) > 20
-        assert loaded <= provenance.source_of(stage).keys()
+        assert loaded <= provenance.source_digests(stage).keys()
 
 
 # --- libraries -------------------------------------------------------------------------------------------------------
@@ -147,15 +199,18 @@ def test_every_dependency_is_recorded_or_known_to_change_no_digit() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     names = {re.split(r"[\[<>=~!; ]", one)[0] for one in project["dependencies"]}
     assert names == NO_DIGIT | set(provenance.LIBRARIES) - {"lazrs"}  # which laspy brings
-    assert "not installed" not in provenance.versions().values()
+    assert "not installed" not in provenance.library_versions().values()
 
 
-def test_a_decoders_new_version_makes_a_run_stale(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("decoder", ["pye57", "gsfu", "pykmall", "lazrs"])
+def test_a_decoders_new_version_reads_raw_files_again(
+    pool: Pool, monkeypatch: pytest.MonkeyPatch, decoder: str
+) -> None:
     pool.run()
-    versions = provenance.versions()
-    monkeypatch.setattr(provenance, "versions", lambda: {**versions, "gsfu": "0.0.1"})
+    versions = provenance.library_versions()
+    monkeypatch.setattr(provenance, "library_versions", lambda: {**versions, decoder: "0.0.1"})
     assert pool.run()[0] == "take"
-    assert f"take: gsfu {versions['gsfu']} -> 0.0.1" in pool.said
+    assert f"take: {decoder} {versions[decoder]} -> 0.0.1" in pool.said
 
 
 # --- raw files -------------------------------------------------------------------------------------------------------

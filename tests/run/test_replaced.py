@@ -15,7 +15,7 @@ from pipeline import atomic_files
 from pipeline.errors import ArtefactError
 from pipeline.run import runner
 from pipeline.run.settings import load_settings
-from pipeline.run.verify import verify
+from pipeline.run.verify import problems_of_run
 from tests.support import toys
 from tests.support.effort import often
 from tests.support.toy_run import Pool
@@ -159,7 +159,7 @@ def test_killed_at_any_step_the_accepted_result_is_there(
 def test_verify_looks_past_what_is_kept(judged: Pool) -> None:
     limit(judged, 2.0)
     judged.run()
-    assert verify(judged.stages, judged.run_folder) == []
+    assert problems_of_run(judged.stages, judged.run_folder) == []
     assert judged.run() == []
 
 
@@ -191,7 +191,7 @@ def test_another_session_is_refused_and_nothing_changed(judged: Pool) -> None:
         assert word in str(told.value)
     settings = load_settings(judged.session, judged.config)
     with pytest.raises(ArtefactError, match="another session"):
-        runner.run_stage(judged.stages, "take", judged.run_folder, settings)
+        runner.run_stage(judged.stages, "take", judged.run_folder, settings=settings)
     assert everything(judged.run_folder) == before
 
 

@@ -102,11 +102,11 @@ def test_a_deleted_result_is_made_again(pool: Pool) -> None:
 
 def test_other_libraries_or_source_rerun_everything(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
     pool.run()
-    versions, source_of = provenance.versions(), provenance.source_of
-    monkeypatch.setattr(provenance, "versions", lambda: {**versions, "numpy": "0.1"})
+    versions, source_of = provenance.library_versions(), provenance.source_digests
+    monkeypatch.setattr(provenance, "library_versions", lambda: {**versions, "numpy": "0.1"})
     assert pool.run() == ["take", "sift", "tell"]
     assert f"sift: numpy {versions['numpy']} -> 0.1" in pool.said
-    monkeypatch.setattr(provenance, "source_of", lambda stage: {**source_of(stage), "stages/sift.py": "0"})
+    monkeypatch.setattr(provenance, "source_digests", lambda stage: {**source_of(stage), "stages/sift.py": "0"})
     assert pool.run() == ["take", "sift", "tell"]
     assert "sift: poolcal changed (stages/sift.py)" in pool.said
 

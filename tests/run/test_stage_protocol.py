@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from pipeline.artefacts.parquet import read_table
-from pipeline.artefacts.streams import EMPTY, Chunk, MemoryPart, Piece, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, MemoryPart, Stream
 from pipeline.config.pool import Segment
 from pipeline.run.stage_protocol import declared, run_in_memory
 from tests.support import toys
@@ -58,8 +58,12 @@ def test_only_named_sources_are_mapped() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("run_batch", lambda source, chunk, prepared, config: Piece({"far": chunk.columns}, 0), "far"),
-        ("run_batch", lambda source, chunk, prepared, config: Piece({"near": chunk.columns}, 0), "missing columns"),
+        ("run_batch", lambda source, chunk, prepared, config: BatchResult({"far": chunk.columns}, 0), "far"),
+        (
+            "run_batch",
+            lambda source, chunk, prepared, config: BatchResult({"near": chunk.columns}, 0),
+            "missing columns",
+        ),
         ("combine", lambda prepared, partials, config: None, "must return its Outputs"),
         ("combine", lambda prepared, partials, config: toys.SiftOutputs(pd.DataFrame({"a": [1]})), "missing columns"),
         (
@@ -90,13 +94,13 @@ def test_dropped_records_reach_the_stage() -> None:
     seen: list[int] = []
     stage = toys.stages()[0]
 
-    def keep(source: str, chunk: Chunk, prepared: None, config: object) -> Piece:
+    def keep(source: str, chunk: Chunk, prepared: None, config: object) -> BatchResult:
         seen.append(chunk.dropped["bad"])
-        return Piece({}, 0)
+        return BatchResult({}, 0)
 
     stage.run_batch = keep  # type: ignore[attr-defined]
     path = Path(toys.__file__).with_name("nothing.bin")
     with pytest.raises(FileNotFoundError):
         run_in_memory(stage, toys.TakeInputs(Stream((toys.RawPart(path),))), None)
-    assert run_in_memory(stage, toys.TakeInputs(EMPTY), None).points.parts == ()
+    assert run_in_memory(stage, toys.TakeInputs(EMPTY_STREAM), None).points.parts == ()
     assert seen == []

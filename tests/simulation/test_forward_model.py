@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.simulation.motion import R_level_from_body
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.session import SimulatedSession, simulate
+from pipeline.simulation.session import SimulatedSession, simulate_session
 from pipeline.simulation.site import R_ecef_from_level
 
 LEVEL = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": -2.0}
@@ -24,7 +24,7 @@ def one_pass(changed: Change, noise_free: Scenario, mount: dict[str, float], **m
         noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL | motion,
         mbes={"mount": LEVEL | mount, "beams": 131, "sector_deg": 130.0},
     )
-    return simulate(scenario, 1)
+    return simulate_session(scenario, 1)
 
 
 def range_m(session: SimulatedSession, angle_deg: float, y_m: float) -> float:
@@ -75,7 +75,7 @@ def test_yaw_is_counter_clockwise_and_azimuth_clockwise(changed: Change, noise_f
 
 def test_ins_reports_the_track_clockwise_from_north(changed: Change, noise_free: Scenario) -> None:
     target = noise_free.target.model_dump() | {"azimuth_deg": 90.0}
-    session = simulate(changed(noise_free, target=target, motion=STILL), 1)
+    session = simulate_session(changed(noise_free, target=target, motion=STILL), 1)
     ins = session.ins
     assert np.degrees(ins["azimuth_rad"]) == pytest.approx(90.0, abs=1e-4)
     first = ins["t_ns"] < session.truth["passes"][0]["end_ns"]
@@ -107,7 +107,7 @@ def test_points_georeferenced_by_hand_lie_on_the_target(
     changed: Change, noise_free: Scenario, place: Callable[..., np.ndarray], sensor: str, azimuth_deg: float
 ) -> None:
     target = noise_free.target.model_dump() | {"azimuth_deg": azimuth_deg}
-    session = simulate(changed(noise_free, target=target), 3)
+    session = simulate_session(changed(noise_free, target=target), 3)
     mount = session.truth["mbes"]["mount"] if sensor == "mbes" else session.session["laser"]["mount"]
     points = place(session, sensor, mount, every=11)
     assert len(points) > 300
@@ -120,13 +120,13 @@ def test_points_georeferenced_by_hand_lie_on_the_target(
 
 
 def test_latency_is_added_to_recorded_times(changed: Change, noise_free: Scenario) -> None:
-    plain = simulate(noise_free, 1)
-    late = simulate(changed(noise_free, mbes={"latency_s": 0.25}, laser={"latency_s": -0.5}), 1)
+    plain = simulate_session(noise_free, 1)
+    late = simulate_session(changed(noise_free, mbes={"latency_s": 0.25}, laser={"latency_s": -0.5}), 1)
     np.testing.assert_array_equal(late.mbes["t_ns"], plain.mbes["t_ns"] + 250_000_000)
     np.testing.assert_array_equal(late.laser["t_ns"], plain.laser["t_ns"] - 500_000_000)
     np.testing.assert_array_equal(late.mbes["two_way_time_s"], plain.mbes["two_way_time_s"])
     assert late.session["mbes"]["latency_s"] == 0.0
-    declared = simulate(changed(noise_free, mbes={"latency_s": 0.25, "latency_declared_s": 0.2}), 1)
+    declared = simulate_session(changed(noise_free, mbes={"latency_s": 0.25, "latency_declared_s": 0.2}), 1)
     assert declared.session["mbes"]["latency_s"] == 0.2
 
 
@@ -136,11 +136,11 @@ def test_wrong_sound_speed_scales_ranges_and_sines(changed: Change, noise_free: 
         noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL,
         mbes=wrong | {"mount": LEVEL, "beams": 131, "sector_deg": 130.0},
     )
-    session = simulate(scenario, 1)
+    session = simulate_session(scenario, 1)
     true_angle = np.arcsin(1500 / 1485 * np.sin(np.radians(60.0)))
     assert range_m(session, 60.0, 0.0) * 1500 / 1485 == pytest.approx(5.0 / np.sin(true_angle), abs=LEVEL_CURVES)
     assert session.session["mbes"]["sound_speed_m_s"] is None
-    told = simulate(changed(scenario, mbes={"give_true_sound_speed": True}), 1)
+    told = simulate_session(changed(scenario, mbes={"give_true_sound_speed": True}), 1)
     assert told.session["mbes"]["sound_speed_m_s"] == 1500.0
 
 
@@ -153,7 +153,7 @@ def test_where_sound_is_faster_below_beams_bend_upward(
         noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL,
         mbes={"mount": LEVEL, "beams": 131, "sector_deg": 130.0, "sound_speed_gradient_1_s": gradient},
     )  # fmt: skip
-    session = simulate(scenario, 1)
+    session = simulate_session(scenario, 1)
     speed = scenario.mbes.sound_speed_true_m_s
     for angle_deg in (60.0, 64.0):
         start = np.radians(angle_deg)
@@ -170,11 +170,11 @@ def test_separate_projector_lengthens_the_path(changed: Change, noise_free: Scen
     scenario = changed(noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL, mbes=mbes)
     down = np.array([0.0, 0.0, -3.3])
     expected = (3.3 + np.linalg.norm(down - [0.0, 0.3, 0.119])) / 2
-    assert range_m(simulate(scenario, 1), 0.0, 0.0) == pytest.approx(expected, abs=LEVEL_CURVES)
+    assert range_m(simulate_session(scenario, 1), 0.0, 0.0) == pytest.approx(expected, abs=LEVEL_CURVES)
 
 
 def test_angle_noise_turns_the_beam_not_the_record(changed: Change, noise_free: Scenario) -> None:
-    session = simulate(
+    session = simulate_session(
         changed(
             noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL,
             mbes={"mount": LEVEL, "beams": 131, "sector_deg": 130.0, "angle_sigma_deg": 0.06, "ping_rate_hz": 10.0},
@@ -194,8 +194,8 @@ def test_laser_points_placed_in_ecef_are_the_same_points(
     changed: Change, noise_free: Scenario, place: Callable[..., np.ndarray]
 ) -> None:
     latency = {"latency_s": 0.3, "latency_declared_s": 0.3}
-    placed = simulate(changed(noise_free, laser=latency | {"frame": "EPSG:4978"}), 1)
-    raw = simulate(noise_free, 1)
+    placed = simulate_session(changed(noise_free, laser=latency | {"frame": "EPSG:4978"}), 1)
+    raw = simulate_session(noise_free, 1)
     origin = placed.truth["target"]["origin"]
     centre = Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True).transform(
         origin["longitude_deg"], origin["latitude_deg"], origin["height_m"]

@@ -16,13 +16,13 @@ from pipeline.gps_time import NS, WEEK_NS, gps_ns_from_unix_utc
 from pipeline.simulation.novatel import crc32
 from pipeline.simulation.r2sonic_packets import packet_dtype, utc_from_gps_ns
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.session import SimulatedSession, simulate, write_session
+from pipeline.simulation.session import SimulatedSession, simulate_session, write_session
 
 Change = Callable[..., Scenario]
 
 
 def written(scenario: Scenario, folder: Path) -> SimulatedSession:
-    simulated = simulate(scenario, 5)
+    simulated = simulate_session(scenario, 5)
     write_session(simulated, folder, scenario)
     load_session(folder)
     load_pool(folder / "pool.yaml")

@@ -13,10 +13,10 @@ from pipeline.config.load import load_pool, load_session
 from pipeline.config.yaml_file import read_yaml
 from pipeline.errors import ConfigError
 from pipeline.simulation import session as session_module
-from pipeline.simulation.ins import drift
+from pipeline.simulation.ins import gauss_markov_drift
 from pipeline.simulation.motion import Movement
 from pipeline.simulation.scenario import Scenario, load_scenario
-from pipeline.simulation.session import simulate, simulate_to_folder, write_session
+from pipeline.simulation.session import simulate_session, simulate_to_folder, write_session
 from tests.support.roots import SCENARIOS
 
 Change = Callable[..., Scenario]
@@ -66,16 +66,16 @@ def test_faulty_scenarios_are_refused_by_name(tmp_path: Path, text: str, named: 
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, noisy: Scenario) -> None:
     for name in ("one", "two"):
-        write_session(simulate(noisy, 7), tmp_path / name, noisy)
+        write_session(simulate_session(noisy, 7), tmp_path / name, noisy)
     assert digests(tmp_path / "one") == digests(tmp_path / "two")
     assert (tmp_path / "one.truth.json").read_bytes() == (tmp_path / "two.truth.json").read_bytes()
-    write_session(simulate(noisy, 8), tmp_path / "three", noisy)
+    write_session(simulate_session(noisy, 8), tmp_path / "three", noisy)
     assert digests(tmp_path / "one").keys() == digests(tmp_path / "three").keys()
     assert digests(tmp_path / "one") != digests(tmp_path / "three")
 
 
 def test_folder_has_its_files_and_the_truth_lies_beside(tmp_path: Path, noisy: Scenario) -> None:
-    write_session(simulate(noisy, 7), tmp_path / "deep" / "s", noisy)
+    write_session(simulate_session(noisy, 7), tmp_path / "deep" / "s", noisy)
     found = {"session.yaml", "pool.yaml", "ins/ins.gps"}
     found |= {f"{sensor}/pass_{k}.{end}" for sensor, end in (("laser", "laz"), ("mbes", "xtf")) for k in (0, 1)}
     assert digests(tmp_path / "deep" / "s").keys() == found
@@ -96,10 +96,10 @@ def test_existing_folder_is_refused_and_untouched(tmp_path: Path, noisy: Scenari
     with pytest.raises(ConfigError, match="exists already"):
         simulate_to_folder(out, None, 1)
     with pytest.raises(ConfigError, match="exists already"):
-        write_session(simulate(noisy, 1), out, noisy)
+        write_session(simulate_session(noisy, 1), out, noisy)
     assert digests(out).keys() == {"mine.txt"}
     (out / "mine.txt").unlink()
-    write_session(simulate(noisy, 1), out, noisy)  # an empty folder may be used
+    write_session(simulate_session(noisy, 1), out, noisy)  # an empty folder may be used
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(ConfigError, match="file"):
         simulate_to_folder(tmp_path / "file" / "s", None, 1)
@@ -109,7 +109,7 @@ def test_a_failure_leaves_nothing_behind(tmp_path: Path, noisy: Scenario, monkey
     def no_space(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    simulated = simulate(noisy, 1)
+    simulated = simulate_session(noisy, 1)
     monkeypatch.setattr(session_module, "write_las", no_space)
     with pytest.raises(ConfigError, match="No space left"):
         write_session(simulated, tmp_path / "s", noisy)
@@ -118,18 +118,18 @@ def test_a_failure_leaves_nothing_behind(tmp_path: Path, noisy: Scenario, monkey
 
 def test_a_killed_run_is_swept_up_by_the_next(tmp_path: Path, noisy: Scenario) -> None:
     (tmp_path / ".s.partial" / "laser").mkdir(parents=True)
-    write_session(simulate(noisy, 1), tmp_path / "s", noisy)
+    write_session(simulate_session(noisy, 1), tmp_path / "s", noisy)
     assert {path.name for path in tmp_path.iterdir()} == {"s", "s.truth.json"}
 
 
 def test_negative_seed_is_refused(noisy: Scenario) -> None:
     with pytest.raises(ConfigError, match="seed = -1"):
-        simulate(noisy, -1)
+        simulate_session(noisy, -1)
 
 
 def test_one_noise_source_leaves_the_others_alone(changed: Change, noisy: Scenario) -> None:
-    plain = simulate(noisy, 3)
-    other = simulate(changed(noisy, laser={"range_sigma_m": 0.0}, mbes={"outlier_share": 0.0}), 3)
+    plain = simulate_session(noisy, 3)
+    other = simulate_session(changed(noisy, laser={"range_sigma_m": 0.0}, mbes={"outlier_share": 0.0}), 3)
     for name in plain.ins:
         np.testing.assert_array_equal(plain.ins[name], other.ins[name])
     assert plain.session["mbes"]["mount"] == other.session["mbes"]["mount"]
@@ -140,8 +140,8 @@ def test_one_noise_source_leaves_the_others_alone(changed: Change, noisy: Scenar
 
 
 def test_noise_is_what_was_put_in(changed: Change, noise_free: Scenario) -> None:
-    true = simulate(noise_free, 2)
-    noisy = simulate(
+    true = simulate_session(noise_free, 2)
+    noisy = simulate_session(
         changed(
             noise_free, ins={"white": {"position_m": 0.002, "attitude_deg": 0.002}},
             laser={"range_sigma_m": 0.005}, mbes={"range_sigma_m": 0.008},
@@ -159,26 +159,26 @@ def test_noise_is_what_was_put_in(changed: Change, noise_free: Scenario) -> None
 def test_drift_is_stationary_and_correlated(noisy: Scenario) -> None:
     given = load_scenario(SCENARIOS / "drift.yaml").ins.drift
     t_ns = np.concatenate([np.arange(0, 50_000), np.arange(56_000, 100_000)]) * 1_000_000_000  # 1 Hz with a gap
-    errors = drift(given, t_ns, np.random.default_rng(0))
+    errors = gauss_markov_drift(given, t_ns, np.random.default_rng(0))
     sigmas = [0.015, 0.015, 0.02, *np.radians([0.01, 0.01, 0.03])]
     np.testing.assert_allclose(errors.std(axis=1), sigmas, rtol=0.12)
     lag = [np.mean(row[:-200] * row[200:]) / row.var() for row in errors]
     np.testing.assert_allclose(lag, np.exp(-1), atol=0.12)
-    assert np.all(drift(noisy.ins.drift, t_ns[:100], np.random.default_rng(0)) == 0)
+    assert np.all(gauss_markov_drift(noisy.ins.drift, t_ns[:100], np.random.default_rng(0)) == 0)
 
 
 def test_unwanted_echoes_come_in_the_shares_asked_for(changed: Change, noisy: Scenario) -> None:
-    plain = simulate(changed(noisy, mbes={"outlier_share": 0.0}), 3)
-    wild = simulate(changed(noisy, mbes={"outlier_share": 0.1}), 3)
+    plain = simulate_session(changed(noisy, mbes={"outlier_share": 0.0}), 3)
+    wild = simulate_session(changed(noisy, mbes={"outlier_share": 0.1}), 3)
     assert len(wild.mbes["t_ns"]) > len(plain.mbes["t_ns"])  # beams without echo get one too
-    dropped = simulate(changed(noisy, mbes={"dropped_ping_share": 0.5}), 3)
+    dropped = simulate_session(changed(noisy, mbes={"dropped_ping_share": 0.5}), 3)
     assert len(dropped.pings["ping"]) / len(plain.pings["ping"]) == pytest.approx(0.5, abs=0.12)
     assert set(np.diff(dropped.pings["ping"])) > {1, 2}
 
 
 def test_wide_beams_agree_with_their_axis_on_one_plane_only(changed: Change, noise_free: Scenario) -> None:
-    point = simulate(noise_free, 2).mbes
-    wide = simulate(changed(noise_free, mbes={"point_beams": False}), 2).mbes
+    point = simulate_session(noise_free, 2).mbes
+    wide = simulate_session(changed(noise_free, mbes={"point_beams": False}), 2).mbes
     first = {(p, b): t for p, b, t in zip(point["ping"], point["beam"], point["two_way_time_s"], strict=True)}
     found = zip(wide["ping"], wide["beam"], wide["two_way_time_s"], strict=True)
     pairs = [(first[p, b], t) for p, b, t in found if (p, b) in first]
@@ -189,14 +189,14 @@ def test_wide_beams_agree_with_their_axis_on_one_plane_only(changed: Change, noi
 
 def test_all_pings_may_drop(changed: Change, noisy: Scenario, tmp_path: Path) -> None:
     scenario = changed(noisy, mbes={"dropped_ping_share": 1.0})
-    simulated = simulate(scenario, 1)
+    simulated = simulate_session(scenario, 1)
     assert len(simulated.mbes["t_ns"]) == len(simulated.pings["t_ns"]) == 0
     write_session(simulated, tmp_path / "s", scenario)
 
 
 def test_logging_on_between_passes(changed: Change, noisy: Scenario) -> None:
     scenario = changed(noisy, track={"log_between_passes": True}, ins={"white": {"position_m": 0, "attitude_deg": 0}})
-    ins, movement = simulate(scenario, 1).ins, Movement(scenario, 1)
+    ins, movement = simulate_session(scenario, 1).ins, Movement(scenario, 1)
     assert set(np.diff(ins["t_ns"])) == {5_000_000}
     turned = np.degrees(np.unwrap(ins["azimuth_rad"]))
     assert turned[-1] - turned[0] == pytest.approx(-360, abs=5)
@@ -211,18 +211,19 @@ def test_logging_on_between_passes(changed: Change, noisy: Scenario) -> None:
 def test_pool_yaml_holds_the_surveyors_errors(changed: Change, noisy: Scenario) -> None:
     target = noisy.target.model_dump() | {"azimuth_deg": 90.0}
     wrong = {"origin_error_m": [0.0, 0.2, 0.05], "azimuth_error_deg": 1.5}
-    pool = simulate(changed(noisy, target=target, surroundings=wrong), 1).pool["target"]
+    pool = simulate_session(changed(noisy, target=target, surroundings=wrong), 1).pool["target"]
     assert pool["azimuth_deg"] == 91.5
     assert pool["origin"]["height_m"] == pytest.approx(12.05, abs=1e-6)
     east_m = np.radians(pool["origin"]["longitude_deg"] - 120.1) * 6_385_500 * np.cos(np.radians(36.0))
     assert east_m == pytest.approx(0.2, abs=1e-3)  # +y is east there
-    assert simulate(changed(noisy, surroundings={"give_azimuth": False}), 1).pool["target"]["azimuth_deg"] is None
+    without_azimuth = simulate_session(changed(noisy, surroundings={"give_azimuth": False}), 1)
+    assert without_azimuth.pool["target"]["azimuth_deg"] is None
 
 
 def test_sigmas_may_stay_unsaid(changed: Change, noisy: Scenario, tmp_path: Path) -> None:
     content = noisy.model_dump(mode="json") | {"declare_sigmas": False}
     scenario = Scenario.model_validate_json(json.dumps(content), strict=True)
-    write_session(simulate(scenario, 1), tmp_path / "s", scenario)
+    write_session(simulate_session(scenario, 1), tmp_path / "s", scenario)
     assert not {"drift", "white"} & set(read_yaml(tmp_path / "s" / "session.yaml")["ins"])
     assert not {"beam_deg", "range_sigma_m"} & set(read_yaml(tmp_path / "s" / "session.yaml")["mbes"])
     assert load_session(tmp_path / "s").ins.drift.horizontal_m == 0.015
@@ -230,7 +231,7 @@ def test_sigmas_may_stay_unsaid(changed: Change, noisy: Scenario, tmp_path: Path
 
 def test_ecef_points_survive_the_file(changed: Change, noisy: Scenario, tmp_path: Path) -> None:
     scenario = changed(noisy, laser={"frame": "EPSG:4978"})
-    simulated = simulate(scenario, 1)
+    simulated = simulate_session(scenario, 1)
     write_session(simulated, tmp_path / "s", scenario)
     las = laspy.read(tmp_path / "s" / "laser" / "pass_0.laz")
     np.testing.assert_allclose(las.x, simulated.laser["x_m"][: simulated.laser_rows[1]], atol=0.51e-4)

@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config.load import load_session
 from pipeline.errors import ConfigError
-from pipeline.simulation.beams import Beams, directions_in_mbes, swing_rad, transmit_tilts_rad
+from pipeline.simulation.beams import BeamBundles, directions_in_mbes, swing_rad, transmit_tilts_rad
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import Scenario, load_scenario
-from pipeline.simulation.session import SimulatedSession, simulate, write_session
+from pipeline.simulation.session import SimulatedSession, simulate_session, write_session
 from tests.simulation.test_forward_model import LEVEL, LEVEL_CURVES, STILL, distance_to_model_m, range_m
 from tests.support.files.build import read
 
@@ -35,7 +35,7 @@ def one_pass(changed: Change, noise_free: Scenario, mount: dict[str, float], **m
         noise_free, track={"distances_m": [5.0], "ins_height_m": 1.0}, motion=STILL,
         mbes={"mount": LEVEL | mount, "beams": 131, "sector_deg": 130.0} | mbes,
     )  # fmt: skip
-    return simulate(scenario, 1)
+    return simulate_session(scenario, 1)
 
 
 def test_a_ray_by_hand() -> None:
@@ -112,7 +112,7 @@ def test_each_sector_has_its_tilt_and_each_ping_its_own(changed: Change, noise_f
 def test_points_georeferenced_by_hand_lie_on_the_target(
     changed: Change, noise_free: Scenario, place: Callable[..., np.ndarray], mbes: dict[str, Any]
 ) -> None:
-    session = simulate(changed(noise_free, mbes=mbes), 3)
+    session = simulate_session(changed(noise_free, mbes=mbes), 3)
     mount = session.truth["mbes"]["mount"]
 
     def distances_m(tilt_sign: float, speed_of_head: bool = False) -> np.ndarray:
@@ -145,7 +145,7 @@ def test_a_wide_beam_is_wide_in_both_angles(changed: Change, noise_free: Scenari
 
     wide = {"beam_deg": [0.2, 0.3], "point_beams": False, "sub_rays": [3, 3]}
     scenario = changed(noise_free, mbes=wide)
-    beams = Beams(scenario.mbes, Watched(build_mesh(scenario.target, scenario.surroundings)), 0.0)
+    beams = BeamBundles(scenario.mbes, Watched(build_mesh(scenario.target, scenario.surroundings)), 0.0)
     for angle_deg, tilt_deg in ((60.0, -20.0), (-70.0, 5.0), (10.0, 0.0)):
         tilt = np.radians([[tilt_deg]])
         swing, _ = swing_rad(np.sin(np.radians([[angle_deg]])), tilt)
@@ -212,7 +212,7 @@ def test_where_sound_is_faster_below_tilted_beams_bend_upward(
 
 def test_the_file_holds_the_tilts(tmp_path: Path, changed: Change, noisy: Scenario) -> None:
     scenario = changed(noisy, mbes=sectors((0.0, -0.447), (90.0, -0.75)) | {"latency_s": 0.1})
-    simulated = simulate(scenario, 5)
+    simulated = simulate_session(scenario, 5)
     write_session(simulated, tmp_path / "s", scenario)
     session = load_session(tmp_path / "s")
     assert session.mbes is not None

@@ -10,7 +10,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Mbes
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from pipeline.run.settings import load_settings, refuse_cast
+from pipeline.run.settings import load_settings, refuse_shallow_cast
 from tests.support.effort import often
 from tests.support.simulated import QUIET, calibrated, made
 
@@ -65,7 +65,7 @@ def test_a_cast_of_less_than_half_the_depth_is_refused(quiet, cast, refused):
     pool = parse(PoolConfig, quiet.pool, "pool")
     session = {**quiet.session["mbes"], "svp": cast}
     with pytest.raises(ConfigError, match=r"mbes\.svp: reaches") if refused else contextlib.nullcontext():
-        refuse_cast(pool.target, parse(Mbes, session, "session"), "session.yaml")
+        refuse_shallow_cast(pool.target, parse(Mbes, session, "session"), "session.yaml")
 
 
 def test_the_target_is_measured_and_what_differs_is_said(quiet, quiet_found):

@@ -12,7 +12,7 @@ from pipeline.artefacts.streams import Stream
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.session import simulate
+from pipeline.simulation.session import simulate_session
 from tests.support.places import errors, sigmas
 from tests.support.roots import SCENARIOS
 from tests.support.simulated import THIN, calibrated, made, merged
@@ -46,7 +46,7 @@ def test_the_patents_target_by_its_faces_gives_what_its_letters_give() -> None:
 @pytest.mark.parametrize(("name", "front"), [("dock", "fronts"), ("caisson", "left")])
 def test_other_targets_calibrate(name: str, front: str) -> None:
     content = merged(read_yaml(SCENARIOS / f"{name}.yaml"), THIN)
-    session = simulate(parse(Scenario, content, name), 3)
+    session = simulate_session(parse(Scenario, content, name), 3)
     found = calibrated(session)
     result = json.loads(found["report/calibration.json"])
     assert result["verdict"] == "accepted", result["reasons"]
@@ -60,7 +60,7 @@ def test_other_targets_calibrate(name: str, front: str) -> None:
 
 def test_a_wet_foot_is_parallel_to_its_wall_and_seen_by_the_sonar_alone() -> None:
     content = merged(read_yaml(SCENARIOS / "caisson.yaml"), THIN)
-    found = calibrated(simulate(parse(Scenario, content, "caisson"), 3), "adjust")
+    found = calibrated(simulate_session(parse(Scenario, content, "caisson"), 3), "adjust")
     surfaces = found["adjust/surfaces"].set_index("family")
     normals = surfaces[[f"normal_{axis}_target_1" for axis in "xyz"]]
     for wall, foot in (("left", "toe-left"), ("right", "toe-right")):

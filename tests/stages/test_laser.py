@@ -14,7 +14,7 @@ from pipeline.config.yaml_models import parse
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.session import SimulatedSession, simulate
+from pipeline.simulation.session import SimulatedSession, simulate_session
 from stages.in_memory import calibrate_in_memory
 from tests.stages.test_faces import SCENARIOS
 from tests.support.effort import often
@@ -154,7 +154,7 @@ def test_bounds_are_the_stricter_of_verdict_and_coarse() -> None:
 
 
 def test_the_dock_gives_the_lasers_angles_as_well() -> None:
-    session = simulate(parse(Scenario, merged(read_yaml(SCENARIOS / "dock.yaml"), THIN, OFF), "dock"), 3)
+    session = simulate_session(parse(Scenario, merged(read_yaml(SCENARIOS / "dock.yaml"), THIN, OFF), "dock"), 3)
     result = result_of(calibrated(session, laser_fit=EXACT, verdict=WIDE))
     error, sigma = errors(result, session.truth), np.sqrt(np.diag(result["laser"]["covariance_total"]))
     assert result["verdict"] == "accepted", result["reasons"]

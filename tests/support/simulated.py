@@ -12,7 +12,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.session import SimulatedSession, simulate
+from pipeline.simulation.session import SimulatedSession, simulate_session
 from stages.in_memory import calibrate_in_memory
 
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 4000.0}, "mbes": {"ping_rate_hz": 10.0}}
@@ -48,7 +48,7 @@ def made(*parts: Mapping[str, Any], seed: int = 1) -> SimulatedSession:
 
 @functools.lru_cache(maxsize=4)
 def _made(scenario: str, seed: int) -> SimulatedSession:
-    return simulate(parse(Scenario, json.loads(scenario), "test"), seed)
+    return simulate_session(parse(Scenario, json.loads(scenario), "test"), seed)
 
 
 def calibrated(

@@ -64,8 +64,7 @@ def install() -> None:
     report = types.ModuleType("stages.report")
     report.__file__ = __file__
     vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
-    stages.commands.draw.Painters.begin = lambda *_: None  # type: ignore[method-assign]  # toys have nothing to show
-    stages.commands.draw.Painters.draw = lambda *_: []  # type: ignore[method-assign]
+    stages.commands.draw.draw_missing = lambda *_: []  # toys have nothing to show
     pipeline.results.screen.summary = lambda calibration: f"{calibration['session']}: {calibration['verdict']}"
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"

@@ -44,4 +44,4 @@ class Pool:
         progress = Progress()
         self.said.clear()
         progress.note = self.said.append  # type: ignore[assignment,method-assign]
-        return runner.run(self.stages, self.session, self.config, self.run_folder, workers, progress)
+        return runner.run(self.stages, self.session, self.config, self.run_folder, workers=workers, progress=progress)

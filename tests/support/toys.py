@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline.artefacts.columns import F64, I16, I64, TEXT
-from pipeline.artefacts.schema import Artefact, Column, Document, Provenance, Raw
-from pipeline.artefacts.streams import EMPTY, Batch, Chunk, Piece, Stream
+from pipeline.artefacts.schema import Artefact, Column, Document, Provenance, RawFiles
+from pipeline.artefacts.streams import EMPTY_STREAM, Batch, BatchResult, Chunk, Stream
 from pipeline.config.pool import Ingest, Segment, Verdict
 from pipeline.config.session import Laser
 from pipeline.errors import RawDataError
@@ -66,17 +66,17 @@ class TakeConfig:
 
 @dataclass(frozen=True)
 class TakeInputs:
-    laser: Annotated[Stream, Raw("laser")]
+    laser: Annotated[Stream, RawFiles("laser")]
 
 
 @dataclass(frozen=True)
 class TakeOutputs:
     counts: Annotated[pd.DataFrame, TAKE_COUNTS]
-    points: Annotated[Stream, POINTS] = EMPTY
+    points: Annotated[Stream, POINTS] = EMPTY_STREAM
 
 
-def _take_batch(source: str, chunk: Chunk, prepared: None, config: TakeConfig) -> Piece:
-    return Piece({"points": chunk.columns}, len(chunk.columns["t_ns"]))
+def _take_batch(source: str, chunk: Chunk, prepared: None, config: TakeConfig) -> BatchResult:
+    return BatchResult({"points": chunk.columns}, len(chunk.columns["t_ns"]))
 
 
 def _take_combine(prepared: None, partials: dict[str, list[tuple[str, int]]], config: TakeConfig) -> TakeOutputs:
@@ -98,7 +98,7 @@ class SiftInputs:
 @dataclass(frozen=True)
 class SiftOutputs:
     means: Annotated[pd.DataFrame, MEANS]
-    near: Annotated[Stream, NEAR] = EMPTY
+    near: Annotated[Stream, NEAR] = EMPTY_STREAM
 
 
 def _sift_prepare(inputs: SiftInputs, config: SiftConfig) -> float:
@@ -109,14 +109,14 @@ def _largest(batch: Batch) -> float:
     return float(np.max(batch["x_m"]))
 
 
-def _sift_batch(source: str, chunk: Chunk, prepared: float, config: SiftConfig) -> Piece:
+def _sift_batch(source: str, chunk: Chunk, prepared: float, config: SiftConfig) -> BatchResult:
     x_m = chunk.columns["x_m"]
     keep = np.abs(x_m) > config.segment.margin_m
     near = {"t_ns": chunk.columns["t_ns"][keep], "face": np.zeros(keep.sum(), np.int64), "x_m": x_m[keep] / prepared}
-    return Piece({"near": near}, (float(x_m[keep].sum()), int(keep.sum())))
+    return BatchResult({"near": near}, (float(x_m[keep].sum()), int(keep.sum())))
 
 
-def refuse(source: str, chunk: Chunk, prepared: float, config: SiftConfig) -> Piece:
+def refuse(source: str, chunk: Chunk, prepared: float, config: SiftConfig) -> BatchResult:
     raise RawDataError("laser/0.bin: cannot be used; take another")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from stages.commands.draw import Painters
+from stages.commands.draw import Drawings, draw_missing
 from stages.views.blueprint import TABS
 from stages.views.recording import recordings_of
 from tools.pictures import picture_of, show_tab, viewer
@@ -19,7 +19,7 @@ LEAST_COLOURS = 40
 
 @pytest.fixture(scope="module")
 def client(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    assert Painters(report=False, recordings=True).draw(run) == []
+    assert draw_missing(run, Drawings(report=False, recordings=True)) == []
     with viewer(*recordings_of(run)) as opened:
         yield opened
 

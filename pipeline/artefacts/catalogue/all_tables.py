@@ -3,7 +3,7 @@
 from pipeline.artefacts.catalogue import patent, points, results, target
 from pipeline.artefacts.schema import Artefact
 
-ALL: tuple[Artefact, ...] = tuple(
+ALL_ARTEFACTS: tuple[Artefact, ...] = tuple(
     value
     for module in (points, target, patent, results)
     for value in vars(module).values()

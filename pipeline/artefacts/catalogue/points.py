@@ -1,7 +1,18 @@
 """Tables of stages ingest and georeference: what was recorded, and where it lies in the pool."""
 
 # fmt: off: the tables are laid out by hand
-from pipeline.artefacts.columns import BOOL, COUNTS, F64, I16, I64, PASS, T_NS, TEXT, near, xyz
+from pipeline.artefacts.columns import (
+    BOOL,
+    COUNTS,
+    F64,
+    I16,
+    I64,
+    PASS,
+    T_NS,
+    TEXT,
+    coordinate_columns,
+    float32_coordinates,
+)
 from pipeline.artefacts.schema import Artefact, Column
 
 # --- ingest ----------------------------------------------------------------------------------------------------------
@@ -95,13 +106,13 @@ POSES = Artefact(
     "georeference", "poses", "table", "the trajectory in the pool frame",
     (
         T_NS,
-        *xyz("pool"),
+        *coordinate_columns("pool"),
         *(Column(f"q{axis}", F64, "1", f"quaternion of R_pool_from_body, component {axis}") for axis in "wxyz"),
     ),
 )
 LASER_POOL = Artefact(
     "georeference", "laser_pool", "stream", "laser points near the target",
-    (T_NS, PASS, *near("laser"), *near("pool")),
+    (T_NS, PASS, *float32_coordinates("laser"), *float32_coordinates("pool")),
 )
 SOUNDINGS_POOL = Artefact(
     "georeference", "soundings_pool", "stream", "soundings near the target, placed with the coarse mount",
@@ -109,7 +120,7 @@ SOUNDINGS_POOL = Artefact(
         T_NS, PASS,
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number"),
-        *near("mbes"), *near("pool"),
+        *float32_coordinates("mbes"), *float32_coordinates("pool"),
     ),
 )
 GEOREFERENCE_COUNTS = Artefact("georeference", "counts", "table", "points used and left out, by reason", COUNTS)

@@ -1,7 +1,19 @@
 """Tables of stages adjust and report: the rigorous solution and the answer."""
 
 # fmt: off: the tables are laid out by hand
-from pipeline.artefacts.columns import BOOL, F32, F64, I16, I32, I64, PASS, T_NS, TEXT, near, xyz
+from pipeline.artefacts.columns import (
+    BOOL,
+    F32,
+    F64,
+    I16,
+    I32,
+    I64,
+    PASS,
+    T_NS,
+    TEXT,
+    coordinate_columns,
+    float32_coordinates,
+)
 from pipeline.artefacts.schema import Artefact, Column, Document
 
 # --- adjust ----------------------------------------------------------------------------------------------------------
@@ -33,7 +45,7 @@ GEOMETRY = Artefact(
 DRIFT = Artefact(
     "adjust", "drift", "table", "slow errors of the recorded poses, at knots: to be added to the recorded ones",
     (
-        T_NS, *xyz("target"),
+        T_NS, *coordinate_columns("target"),
         *(Column(f"turn_{axis}_target_deg", F64, "deg", f"about target {axis}") for axis in "xyz"),
     ),
 )
@@ -55,7 +67,7 @@ SURFACES = Artefact(
     "adjust", "surfaces", "table", "the adjusted surfaces, shared by both sensors",
     (
         Column("family", TEXT, "", "P1, P2, P3 or H"),
-        *xyz("target", "1", "normal_"),
+        *coordinate_columns("target", "1", "normal_"),
         Column("distance_m", F64, "m", "normal · x = distance; H: shift against the design heights"),
         Column("laser_points", I64, "1", "observations"), Column("soundings", I64, "1", "observations"),
     ),
@@ -110,8 +122,8 @@ RESIDUALS = Artefact(
     (
         Column("sensor", TEXT, "", "laser or mbes"), T_NS, PASS,
         Column("face", I16, "1", "number of the face"),
-        *near("target"),
-        *xyz("target", "m", "coarse_", F32),
+        *float32_coordinates("target"),
+        *coordinate_columns("target", "m", "coarse_", F32),
         Column("range_m", F32, "m", "distance from the sensor"),
         Column("angle_deg", F32, "deg", "sonar: across track, starboard +; laser: above the scanner's xy plane"),
         Column("residual_m", F32, "m", "distance from the adjusted surface along its normal (toward the boat, or up)"),
@@ -136,7 +148,7 @@ RESIDUAL_MAP = Artefact(
     "adjust", "residual_map", "table", "mean residuals by square cell of each face, of the points in residuals",
     (
         Column("sensor", TEXT, "", "laser or mbes"), Column("face", I16, "1", "number of the face"),
-        *near("target"),
+        *float32_coordinates("target"),
         Column("size_m", F64, "m", "side of the cell whose centre x, y, z is"),
         Column("count", I64, "1", "points"),
         Column("mean_m", F64, "m", "mean residual, robust weights"),

@@ -13,8 +13,8 @@ from pipeline.artefacts.columns import (
     PASS,
     T_NS,
     TEXT,
-    near,
-    xyz,
+    coordinate_columns,
+    float32_coordinates,
 )
 from pipeline.artefacts.schema import Artefact, Column
 
@@ -28,7 +28,7 @@ FACES = Artefact(
         Column("sense", F64, "1", "+1: its normal is its family's; -1: the opposite"),
         Column("offset_m", F64, "m", "from the family's plane, along the family's normal"),
         Column("one_plane", BOOL, "", "no face of the family stands off its plane"),
-        *xyz("target", "1", "normal_"),
+        *coordinate_columns("target", "1", "normal_"),
         Column("distance_m", F64, "m", "normal · x = distance on the face"),
         Column("vertices_target_m", FLOATS, "m", "corners, x y z one after another"),
     ),
@@ -37,7 +37,7 @@ TARGET_POSE = Artefact(
     "segment", "target_pose", "table", "the target as the laser sees it, relative to the pool frame (one row)",
     (
         Column("R_target_from_pool", FLOATS, "1", "rotation matrix, row by row"),
-        *xyz("pool", "m", "origin_"),
+        *coordinate_columns("pool", "m", "origin_"),
         Column("azimuth_correction_deg", F64, "deg", "true azimuth minus configured azimuth, clockwise +"),
         Column("tilt_x_deg", F64, "deg", "target tilted about its x axis (not applied: a check)"),
         Column("tilt_y_deg", F64, "deg", "target tilted about its y axis (not applied: a check)"),
@@ -73,7 +73,7 @@ LASER_LABELLED = Artefact(
     (
         T_NS, PASS,
         Column("face", I16, "1", "number of the face"),
-        *near("laser"), *near("target"),
+        *float32_coordinates("laser"), *float32_coordinates("target"),
         Column("cos_incidence", F32, "1", "|cosine| of the angle between ray and the face's normal"),
     ),
 )
@@ -84,7 +84,7 @@ SOUNDINGS_LABELLED = Artefact(
         Column("ping", I64, "1", "ping number as recorded"),
         Column("beam", I16, "1", "beam number"),
         Column("face", I16, "1", "number of the face"),
-        *near("mbes"),
+        *float32_coordinates("mbes"),
     ),
 )
 SEGMENT_COUNTS = Artefact("segment", "counts", "table", "points labelled and left out, by reason", COUNTS)
@@ -96,9 +96,9 @@ PLANES = Artefact(
         Column("sensor", TEXT, "", "laser or mbes"),
         PASS,
         Column("plane", TEXT, "", "a face, a family (P1, P2, P3) or P4 = P1 x P2 (normal only)"),
-        *xyz("target", "1", "normal_"),
+        *coordinate_columns("target", "1", "normal_"),
         Column("distance_m", F64, "m", "normal · x = distance"),
-        *xyz("target", "m", "centroid_"),
+        *coordinate_columns("target", "m", "centroid_"),
         Column("count", I64, "1", "points"),
         Column("rms_m", F64, "m", "RMS distance of the points from the plane"),
         Column("eigenvalues_m2", FLOATS, "m²", "of the centred scatter matrix / count, ascending"),

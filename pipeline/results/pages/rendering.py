@@ -52,16 +52,6 @@ def drawing_style() -> Iterator[None]:
         yield
 
 
-def prepare_drawing() -> None:
-    """Load fonts and drivers, so that the first picture does not wait for them."""
-    with drawing_style():
-        figure = Figure()
-        axis = figure.subplots()
-        axis.plot(range(2), "o", rasterized=True, label="0")
-        axis.legend()
-        picture(figure, "")
-
-
 def render_page(template: str, **values: Any) -> str:
     """Return a page made from ``pipeline/results/pages/<template>`` with these values."""
     environment = jinja2.Environment(

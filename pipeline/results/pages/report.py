@@ -87,7 +87,7 @@ def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pict
         **_residual_values(tables, result, settings),
         **_data_values(tables, manifests, settings),
         drawn_from=page_digest(tables.run, manifests),
-        pictures=dict(zip(picture_names(tables.run), pictures, strict=True)),  # last: others may still be drawing them
+        pictures=dict(zip(picture_names(tables.run), pictures, strict=True)),
     )
 
 

@@ -21,7 +21,7 @@ from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.motion import Movement
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
 from pipeline.simulation.scenario import Scenario, load_scenario
-from pipeline.simulation.session import simulate
+from pipeline.simulation.session import simulate_session
 from tests.support.roots import SCENARIOS
 
 NOISE_FREE = SCENARIOS / "noise_free.yaml"
@@ -84,7 +84,7 @@ def test_soundings_of_the_simulator_lie_where_they_were_made(recorded: float) ->
     content["laser"]["point_rate_hz"] = 100.0
     content["track"]["distances_m"] = [5.0]
     scenario = Scenario.model_validate_json(json.dumps(content), strict=True)
-    made, mesh = simulate(scenario, 4), build_mesh(scenario.target, scenario.surroundings)
+    made, mesh = simulate_session(scenario, 4), build_mesh(scenario.target, scenario.surroundings)
     pose = Movement(scenario, 4).pose(0, made.mbes["t_ns"])
 
     def off_m(tilts: np.ndarray) -> np.ndarray:

@@ -1,0 +1,20 @@
+"""``poolcal verify``: whether everything that a run read and wrote is as it was recorded."""
+
+import sys
+from pathlib import Path
+
+from pipeline.console import plural, say
+from pipeline.run.settings import calibrated_in
+from pipeline.run.verify import problems_of_run
+from pipeline.run.workers import workers
+from stages import load
+
+
+def command(run: Path, jobs: int | None) -> int:
+    """Hash again what a run read and wrote, with ``jobs`` threads, and list what is not as recorded."""
+    with workers(jobs) as pool:
+        problems = problems_of_run(load(calibrated_in(run)), run, pool)
+    for problem in problems:
+        say(problem, sys.stdout)
+    say(plural(len(problems), "problem") if problems else f"{run}: everything is as recorded", sys.stdout)
+    return 1 if problems else 0
