@@ -42,8 +42,8 @@ from pipeline.maths.adjustment.parallel_constraints import of_ties
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.target.model import TargetModel
 from pipeline.mount import mount_of
-from pipeline.planning.observability import Seen, geometry_of
-from pipeline.planning.prediction import Setting
+from pipeline.planning.observability import Coverage, geometry_advice
+from pipeline.planning.prediction import PredictionSetting
 from pipeline.target.design import target_of
 
 SHOWN = 100_000  # points of a sensor in the table residuals, at most
@@ -139,7 +139,7 @@ def _geometry_table(
         }
     )
     model = target_of(config.target)
-    setting = Setting(model, found.state, plan, config.segment, ins, config.laser, config.mbes)
+    setting = PredictionSetting(model, found.state, plan, config.segment, ins, config.laser, config.mbes)
     families = [surface.family for surface in found.state.surfaces]
     soundings = dict.fromkeys(families, 0)
     for (sensor, surface, _), cell in cells.items():
@@ -149,8 +149,8 @@ def _geometry_table(
     speed = _or(passes["speed_m_s"].abs().median(), usual.speed_m_s)
     swing = _or(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg)  # of a wave: its amplitude
     level = {family.name for family in model.families if family.level}
-    seen = Seen(distances, soundings, level, speed, swing)
-    geometry = geometry_of(setting, seen, found.equations.normal, found.solution)
+    coverage = Coverage(distances, soundings, level, speed, swing)
+    geometry = geometry_advice(setting, coverage, found.equations.normal, found.solution)
     rows = [("gap", words) for words in geometry.gaps] + ([("remedy", geometry.remedy)] if geometry.remedy else [])
     return pd.DataFrame(rows, columns=["kind", "words"]).assign(sigma=np.nan)
 

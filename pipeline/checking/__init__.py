@@ -1,6 +1,6 @@
-"""A session looked at before it is calibrated: samples of its files, and one function a question.
+"""A session checked before it is calibrated, on samples of its files.
 
-``survey`` reads heads, tails and pieces of every file; the questions take what it has seen and return findings, each
-one line that names file or sensor, value and remedy. What would follow from a finding is not said again: of a sensor a
-week off nobody asks whether it hits the target.
+``file_survey`` reads heads, tails and pieces of every file. Each question then is one function: it takes what was
+read, and yields findings, each one line that names file or sensor, value and remedy. What would follow from a finding
+is not said again: of a sensor whose clock is a week off nobody asks whether it hits the target.
 """

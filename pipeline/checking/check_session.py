@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.checking import clocks, file_checks, target_hits, track_checks
-from pipeline.checking.expected_soundings import Soundings, missed, soundings
-from pipeline.checking.file_survey import SENSORS, Seen, Times, survey
+from pipeline.checking.expected_soundings import PingsOnTarget, SoundingCounts, count_soundings, faces_missed
+from pipeline.checking.file_survey import SENSORS, SurveyedFile, Times, survey_files
 from pipeline.checking.findings import Finding
-from pipeline.checking.ins_quality import Quality, quality, told
-from pipeline.checking.latency import latencies
-from pipeline.checking.point_samples import placeable, rows_of, sample
+from pipeline.checking.ins_quality import InsQuality, assess_ins_quality, quality_findings
+from pipeline.checking.latency import latency_findings
+from pipeline.checking.point_samples import rows_with_pose, sample_points, sampled_rows
 from pipeline.checking.track import Leg, Track, frame_of, joined, track_of
-from pipeline.checking.trial_calibration import Calibrate, Calibrated
-from pipeline.checking.trial_findings import other_pose, signs
+from pipeline.checking.trial_calibration import Calibrate, TrialCalibration
+from pipeline.checking.trial_findings import pose_findings, sign_findings
 from pipeline.config.pool import Ingest, PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.gps_time import NS
@@ -27,134 +27,155 @@ ROUGHLY, SAMPLED, FINELY = 4_000, 20_000, 60_000  # rows of a sensor: to hit the
 
 
 @dataclass(frozen=True)
-class Examined:
-    """What is there, and what is wrong with it."""
+class SessionCheck:
+    """What the files of a session hold, and what is wrong with it."""
 
-    files: tuple[Seen, ...]
+    files: tuple[SurveyedFile, ...]
     legs: tuple[Leg, ...]
     findings: tuple[Finding, ...]
     model: TargetModel | None = None  # with the soundings on its faces, where they were counted
-    soundings: Soundings | None = None
-    quality: Quality = field(default_factory=Quality)
+    soundings: SoundingCounts | None = None
+    quality: InsQuality = field(default_factory=InsQuality)
 
     @property
     def faulty(self) -> bool:
+        """Whether a calibration would fail, or would be wrong."""
         return any(finding.severity == "fault" for finding in self.findings)
 
 
 @dataclass(frozen=True)
-class _Given:
-    seen: Sequence[Seen]
-    session: SessionConfig
+class _Session:
+    """A session whose target is known."""
+
+    files: Sequence[SurveyedFile]
+    settings: SessionConfig
     pool: PoolConfig
     model: TargetModel
     calibrate: Calibrate
 
 
-def examine(
+def check_session(
     folder: Path, session: SessionConfig, pool: PoolConfig | None, calibrate: Calibrate
-) -> Examined:
-    """``pool``: where the target is; without it nothing is asked about the target. ``calibrate``: does so in memory."""
-    found = _examined(folder, session, pool, calibrate)
-    said = quality(found.files, [leg for leg in found.legs if leg.good])
-    return replace(found, quality=said, findings=(*found.findings, *told(said)))
+) -> SessionCheck:
+    """Check the files of a session, and what they say together.
+
+    Parameters
+    ----------
+    folder : Path
+        The session folder.
+    session : SessionConfig
+        Its settings.
+    pool : PoolConfig or None
+        The pool's settings; without them no question is asked about the target.
+    calibrate : Calibrate
+        Calibrates a sample of the session in memory.
+    """
+    checked = _check(folder, session, pool, calibrate)
+    quality = assess_ins_quality(checked.files, [leg for leg in checked.legs if leg.good])
+    return replace(checked, quality=quality, findings=(*checked.findings, *quality_findings(quality)))
 
 
-def _examined(
-    folder: Path, session: SessionConfig, pool: PoolConfig | None, calibrate: Calibrate
-) -> Examined:
-    seen, wrong = survey(session, folder)
-    findings = list(_of_files(seen, wrong, session))
-    epochs = _epochs(seen)
+def _check(folder: Path, session: SessionConfig, pool: PoolConfig | None, calibrate: Calibrate) -> SessionCheck:
+    files, list_faults = survey_files(session, folder)
+    findings = list(_file_findings(files, list_faults, session))
+    epochs = _epochs(files)
     if "ins" not in epochs:
-        return Examined(tuple(seen), (), tuple(findings))
+        return SessionCheck(tuple(files), (), tuple(findings))
     max_gap_s = (Ingest() if pool is None else pool.ingest).max_gap_s
-    coarse = max(s.coarseness_ns for s in seen if s.sensor == "ins")
+    coarseness_ns = max(file.coarseness_ns for file in files if file.sensor == "ins")
     weeks = {"ins": session.ins.gps_week, "laser": session.laser.gps_week}
-    findings += clocks.apart(epochs, max(round(max_gap_s * NS), round(coarse)), seen, weeks)
+    findings += clocks.clock_findings(epochs, max(round(max_gap_s * NS), round(coarseness_ns)), files, weeks)
     if pool is None:
-        return Examined(tuple(seen), (), tuple(findings))
-    clocked = {f.words.split(":")[0] for f in findings if f.question == "clock"}
-    clocked |= {"laser", "mbes"} if "ins" in clocked else set()
-    clocked |= {"laser" for f in findings if f.question == "frame"}
-    given = _Given(seen, session, pool, target_of(pool.target), calibrate)
-    of_target = _of_target(given, epochs, clocked)
-    return replace(of_target, findings=(*findings, *of_target.findings))
+        return SessionCheck(tuple(files), (), tuple(findings))
+    unusable = {finding.words.split(":")[0] for finding in findings if finding.question == "clock"}
+    unusable |= {"laser", "mbes"} if "ins" in unusable else set()
+    unusable |= {"laser" for finding in findings if finding.question == "frame"}
+    at_target = _check_at_target(_Session(files, session, pool, target_of(pool.target), calibrate), epochs, unusable)
+    return replace(at_target, findings=(*findings, *at_target.findings))
 
 
-def _of_files(seen: Sequence[Seen], wrong: Sequence[str], session: SessionConfig) -> Iterator[Finding]:
-    yield from file_checks.unreadable(seen, wrong)
-    yield from file_checks.missing_sensors(seen, session)
-    yield from file_checks.twice(seen)
-    yield from file_checks.ins_rate(seen)
-    yield from file_checks.alignment(seen)
-    yield from file_checks.frames(seen, session)
-    yield from file_checks.far_arms(session)
-    yield from file_checks.sound_speed(seen, session)
-    yield from file_checks.cast(seen, session)
+def _file_findings(
+    files: Sequence[SurveyedFile], list_faults: Sequence[str], session: SessionConfig
+) -> Iterator[Finding]:
+    yield from file_checks.unreadable_files(files, list_faults)
+    yield from file_checks.sensors_without_records(files, session)
+    yield from file_checks.duplicate_files(files)
+    yield from file_checks.slow_ins_logs(files)
+    yield from file_checks.unaligned_ins(files)
+    yield from file_checks.wrong_frames(files, session)
+    yield from file_checks.long_lever_arms(session)
+    if session.mbes is not None:
+        yield from file_checks.doubtful_sound_speeds(files, session.mbes)
+        yield from file_checks.doubtful_cast(files, session.mbes)
 
 
-def _of_target(given: _Given, epochs: dict[str, Times], clocked: set[str]) -> Examined:
-    """``clocked``: sensors of which nothing more is asked."""
-    seen, pool, model, ins = given.seen, given.pool, given.model, joined(given.seen)
-    nothing = Examined(tuple(seen), (), tuple(track_checks.place(ins, pool, model)))
-    if nothing.findings:
-        return nothing
+def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[str]) -> SessionCheck:
+    """Check what the session says of the target; of the sensors in ``unusable`` nothing more is asked."""
+    files, pool, model, ins = session.files, session.pool, session.model, joined(session.files)
+    away = SessionCheck(tuple(files), (), tuple(track_checks.origin_findings(ins, pool, model)))
+    if away.findings:
+        return away
     frame = frame_of(ins, pool.target_place)
     if frame is None:
         words = "target.azimuth_deg is not given, and the boat never has target.origin within 20 m to starboard"
-        return replace(nothing, findings=(Finding("side", f"{words}; give azimuth_deg, or check target.origin"),))
-    track = track_of(ins, frame, model, seen, pool.ingest)
-    findings = list(track_checks.sailing(track, pool.target_place))
-    asked = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in clocked]
-    wrong: list[Finding] = []
-    counted = None
+        return replace(away, findings=(Finding("side", f"{words}; give azimuth_deg, or check target.origin"),))
+    track = track_of(ins, frame, model, files, pool.ingest)
+    findings = list(track_checks.sailing_findings(track, pool.target_place))
+    usable = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in unusable]
+    of_points: list[Finding] = []
+    counts = None
     if all(finding.severity == "look" for finding in findings):
-        wrong, counted = _of_points(given, track, asked)
-    findings += wrong
-    if not clocked and not any(finding.question == "clock" for finding in wrong):
-        findings += track_checks.missing(track, seen)
-        coarse = max(s.coarseness_ns for s in seen if s.sensor == "ins")
-        sounded = {sensor: t_ns for sensor, t_ns in epochs.items() if sensor != "ins"}
-        findings += track_checks.holes(track, sounded, pool.georeference.max_ins_interval_s, coarse)
-    return Examined(tuple(seen), track.legs, tuple(findings), model, counted)
+        of_points, counts = _point_findings(session, track, usable)
+    findings += of_points
+    if not unusable and not any(finding.question == "clock" for finding in of_points):
+        findings += track_checks.missing_pass_findings(track, files)
+        coarseness_ns = max(file.coarseness_ns for file in files if file.sensor == "ins")
+        sensor_epochs = {sensor: t_ns for sensor, t_ns in epochs.items() if sensor != "ins"}
+        max_interval_s = pool.georeference.max_ins_interval_s
+        findings += track_checks.ins_hole_findings(track, sensor_epochs, max_interval_s, coarseness_ns)
+    return SessionCheck(tuple(files), track.legs, tuple(findings), model, counts)
 
 
-def _of_points(given: _Given, track: Track, asked: Sequence[str]) -> tuple[list[Finding], Soundings | None]:
-    """Where the points fall; of sensors whose points miss the target nothing finer is asked."""
-    seen, session, pool, model = given.seen, given.session, given.pool, given.model
-    few = [sample(seen, session, sensor, track, ROUGHLY) for sensor in asked]
-    found = list(target_hits.off_target(track, [one for one in few if one is not None], ClosestSurface(model), pool))
-    some = sample(seen, session, "mbes", track, FINELY) if "mbes" in asked and not found else None
-    if some is None:
-        return found, None
-    some = some.placeable(track)
-    raw = {sensor: placeable(rows_of(seen, sensor, SAMPLED), track) for sensor in ("laser", "mbes")}
-    raw["ins"] = joined(seen)
-    tried = given.calibrate(session, pool, raw) if "laser" in asked else Calibrated()
-    found = list(_of_trial(given, track, tried))
-    if any(finding.severity == "fault" for finding in found):
-        return found, None
-    counted = soundings(track, some, tried.soundings, len(raw["mbes"]["t_ns"]), seen, model, pool, session)
-    found += missed(model, counted) if counted is not None else []
-    found += latencies(tried.freed) if tried.freed is not None else []
-    return found, counted
+def _point_findings(
+    session: _Session, track: Track, sensors: Sequence[str]
+) -> tuple[list[Finding], SoundingCounts | None]:
+    """Return where the points fall; of sensors whose points miss the target nothing finer is asked."""
+    files, settings, pool, model = session.files, session.settings, session.pool, session.model
+    rough = [sample_points(files, settings, sensor, track, ROUGHLY) for sensor in sensors]
+    samples = [sample for sample in rough if sample is not None]
+    findings = list(target_hits.points_off_target(track, samples, ClosestSurface(model), pool))
+    fine = sample_points(files, settings, "mbes", track, FINELY) if "mbes" in sensors and not findings else None
+    if fine is None:
+        return findings, None
+    fine = fine.with_pose(track)
+    raw = {sensor: rows_with_pose(sampled_rows(files, sensor, SAMPLED), track) for sensor in ("laser", "mbes")}
+    raw["ins"] = joined(files)
+    trial = session.calibrate(settings, pool, raw) if "laser" in sensors else TrialCalibration()
+    findings = list(_trial_findings(session, track, trial))
+    if any(finding.severity == "fault" for finding in findings):
+        return findings, None
+    pings = PingsOnTarget(track=track, files=files, model=model, pool=pool, session=settings)
+    counts = count_soundings(pings, fine, trial.soundings, len(raw["mbes"]["t_ns"]))
+    findings += faces_missed(model, counts) if counts is not None else []
+    findings += latency_findings(trial.freed) if trial.freed is not None else []
+    return findings, counts
 
 
-def _of_trial(given: _Given, track: Track, tried: Calibrated) -> Iterator[Finding]:
-    """Whether the target stands, and the sonar is mounted, as the settings say."""
-    laser = sample(given.seen, given.session, "laser", track, SAMPLED)
-    if laser is not None and tried.target_pose is not None:
-        yield from other_pose(track, laser, tried.target_pose, given.model, given.pool)
-    if tried.provisional_mount is not None:
-        mount = given.session.sonar.mount
-        yield from signs(mount, tried.provisional_mount, given.model, given.pool.segment.search_mount_deg)
+def _trial_findings(session: _Session, track: Track, trial: TrialCalibration) -> Iterator[Finding]:
+    """Yield what speaks against the target's pose and the sonar's mount in the settings."""
+    laser = sample_points(session.files, session.settings, "laser", track, SAMPLED)
+    if laser is not None and trial.target_pose is not None:
+        yield from pose_findings(track, laser, trial.target_pose, session.model, session.pool)
+    if trial.provisional_mount is not None:
+        mount = session.settings.sonar.mount
+        yield from sign_findings(mount, trial.provisional_mount, session.model, session.pool.segment.search_mount_deg)
 
 
-def _epochs(seen: Sequence[Seen]) -> dict[str, Times]:
-    found: dict[str, Times] = {}
+def _epochs(files: Sequence[SurveyedFile]) -> dict[str, Times]:
+    """Return the times of each sensor's records, in order, each once; those of sensors that have any."""
+    epochs: dict[str, Times] = {}
     for sensor in SENSORS:
-        pieces = [one.epochs_ns for one in seen if one.sensor == sensor and len(one.epochs_ns)]
+        pieces = [file.epochs_ns for file in files if file.sensor == sensor and len(file.epochs_ns)]
         if pieces:
-            found[sensor] = np.unique(np.concatenate(pieces))
-    return found
+            epochs[sensor] = np.unique(np.concatenate(pieces))
+    return epochs

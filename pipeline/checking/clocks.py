@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.file_survey import Seen
+from pipeline.checking.file_survey import SurveyedFile
 from pipeline.checking.findings import Finding
 from pipeline.console import plural
 from pipeline.gps_time import NS, WEEK_NS, utc_text
@@ -26,24 +26,36 @@ FARTHEST_H = 14
 ENOUGH, MOST = 0.9, 0.99  # of a sensor's time in which the INS runs: as it is, and with a named offset
 
 
-def named(offset_s: float, within_s: float = 0.3) -> str:
-    """What an offset of clocks is known as; nothing where it has no name.
+def offset_name(offset_s: float, within_s: float = 0.3) -> str:
+    """Return what an offset of clocks is known as; nothing where it has no name.
 
-    >>> named(18.1), named(-18.0), named(5.0)
+    >>> offset_name(18.1), offset_name(-18.0), offset_name(5.0)
     ('UTC and GPS time are mixed up', 'UTC and GPS time are mixed up', '')
     """
     return next((words for leap, words in LEAPS.items() if abs(abs(offset_s) - leap) <= within_s), "")
 
 
-def covered(t_ns: Times, stretches: Sequence[tuple[int, int]]) -> float:
-    """Share of moments that lie in a stretch."""
+def share_within(t_ns: Times, stretches: Sequence[tuple[int, int]]) -> float:
+    """Return the share of the times that lie in a stretch."""
     starts, ends = (np.array(column, dtype=np.int64) for column in zip(*stretches, strict=True))
     return float(np.mean(pass_of(t_ns, starts, ends) >= 0))
 
 
 @dataclass(frozen=True)
 class Offset:
-    """How far a clock is from the INS's, what that is called and calls for; ``weeks``: where it is whole weeks."""
+    """How far a sensor's clock is from the INS's.
+
+    Attributes
+    ----------
+    how : str
+        The amount, in words.
+    ahead : bool
+        Whether the sensor's clock is ahead.
+    why : str
+        What the offset is known as, and the remedy.
+    weeks : int
+        The offset in weeks, where it is whole weeks; else 0.
+    """
 
     how: str
     ahead: bool
@@ -51,8 +63,19 @@ class Offset:
     weeks: int = 0
 
     def words(self, to_the_ins: bool, week: int | None, key: str, whose: str = "the INS's") -> str:
-        """What to say of a sensor's clock against the INS's, or (``to_the_ins`` false) of the INS's against theirs.
-        ``week``: the session's ``key``, from which another may follow."""
+        """Return what to say of a sensor's clock against the INS's.
+
+        Parameters
+        ----------
+        to_the_ins : bool
+            False: say it of the INS's clock against the sensors'.
+        week : int or None
+            The week in the session's settings, from which the right one follows.
+        key : str
+            The setting that holds the week.
+        whose : str
+            The clock that it is compared with.
+        """
         ahead = self.ahead == to_the_ins
         why = self.why
         if self.weeks and week is not None:
@@ -60,13 +83,28 @@ class Offset:
         return f"its clock is {self.how} {'ahead of' if ahead else 'behind'} {whose}: {why}"
 
 
-def apart(
-    epochs: Mapping[str, Times], max_gap_ns: int, files: Sequence[Seen], weeks: Mapping[str, int | None] = NO_WEEKS
+def clock_findings(
+    epochs: Mapping[str, Times],
+    max_gap_ns: int,
+    files: Sequence[SurveyedFile],
+    weeks: Mapping[str, int | None] = NO_WEEKS,
 ) -> Iterator[Finding]:
-    """Sensors that did not run while the INS did; what both are off by is the INS's. ``weeks``: gps_week by sensor."""
+    """Yield the sensors that did not run while the INS did; where both are off by the same, it is the INS's clock.
+
+    Parameters
+    ----------
+    epochs : Mapping[str, Times]
+        Times of the records of each sensor, in order; ``ins`` among them.
+    max_gap_ns : int
+        A longer time without a record is a pause.
+    files : Sequence[SurveyedFile]
+        The session's files.
+    weeks : Mapping[str, int or None]
+        gps_week in the settings, by sensor.
+    """
     ins = epochs["ins"]
     running = split_at_gaps(ins, max_gap_ns)
-    shares = {sensor: covered(t_ns, running) for sensor, t_ns in epochs.items() if sensor != "ins" and len(t_ns)}
+    shares = {sensor: share_within(t_ns, running) for sensor, t_ns in epochs.items() if sensor != "ins" and len(t_ns)}
     astray = {sensor: share for sensor, share in shares.items() if share < ENOUGH}
     offsets = {
         sensor: off
@@ -78,12 +116,13 @@ def apart(
         words = both[0].words(False, weeks.get("ins"), "ins.gps_week", "both sensors'")
         yield Finding("clock", f"ins: {words} (ins from {utc_text(ins[0])}, {_from(epochs)})")
         return
-    third = len(shares) == 2 and len(astray) == 1  # the other sensor runs with the INS
+    other_agrees = len(shares) == 2 and len(astray) == 1  # the other sensor runs with the INS
     for sensor, share in sorted(astray.items()):
         t_ns = epochs[sensor]
         spans = f"ins {utc_text(ins[0])} to {utc_text(ins[-1])}, {sensor} {utc_text(t_ns[0])} to {utc_text(t_ns[-1])}"
         if sensor in offsets:
-            whose = f"the INS's and {'the sonar' if sensor == 'laser' else 'the laser'}'s" if third else "the INS's"
+            other = "the sonar" if sensor == "laser" else "the laser"
+            whose = f"the INS's and {other}'s" if other_agrees else "the INS's"
             words = offsets[sensor].words(True, weeks.get(sensor), f"{sensor}.gps_week", whose)
             yield Finding("clock", f"{sensor}: {words} ({spans})")
         elif share < 1 - ENOUGH:
@@ -93,8 +132,8 @@ def apart(
                 "files are of one session",
             )
         else:
-            own = [seen for seen in files if seen.sensor == sensor and len(seen.epochs_ns)]
-            outside = [seen.name for seen in own if covered(seen.epochs_ns, running) < 1 - ENOUGH]
+            own = [file for file in files if file.sensor == sensor and len(file.epochs_ns)]
+            outside = [file.name for file in own if share_within(file.epochs_ns, running) < 1 - ENOUGH]
             which = f" ({', '.join(outside[:3])} wholly)" if outside else ""
             between = np.count_nonzero((t_ns > ins[0]) & (t_ns < ins[-1])) / len(t_ns)
             yield Finding(
@@ -106,6 +145,7 @@ def apart(
 
 
 def _pauses(t_ns: Times, max_gap_ns: int) -> bool:
+    """Return whether a sensor paused."""
     return len(split_at_gaps(t_ns, max_gap_ns)) > 1
 
 
@@ -114,7 +154,8 @@ def _from(epochs: Mapping[str, Times]) -> str:
 
 
 def _amount(offset_ns: int) -> str:
-    """
+    """Return an offset in its largest whole unit.
+
     >>> _amount(18 * NS), _amount(-2 * WEEK_NS)
     ('18 s', '2 weeks')
     """
@@ -124,16 +165,16 @@ def _amount(offset_ns: int) -> str:
 
 
 def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses: bool) -> Offset | None:
-    """By how much the sensor's clock is off, if an offset that has a name brings it into the INS's time; else nothing.
+    """Return the offset with a name that brings the sensor into the INS's time; None where there is none.
 
-    Weeks and hours only where nothing was in common; leap seconds there, and where the sensor paused: one that did not,
-    and was switched on before the INS, looks the same.
+    Weeks and hours are tried only where the two have no time in common (``apart``). Leap seconds are tried there, and
+    where the sensor paused: a sensor that did not pause, and was switched on before the INS, looks the same.
     """
     away = int((t_ns[0] + t_ns[-1]) // 2) - (running[0][0] + running[-1][1]) // 2
     weeks = round(away / WEEK_NS)
 
     def fits(offset_ns: int) -> bool:
-        return covered(t_ns - offset_ns, running) >= MOST
+        return share_within(t_ns - offset_ns, running) >= MOST
 
     if apart and weeks and fits(weeks * WEEK_NS):
         why = "check gps_week, and the GPS time flag of the export"
@@ -143,7 +184,8 @@ def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses
     leaps = [sign * leap * NS for leap in LEAPS for sign in (1, -1)] if apart or pauses else []
     for offset_ns in leaps:
         if fits(offset_ns):
-            return Offset(_amount(offset_ns), offset_ns > 0, f"{named(offset_ns / NS)}; set the clock's time scale")
+            name = offset_name(offset_ns / NS)
+            return Offset(_amount(offset_ns), offset_ns > 0, f"{name}; set the clock's time scale")
     if apart:
         hours = [h for h in range(-FARTHEST_H, FARTHEST_H + 1) if h and fits(h * HOUR_NS)]
         if hours:

@@ -6,13 +6,14 @@ are read from their start for as long as allowed: of those the end stays unseen.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from pipeline.artefacts.streams import Part
+from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.readers.las import LasPart
 from pipeline.readers.raw_file import opened, read_at, size_of
@@ -29,8 +30,36 @@ LOGS = ("novatel", "r2sonic", "gsf", "kmall", "all")
 TEXTS = ("inertial_explorer",)
 
 
+@dataclass(frozen=True)
+class SensorFiles:
+    """What the survey of one sensor's files has in common.
+
+    Attributes
+    ----------
+    sensor : Sensor
+        ``ins``, ``laser`` or ``mbes``.
+    settings : Ins, Laser or Mbes
+        The sensor's block of session.yaml.
+    folder : Path
+        The session folder.
+    number : int
+        How many files there are, which share what may be read.
+    copies : Path
+        The folder for short copies.
+    """
+
+    sensor: Sensor
+    settings: Ins | Laser | Mbes
+    folder: Path
+    number: int
+    copies: Path
+
+
 def stretches(parts: Sequence[LasPart], files: int) -> tuple[list[Part], float]:
-    """Parts over some stretches of one LAS file, and the share of its points in them."""
+    """Return parts over evenly spread stretches of one LAS file, and the share of its points in them.
+
+    ``files`` is the number of the sensor's files, which share what may be read.
+    """
     total = sum(part.stop - part.start for part in parts)
     packed = any(part.compressed for part in parts)
     if total <= POINTS // files:
@@ -39,50 +68,70 @@ def stretches(parts: Sequence[LasPart], files: int) -> tuple[list[Part], float]:
     places = max(3, (PACKED_PLACES if packed else POINTS // STRETCH) // files)
     if places * each >= total:
         return list(parts), 1.0
-    found: list[Part] = []
+    spread: list[Part] = []
     for start in _starts(total - each, places):
         part = next(part for part in parts if part.start <= start < part.stop)
         last = start + each >= total
-        found.append(replace(part, start=start, stop=min(start + each, part.stop), missing=part.missing * last))
-    return found, places * each / total
+        spread.append(replace(part, start=start, stop=min(start + each, part.stop), missing=part.missing * last))
+    return spread, places * each / total
 
 
 def _starts(last: int, places: int) -> list[int]:
-    """The first, the last, and between them one somewhere in each step: at even steps always the same part of a scan's
-    line might be read."""
+    """Return the first place, the last, and between them one at random in each step.
+
+    At even steps always the same part of a scan's line might be read.
+    """
     steps = np.linspace(0.0, 1.0, places)
     steps[1:-1] += np.random.default_rng(0).uniform(-0.45, 0.45, places - 2) / (places - 1)
     return [int(step * last) for step in steps]
 
 
-def excerpt(
-    path: Path, name: str, sensor: str, settings: Ins | Laser | Mbes, files: int, folder: Path
-) -> tuple[Path, float, int]:
-    """A short copy in ``folder``, the share of the file in it, and from how many places that comes; the file itself
-    where it is short, or cannot be cut."""
-    allowed = BYTES.get(sensor, 0) // files
+@dataclass(frozen=True)
+class Excerpt:
+    """A short copy of a file, the share of the file in it, and from how many places it comes."""
+
+    path: Path
+    share: float = 1.0
+    places: int = 1
+
+
+def excerpt(path: Path, name: str, sharing: SensorFiles) -> Excerpt:
+    """Return a short copy of a file; the file itself where it is short, or cannot be cut.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What messages call it.
+    sharing : SensorFiles
+        The sensor's files, and where the copy goes.
+    """
+    sensor, settings = sharing.sensor, sharing.settings
+    allowed = BYTES.get(sensor, 0) // sharing.number
     with opened(path, name) as file:
         size = size_of(file)
         least = LEAST.get(sensor, HEAD)
         if size <= 2 * max(allowed, HEAD + 2 * least) or settings.format not in (*LOGS, *TEXTS, "sbet"):
-            return path, 1.0, 1
-        copy = folder / f"{sensor}{len(list(folder.iterdir()))}"
+            return Excerpt(path)
+        copy = sharing.copies / f"{sensor}{len(list(sharing.copies.iterdir()))}"
         each = max(allowed // PLACES, least)
         places = max(2, allowed // each)
         with copy.open("wb") as out:
             for piece in _pieces(file, size, each, places, settings.format):
                 out.write(piece)
-        return copy, copy.stat().st_size / size, places
+        return Excerpt(copy, copy.stat().st_size / size, places)
 
 
 def _pieces(file: BinaryIO, size: int, each: int, places: int, form: str) -> Iterator[bytes]:
-    """Of a file that is at least twice as long as they are together: they do not overlap."""
+    """Yield pieces of a file that is at least twice as long as they are together, so that they do not overlap."""
     yield from _cut(file, 0, HEAD, form)
     for start in np.linspace(HEAD, size - each, places).astype(int).tolist():
         yield from _cut(file, start, each, form)
 
 
 def _cut(file: BinaryIO, start: int, count: int, form: str) -> Iterator[bytes]:
+    """Yield about so many bytes from a place on: whole records, or whole lines, where the format needs it."""
     if form == "sbet":
         start, count = -(-start // SBET_RECORD) * SBET_RECORD, count // SBET_RECORD * SBET_RECORD
         data = read_at(file, start, count)

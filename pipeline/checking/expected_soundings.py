@@ -1,7 +1,8 @@
 """Soundings on the target's wet faces against what these very pings should have given.
 
-Expected is what the sonar's own beams (angles as recorded) meet from where the boat truly was at its own pings, by the
-labels' own rules: what is then missing was not detected, or does not lie where the target is said to be.
+The sonar's own beams, with the angles that it recorded, are cast from where the boat truly was at its own pings. A
+sounding is expected where a beam meets a face by the rules of the labels. A sounding that is then missing was not
+detected, or the face does not lie where the target is said to be.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Stream
-from pipeline.checking.file_survey import Columns, Seen, Times
+from pipeline.checking.file_survey import Columns, SurveyedFile, Times
 from pipeline.checking.findings import Finding
-from pipeline.checking.point_samples import Sample, put, rows_of
+from pipeline.checking.point_samples import PointSample, place_points, sampled_rows
 from pipeline.checking.track import Track
 from pipeline.config.plan import MbesFigures, Pass, Plan
 from pipeline.config.pool import PoolConfig
@@ -23,7 +24,7 @@ from pipeline.gps_time import NS
 from pipeline.maths.adjustment.observations import SPEED_M_S
 from pipeline.maths.sonar.soundings import points_in_mbes
 from pipeline.maths.target.model import TargetModel
-from pipeline.planning.prediction import Setting, labelled, state_by_design
+from pipeline.planning.prediction import Rays, label_rays, setting_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
@@ -36,110 +37,131 @@ FARTHEST_M = 100.0
 
 
 @dataclass(frozen=True)
-class Soundings:
-    """On the faces of a target, in their order: how many these passes should give, and about how many there are."""
+class SoundingCounts:
+    """How many soundings on each face of a target, in their order: expected of these passes, and about found."""
 
     expected: Array
     found: Array
 
 
-def soundings(
-    track: Track,
-    some: Sample,
-    on_faces: Stream,
-    sampled: int,
-    files: Sequence[Seen],
-    model: TargetModel,
-    pool: PoolConfig,
-    session: SessionConfig,
-) -> Soundings | None:
-    """``on_faces``: of a calibrated sample of ``sampled`` rows; without it a sounding belongs to the face that it is
-    nearest to with the coarse mount. None without a pass in which the sonar ran below the water.
+@dataclass(frozen=True)
+class PingsOnTarget:
+    """A session's pings, and where boat and target are."""
+
+    track: Track
+    files: Sequence[SurveyedFile]
+    model: TargetModel
+    pool: PoolConfig
+    session: SessionConfig
+
+
+def count_soundings(
+    pings: PingsOnTarget, sample: PointSample, labelled: Stream, labelled_rows: int
+) -> SoundingCounts | None:
+    """Count the soundings on each face, and those that these pings should have given.
+
+    Parameters
+    ----------
+    pings : PingsOnTarget
+        The session's pings.
+    sample : PointSample
+        Soundings; each belongs to the face that it is nearest to with the coarse mount. Used where none is labelled.
+    labelled : Stream
+        Soundings with their faces, of a calibrated sample.
+    labelled_rows : int
+        How many rows that sample had.
+
+    Returns
+    -------
+    SoundingCounts or None
+        None without a pass in which the sonar ran below the water.
     """
+    track, files, model = pings.track, pings.files, pings.model
     legs = [leg for leg in track.legs if leg.good and leg.distance_m > 0.5 and leg.ran["mbes"] > RAN]
     height_m = float(np.median([leg.height_m for leg in legs])) - model.water_level_m if legs else 0.0
-    if not legs or height_m + session.sonar.mount.z_m >= 0:
+    if not legs or height_m + pings.session.sonar.mount.z_m >= 0:
         return None
-    of_sonar = [seen for seen in files if seen.sensor == "mbes" and len(seen.epochs_ns)]
+    sonar_files = [file for file in files if file.sensor == "mbes" and len(file.epochs_ns)]
     inside = [
         np.concatenate([t_ns[(t_ns >= leg.start_ns) & (t_ns <= leg.end_ns)] for leg in legs])
-        for t_ns in (seen.epochs_ns for seen in of_sonar)
+        for t_ns in (file.epochs_ns for file in sonar_files)
     ]
-    pings = np.sort(np.concatenate(inside))
-    many = sum(len(t_ns) / seen.share for t_ns, seen in zip(inside, of_sonar, strict=True))
-    pings = pings[track.trajectory.covers(pings, NS)]
-    if not len(pings):
+    epochs_ns = np.sort(np.concatenate(inside))
+    number = sum(len(t_ns) / file.share for t_ns, file in zip(inside, sonar_files, strict=True))
+    epochs_ns = epochs_ns[track.trajectory.covers(epochs_ns, NS)]
+    if not len(epochs_ns):
         return None
-    cast = pings[np.unique(np.linspace(0, len(pings) - 1, PINGS).astype(int))]
-    wanted = _met(track, cast, rows_of(files, "mbes", BEAMS), model, pool, session) * (many / len(cast))
-    faces = [batch["face"] for batch in on_faces.batches()]
-    face, share = (np.concatenate(faces), sampled) if faces else (_nearest(track, some, model), len(some.t_ns))
-    rows = sum(seen.records for seen in files if seen.sensor == "mbes")
-    found = np.bincount(face[face >= 0], minlength=len(model.faces)) * (rows / max(1, share))
-    return Soundings(wanted, np.asarray(found, dtype=np.float64))
+    cast_ns = epochs_ns[np.unique(np.linspace(0, len(epochs_ns) - 1, PINGS).astype(int))]
+    expected = _beams_that_meet(pings, cast_ns) * (number / len(cast_ns))
+    faces = [batch["face"] for batch in labelled.batches()]
+    face = np.concatenate(faces) if faces else _nearest_faces(track, sample, model)
+    rows_read = labelled_rows if faces else len(sample.t_ns)
+    rows = sum(file.records for file in files if file.sensor == "mbes")
+    found = np.bincount(face[face >= 0], minlength=len(model.faces)) * (rows / max(1, rows_read))
+    return SoundingCounts(expected, np.asarray(found, dtype=np.float64))
 
 
-def _met(
-    track: Track, t_ns: Times, rows: Columns, model: TargetModel, pool: PoolConfig, session: SessionConfig
-) -> Array:
-    """How many beams of these pings meet each face so that they would be used."""
+def _beams_that_meet(pings: PingsOnTarget, t_ns: Times) -> Array:
+    """Return how many beams of the pings at these times meet each face so that they would be used, (f,)."""
+    model, session = pings.model, pings.session
+    rows = sampled_rows(pings.files, "mbes", BEAMS)
     fan = _fan(rows)
     reach = float(np.quantile(rows["two_way_time_s"], 0.99)) * SPEED_M_S / 2
     plan = Plan(
         mbes=MbesFigures(max_range_m=float(np.clip(reach, MbesFigures().max_range_m, FARTHEST_M))),
         passes=(Pass(distance_m=1.0),),  # none is sailed: the boat's own track stands in its place
     )
-    state = state_by_design(model, session.sonar)
-    setting = Setting(model, state, plan, pool.segment, session.ins, session.laser, session.sonar)
-    rays = np.tile(fan, (len(t_ns), 1))
-    met = labelled(setting, ClosestSurface(model), track.trajectory, "mbes", np.repeat(t_ns, len(fan)), rays)
+    setting = setting_of(plan, pings.pool, session)
+    rays = Rays("mbes", np.repeat(t_ns, len(fan)), np.tile(fan, (len(t_ns), 1)))
+    met = label_rays(setting, ClosestSurface(model), pings.track.trajectory, rays)
     return np.bincount(met["face"].astype(np.int64), minlength=len(model.faces)).astype(np.float64)
 
 
 def _fan(rows: Columns) -> Array:
-    """Unit rays (b, 3) of the beams that a sonar has, each in the middle of where it pointed."""
+    """Return unit rays (b, 3) of the beams that a sonar has, each in the middle of where it pointed."""
     order = np.argsort(rows["beam"], kind="stable")
     _, first = np.unique(rows["beam"][order], return_index=True)
     angle, tilt = (
-        np.array([np.median(one) for one in np.split(rows[name][order], first[1:])])
+        np.array([np.median(angles) for angles in np.split(rows[name][order], first[1:])])
         for name in ("angle_rad", "transmit_tilt_rad")
     )
     speed = np.full(len(angle), SPEED_M_S)
     return points_in_mbes(2 / speed, angle, tilt, speed)[0]
 
 
-def _nearest(track: Track, some: Sample, model: TargetModel) -> NDArray[np.int64]:
-    """The nearest faces of soundings that are near one."""
-    points = put(track, some.near(track))
+def _nearest_faces(track: Track, sample: PointSample, model: TargetModel) -> NDArray[np.int64]:
+    """Return the nearest face of each sounding that is near one."""
+    points = place_points(track, sample.in_good_legs(track))
     points = points[np.isfinite(points[:, 0])]
     on, face = ClosestSurface(model)(points)
     return np.asarray(face[np.linalg.norm(points - on, axis=1) < NEAR_M])
 
 
-def missed(model: TargetModel, counted: Soundings) -> Iterator[Finding]:
-    """Faces of which far too little was found: in the upper and the lower half of the water; else one by one."""
-    middle = [(one.vertices_m[:, 2].min() + one.vertices_m[:, 2].max()) / 2 for one in model.faces]
+def faces_missed(model: TargetModel, counts: SoundingCounts) -> Iterator[Finding]:
+    """Yield faces of which far too little was found: by the upper and the lower half of the water, else one by one."""
+    middle = [(face.vertices_m[:, 2].min() + face.vertices_m[:, 2].max()) / 2 for face in model.faces]
     deep = np.array(middle) < (model.water_level_m + model.bounds()[0][2]) / 2
     remedy = "turn the head, widen its sector, or check its range and gates"
-    told = False
+    half_told = False
     for words, half in (("lower", deep), ("upper", ~deep)):
-        expected, there = float(counted.expected[half].sum()), float(counted.found[half].sum())
-        if expected >= FEWEST and there < POOR * expected:
-            told = True
+        expected, found = float(counts.expected[half].sum()), float(counts.found[half].sum())
+        if expected >= FEWEST and found < POOR * expected:
+            half_told = True
             yield Finding(
                 "faces",
-                f"mbes: about {there:.0f} soundings on the faces in the {words} half of the water, where these pings "
-                f"should give about {expected:.0f} ({there / expected:.0%}; {USUAL}): the fan does not reach them, or "
+                f"mbes: about {found:.0f} soundings on the faces in the {words} half of the water, where these pings "
+                f"should give about {expected:.0f} ({found / expected:.0%}; {USUAL}): the fan does not reach them, or "
                 f"sees little there; {remedy}",
-                "fault" if there < NONE * expected else "look",
+                "fault" if found < NONE * expected else "look",
             )
-    bare = (counted.expected >= FEWEST) & (counted.found < NONE * counted.expected)
-    if bare.any() and not told:
-        one = int(np.argmax(np.where(bare, counted.expected, 0.0)))
+    bare = (counts.expected >= FEWEST) & (counts.found < NONE * counts.expected)
+    if bare.any() and not half_told:
+        barest = int(np.argmax(np.where(bare, counts.expected, 0.0)))
         others = f", and {plural(int(bare.sum()) - 1, 'other face')} likewise" if bare.sum() > 1 else ""
         yield Finding(
             "faces",
-            f"mbes: about {counted.found[one]:.0f} soundings on the face {model.faces[one].name}, where these pings "
-            f"should give about {counted.expected[one]:.0f}{others}: is something before it, or does it lie elsewhere?",
+            f"mbes: about {counts.found[barest]:.0f} soundings on the face {model.faces[barest].name}, where these "
+            f"pings should give about {counts.expected[barest]:.0f}{others}: is something before it, or does it lie "
+            "elsewhere?",
             "look",
         )

@@ -1,4 +1,4 @@
-"""Questions to the files by themselves: can they be read, do they hold what they should, is one there twice."""
+"""Questions to the files by themselves: can they be read, do they hold what they should, is one of them a copy."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.file_survey import SENSORS, Seen
+from pipeline.checking.file_survey import SENSORS, SurveyedFile
 from pipeline.checking.findings import Finding
-from pipeline.config.session import SessionConfig
+from pipeline.config.session import Mbes, SessionConfig
 from pipeline.gps_time import utc_text
 from pipeline.maths.geometry.geodesy import ecef_from_geodetic
 from pipeline.report.cast_checks import doubts
@@ -20,76 +20,77 @@ FAR_M = 10_000.0  # from a scanner: coordinates of a CRS
 SPEEDS_M_S = (1400.0, 1560.0)
 DIFFERENT_M_S = 5.0
 FAR_ARM_M = 5.0  # of a bracket that is rigid to millimetres
-NAMES = ("latitude_rad", "longitude_rad", "height_m")
+GEODETIC = ("latitude_rad", "longitude_rad", "height_m")
 
 
-def unreadable(files: Sequence[Seen], wrong: Sequence[str]) -> Iterator[Finding]:
-    """Lists that name nothing, files that a reader refuses, that are cut off, or hold nothing of use."""
-    for words in wrong:
+def unreadable_files(files: Sequence[SurveyedFile], list_faults: Sequence[str]) -> Iterator[Finding]:
+    """Yield files that a reader refuses, that are cut off, or hold nothing of use; and what is wrong with the lists."""
+    for words in list_faults:
         yield Finding("files", words)
-    for seen in files:
-        if seen.complaint:
-            yield Finding("file", seen.complaint)
+    for file in files:
+        if file.complaint:
+            yield Finding("file", file.complaint)
             continue
-        cut = {reason: seen.dropped[reason] for reason in CUT if seen.dropped[reason]}
-        if cut and (seen.share == 1.0 or "truncated" in cut):  # pieces of a log end within a record
+        cut = {reason: file.dropped[reason] for reason in CUT if file.dropped[reason]}
+        if cut and (file.share == 1.0 or "truncated" in cut):  # pieces of a log end within a record
             lost = ", ".join(f"{number} x {reason}" for reason, number in cut.items())
-            words = f"{seen.name}: ends in the middle of a record ({lost}); copy it again, unless it was logged so"
+            words = f"{file.name}: ends in the middle of a record ({lost}); copy it again, unless it was logged so"
             yield Finding("cut off", words, "look" if sum(cut.values()) == 1 and "truncated" not in cut else "fault")
-        if not seen.records:
-            why = ", ".join(f"{n} x {reason}" for reason, n in sorted(seen.dropped.items()) if n) or "it is empty"
-            words = f"{seen.name}: no usable {seen.sensor} record ({why}); log or export it again"
-            aligning = any(reason.startswith("ins status") for reason in seen.dropped)
-            others = any(other.records for other in files if other.sensor == seen.sensor)
+        if not file.records:
+            why = ", ".join(f"{n} x {reason}" for reason, n in sorted(file.dropped.items()) if n) or "it is empty"
+            words = f"{file.name}: no usable {file.sensor} record ({why}); log or export it again"
+            aligning = any(reason.startswith("ins status") for reason in file.dropped)
+            others = any(other.records for other in files if other.sensor == file.sensor)
             yield Finding("no records", words, "look" if aligning and others else "fault")
 
 
-def twice(files: Sequence[Seen]) -> Iterator[Finding]:
-    """Files of one sensor that hold the same time."""
-    for one, other in _overlapping([seen for seen in files if len(seen.epochs_ns) > 1]):
-        first = max(one.span_ns[0], other.span_ns[0])
-        common = np.count_nonzero(np.isin(one.epochs_ns, other.epochs_ns, assume_unique=True))
-        share = float(common / min(len(one.epochs_ns), len(other.epochs_ns)))
+def duplicate_files(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
+    """Yield files of one sensor that hold the same time."""
+    for first, second in _overlapping([file for file in files if len(file.epochs_ns) > 1]):
+        start_ns = max(first.span_ns[0], second.span_ns[0])
+        common = np.count_nonzero(np.isin(first.epochs_ns, second.epochs_ns, assume_unique=True))
+        share = float(common / min(len(first.epochs_ns), len(second.epochs_ns)))
         if share < TWICE:
             continue
-        same = one.records == other.records and len(one.epochs_ns) == len(other.epochs_ns) == common
+        same = first.records == second.records and len(first.epochs_ns) == len(second.epochs_ns) == common
         what = "is the same recording" if same else f"has {share:.0%} of its times in common"
-        what += f" as {one.name}" if same else f" with {one.name}"
-        advice = f"take one of them out of {one.sensor}.files, unless they are parts of one scan"
-        tiles = one.sensor == "laser" and not same
-        words = f"{other.name}: {what}, from {utc_text(first)}; {advice}"
+        what += f" as {first.name}" if same else f" with {first.name}"
+        advice = f"take one of them out of {first.sensor}.files, unless they are parts of one scan"
+        tiles = first.sensor == "laser" and not same
+        words = f"{second.name}: {what}, from {utc_text(start_ns)}; {advice}"
         yield Finding("twice", words, "look" if tiles else "fault")
 
 
-def _overlapping(files: Sequence[Seen]) -> Iterator[tuple[Seen, Seen]]:
-    """Pairs of one sensor whose times overlap, each in the order of the list. Of many files few do."""
-    order = {id(seen): k for k, seen in enumerate(files)}
-    running: list[Seen] = []
-    for seen in sorted(files, key=lambda seen: (seen.sensor, seen.span_ns[0])):
-        start, end = seen.span_ns
-        running = [one for one in running if one.sensor == seen.sensor and one.span_ns[1] > start]
-        for one in running if end > start else ():
-            first, second = sorted((one, seen), key=lambda seen: order[id(seen)])
+def _overlapping(files: Sequence[SurveyedFile]) -> Iterator[tuple[SurveyedFile, SurveyedFile]]:
+    """Yield pairs of one sensor whose times overlap, each in the order of the list; of many files few do."""
+    order = {id(file): k for k, file in enumerate(files)}
+    running: list[SurveyedFile] = []
+    for later in sorted(files, key=lambda file: (file.sensor, file.span_ns[0])):
+        start, end = later.span_ns
+        running = [file for file in running if file.sensor == later.sensor and file.span_ns[1] > start]
+        for earlier in running if end > start else ():
+            first, second = sorted((earlier, later), key=lambda file: order[id(file)])
             yield first, second
-        running.append(seen)
+        running.append(later)
 
 
-def ins_rate(files: Sequence[Seen]) -> Iterator[Finding]:
-    for seen in files:
-        if seen.sensor == "ins" and seen.rate_hz < SLOWEST_HZ:
+def slow_ins_logs(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
+    """Yield logs of the INS that are too slow for a boat that rolls."""
+    for file in files:
+        if file.sensor == "ins" and file.rate_hz < SLOWEST_HZ:
             yield Finding(
                 "ins rate",
-                f"{seen.name}: the INS was logged at {seen.rate_hz:.1f} Hz, which is too slow for a boat that rolls; "
+                f"{file.name}: the INS was logged at {file.rate_hz:.1f} Hz, which is too slow for a boat that rolls; "
                 "log it at 100 Hz or more",
             )
 
 
-def alignment(files: Sequence[Seen]) -> Iterator[Finding]:
-    """An INS without a solution for most of its log."""
-    of_ins = [seen for seen in files if seen.sensor == "ins" and seen.records]
-    dropped = sum((seen.dropped for seen in of_ins), Counter[str]())
+def unaligned_ins(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
+    """Yield an INS without a solution for most of its log."""
+    of_ins = [file for file in files if file.sensor == "ins" and file.records]
+    dropped = sum((file.dropped for file in of_ins), Counter[str]())
     bad = {reason: number for reason, number in dropped.items() if reason.startswith("ins status")}
-    used = sum(round(seen.records * seen.share) for seen in of_ins)
+    used = sum(round(file.records * file.share) for file in of_ins)
     if sum(bad.values()) > used:
         why = ", ".join(f"{number} x {reason.removeprefix('ins status ')}" for reason, number in sorted(bad.items()))
         yield Finding(
@@ -99,34 +100,34 @@ def alignment(files: Sequence[Seen]) -> Iterator[Finding]:
         )
 
 
-def frames(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
-    """Points in a CRS that are declared as the scanner's own, and the reverse."""
-    for seen in files:
-        if seen.sensor != "laser" or not len(seen.columns.get("x_m", ())):
+def wrong_frames(files: Sequence[SurveyedFile], session: SessionConfig) -> Iterator[Finding]:
+    """Yield points in a CRS that are declared as the scanner's own, and the reverse."""
+    for file in files:
+        if file.sensor != "laser" or not len(file.columns.get("x_m", ())):
             continue
-        away = float(np.median(np.sqrt(sum(seen.columns[axis] ** 2 for axis in ("x_m", "y_m", "z_m")))))
+        away = float(np.median(np.sqrt(sum(file.columns[axis] ** 2 for axis in ("x_m", "y_m", "z_m")))))
         if session.laser.frame == "laser" and away > FAR_M:
             yield Finding(
                 "frame",
-                f"{seen.name}: its points lie {away:.4g} m from their origin, but laser.frame is laser: they are "
+                f"{file.name}: its points lie {away:.4g} m from their origin, but laser.frame is laser: they are "
                 "georeferenced, or in mm; write their CRS into laser.frame, or export them in the scanner's own frame",
             )
         elif session.laser.frame == "EPSG:4978" and away < FAR_M:
             yield Finding(
                 "frame",
-                f"{seen.name}: its points lie {away:.4g} m from their origin, but laser.frame is EPSG:4978 (from the "
+                f"{file.name}: its points lie {away:.4g} m from their origin, but laser.frame is EPSG:4978 (from the "
                 "earth's centre): write laser.frame: laser if they are in the scanner's own frame",
             )
         elif session.laser.frame != "laser":
-            yield from _elsewhere(seen, files, session.laser.frame)
+            yield from _elsewhere(file, files, session.laser.frame)
 
 
-def _elsewhere(laser: Seen, files: Sequence[Seen], frame: str) -> Iterator[Finding]:
-    """Points of a CRS, which are in ECEF by now, far from every place where the boat was: the zone may be another."""
-    of_ins = [seen.columns for seen in files if seen.sensor == "ins" and seen.records]
+def _elsewhere(laser: SurveyedFile, files: Sequence[SurveyedFile], frame: str) -> Iterator[Finding]:
+    """Yield points of a CRS, in ECEF by now, that are far from every place where the boat was: in another zone."""
+    of_ins = [file.columns for file in files if file.sensor == "ins" and file.records]
     if not of_ins:
         return
-    track = ecef_from_geodetic(*(np.concatenate([one[name] for one in of_ins]) for name in NAMES))
+    track = ecef_from_geodetic(*(np.concatenate([columns[name] for columns in of_ins]) for name in GEODETIC))
     points = np.median(np.column_stack([laser.columns[axis] for axis in ("x_m", "y_m", "z_m")]), axis=0)
     away = float(np.min(np.linalg.norm(track - points, axis=1)))
     if away > FAR_M:
@@ -137,8 +138,8 @@ def _elsewhere(laser: Seen, files: Sequence[Seen], frame: str) -> Iterator[Findi
         )
 
 
-def far_arms(session: SessionConfig) -> Iterator[Finding]:
-    """Lever arms as long as a boat: they may be in another unit."""
+def long_lever_arms(session: SessionConfig) -> Iterator[Finding]:
+    """Yield lever arms as long as a boat: they may be in another unit."""
     for sensor in ("laser", "mbes"):
         settings = getattr(session, sensor)
         for key in ("x_m", "y_m", "z_m") if settings is not None else ():
@@ -152,14 +153,12 @@ def far_arms(session: SessionConfig) -> Iterator[Finding]:
                 )
 
 
-def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
-    """Recorded sound speeds that no pool has, that differ from file to file, or that look like a default."""
-    if session.mbes is None:
-        return
-    speeds = {seen.name: seen.columns["sound_speed_m_s"] for seen in files if seen.sensor == "mbes" and seen.columns}
+def doubtful_sound_speeds(files: Sequence[SurveyedFile], mbes: Mbes) -> Iterator[Finding]:
+    """Yield recorded sound speeds that no pool has, that differ from file to file, or that look like a default."""
+    speeds = {file.name: file.columns["sound_speed_m_s"] for file in files if file.sensor == "mbes" and file.columns}
     medians = {name: float(np.median(values)) for name, values in speeds.items() if len(values)}
     low, high = SPEEDS_M_S
-    recorded = session.mbes.sound_speed_m_s is None and session.mbes.svp is None  # what is recorded is used
+    recorded = mbes.sound_speed_m_s is None and mbes.svp is None  # what is recorded is used
     for name, speed in medians.items():
         if not low <= speed <= high and recorded:
             yield Finding(
@@ -169,8 +168,8 @@ def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Findi
             )
     if recorded:
         yield from _differing(medians)
-    cast = session.mbes.svp
-    if cast is not None and session.mbes.sound_speed_m_s is None and medians:
+    cast = mbes.svp
+    if cast is not None and mbes.sound_speed_m_s is None and medians:
         measured = float(np.median([speed for _, speed in cast]))
         worked = float(np.median(list(medians.values())))
         if abs(measured - worked) > DIFFERENT_M_S:
@@ -182,15 +181,15 @@ def sound_speed(files: Sequence[Seen], session: SessionConfig) -> Iterator[Findi
             )
 
 
-def cast(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
-    """A cast's file of another day, or of another place."""
-    if session.mbes is None or session.mbes.svp_from is None:
+def doubtful_cast(files: Sequence[SurveyedFile], mbes: Mbes) -> Iterator[Finding]:
+    """Yield a cast's file of another day, or of another place."""
+    if mbes.svp_from is None:
         return
-    times = [seen.span_ns for seen in files if seen.sensor == "mbes" and len(seen.epochs_ns)]
+    times = [file.span_ns for file in files if file.sensor == "mbes" and len(file.epochs_ns)]
     span = (min(first for first, _ in times), max(last for _, last in times)) if times else None
-    ins = next((seen.columns for seen in files if seen.sensor == "ins" and seen.columns), None)
+    ins = next((file.columns for file in files if file.sensor == "ins" and file.columns), None)
     place = None if ins is None else (_degrees(ins["latitude_rad"]), _degrees(ins["longitude_rad"]))
-    for words in doubts(session.mbes.svp_from, span, place):
+    for words in doubts(mbes.svp_from, span, place):
         yield Finding("sound speed", words, "look")
 
 
@@ -199,6 +198,7 @@ def _degrees(angles_rad: NDArray[np.float64]) -> float:
 
 
 def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:
+    """Yield files whose sound speeds differ; ``medians``: by file, m/s."""
     if medians and max(medians.values()) - min(medians.values()) > DIFFERENT_M_S:
         slow, fast = min(medians, key=lambda name: medians[name]), max(medians, key=lambda name: medians[name])
         yield Finding(
@@ -208,9 +208,9 @@ def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:
         )
 
 
-def missing_sensors(files: Sequence[Seen], session: SessionConfig) -> Iterator[Finding]:
-    """A sensor of which no file at all can be used."""
+def sensors_without_records(files: Sequence[SurveyedFile], session: SessionConfig) -> Iterator[Finding]:
+    """Yield sensors of which no file at all can be used."""
     for sensor in SENSORS:
-        if getattr(session, sensor) is not None and not any(s.records for s in files if s.sensor == sensor):
+        if getattr(session, sensor) is not None and not any(file.records for file in files if file.sensor == sensor):
             yield Finding("no records", f"{sensor}: has no file that can be used; correct {sensor}.files or the files")
 

@@ -1,4 +1,4 @@
-"""Every file of a session looked into: what it is, when it begins and ends, how fast it runs, samples of its rows."""
+"""A survey of every file of a session: what it is, when it begins and ends, how fast it runs, samples of its rows."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Part
 from pipeline.atomic_files import temporary_folder
-from pipeline.checking.excerpts import excerpt, stretches
+from pipeline.checking.excerpts import SensorFiles, excerpt, stretches
 from pipeline.config.instruments import Sensor
 from pipeline.config.session import Ins, SessionConfig
 from pipeline.errors import ConfigError, RawDataError
@@ -34,11 +34,34 @@ TICK_NS = NS // 20  # of the laser's times one in each such interval is kept
 
 
 @dataclass(frozen=True)
-class Seen:
-    """One file. ``share``: how much of it was read, ``places``: in how many evenly spread ones; ``ended``: its end was
-    among that; ``epochs_ns``: times of records or pings, of a laser one a tick; ``columns``: sampled rows, of an INS
-    all; ``states``: of each of these what its log says of it; ``sigmas``: what the INS says of its accuracy, thinned;
-    ``complaint``: why it could not be read."""
+class SurveyedFile:
+    """What was read of one file.
+
+    Attributes
+    ----------
+    sensor, name, size, kind
+        The sensor, the name within the session folder, the bytes, and what the file is, for people.
+    share : float
+        How much of it was read.
+    places : int
+        At how many evenly spread places.
+    ended : bool
+        Whether its end was read.
+    records : int
+        Records of an INS, soundings, points; estimated where the file was read in part.
+    dropped : Counter[str]
+        Rows that cannot be used, by reason.
+    epochs_ns : ndarray of int64
+        Times of records or pings, in order; of a laser one in each tick.
+    columns : Columns
+        Sampled rows; of an INS all rows.
+    states : Columns
+        What an INS's log says of each of its rows.
+    sigmas : Columns
+        What an INS says of its accuracy, thinned.
+    complaint : str
+        Why the file could not be read.
+    """
 
     sensor: Sensor
     name: str
@@ -57,67 +80,69 @@ class Seen:
 
     @property
     def span_ns(self) -> tuple[int, int]:
+        """Times of the first and the last record."""
         return int(self.epochs_ns[0]), int(self.epochs_ns[-1])
 
     @property
     def rate_hz(self) -> float:
-        """Records of the INS, pings, points."""
+        """How many records of the INS, pings or points a second."""
         return rate_hz(self.sensor, self.epochs_ns, self.records)
 
     @property
     def coarseness_ns(self) -> float:
-        """A longer time without an epoch is a hole, not one between two places that were read."""
+        """The time between two places that were read; a longer time without a record is a hole in the file."""
         if self.places < 2 or len(self.epochs_ns) < 2:
             return 0.0
         return 3 * float(self.epochs_ns[-1] - self.epochs_ns[0]) / (self.places - 1)
 
 
-def survey(session: SessionConfig, folder: Path) -> tuple[list[Seen], list[str]]:
-    """All files, those that cannot be read with their refusal; and what is wrong with the lists themselves."""
-    found: list[Seen] = []
-    wrong: list[str] = []
-    with temporary_folder() as place:
+def survey_files(session: SessionConfig, folder: Path) -> tuple[list[SurveyedFile], list[str]]:
+    """Return all files, those that cannot be read with their refusal, and what is wrong with the lists of files."""
+    files: list[SurveyedFile] = []
+    list_faults: list[str] = []
+    with temporary_folder() as copies:
         for sensor in SENSORS:
             settings: SensorSettings | None = getattr(session, sensor)
             if settings is None:
                 continue
             names, complaints = _listed(settings, folder)
-            wrong += complaints
+            list_faults += complaints
+            sharing = SensorFiles(sensor=sensor, settings=settings, folder=folder, number=len(names), copies=copies)
             for name, parts in _parts(sensor, settings, folder, names):
-                found.append(_look(sensor, settings, folder, name, parts, len(names), place))
+                files.append(_survey_file(sharing, name, parts))
     if session.ins.accuracy:
-        found, wrong = _with_accuracy(found, wrong, session.ins, folder)
-    return found, wrong
+        files, list_faults = _with_accuracy(files, list_faults, session.ins, folder)
+    return files, list_faults
 
 
 def _with_accuracy(
-    found: Sequence[Seen], wrong: Sequence[str], ins: Ins, folder: Path
-) -> tuple[list[Seen], list[str]]:
-    """The first good file of the INS has what its accuracy files say; those that cannot be read, with their refusal."""
-    good = next((k for k, seen in enumerate(found) if seen.sensor == "ins" and not seen.complaint), None)
+    files: Sequence[SurveyedFile], list_faults: Sequence[str], ins: Ins, folder: Path
+) -> tuple[list[SurveyedFile], list[str]]:
+    """Give the first good file of the INS what its accuracy files say; refusals of these go to the faults."""
+    good = next((k for k, file in enumerate(files) if file.sensor == "ins" and not file.complaint), None)
     if good is None:
-        return list(found), list(wrong)
+        return list(files), list(list_faults)
     try:
-        alone = ins.model_copy(update={"files": [_escaped(found[good].name)]})
+        alone = ins.model_copy(update={"files": [_escaped(files[good].name)]})
         parts = [part for part in raw_parts("ins", alone, folder) if isinstance(part, SmrmsgPart)]
         told = [thin_sigmas(chunk.sigmas) for part in parts for chunk in part.chunks()]
     except (RawDataError, ConfigError) as error:
-        return list(found), [*wrong, str(error)]
-    sigmas = _joined([one for one in told if one])
-    return [replace(seen, sigmas=sigmas) if k == good else seen for k, seen in enumerate(found)], list(wrong)
+        return list(files), [*list_faults, str(error)]
+    sigmas = _joined([columns for columns in told if columns])
+    return [replace(file, sigmas=sigmas) if k == good else file for k, file in enumerate(files)], list(list_faults)
 
 
 def _listed(settings: SensorSettings, folder: Path) -> tuple[list[str], list[str]]:
-    """Names of the files that the patterns match, and of patterns that match none the refusals."""
+    """Return the names of the files that the patterns match, and the refusals of patterns that match none."""
     names: list[str] = []
-    wrong = []
+    faults = []
     for pattern in settings.files:
         try:
             alone = settings.model_copy(update={"files": [pattern]} | _without_accuracy(settings))
             names += [path.relative_to(folder).as_posix() for path in raw_files(alone, folder)]
         except RawDataError as error:
-            wrong.append(str(error))
-    return sorted(dict.fromkeys(names)), wrong
+            faults.append(str(error))
+    return sorted(dict.fromkeys(names)), faults
 
 
 def _without_accuracy(settings: SensorSettings) -> dict[str, Any]:
@@ -127,11 +152,14 @@ def _without_accuracy(settings: SensorSettings) -> dict[str, Any]:
 def _parts(
     sensor: Sensor, settings: SensorSettings, folder: Path, names: Sequence[str]
 ) -> Iterator[tuple[str, Sequence[Part] | RawDataError]]:
-    """By file its parts, or why there are none. All files together where that goes: weeks follow from the first one."""
+    """Yield by file its parts, or why there are none.
+
+    The files are opened together where that is possible: their weeks follow from the first one.
+    """
     without = _without_accuracy(settings)
 
-    def parts_of(some: Sequence[str]) -> tuple[Part, ...]:
-        escaped = [_escaped(name) for name in some]
+    def parts_of(chosen: Sequence[str]) -> tuple[Part, ...]:
+        escaped = [_escaped(name) for name in chosen]
         return raw_parts(sensor, settings.model_copy(update={"files": escaped} | without), folder)
 
     good, bad = list(names), dict[str, RawDataError]()
@@ -157,35 +185,34 @@ def _escaped(name: str) -> str:
     return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
 
 
-def _look(
-    sensor: Sensor, settings: SensorSettings, folder: Path, name: str, parts: Sequence[Part] | RawDataError, files: int,
-    place: Path,
-) -> Seen:
-    path = folder / name
+def _survey_file(sharing: SensorFiles, name: str, parts: Sequence[Part] | RawDataError) -> SurveyedFile:
+    """Read a file, in pieces where it is long; ``parts``: those of its reader, or its refusal."""
+    path = sharing.folder / name
     try:
-        seen = Seen(sensor, name, path.stat().st_size)
+        file = SurveyedFile(sharing.sensor, name, path.stat().st_size)
     except OSError as error:
-        return Seen(sensor, name, 0, complaint=f"{name}: cannot be read ({error.strerror}); was it moved meanwhile?")
+        complaint = f"{name}: cannot be read ({error.strerror}); was it moved meanwhile?"
+        return SurveyedFile(sharing.sensor, name, 0, complaint=complaint)
     if isinstance(parts, RawDataError):
         with suppress(RawDataError, OSError):
-            seen = replace(seen, kind=detect.kind_of(path, name).title)
-        return replace(seen, complaint=str(parts))
+            file = replace(file, kind=detect.kind_of(path, name).title)
+        return replace(file, complaint=str(parts))
     try:
-        seen = replace(seen, kind=detect.kind_of(path, name).title)
+        file = replace(file, kind=detect.kind_of(path, name).title)
         las = [part for part in parts if isinstance(part, LasPart)]
         if las:
-            some, share = stretches(las, files)
+            spread, share = stretches(las, sharing.number)
             total = sum(part.stop - part.start for part in las)
-            read = _read(seen, some, files)
-            return read if share == 1.0 else replace(read, share=share, places=len(some), records=total)
-        copy, share, places = excerpt(path, name, sensor, settings, files, place)
-        if copy == path:
-            return _read(seen, parts, files)
-        read = _read(seen, [_over(part, copy) for part in parts], files)
-        copy.unlink()
-        return replace(read, share=share, places=places, records=round(read.records / share))
+            read = _read(file, spread, sharing.number)
+            return read if share == 1.0 else replace(read, share=share, places=len(spread), records=total)
+        copy = excerpt(path, name, sharing)
+        if copy.path == path:
+            return _read(file, parts, sharing.number)
+        read = _read(file, [_over(part, copy.path) for part in parts], sharing.number)
+        copy.path.unlink()
+        return replace(read, share=copy.share, places=copy.places, records=round(read.records / copy.share))
     except (RawDataError, ConfigError) as error:
-        return replace(seen, complaint=str(error))
+        return replace(file, complaint=str(error))
 
 
 def _path_of(part: Part) -> Path | None:
@@ -193,12 +220,16 @@ def _path_of(part: Part) -> Path | None:
 
 
 def _over(part: Part, path: Path) -> Part:
+    """Return a part that reads another file."""
     moved: Part = replace(part, path=path)  # type: ignore[type-var]  # every part of a raw file is a dataclass with one
     return moved
 
 
-def _read(seen: Seen, parts: Sequence[Part], files: int) -> Seen:
-    """The rows of some parts of one of so many files: counted, and thinned until few enough remain."""
+def _read(file: SurveyedFile, parts: Sequence[Part], files: int) -> SurveyedFile:
+    """Count the rows of parts of a file, and thin them until few enough remain.
+
+    ``files`` is the number of the sensor's files, which share what may be read and kept.
+    """
     epochs: list[Times] = []
     kept: list[Columns] = []
     states: list[Columns] = []
@@ -215,15 +246,15 @@ def _read(seen: Seen, parts: Sequence[Part], files: int) -> Seen:
         records += rows
         if rows:
             t_ns = chunk.columns["t_ns"]
-            epochs.append(np.unique(t_ns if seen.sensor != "laser" else t_ns // TICK_NS * TICK_NS))
-            while seen.sensor != "ins" and records / one_in > KEPT:
+            epochs.append(np.unique(t_ns if file.sensor != "laser" else t_ns // TICK_NS * TICK_NS))
+            while file.sensor != "ins" and records / one_in > KEPT:
                 one_in *= 2
             kept.append(dict(sample_rows(chunk.columns, one_in)))
             states += [dict(chunk.states)] if chunk.states else []
     times = np.unique(np.concatenate(epochs)) if epochs else np.empty(0, np.int64)
     columns = dict(sample_rows(_joined(kept), one_in)) if kept else {}
     return replace(
-        seen,
+        file,
         records=records,
         dropped=dropped,
         epochs_ns=times,

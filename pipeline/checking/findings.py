@@ -1,4 +1,4 @@
-"""What was found, in one line."""
+"""A finding of poolcal check: one line."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,7 +8,17 @@ Severity = Literal["fault", "look"]  # look: may be meant, and does not change t
 
 @dataclass(frozen=True)
 class Finding:
-    """``question``: the word for programs; ``words``: what, where, the value, what to do."""
+    """What is wrong, where, with which value, and what to do.
+
+    Attributes
+    ----------
+    question : str
+        The question that led to it: a word for programs.
+    words : str
+        The line for people.
+    severity : {"fault", "look"}
+        Whether it has to be mended, or only looked at.
+    """
 
     question: str
     words: str

@@ -1,9 +1,11 @@
-"""Heights by which a sensor misses the target: both by the same, and it is target.origin.height_m that is wrong; one of
-them alone, and it is the z of its mount, or, of a laser's points that others have placed, what their heights are above.
+"""Heights by which the sensors' points miss the target.
+
+If both sensors miss it by the same height, target.origin.height_m is wrong. If one of them does, the z of its mount is
+wrong; where others have placed the laser's points, the surface that their heights are above.
 
 The laser sees the target above the water alone, and the sonar below it alone. So points count only on their own side of
 the water: a shift downwards loses the laser's lowest points and the sonar's deepest, one upwards the laser's highest
-and the sonar's shallowest. Where a target repeats, its ends are what tells one repetition from the next.
+and the sonar's shallowest. Where a target repeats, its ends tell one repetition from the next.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.checking.findings import Finding
-from pipeline.checking.point_samples import NAMES, Sample, put
+from pipeline.checking.point_samples import NAMES, PointSample, place_points
 from pipeline.checking.track import Track
 from pipeline.target.surface import ClosestSurface
 
@@ -32,17 +34,29 @@ SIGN_M = 0.5  # a shift as near to twice a lever arm is its sign
 
 @dataclass(frozen=True)
 class Fit:
-    """How well one sensor's points lie on the target, by shift: where it can see it (``sided``), and anywhere
-    (``free``), as shares of the best."""
+    """How well one sensor's points lie on the target, by shift.
+
+    Attributes
+    ----------
+    sensor : str
+        ``laser`` or ``mbes``.
+    z_m : float
+        Of its mount.
+    sided, free : ndarray, shape (k,)
+        Agreement at each of SHIFTS_M as a share of the best: on the sensor's own side of the water, and anywhere.
+    georeferenced : bool
+        Whether others have placed the points, so that the mount moves nothing.
+    """
 
     sensor: str
-    z_m: float  # of its mount
+    z_m: float
     sided: Array
     free: Array
-    georeferenced: bool = False  # placed by others: its mount moves nothing
+    georeferenced: bool = False
 
     @property
     def shift_m(self) -> float:
+        """The shift upwards at which the points lie best on the target."""
         return _middle(self.sided)
 
     @property
@@ -52,21 +66,35 @@ class Fit:
 
     @property
     def cause(self) -> str:
-        """What may be wrong by the shift."""
+        """The setting, or the data, that may be wrong by the shift."""
         return f"the heights of {self.sensor}.frame" if self.georeferenced else f"{self.sensor}.mount.z_m"
 
     @property
     def off(self) -> bool:
-        """Clearly better elsewhere. A wrong water level lets points lie on the target as they are."""
+        """Whether the points lie clearly better elsewhere; a wrong water level leaves them on the target."""
         far = abs(self.shift_m) >= LEAST_M and self.sided[HERE] < WORSE
         return far and (self.sign or self.free[HERE] < WORSE)
 
 
-def wrong_height(
-    track: Track, samples: Sequence[Sample], closest: ClosestSurface, water_m: float, height_m: float
+def height_findings(
+    track: Track, samples: Sequence[PointSample], closest: ClosestSurface, water_m: float, height_m: float
 ) -> Iterator[Finding]:
-    """``height_m``: target.origin.height_m as given."""
-    fits = [fit for fit in (_fit(track, some, closest, water_m) for some in samples) if fit is not None]
+    """Yield the height that is wrong, where points miss the target by one.
+
+    Parameters
+    ----------
+    track : Track
+        Of the INS.
+    samples : Sequence[PointSample]
+        Points of each sensor.
+    closest : ClosestSurface
+        The target's surface.
+    water_m : float
+        Height of the water in the target frame.
+    height_m : float
+        target.origin.height_m as it is configured.
+    """
+    fits = [fit for fit in (_fit(track, sample, closest, water_m) for sample in samples) if fit is not None]
     common = common_shift(fits)
     if common is not None and len(fits) == len(samples):
         yield Finding("height", _target_is_off(fits, common, height_m))
@@ -110,50 +138,80 @@ def _target_is_off(fits: Sequence[Fit], shift_m: float, height_m: float) -> str:
 
 
 def way(shift_m: float, up: str, down: str) -> str:
-    """
+    """Return a shift and its direction.
+
     >>> way(-4.53, "higher", "lower")
     '4.5 m lower'
     """
     return f"{abs(shift_m):.1f} m {up if shift_m > 0 else down}"
 
 
+@dataclass(frozen=True)
+class SideOfWater:
+    """The side of the water on which a sensor sees the target: the laser above it, the sonar below it."""
+
+    sensor: str
+    water_m: float
+
+    def visible(self, points: Array) -> NDArray[np.bool_]:
+        """Return which points (n, 3) m in the target frame are on that side."""
+        return points[:, 2] > self.water_m if self.sensor == "laser" else points[:, 2] < self.water_m
+
+
 def profile(
     points: Array,
-    sensor: str,
     closest: ClosestSurface,
-    water_m: float | None,
     shifts_m: Array,
+    side: SideOfWater | None = None,
     reach_m: float = REACH_M,
 ) -> Array:
-    """How well points (n, 3) lie on the target when they are shifted upwards: the mean of 1 - (d / reach)², none beyond
-    the reach or on the other sensor's side of the water; (k,). ``water_m``: None where sides do not count."""
-    found = []
+    """Return how well points lie on the target when they are shifted upwards, (k,).
+
+    It is the mean of 1 - (d / reach)², none beyond the reach or on the other sensor's side of the water.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        In metres, in the frame of the surface.
+    closest : ClosestSurface
+        The target's surface.
+    shifts_m : ndarray, shape (k,)
+        The shifts.
+    side : SideOfWater or None
+        Where the sensor can see the target; None: anywhere.
+    reach_m : float
+        Distance from a face beyond which a point counts nothing.
+    """
+    scores = []
     for shift in shifts_m:
         moved = points + np.array([0.0, 0.0, shift])
-        if water_m is not None:
-            moved = moved[moved[:, 2] > water_m if sensor == "laser" else moved[:, 2] < water_m]
+        if side is not None:
+            moved = moved[side.visible(moved)]
         moved = moved[closest.around(moved, reach_m)]
         on, _ = closest(moved)
         squares = np.sum((moved - on) ** 2, axis=1) / reach_m**2
-        found.append(float(np.sum(np.maximum(0.0, 1.0 - squares))) / len(points))
-    return np.array(found)
+        scores.append(float(np.sum(np.maximum(0.0, 1.0 - squares))) / len(points))
+    return np.array(scores)
 
 
-def _fit(track: Track, some: Sample, closest: ClosestSurface, water_m: float) -> Fit | None:
-    """None where its points are few, or hit nothing at any height."""
-    points = put(track, some.near(track))
+def _fit(track: Track, sample: PointSample, closest: ClosestSurface, water_m: float) -> Fit | None:
+    """Return the fit of a sensor's points; None where they are few, or hit nothing at any height."""
+    points = place_points(track, sample.in_good_legs(track))
     points = points[np.isfinite(points[:, 0])]
     if len(points) < FEWEST:
         return None
-    sided, free = (profile(points, some.sensor, closest, level, SHIFTS_M) for level in (water_m, None))
+    sides = (SideOfWater(sample.sensor, water_m), None)
+    sided, free = (profile(points, closest, SHIFTS_M, side) for side in sides)
     return None if sided.max() < FIT else Fit(
-        some.sensor, some.mount.z_m, sided / sided.max(), free / free.max(), some.georeferenced
+        sample.sensor, sample.mount.z_m, sided / sided.max(), free / free.max(), sample.georeferenced
     )
 
 
 def common_shift(fits: Sequence[Fit]) -> float | None:
-    """How far up all sensors' points have to go to lie on the target; None where they lie there as they are, or no one
-    shift brings all there."""
+    """Return how far up all sensors' points have to go to lie on the target.
+
+    None where they lie there as they are, or where no single shift brings all of them there.
+    """
     if not fits:
         return None
     together = np.min([fit.sided for fit in fits], axis=0)
@@ -163,5 +221,6 @@ def common_shift(fits: Sequence[Fit]) -> float | None:
 
 
 def _middle(fits: Array) -> float:
+    """Return the middle of the shifts that are as good as the best."""
     good = SHIFTS_M[fits >= LIKE * fits.max()]
     return float((good.min() + good.max()) / 2)

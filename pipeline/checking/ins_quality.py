@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.ins_drift import rms
-from pipeline.checking.file_survey import Seen
+from pipeline.checking.file_survey import SurveyedFile
 from pipeline.checking.findings import Finding
 from pipeline.checking.track import Leg
 from pipeline.maths.geometry.passes import pass_of
@@ -31,36 +31,52 @@ LIMITS = {  # of the INS's own sigmas: from the first on worth a look, from the 
 
 
 @dataclass(frozen=True)
-class Quality:
-    """By file how many records are in which state; the INS's own sigmas (medians, units in the names); ``of_passes``:
-    within the passes, otherwise of the whole log."""
+class InsQuality:
+    """What the INS says of itself.
+
+    Attributes
+    ----------
+    by_file : dict[str, dict[str, Counter[str]]]
+        By file, and by kind of state, how many records are in which state.
+    together : dict[str, Counter[str]]
+        The same by kind of state, of the records that count.
+    sigmas : dict[str, float]
+        The INS's own sigmas, medians; units in the names.
+    of_passes : bool
+        Whether the records within the passes count; else those of the whole log.
+    """
 
     by_file: dict[str, dict[str, Counter[str]]] = field(default_factory=dict)
-    together: dict[str, Counter[str]] = field(default_factory=dict)  # by kind, of what counts
+    together: dict[str, Counter[str]] = field(default_factory=dict)
     sigmas: dict[str, float] = field(default_factory=dict)
     of_passes: bool = False
 
 
-def quality(files: Sequence[Seen], legs: Sequence[Leg]) -> Quality:
-    """Within the passes where there are any."""
-    of_ins = [seen for seen in files if seen.sensor == "ins"]
+def assess_ins_quality(files: Sequence[SurveyedFile], legs: Sequence[Leg]) -> InsQuality:
+    """Return what the INS says of itself: within the passes, where there are any."""
+    ins_files = [file for file in files if file.sensor == "ins"]
     together: dict[str, Counter[str]] = {}
-    for seen in of_ins:
-        inside = _inside(seen.columns["t_ns"], legs) if seen.states else slice(0)
-        for kind, numbers in seen.states.items():
+    for file in ins_files:
+        inside = _inside(file.columns["t_ns"], legs) if file.states else slice(0)
+        for kind, numbers in file.states.items():
             together.setdefault(kind, Counter()).update(_counted(kind, numbers[inside]))
-    told = [seen.sigmas for seen in of_ins if seen.sigmas]
-    return Quality(
-        {seen.name: {kind: _counted(kind, numbers) for kind, numbers in seen.states.items()} for seen in of_ins},
-        together,
-        rms({name: np.concatenate([one[name][_inside(one["t_ns"], legs)] for one in told]) for name in told[0]})
-        if told
-        else {},
-        bool(legs),
+    stated = [file.sigmas for file in ins_files if file.sigmas]
+    sigmas = {
+        name: np.concatenate([columns[name][_inside(columns["t_ns"], legs)] for columns in stated])
+        for name in (stated[0] if stated else ())
+    }
+    return InsQuality(
+        by_file={
+            file.name: {kind: _counted(kind, numbers) for kind, numbers in file.states.items()} for file in ins_files
+        },
+        together=together,
+        sigmas=rms(sigmas) if stated else {},
+        of_passes=bool(legs),
     )
 
 
 def _inside(t_ns: NDArray[np.int64], legs: Sequence[Leg]) -> Mask:
+    """Return which times are within the legs; all, where there is no leg."""
     if not legs:
         return np.ones(len(t_ns), dtype=bool)
     ordered = sorted(legs, key=lambda leg: leg.start_ns)
@@ -69,23 +85,27 @@ def _inside(t_ns: NDArray[np.int64], legs: Sequence[Leg]) -> Mask:
 
 
 def _counted(kind: str, numbers: NDArray[np.uint8]) -> Counter[str]:
+    """Return how many records are in which state, by its name."""
     values, counts = np.unique(numbers, return_counts=True)
     pairs = zip(values.tolist(), counts.tolist(), strict=True)
     return Counter({STATES[kind].get(value, f"{kind} {value}"): count for value, count in pairs})
 
 
-def told(found: Quality) -> Iterator[Finding]:
-    """A poor state within the passes, and sigmas with which no mount can be found, are faults; what may yet do, and a
-    state of the log as a whole, where the passes are not known, is to be looked at."""
-    where = "in the passes" if found.of_passes else "in the whole log"
+def quality_findings(quality: InsQuality) -> Iterator[Finding]:
+    """Yield what is poor in an INS's log.
+
+    A poor state within the passes, and sigmas with which no mount can be found, are faults. What may yet do, and a
+    state of the log as a whole, where the passes are not known, is to be looked at.
+    """
+    where = "in the passes" if quality.of_passes else "in the whole log"
     judged = False
     for name, (doubtful, useless, what, unit, remedy) in LIMITS.items():
-        sigma = found.sigmas.get(name, 0.0)
+        sigma = quality.sigmas.get(name, 0.0)
         if sigma >= doubtful:
             judged = judged or sigma >= useless
             words = f"ins: its {what} good to {sigma:.2g}{'' if unit == '°' else ' '}{unit} by the log itself"
             yield Finding("ins quality", f"{words} (median {where}): {remedy}", "fault" if sigma >= useless else "look")
-    for kind, counts in found.together.items():
+    for kind, counts in quality.together.items():
         poor = {name: number for name, number in counts.items() if name not in GOOD_STATES[kind]}
         share = sum(poor.values()) / max(1, counts.total())
         if share <= SHARE:
@@ -94,7 +114,7 @@ def told(found: Quality) -> Iterator[Finding]:
         names = ", ".join(f"{name} in {number / counts.total():.0%}" for name, number in sorted(poor.items()))
         what = "status is" if kind == "status" else "positions are"
         remedy = REMEDIES.get(worst, "they are not of fixed RTK or PPP: see that it has corrections")
-        settling = worst == "INS_ALIGNMENT_COMPLETE" and found.of_passes and "heading_deg" not in found.sigmas
+        settling = worst == "INS_ALIGNMENT_COMPLETE" and quality.of_passes and "heading_deg" not in quality.sigmas
         yield Finding(
             "ins quality",
             f"ins: its {what} {names} of its records {where}: {remedy}",

@@ -1,7 +1,7 @@
-"""Small offsets of a clock, as the adjustment finds them in a sample of the session.
+"""Small offsets of a clock, as the adjustment of a sample of the session estimates them.
 
-With a wrong clock the target's planes sway with the boat. The adjustment frees each of its held parameters by itself
-(table ``freed``); where one of the two latencies stands out, and explains more than any other parameter would, that
+With a wrong clock the target's planes sway with the boat. The adjustment tests each of its fixed parameters by itself
+(table ``freed``). Where one of the two latencies stands out, and explains more than any other parameter would, that
 clock is off.
 """
 
@@ -17,40 +17,43 @@ SIGMAS, LEAST_S = 4.0, 0.005  # far enough from zero, and worth a word
 SAME = 3.0  # sigmas within which two offsets are one, of the INS
 
 
-def latencies(freed: pd.DataFrame) -> Iterator[Finding]:
-    """Sensors whose clock is clearly off; both by the same: the INS's."""
-    held = freed[~freed["estimated"] & np.isfinite(freed["value"])].to_dict("records")
-    off = {str(one["unknown"]): abs(one["value"]) / np.hypot(one["sigma"], one["considered"]) for one in held}
-    if not off or not max(off, key=lambda name: off[name]).endswith("_latency"):
+def latency_findings(freed: pd.DataFrame) -> Iterator[Finding]:
+    """Yield the sensors whose clock is clearly off; where both are by the same amount, the INS's.
+
+    ``freed`` is the adjustment's table of single-parameter tests.
+    """
+    fixed = freed[~freed["estimated"] & np.isfinite(freed["value"])].to_dict("records")
+    statistic = {str(row["unknown"]): abs(row["value"]) / np.hypot(row["sigma"], row["considered"]) for row in fixed}
+    if not statistic or not max(statistic, key=lambda name: statistic[name]).endswith("_latency"):
         return
-    found = {
-        sensor: (float(one["value"]), float(one["sigma"]))
+    latencies = {
+        sensor: (float(row["value"]), float(row["sigma"]))
         for sensor in ("laser", "mbes")
-        for one in held
-        if one["unknown"] == f"{sensor}_latency" and off[one["unknown"]] > SIGMAS and abs(one["value"]) > LEAST_S
+        for row in fixed
+        if row["unknown"] == f"{sensor}_latency" and statistic[row["unknown"]] > SIGMAS and abs(row["value"]) > LEAST_S
     }
-    if len(found) == 2:
-        (one, its), (other, others) = found.values()
-        if abs(one - other) < SAME * np.hypot(its, others):
-            both = (one / its**2 + other / others**2) / (1 / its**2 + 1 / others**2)
-            sigma = 1 / np.hypot(1 / its, 1 / others)
+    if len(latencies) == 2:
+        (laser, laser_sigma), (mbes, mbes_sigma) = latencies.values()
+        if abs(laser - mbes) < SAME * np.hypot(laser_sigma, mbes_sigma):
+            both = (laser / laser_sigma**2 + mbes / mbes_sigma**2) / (1 / laser_sigma**2 + 1 / mbes_sigma**2)
+            sigma = 1 / np.hypot(1 / laser_sigma, 1 / mbes_sigma)
             yield Finding(
                 "latency",
-                f"ins: its clock is {_said(-both)} both sensors' ({_between(-both, sigma)}), as the target's planes "
+                f"ins: its clock is {_offset(-both)} both sensors' ({_between(-both, sigma)}), as the target's planes "
                 f"sway with the boat: find what delays it, and add its amount, about {-both:+.3f} s, to ins.latency_s",
             )
             return
-    for sensor, (seconds, sigma) in found.items():
+    for sensor, (seconds, sigma) in latencies.items():
         yield Finding(
             "latency",
-            f"{sensor}: its clock is {_said(seconds)} the INS's ({_between(seconds, sigma)}), as the target's planes "
+            f"{sensor}: its clock is {_offset(seconds)} the INS's ({_between(seconds, sigma)}), as the target's planes "
             f"sway with the boat: find what delays it; for its amount run with adjust.free: [{sensor}_latency], which "
             f"uses all the points, and add what that finds to {sensor}.latency_s",
         )
 
 
 def _between(seconds: float, sigma: float) -> str:
-    """From the sample alone, 95 %.
+    """Return the interval of 95 %, from the sample alone.
 
     >>> _between(-0.0204, 0.001)
     '18.4 to 22.4 ms, 95 %'
@@ -59,9 +62,10 @@ def _between(seconds: float, sigma: float) -> str:
     return f"{low:.1f} to {high:.1f} ms, 95 %"
 
 
-def _said(ahead_s: float) -> str:
-    """
-    >>> _said(-0.0204)
+def _offset(ahead_s: float) -> str:
+    """Return the amount and the direction of a clock's offset.
+
+    >>> _offset(-0.0204)
     '20 ms behind'
     """
     return f"{abs(1000 * ahead_s):.0f} ms {'ahead of' if ahead_s > 0 else 'behind'}"

@@ -1,4 +1,4 @@
-"""Samples of a sensor's points, and where a mount, a clock and a scale put them in the pool."""
+"""Samples of a sensor's points, and where they lie in the pool with a mount, a clock and a scale."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import point_array
-from pipeline.checking.file_survey import Columns, Seen, Times
+from pipeline.checking.file_survey import Columns, SurveyedFile, Times
 from pipeline.checking.track import Track
 from pipeline.config.mount import Mount
 from pipeline.config.session import SessionConfig
@@ -21,8 +21,22 @@ NAMES = {"laser": "laser points", "mbes": "soundings"}
 
 
 @dataclass(frozen=True)
-class Sample:
-    """Rows of a sensor, points (n, 3) m in its own frame; ``georeferenced``: in the pool frame, placed by others."""
+class PointSample:
+    """Points of a sensor.
+
+    Attributes
+    ----------
+    sensor : str
+        ``laser`` or ``mbes``.
+    t_ns : ndarray of int64, shape (n,)
+        Their times.
+    points_m : ndarray, shape (n, 3)
+        In the sensor's own frame; in the pool frame where they are ``georeferenced``.
+    mount : Mount
+        The sensor's coarse mount.
+    georeferenced : bool
+        Whether others have placed the points, so that the mount moves nothing.
+    """
 
     sensor: str
     t_ns: Times
@@ -30,50 +44,101 @@ class Sample:
     mount: Mount
     georeferenced: bool = False
 
-    def placeable(self, track: Track) -> "Sample":
-        """The rows for which the INS, which may have been read in part, has a pose."""
-        return self._of(track.trajectory.covers(self.t_ns, NS))
+    def with_pose(self, track: Track) -> "PointSample":
+        """Return the points for which the INS, which may have been read in part, has a pose."""
+        return self._rows(track.trajectory.covers(self.t_ns, NS))
 
-    def near(self, track: Track) -> "Sample":
-        """The rows of legs as a session wants them."""
+    def in_good_legs(self, track: Track) -> "PointSample":
+        """Return the points of the legs on which the target is to starboard, and in front of it."""
         rows = np.zeros(len(self.t_ns), dtype=bool)
         for leg in track.legs:
             if leg.good:
                 rows |= (self.t_ns >= leg.start_ns) & (self.t_ns <= leg.end_ns)
-        return self._of(rows)
+        return self._rows(rows)
 
-    def _of(self, rows: NDArray[np.bool_]) -> "Sample":
-        return Sample(self.sensor, self.t_ns[rows], self.points_m[rows], self.mount, self.georeferenced)
+    def _rows(self, rows: NDArray[np.bool_]) -> "PointSample":
+        return PointSample(self.sensor, self.t_ns[rows], self.points_m[rows], self.mount, self.georeferenced)
 
 
-def rows_of(files: Sequence[Seen], sensor: str, rows: int) -> Columns:
-    """About so many rows of a sensor as they were read, evenly over its files; nothing where it has none."""
-    pieces = [seen.columns for seen in files if seen.sensor == sensor and seen.records and seen.columns]
+@dataclass(frozen=True)
+class Placing:
+    """How a sensor's points are placed, where not as the settings say.
+
+    Attributes
+    ----------
+    mount : Mount or None
+        Another mount than the sample's; None: the sample's.
+    clock_ahead_s : float
+        By how much the sensor's clock is ahead of the INS's.
+    scale : float
+        Metres in a unit of the points.
+    """
+
+    mount: Mount | None = None
+    clock_ahead_s: float = 0.0
+    scale: float = 1.0
+
+
+AS_GIVEN = Placing()
+
+
+def sampled_rows(files: Sequence[SurveyedFile], sensor: str, rows: int) -> Columns:
+    """Return rows of a sensor, evenly over its files.
+
+    Parameters
+    ----------
+    files : Sequence[SurveyedFile]
+        The session's files.
+    sensor : str
+        ``ins``, ``laser`` or ``mbes``.
+    rows : int
+        About how many.
+
+    Returns
+    -------
+    Columns
+        The columns as the reader gives them; none where the sensor has no row.
+    """
+    pieces = [file.columns for file in files if file.sensor == sensor and file.records and file.columns]
     if not pieces:
         return {}
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     return dict(sample_rows(columns, max(1.0, len(columns["t_ns"]) / rows)))
 
 
-def placeable(columns: Columns, track: Track) -> Columns:
-    """The same of rows as they were read."""
+def rows_with_pose(columns: Columns, track: Track) -> Columns:
+    """Return the rows, as they were read, for which the INS has a pose."""
     rows = track.trajectory.covers(columns["t_ns"], NS) if columns else slice(None)
     return {name: values[rows] for name, values in columns.items()}
 
 
-def sample(
-    files: Sequence[Seen], session: SessionConfig, sensor: str, track: Track, rows: int
-) -> Sample | None:
-    """About so many points of a sensor; None where it has none."""
-    columns = rows_of(files, sensor, rows)
+def sample_points(
+    files: Sequence[SurveyedFile], session: SessionConfig, sensor: str, track: Track, rows: int
+) -> PointSample | None:
+    """Return points of a sensor, evenly over its files; None where it has none.
+
+    Parameters
+    ----------
+    files : Sequence[SurveyedFile]
+        The session's files.
+    session : SessionConfig
+        The session's settings.
+    sensor : str
+        ``laser`` or ``mbes``.
+    track : Track
+        Of the INS; its frame is that of georeferenced points.
+    rows : int
+        About how many.
+    """
+    columns = sampled_rows(files, sensor, rows)
     if not columns:
         return None
     if sensor == "laser":
-        placed = session.laser.frame != "laser"
+        georeferenced = session.laser.frame != "laser"
         points = point_array(columns, "m")
-        if placed:
+        if georeferenced:
             points = track.frame.points_from_ecef(points)
-        return Sample(sensor, columns["t_ns"], points, session.laser.mount, placed)
+        return PointSample(sensor, columns["t_ns"], points, session.laser.mount, georeferenced)
     mbes = session.sonar
     offset = None if mbes.projector_offset_m is None else np.array(mbes.projector_offset_m)
     points, valid = points_in_mbes(
@@ -84,21 +149,19 @@ def sample(
         true_sound_speed_m_s=mbes.sound_speed_m_s,
         projector_offset_m=offset,
     )
-    return Sample(sensor, columns["t_ns"][valid], points[valid], mbes.mount)
+    return PointSample(sensor, columns["t_ns"][valid], points[valid], mbes.mount)
 
 
-def put(
-    track: Track, some: Sample, mount: Mount | None = None, ahead_s: float = 0.0, scale: float = 1.0
-) -> Array:
-    """Points (n, 3) m in the pool frame; NaN where the INS has no pose. ``ahead_s``: of the sensor's clock.
+def place_points(track: Track, sample: PointSample, placing: Placing = AS_GIVEN) -> Array:
+    """Return a sample's points (n, 3) m in the pool frame; NaN where the INS has no pose.
 
-    Of points that others placed none of the three changes anything.
+    Another placing changes nothing of points that others have placed.
     """
-    if some.georeferenced:
-        return some.points_m
-    mounted = mount_of(mount or some.mount)
-    body = scale * some.points_m @ mounted.R_body_from_sensor.T + mounted.lever_arm_body_m
-    t_ns = some.t_ns - round(ahead_s * NS)
+    if sample.georeferenced:
+        return sample.points_m
+    mounted = mount_of(placing.mount or sample.mount)
+    body = placing.scale * sample.points_m @ mounted.R_body_from_sensor.T + mounted.lever_arm_body_m
+    t_ns = sample.t_ns - round(placing.clock_ahead_s * NS)
     covered = track.trajectory.covers(t_ns, NS)
     placed = np.full(body.shape, np.nan)
     placed[covered] = track.trajectory.points_from_body(t_ns[covered], body[covered])

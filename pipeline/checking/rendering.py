@@ -1,24 +1,24 @@
-"""What was seen and found, for people and for programs."""
+"""What poolcal check says, for people and for programs."""
 
 import json
 from typing import Any
 
 import numpy as np
 
-from pipeline.checking.check_session import Examined
+from pipeline.checking.check_session import SessionCheck
 from pipeline.checking.expected_soundings import USUAL
-from pipeline.checking.file_survey import Seen
-from pipeline.checking.ins_quality import Quality
+from pipeline.checking.file_survey import SurveyedFile
+from pipeline.checking.ins_quality import InsQuality
 from pipeline.gps_time import utc_text
 from pipeline.maths.target.model import names_in_order
 from pipeline.text_table import text_table
 
 
-def text(examined: Examined) -> str:
-    """Files, passes, findings."""
+def check_text(examined: SessionCheck) -> str:
+    """Return files, passes and findings for the screen."""
     heads = ("sensor", "file", "kind", "records", "from (UTC)", "to", "rate")
-    lines = text_table("<7<4  <24>11  <21<10>9", heads, [_file_cells(seen) for seen in examined.files])
-    if any(seen.share < 1 or not seen.ended for seen in examined.files):
+    lines = text_table("<7<4  <24>11  <21<10>9", heads, [_file_cells(file) for file in examined.files])
+    if any(file.share < 1 or not file.ended for file in examined.files):
         lines.append("~: read in part")
     lines += _quality_lines(examined.quality)
     if examined.legs:
@@ -26,13 +26,13 @@ def text(examined: Examined) -> str:
     lines += _soundings_lines(examined)
     lines.append("")
     for severity, head in (("fault", "Wrong"), ("look", "But look")):
-        lines += [f"{head}: {one.words}." for one in examined.findings if one.severity == severity]
+        lines += [f"{head}: {finding.words}." for finding in examined.findings if finding.severity == severity]
     if not examined.findings:
         lines.append("Nothing found.")
     return "\n".join(lines)
 
 
-def _pass_lines(examined: Examined) -> list[str]:
+def _pass_lines(examined: SessionCheck) -> list[str]:
     rows = [
         (
             str(number),
@@ -50,8 +50,8 @@ def _pass_lines(examined: Examined) -> list[str]:
     return text_table("<6<22>8>10>10>8>8  <1", heads, rows)
 
 
-def _quality_lines(found: Quality) -> list[str]:
-    """What the INS says of itself; nothing where it says nothing."""
+def _quality_lines(found: InsQuality) -> list[str]:
+    """Return what the INS says of itself; nothing where it says nothing."""
     lines = []
     for name, kinds in found.by_file.items():
         for counts in kinds.values():
@@ -65,8 +65,8 @@ def _quality_lines(found: Quality) -> list[str]:
     return lines
 
 
-def _by_face(examined: Examined) -> list[dict[str, Any]]:
-    """Wet faces with the soundings expected and found on them; none where they were not counted."""
+def _by_face(examined: SessionCheck) -> list[dict[str, Any]]:
+    """Return wet faces with the soundings expected and found on them; none where they were not counted."""
     if examined.model is None or examined.soundings is None:
         return []
     both = zip(examined.model.faces, examined.soundings.expected, examined.soundings.found, strict=True)
@@ -78,8 +78,8 @@ def _by_face(examined: Examined) -> list[dict[str, Any]]:
     ]
 
 
-def _soundings_lines(examined: Examined) -> list[str]:
-    """By family; by face they are in the JSON."""
+def _soundings_lines(examined: SessionCheck) -> list[str]:
+    """Return the soundings by family; by face they are in the JSON."""
     faces = _by_face(examined)
     if not faces:
         return []
@@ -92,41 +92,42 @@ def _soundings_lines(examined: Examined) -> list[str]:
     return ["", *text_table("<22>10>10>8 <1", ("soundings on", "expected", "found", "share", f"({USUAL})"), rows)]
 
 
-def _file_cells(seen: Seen) -> tuple[str, ...]:
-    about = "" if seen.share == 1.0 and seen.ended else "~"
-    first, last = (utc_text(t) for t in seen.span_ns) if len(seen.epochs_ns) else ("-", "-")
+def _file_cells(file: SurveyedFile) -> tuple[str, ...]:
+    about = "" if file.share == 1.0 and file.ended else "~"
+    first, last = (utc_text(t) for t in file.span_ns) if len(file.epochs_ns) else ("-", "-")
     last = last[11:] if last[:10] == first[:10] else last
-    rate = _rate(seen.rate_hz) if np.isfinite(seen.rate_hz) else "-"
-    return seen.sensor, seen.name, seen.kind, f"{about}{seen.records}", first, last, rate
+    rate = _rate(file.rate_hz) if np.isfinite(file.rate_hz) else "-"
+    return file.sensor, file.name, file.kind, f"{about}{file.records}", first, last, rate
 
 
 def _rate(rate_hz: float) -> str:
-    """
+    """Return a rate to three digits.
+
     >>> _rate(10638.7), _rate(199.98), _rate(9.9)
     ('10600 Hz', '200 Hz', '9.9 Hz')
     """
     return f"{float(f'{rate_hz:.3g}'):.15g} Hz"
 
 
-def as_json(examined: Examined) -> str:
-    """The same, times as GPS nanoseconds."""
+def check_json(examined: SessionCheck) -> str:
+    """Return the same as JSON, times as GPS nanoseconds."""
     content: dict[str, Any] = {
         "faulty": examined.faulty,
         "findings": [{"question": f.question, "severity": f.severity, "words": f.words} for f in examined.findings],
         "files": [
             {
-                "sensor": seen.sensor,
-                "file": seen.name,
-                "kind": seen.kind,
-                "bytes": seen.size,
-                "share_read": seen.share if seen.ended else None,
-                "records": seen.records,
-                "dropped": {reason: number for reason, number in sorted(seen.dropped.items()) if number},
-                "first_ns": seen.span_ns[0] if len(seen.epochs_ns) else None,
-                "last_ns": seen.span_ns[1] if len(seen.epochs_ns) else None,
-                "rate_hz": seen.rate_hz if np.isfinite(seen.rate_hz) else None,
+                "sensor": file.sensor,
+                "file": file.name,
+                "kind": file.kind,
+                "bytes": file.size,
+                "share_read": file.share if file.ended else None,
+                "records": file.records,
+                "dropped": {reason: number for reason, number in sorted(file.dropped.items()) if number},
+                "first_ns": file.span_ns[0] if len(file.epochs_ns) else None,
+                "last_ns": file.span_ns[1] if len(file.epochs_ns) else None,
+                "rate_hz": file.rate_hz if np.isfinite(file.rate_hz) else None,
             }
-            for seen in examined.files
+            for file in examined.files
         ],
         "ins_states": examined.quality.by_file,
         "ins_sigmas": examined.quality.sigmas,

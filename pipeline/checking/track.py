@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.file_survey import Columns, Seen
+from pipeline.checking.file_survey import Columns, SurveyedFile
 from pipeline.config.pool import Ingest, TargetPlace
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
@@ -25,35 +25,56 @@ NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "
 
 @dataclass(frozen=True)
 class Leg:
-    """The boat past the target once: while it is abeam of it. ``astern``: against its own heading; ``ran``: by sensor
-    the share of that time in which it ran."""
+    """One way of the boat past the target, while it is abeam of it.
+
+    Attributes
+    ----------
+    start_ns, end_ns : int
+        Times at which it begins and ends.
+    distance_m : float
+        Of the INS from the target's front; positive on the side to which the front looks.
+    speed_m_s : float
+        Along the target.
+    heading_swing_deg : float
+        Standard deviation of the heading.
+    height_m : float
+        Of the INS in the target frame.
+    starboard : bool
+        Whether the target is to starboard.
+    ran : Mapping[str, float]
+        By sensor the share of the time in which it ran.
+    astern : bool
+        Whether the boat goes against its own heading.
+    """
 
     start_ns: int
     end_ns: int
-    distance_m: float  # + where the target's front looks
+    distance_m: float
     speed_m_s: float
     heading_swing_deg: float
-    height_m: float  # of the INS in the target frame
+    height_m: float
     starboard: bool
     ran: Mapping[str, float]
     astern: bool = False
 
     @property
     def good(self) -> bool:
-        """As a session wants it: in front of the target, which is to starboard."""
+        """Whether the boat is in front of the target, and has it to starboard, as a session wants it."""
         return self.starboard and self.distance_m > 0
 
 
 @dataclass(frozen=True)
 class Track:
+    """The INS's poses in the pool frame, and the legs past the target."""
+
     frame: PoolFrame
     trajectory: Trajectory
     legs: tuple[Leg, ...]
 
 
-def joined(files: Sequence[Seen]) -> Columns:
-    """All records of the INS in order of time, each time once, thinned where they are many."""
-    pieces = [seen.columns for seen in files if seen.sensor == "ins" and seen.records]
+def joined(files: Sequence[SurveyedFile]) -> Columns:
+    """Return all records of the INS in order of time, each time once, thinned where they are many."""
+    pieces = [file.columns for file in files if file.sensor == "ins" and file.records]
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in ("t_ns", *NAMES)}
     _, first = np.unique(columns["t_ns"], return_index=True)
     rows = first[:: max(1, len(first) // MOST_RECORDS)]
@@ -61,7 +82,7 @@ def joined(files: Sequence[Seen]) -> Columns:
 
 
 def frame_of(ins: Columns, place: TargetPlace) -> PoolFrame | None:
-    """The pool frame; None where its azimuth is to follow from the track, and does not."""
+    """Return the pool frame; None where its azimuth is to follow from the track, and does not."""
     at = (np.radians(place.origin.latitude_deg), np.radians(place.origin.longitude_deg), place.origin.height_m)
     if place.azimuth_deg is not None:
         return PoolFrame.at(*at, float(np.radians(place.azimuth_deg)))
@@ -71,15 +92,31 @@ def frame_of(ins: Columns, place: TargetPlace) -> PoolFrame | None:
 
 
 def track_of(
-    ins: Columns, frame: PoolFrame, model: TargetModel, files: Sequence[Seen], settings: Ingest
+    ins: Columns, frame: PoolFrame, model: TargetModel, files: Sequence[SurveyedFile], settings: Ingest
 ) -> Track:
+    """Return the INS's track and its legs past the target.
+
+    Parameters
+    ----------
+    ins : Columns
+        The INS's records.
+    frame : PoolFrame
+        The pool frame.
+    model : TargetModel
+        The target.
+    files : Sequence[SurveyedFile]
+        The session's files, which tell what ran in each leg.
+    settings : Ingest
+        What ends a pass.
+    """
     positions, R = poses_in_pool(frame, GeodeticPoses(**{name: ins[name] for name in NAMES}))
     t_ns = ins["t_ns"]
     low, high = model.bounds()
     reach, max_gap_ns = float(max(-low[1], high[1])), round(settings.max_gap_s * NS)
-    coarse = max((seen.coarseness_ns for seen in files if seen.sensor == "ins"), default=0.0)
+    coarseness_ns = max((file.coarseness_ns for file in files if file.sensor == "ins"), default=0.0)
+    longest_gap_ns = max(max_gap_ns, round(coarseness_ns))
     legs = []
-    for start, end in find_passes(t_ns, positions[:, 1], t_ns, max(max_gap_ns, round(coarse)), settings.reversal_m):
+    for start, end in find_passes(t_ns, positions[:, 1], t_ns, longest_gap_ns, settings.reversal_m):
         x, y = positions[:, 0], positions[:, 1]
         rows = np.flatnonzero((t_ns >= start) & (t_ns <= end) & (np.abs(y) <= reach) & (np.abs(x) <= NEAR_M))
         if len(rows) > 1 and np.ptp(y[rows]) >= min(SHORTEST_M, reach):
@@ -87,29 +124,33 @@ def track_of(
     return Track(frame, Trajectory.build(t_ns, positions, R), tuple(legs))
 
 
-def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[Seen]) -> Leg:
+def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile]) -> Leg:
     start, end = int(t_ns[0]), int(t_ns[-1])
     away = float(np.median(positions[:, 0]))
     ahead = R[:, :2, 1]  # of the body's y axis, level
     heading = np.arctan2(ahead[:, 0], ahead[:, 1])
     forward = float(np.median(ahead[:, 1])) > 0
     run = float(positions[-1, 1] - positions[0, 1])
+    by_sensor = {sensor: [file for file in files if file.sensor == sensor] for sensor in ("laser", "mbes")}
     return Leg(
-        start,
-        end,
-        -away,
-        abs(run) / max((end - start) / NS, 1e-3),
-        float(np.degrees(np.std(np.unwrap(heading)))),
-        float(np.median(positions[:, 2])),
-        forward == (away < 0),
-        {sensor: _ran(start, end, [seen for seen in files if seen.sensor == sensor]) for sensor in ("laser", "mbes")},
-        forward != (run > 0),
+        start_ns=start,
+        end_ns=end,
+        distance_m=-away,
+        speed_m_s=abs(run) / max((end - start) / NS, 1e-3),
+        heading_swing_deg=float(np.degrees(np.std(np.unwrap(heading)))),
+        height_m=float(np.median(positions[:, 2])),
+        starboard=forward == (away < 0),
+        ran={sensor: _ran(start, end, of_sensor) for sensor, of_sensor in by_sensor.items()},
+        astern=forward != (run > 0),
     )
 
 
 def askew_deg(track: Track) -> float | None:
-    """By how much the boat headed and went to the right of the target's +y while it had target.origin to starboard and
-    near, within ±180 degrees: the lesser of the two, none where they do not agree. None where it never had."""
+    """Return by how much the boat sailed to the right of the target's +y, within ±180 degrees.
+
+    It is taken while the boat had target.origin to starboard and near: the lesser of what it headed and what it made
+    good, 0 where the two do not agree. None where the boat never had target.origin there.
+    """
     x, y = track.trajectory.positions_m[:, :2].T
     ahead = track.trajectory.R_frame_from_body[:, :2, 1]
     near = abeam(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
@@ -121,11 +162,11 @@ def askew_deg(track: Track) -> float | None:
     return float(np.degrees(min(headed, went, key=abs))) if headed * went > 0 else 0.0
 
 
-def _ran(start: int, end: int, files: Sequence[Seen]) -> float:
-    """Share of a time in which a sensor ran, second by second; of files read in pieces, from one to the next."""
-    known = [seen for seen in files if len(seen.epochs_ns)]
-    width = max([BIN_NS, *(round(seen.coarseness_ns) for seen in known)])
+def _ran(start: int, end: int, files: Sequence[SurveyedFile]) -> float:
+    """Return the share of a time in which a sensor ran: by seconds; by pieces, of files that were read in pieces."""
+    known = [file for file in files if len(file.epochs_ns)]
+    width = max([BIN_NS, *(round(file.coarseness_ns) for file in known)])
     bins = max(1, (end - start) // width)
-    t_ns = np.concatenate([np.empty(0, np.int64), *(seen.epochs_ns for seen in known)])
+    t_ns = np.concatenate([np.empty(0, np.int64), *(file.epochs_ns for file in known)])
     inside = t_ns[(t_ns >= start) & (t_ns < start + bins * width)]
     return float(len(np.unique((inside - start) // width)) / bins)

@@ -1,11 +1,11 @@
-"""Questions to the track: is the boat where the target is, does it pass it as it should, did everything run."""
+"""Questions to the track: is the boat where the target is, does it pass it as it should, did every sensor run."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checking.file_survey import Columns, Seen
+from pipeline.checking.file_survey import Columns, SurveyedFile
 from pipeline.checking.findings import Finding
 from pipeline.checking.track import Track, askew_deg
 from pipeline.config.pool import PoolConfig, TargetPlace
@@ -25,8 +25,18 @@ ASKEW_DEG = 15.0  # between the boat's heading and the target's +y: no coarse az
 HOLE_S = 0.3  # without the INS while a sensor saw the target
 
 
-def place(ins: Columns, pool: PoolConfig, model: TargetModel) -> Iterator[Finding]:
-    """The track against target.origin; a finding here leaves nothing to ask about the target."""
+def origin_findings(ins: Columns, pool: PoolConfig, model: TargetModel) -> Iterator[Finding]:
+    """Yield where the track is far from target.origin; nothing more is asked about the target then.
+
+    Parameters
+    ----------
+    ins : Columns
+        The INS's records.
+    pool : PoolConfig
+        The pool's settings.
+    model : TargetModel
+        The target.
+    """
     origin = pool.target.origin
     away = _away_m(ins, origin.latitude_deg, origin.longitude_deg)
     if away > ASTRAY_M:
@@ -49,7 +59,7 @@ def place(ins: Columns, pool: PoolConfig, model: TargetModel) -> Iterator[Findin
 
 
 def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
-    """Nearest horizontal distance of the track from a place."""
+    """Return the nearest horizontal distance of the track from a place."""
     if not -90 <= latitude_deg <= 90:
         return np.inf
     frame = PoolFrame.at(np.radians(latitude_deg), np.radians(longitude_deg), 0.0, 0.0)
@@ -58,6 +68,7 @@ def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
 
 
 def _why_astray(ins: Columns, origin: Origin) -> str:
+    """Return the remedy: what would bring target.origin to the track."""
     latitude, longitude = origin.latitude_deg, origin.longitude_deg
     for words, place in (
         ("latitude and longitude are interchanged", (longitude, latitude)),
@@ -70,12 +81,13 @@ def _why_astray(ins: Columns, origin: Origin) -> str:
     return "check target.origin, and that these are this pool's files"
 
 
-def sailing(track: Track, place: TargetPlace) -> Iterator[Finding]:
-    """Passes on the wrong side, none at all, all at one distance."""
+def sailing_findings(track: Track, place: TargetPlace) -> Iterator[Finding]:
+    """Yield passes on the wrong side, none at all, all at one distance; ``place`` has the azimuth as configured."""
     sounded = [leg for leg in track.legs if max(leg.ran.values()) > NOT]
     legs = f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')}"
     if not track.legs:
-        yield Finding("passes", f"the boat never passes the target: {heading(track, place) or 'check target.origin'}")
+        remedy = azimuth_remedy(track, place) or "check target.origin"
+        yield Finding("passes", f"the boat never passes the target: {remedy}")
     elif all(leg.distance_m < 0 for leg in track.legs):
         given = place.azimuth_deg
         turned = "" if given is None else f" ({(given + 180) % 360:g} in place of {given:g})"
@@ -88,7 +100,7 @@ def sailing(track: Track, place: TargetPlace) -> Iterator[Finding]:
             yield Finding("side", f"{words}, stern first by its heading: is the INS's heading turned by 180°?")
         else:
             yield Finding("side", f"{words}: sail the other way, with the target's front to starboard")
-    elif askew := heading(track, place):
+    elif askew := azimuth_remedy(track, place):
         yield Finding("azimuth", f"the boat does not sail along the target: {askew}")
     distances = [leg.distance_m for leg in sounded if leg.good]
     if distances and np.ptp(distances) < ALIKE_M:
@@ -100,8 +112,8 @@ def sailing(track: Track, place: TargetPlace) -> Iterator[Finding]:
         )
 
 
-def heading(track: Track, place: TargetPlace) -> str:
-    """What to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
+def azimuth_remedy(track: Track, place: TargetPlace) -> str:
+    """Return what to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
     turn = askew_deg(track)
     if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:
         return ""
@@ -112,24 +124,39 @@ def heading(track: Track, place: TargetPlace) -> str:
     )
 
 
-def missing(track: Track, files: Sequence[Seen]) -> Iterator[Finding]:
-    """A pass of which one sensor has nothing, or not all."""
-    there = {seen.sensor for seen in files if seen.records} - {seen.sensor for seen in files if not seen.ended}
+def missing_pass_findings(track: Track, files: Sequence[SurveyedFile]) -> Iterator[Finding]:
+    """Yield passes of which one sensor has nothing, or not all."""
+    there = {file.sensor for file in files if file.records} - {file.sensor for file in files if not file.ended}
     for leg in track.legs:
         if not leg.good or not {"laser", "mbes"} <= there:
             continue
-        for one, other in (("laser", "mbes"), ("mbes", "laser")):
+        for running, silent in (("laser", "mbes"), ("mbes", "laser")):
             when = f"{utc_text(leg.start_ns)}, at {leg.distance_m:.1f} m"
-            if leg.ran[one] >= RAN and leg.ran[other] < RAN:
-                part = "did not run" if leg.ran[other] < NOT else f"ran for only {leg.ran[other]:.0%} of the time"
+            if leg.ran[running] >= RAN and leg.ran[silent] < RAN:
+                part = "did not run" if leg.ran[silent] < NOT else f"ran for only {leg.ran[silent]:.0%} of the time"
                 yield Finding(
                     "missing pass",
-                    f"{other}: {part} in the pass of {when}, while {one} did: find its file, or sail the pass again",
+                    f"{silent}: {part} in the pass of {when}, while {running} did: find its file, or sail the pass "
+                    "again",
                 )
 
 
-def holes(track: Track, epochs: dict[str, Times], max_interval_s: float, coarse_ns: float) -> Iterator[Finding]:
-    """Holes in the INS's log while the boat was by the target and a sensor ran."""
+def ins_hole_findings(
+    track: Track, epochs: dict[str, Times], max_interval_s: float, coarse_ns: float
+) -> Iterator[Finding]:
+    """Yield holes in the INS's log while the boat was by the target and a sensor ran.
+
+    Parameters
+    ----------
+    track : Track
+        Of the INS.
+    epochs : dict[str, Times]
+        Times at which each sensor ran.
+    max_interval_s : float
+        The longest interval between two INS records that is interpolated over.
+    coarse_ns : float
+        Time between two places at which the INS's files were read; 0 where they were read whole.
+    """
     t_ns, y = track.trajectory.t_ns, track.trajectory.positions_m[:, 1]
     by = [np.abs(y[(t_ns >= leg.start_ns) & (t_ns <= leg.end_ns)]).max() for leg in track.legs]
     reach = float(max(by, default=0.0))

@@ -15,9 +15,16 @@ Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by se
 
 
 @dataclass(frozen=True)
-class Calibrated:
-    """Soundings, each with the face that it is on, and tables: the target's pose, the mount that the labels are by, and
-    the adjustment's ``freed``; none where it got no farther."""
+class TrialCalibration:
+    """Tables of a trial calibration; None where it got no farther.
+
+    Attributes
+    ----------
+    soundings : Stream
+        Soundings, each with the face that it is on.
+    target_pose, provisional_mount, freed : pd.DataFrame or None
+        The pose of the target, the mount that the labels are made with, and the adjustment's ``freed``.
+    """
 
     soundings: Stream = EMPTY_STREAM
     target_pose: pd.DataFrame | None = None
@@ -25,4 +32,4 @@ class Calibrated:
     freed: pd.DataFrame | None = None
 
 
-Calibrate = Callable[[SessionConfig, PoolConfig, Raw], Calibrated]
+Calibrate = Callable[[SessionConfig, PoolConfig, Raw], TrialCalibration]

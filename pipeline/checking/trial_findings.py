@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.from_tables import rotation_vector_deg, target_frame
 from pipeline.checking.findings import Finding
-from pipeline.checking.heights import profile, way
-from pipeline.checking.point_samples import Sample, put
+from pipeline.checking.heights import SideOfWater, profile, way
+from pipeline.checking.point_samples import PointSample, place_points
 from pipeline.checking.track import Track
 from pipeline.config.mount import Mount
 from pipeline.config.pool import PoolConfig
@@ -32,21 +32,37 @@ DIRECTIONS = 0.3  # smallest singular value of normals that span all directions
 HALF = 0.5  # of its error, which a reversed sign must leave at most
 
 
-def other_pose(
-    track: Track, laser: Sample, pose: pd.DataFrame, model: TargetModel, pool: PoolConfig
+def pose_findings(
+    track: Track, laser: PointSample, pose: pd.DataFrame, model: TargetModel, pool: PoolConfig
 ) -> Iterator[Finding]:
-    """Whether the laser's points lie better on the target elsewhere than where they were found to: at another height,
-    or with its sides exchanged; and what of that cannot be told."""
+    """Yield where the laser's points lie better on the target than in the pose of the trial calibration.
+
+    It may stand at another height, or with its sides exchanged; where the points cannot tell, that is said.
+
+    Parameters
+    ----------
+    track : Track
+        Of the INS.
+    laser : PointSample
+        The laser's points.
+    pose : pd.DataFrame
+        The table ``segment/target_pose`` of the trial calibration.
+    model : TargetModel
+        The target as it is configured.
+    pool : PoolConfig
+        The pool's settings.
+    """
     found = pose.iloc[0]
     frame = target_frame(pose)
     R, origin = frame.R_target_from_pool, frame.origin_pool_m
-    points = put(track, laser.near(track))
+    points = place_points(track, laser.in_good_legs(track))
     points = (points[np.isfinite(points[:, 0])] - origin) @ R.T
     if not len(points):
         return
     models = [model] if model.symmetric else [model, model.mirrored()]
+    side = SideOfWater("laser", model.water_level_m)
     agreed = np.array(
-        [profile(points, "laser", ClosestSurface(one), model.water_level_m, SHIFTS_M, REACH_M) for one in models]
+        [profile(points, ClosestSurface(shape), SHIFTS_M, side, REACH_M) for shape in models]
     )
     exchanged, place = map(int, np.unravel_index(int(agreed.argmax()), agreed.shape))
     higher = SHIFTS_M - origin[2]  # than the target is configured
@@ -56,7 +72,7 @@ def other_pose(
     as_found = agreed[0, np.abs(SHIFTS_M) <= SMALLEST_M + STEP_M / 2].max()
     another = bool(as_found < CLEARLY * agreed.max())
     if found["ambiguous"] and len(alike) > 1:
-        ways = ", or ".join(_said(*one) for one in alike)
+        ways = ", or ".join(_described(*peak) for peak in alike)
         yield Finding(
             "target",
             f"target: the laser's points fit it as well {ways}: its upper end was not seen clearly enough to tell; let "
@@ -82,17 +98,17 @@ def other_pose(
 
 
 def _peaks(agreed: Array, shifts: Array) -> list[tuple[bool, float]]:
-    """Sides exchanged or not, and shift, of all that agree as well as the best but for a neighbour of it."""
-    found = []
+    """Return the peaks that agree as well as the best: whether sides are exchanged, and the shift."""
+    peaks = []
     for exchanged, row in enumerate(agreed):
         for k in np.flatnonzero(row >= CLEARLY * agreed.max()).tolist():
             around = row[np.abs(shifts - shifts[k]) < 2 * REACH_M]
             if row[k] == around.max():
-                found.append((bool(exchanged), float(shifts[k])))
-    return found
+                peaks.append((bool(exchanged), float(shifts[k])))
+    return peaks
 
 
-def _said(exchanged: bool, shift_m: float) -> str:
+def _described(exchanged: bool, shift_m: float) -> str:
     height = f"with target.origin.height_m {way(-shift_m, 'higher', 'lower')}"
     height = "as it is given" if abs(shift_m) <= SMALLEST_M else height
     return f"with left and right exchanged, {height}" if exchanged else height
@@ -105,12 +121,25 @@ def _sides(target: Target) -> str:
     return "reverse the sign of the y of all corners, and the order of each face's corners"
 
 
-def signs(
-    given: Mount, provisional: pd.DataFrame, model: TargetModel, within_deg: float
+def sign_findings(
+    coarse: Mount, provisional: pd.DataFrame, model: TargetModel, within_deg: float
 ) -> Iterator[Finding]:
-    """Angles whose reversed sign is nearer to the mount that the sample asks for; ``within_deg``: how far off a coarse
-    mount may be, so that the calibration finds the rest. Nothing of a target whose faces do not look into three
-    directions: with a plain wall some angles are free, and come out as chance has it."""
+    """Yield angles whose reversed sign is nearer to the mount that the sample asks for.
+
+    Nothing is said with a target whose faces do not look into three directions: with a plain wall some angles are not
+    determined, and come out as chance has it.
+
+    Parameters
+    ----------
+    coarse : Mount
+        The sonar's coarse mount as configured.
+    provisional : pd.DataFrame
+        The table ``segment/provisional_mount`` of the trial calibration.
+    model : TargetModel
+        The target.
+    within_deg : float
+        How far off a coarse mount may be, so that the calibration finds the rest.
+    """
     normals = np.array([face.normal for face in model.faces if face.seen != "dry"])
     if np.linalg.matrix_rank(normals, tol=DIRECTIONS) < 3:
         return
@@ -118,26 +147,29 @@ def signs(
     turn_deg = rotation_vector_deg(row)
     if not np.isfinite(turn_deg).all():
         return
-    wanted = corrected_mount(given, turn_deg)
+    wanted = corrected_mount(coarse, turn_deg)
 
     def off_deg(mount: Mount) -> float:
         R = mount_of(mount).R_body_from_sensor
         return float(np.degrees(np.linalg.norm(log_so3(wanted.R_body_from_sensor @ R.T))))
 
-    as_given = off_deg(given)
-    keys = [key for key in ANGLES if abs(getattr(given, key)) > SMALL_DEG]
-    some = [set_ for number in (1, 2, 3) for set_ in combinations(keys, number)]
-    reversed_ = [(off_deg(given.model_copy(update={key: -getattr(given, key) for key in one})), one) for one in some]
-    best, which = min(reversed_, default=(np.inf, ()))
-    if as_given < LEAST_DEG or best > HALF * as_given:
+    as_configured = off_deg(coarse)
+    keys = [key for key in ANGLES if abs(getattr(coarse, key)) > SMALL_DEG]
+    choices = [choice for number in (1, 2, 3) for choice in combinations(keys, number)]
+
+    def reversed_at(choice: tuple[str, ...]) -> Mount:
+        return coarse.model_copy(update={key: -getattr(coarse, key) for key in choice})
+
+    best, which = min(((off_deg(reversed_at(choice)), choice) for choice in choices), default=(np.inf, ()))
+    if as_configured < LEAST_DEG or best > HALF * as_configured:
         return
-    found = wanted.settings()
-    values = {key: getattr(given, key) for key in which}
+    settings = wanted.settings()
+    values = {key: getattr(coarse, key) for key in which}
     changed = ", ".join(f"mbes.mount.{key} = {-value:g} in place of {value:g}" for key, value in values.items())
-    asked = ", ".join(f"{key} {found[key]:.1f}" for key in ANGLES)
+    asked = ", ".join(f"{key} {settings[key]:.1f}" for key in ANGLES)
     yield Finding(
         "sign",
         f"mbes: the soundings fit better with {changed} (a sample of them asks for {asked}): reverse the sign; if you "
         "have measured it so, enter those three values and check again",
-        "fault" if as_given > within_deg else "look",
+        "fault" if as_configured > within_deg else "look",
     )

@@ -26,6 +26,8 @@ TiltSigma = Annotated[float, Field(ge=1e-4, le=10)]
 
 
 class Mark(Model):
+    """A mark: its coordinates (m) and, where it has its own, their standard deviations."""
+
     at: tuple[Coordinate, Coordinate, Coordinate]
     sigma_m: Sigmas | None = None
 
@@ -81,6 +83,8 @@ class Body(Model):
 
 
 class Marks(Model):
+    """MARKS.yaml: the survey, the body frame, and the drawings of the sensors."""
+
     survey: Survey
     body: Body
     laser: Drawing | None = None
@@ -95,12 +99,13 @@ class Marks(Model):
 
     @property
     def sensors(self) -> dict[str, Drawing]:
+        """The drawings of the sensors that have one."""
         both = {"laser": self.laser, "mbes": self.mbes}
         return {name: drawing for name, drawing in both.items() if drawing is not None}
 
     @property
     def named(self) -> dict[str, list[str]]:
-        """By key, the marks that must have been surveyed."""
+        """The marks that must have been surveyed, by key."""
         axes = self.body.axes
         found = {"body.marks": list(self.body.marks or {})}
         if axes is not None:
@@ -110,7 +115,7 @@ class Marks(Model):
 
 
 def load_marks(path: Path) -> Marks:
-    """Checked, every name in it known."""
+    """Return the marks in a file, checked, every name in it known; raise ConfigError where they are not."""
     content = read_yaml(path)
     for name in ("survey", "body", "laser", "mbes"):
         _spell_out(content.get(name))
@@ -128,7 +133,7 @@ def load_marks(path: Path) -> Marks:
 
 
 def _spell_out(block: Any) -> None:
-    """A mark's short form, [x, y, z], and one sigma for all three, in full; what is neither is left to the model."""
+    """Write a mark's short form, [x, y, z], and one sigma for all three in full; leave the rest to the model."""
     inside = block.get("marks") if isinstance(block, dict) else None
     if isinstance(inside, dict):
         for name, mark in inside.items():

@@ -1,4 +1,4 @@
-"""PLAN.yaml: passes that are to be sailed, and of the instruments what a session's settings do not tell."""
+"""PLAN.yaml: passes that are to be sailed, and the figures of instruments that a session's settings do not have."""
 
 from typing import Annotated
 
@@ -12,7 +12,7 @@ Sway = Annotated[float, Field(ge=0, le=5)]
 
 
 class LaserFigures(Model):
-    """Lines athwart, by an angle from the scanner's z axis towards its x axis."""
+    """Rates and field of the scanner: lines athwart, by an angle from its z axis towards its x axis."""
 
     point_rate_hz: Rate = 20_000.0
     line_rate_hz: Rate = 50.0
@@ -21,6 +21,8 @@ class LaserFigures(Model):
 
 
 class MbesFigures(Model):
+    """Rates and sector of the sonar."""
+
     ping_rate_hz: Annotated[float, Field(ge=0.1, le=200)] = 20.0
     beams: Annotated[int, Field(ge=2, le=2048)] = 256
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
@@ -29,7 +31,7 @@ class MbesFigures(Model):
 
 
 class Unrest(Model):
-    """Amplitude and period of what the boat does about its track."""
+    """Amplitudes and period of the boat's motion about its track."""
 
     roll_deg: Swing = 1.0
     pitch_deg: Swing = 0.6
@@ -47,6 +49,7 @@ class Pass(Model):
     half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the blocks
 
     def seconds(self, half_length_m: float) -> float:
+        """Return the time of the pass; ``half_length_m``: where it has none of its own."""
         return 2 * (self.half_length_m or half_length_m) / self.speed_m_s
 
 
@@ -58,6 +61,8 @@ class Budget(Model):
 
 
 class Plan(Model):
+    """PLAN.yaml: the passes to be sailed, and the rates of the instruments."""
+
     ins_height_m: Lever = 1.3  # of the INS above the water
     ins_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
     laser: LaserFigures = LaserFigures()

@@ -1,7 +1,7 @@
-"""YAML -> frozen, strict models. Unknown keys, wrong types and impossible values are errors that name file and key.
+"""The pool's config: the target, and a block of thresholds for each stage.
 
-Two files are read: the pool's config (target, thresholds) and the session's (instrument files, mounts, sigmas).
-Both keep the units of the contract (degrees, metres); code that computes converts at once to radians.
+Settings keep the units of the contract (degrees, metres); code that computes converts at once to radians. Unknown
+keys, wrong types and impossible values are errors that name file and key.
 """
 
 from typing import Annotated, Literal
@@ -12,7 +12,6 @@ from pipeline.config.quantities import Model, NotNegative, Positive, SigmaDeg, S
 from pipeline.config.target import Origin, Target
 
 
-# --- the pool --------------------------------------------------------------------------------------------------------
 class AsBuilt(Model):
     """The target as surveyed: faces off their design, and how far the wet ones of a family may stand off besides."""
 
@@ -22,23 +21,29 @@ class AsBuilt(Model):
 
 
 class TargetPlace(Model):
-    """Of the target, what reading the files needs: changing a letter must not read them again."""
+    """What reading the files needs of the target: changing a letter must not read them again."""
 
     origin: Origin
     azimuth_deg: float | None
 
 
 class Ingest(Model):
+    """What ends a pass."""
+
     max_gap_s: Positive = 5.0  # a longer gap in INS or soundings ends a pass
     reversal_m: Positive = 1.0  # going back along the track by more than this ends a pass
 
 
 class Georeference(Model):
+    """How far round the target points are kept, and how far apart INS records may be."""
+
     box_margin_m: Annotated[float, Field(ge=1.5, le=20)] = 1.5  # round the target; what lies outside is dropped
     max_ins_interval_s: Annotated[float, Field(gt=0, le=1)] = 0.1  # never interpolate over a longer hole in the INS
 
 
 class Segment(Model):
+    """How the target and the coarse mounts are searched for, and which points get a label."""
+
     margin_m: NotNegative = 0.03  # to a face's edges, beyond the footprint's half extent
     gate_m: Positive = 0.05  # smallest gate round a face; widened to five times the robust scale
     water_margin_m: NotNegative = 0.10  # no point nearer than this to the water line is used
@@ -56,22 +61,30 @@ class Segment(Model):
 
     @property
     def farthest_mount(self) -> tuple[float, float]:
-        """Angle (degrees) and lever arm (m) beyond which no mount found is taken: the coarse one's error may be half as
-        large again as it is said to be."""
+        """Angle (degrees) and lever arm (m) from the coarse mount beyond which no mount is taken.
+
+        The coarse mount's error may be half as large again as it is said to be.
+        """
         return 1.5 * self.search_mount_deg, 1.5 * self.search_mount_m
 
 
 class FitPlanes(Model):
+    """Which planes are fitted."""
+
     min_points: Annotated[int, Field(ge=10)] = 50  # a plane of fewer points is not fitted
 
 
 class AngleIterate(Model):
+    """When the patent's iteration of angles ends."""
+
     max_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
     step_tolerance_deg: Positive = 1e-6
     angle_tolerance_deg: Positive = 1e-6  # change of the angles between the normals in one step
 
 
 class Offsets(Model):
+    """How the patent's offsets are found, and when their iteration ends."""
+
     max_iterations: Annotated[int, Field(ge=1, le=10000)] = 500
     step_tolerance_deg: Positive = 1e-7
     step_tolerance_m: Positive = 1e-8
@@ -82,6 +95,8 @@ Freeable = Literal["mbes_latency", "laser_latency", "sound_speed"]
 
 
 class Adjust(Model):
+    """What the adjustment estimates, and how it weights and tests."""
+
     free: tuple[Freeable, ...] = ()  # estimated besides the mount and the surfaces
     max_iterations: Annotated[int, Field(ge=1, le=100)] = 20
     robust_k0: Annotated[float, Field(ge=0.5, le=1000)] = 3.0  # IGG III: full weight below, in sigmas
@@ -111,6 +126,8 @@ class LaserFit(Model):
 
 
 class Verdict(Model):
+    """The largest total sigmas of an accepted calibration."""
+
     max_sigma_deg: Positive = 0.05
     max_sigma_m: Positive = 0.005
 
@@ -119,7 +136,7 @@ Method = Literal["patent_sequential", "patent_alternating", "adjustment"]
 
 
 class PoolConfig(Model):
-    """configs/<pool>.yaml"""
+    """The pool's config: configs/<pool>.yaml."""
 
     target: Target
     as_built: AsBuilt = AsBuilt()
@@ -136,9 +153,5 @@ class PoolConfig(Model):
 
     @property
     def target_place(self) -> TargetPlace:
+        """What reading the files needs of the target."""
         return TargetPlace(origin=self.target.origin, azimuth_deg=self.target.azimuth_deg)
-
-
-# --- reading ---------------------------------------------------------------------------------------------------------
-
-

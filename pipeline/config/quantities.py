@@ -21,6 +21,8 @@ Latency = Annotated[float, Field(ge=-10, le=10)]
 
 
 class Model(BaseModel):
+    """A block of settings: frozen, strict, without unknown keys."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 

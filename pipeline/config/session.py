@@ -43,6 +43,8 @@ class White(Model):
 
 
 class Ins(Model):
+    """The INS: its files, its clock, its errors."""
+
     instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["novatel", "sbet", "inertial_explorer", "table"]
@@ -68,6 +70,8 @@ class Ins(Model):
 
 
 class Laser(Model):
+    """The laser scanner: its files, its coarse mount, its errors."""
+
     instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["las", "e57", "table"]
@@ -110,6 +114,8 @@ class Laser(Model):
 
 
 class Mbes(Model):
+    """The sonar: its files, its coarse mount, sound speed, and errors."""
+
     instrument: InstrumentUsed | None = None
     files: Files
     format: Literal["r2sonic", "gsf", "kmall", "all", "table"]
@@ -146,7 +152,7 @@ class Mbes(Model):
 
 
 class SessionConfig(Model):
-    """SESSION/session.yaml"""
+    """The session's config: SESSION/session.yaml."""
 
     name: Annotated[str, Field(min_length=1, max_length=300)]  # left out: the session folder's name
     ins: Ins
@@ -155,12 +161,12 @@ class SessionConfig(Model):
 
     @property
     def calibrated(self) -> Calibrated:
-        """What is calibrated: the laser, where there is no sonar."""
+        """Which sensor is calibrated: the laser, where there is no sonar."""
         return "laser" if self.mbes is None else "mbes"
 
     @property
     def sonar(self) -> Mbes:
-        """The sonar, where one is needed."""
+        """The sonar; raise ConfigError where there is none."""
         if self.mbes is None:
             raise ConfigError("session.yaml: mbes is missing: there is no sonar to be calibrated; add its block")
         return self.mbes

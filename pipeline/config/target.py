@@ -19,7 +19,7 @@ FaceNames = Annotated[tuple[FaceName, ...], Field(min_length=2)]
 
 
 class Origin(Model):
-    """Of the target frame; of the patent's target the middle of the centre wall's front face."""
+    """Origin of the target frame: of the patent's target the middle of the centre wall's front face."""
 
     latitude_deg: Annotated[float, Field(ge=-90, le=90)]
     longitude_deg: Annotated[float, Field(ge=-180, le=360)]
@@ -99,6 +99,7 @@ class RelationSettings(Model):
 
     @property
     def given(self) -> dict[Literal["same_plane", "distance", "height", "parallel"], tuple[str, ...]]:
+        """The faces by the kind of relation; one entry."""
         kinds = {
             "same_plane": self.same_plane, "distance": self.distance, "height": self.height, "parallel": self.parallel,
         }
@@ -118,10 +119,12 @@ class Faces(Model):
 
     @property
     def shape(self) -> str:
+        """Which settings give the shape, for people."""
         return "target.faces"
 
     @property
     def sides(self) -> str:
+        """Which setting tells left from right."""
         return "the sign of y in target.faces"
 
 

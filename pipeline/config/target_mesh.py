@@ -28,9 +28,10 @@ GROUP = "group"
 
 
 def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
-    """A pool's (or scenario's) settings with the corners of ``target.mesh``, a file beside ``path``, written out.
+    """Return the content of a pool's (or scenario's) file with the corners of its ``target.mesh`` written out.
 
-    What ``target.faces`` says of a group (seen, role) stays; a face with corners of its own is one more.
+    The mesh is a file beside ``path``. What ``target.faces`` says of a group (seen, role) stays; a face with corners of
+    its own is one more. Raises ConfigError where the mesh cannot be used.
     """
     target = content.get("target")
     if not isinstance(target, dict) or target.get("kind") != "faces" or "mesh" not in target:
@@ -50,7 +51,7 @@ def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
     if twice:
         raise ConfigError(f"{path}: target.faces.{twice[0]}: has corners here and in the mesh; take one of them out")
     faces = {key: {"corners": corners.tolist()} | given.get(key, {}) for key, corners in found.items()}
-    faces |= {key: one for key, one in given.items() if key not in faces}
+    faces |= {key: face for key, face in given.items() if key not in faces}
     return content | {"target": {key: value for key, value in target.items() if key != "mesh"} | {"faces": faces}}
 
 
@@ -58,7 +59,7 @@ Groups = Mapping[str, tuple[Array, Sequence[Polygon]]]
 
 
 def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
-    """By group its outline's corners (k, 3), in the polygons' sense of turning."""
+    """Yield by group its outline's corners (k, 3), in the polygons' sense of turning."""
     read = {".obj": _obj, ".ply": _ply}.get(path.suffix.lower())
     if read is None:
         raise ConfigError(f"{where}: is neither .obj nor .ply; export it as one of them")
@@ -77,10 +78,10 @@ def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
     if not 0 < len(groups) <= MOST_GROUPS:
         raise ConfigError(f"{where}: has {len(groups)} groups of faces, of 1 to {MOST_GROUPS}; export the target alone")
     for name, (vertices, polygons) in groups.items():
-        used = np.unique([number for one in polygons for number in one])
+        used = np.unique([number for polygon in polygons for number in polygon])
         if not len(used) or used[0] < 0 or used[-1] >= len(vertices) or not np.all(np.isfinite(vertices[used])):
             raise ConfigError(f"{where}: group {name!r}: a polygon's vertex is not there; export it again")
-        own = [np.searchsorted(used, one).tolist() for one in polygons]
+        own = [np.searchsorted(used, polygon).tolist() for polygon in polygons]
         yield name, _outline(vertices[used], own, f"{where}: group {name!r}")
 
 
@@ -90,7 +91,7 @@ def _obj(content: bytes, path: Path) -> Groups:
     text = io.StringIO(content.decode("utf-8", errors="replace"), newline=None)
     scene = load_obj(text, skip_materials=True, split_groups=True, split_objects=True)
     meshes = scene.get("geometry", {"mesh": scene})
-    return {name: (_array(one["vertices"]), np.asarray(one["faces"]).tolist()) for name, one in meshes.items()}
+    return {name: (_array(mesh["vertices"]), np.asarray(mesh["faces"]).tolist()) for name, mesh in meshes.items()}
 
 
 def _ply(content: bytes, path: Path) -> Groups:
@@ -121,7 +122,7 @@ def _array(values: Any) -> Array:
 
 
 def _outline(vertices: Array, polygons: Sequence[Polygon], where: str) -> Array:
-    """The one closed line around some polygons: their edges that no neighbour runs the other way."""
+    """Return the corners (k, 3) of the single outline of polygons: their edges that no neighbour runs the other way."""
     pairs = cKDTree(vertices).query_pairs(SAME_M, output_type="ndarray")
     count = len(vertices)
     _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count)))

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 from pipeline.config.plan import Pass
 from pipeline.maths.adjustment.parameters import SIX
 from pipeline.maths.adjustment.solution import WORDS, Solution, solve, together
-from pipeline.planning.prediction import Setting, predict
+from pipeline.planning.prediction import PredictionSetting, predict
 
 Array = NDArray[np.float64]
 NEAR_M = 1.5  # passes whose distances differ by less are at one distance
 WANTED_DEG, WANTED_M = 0.025, 0.0025  # larger random sigmas are worth another pass
+WANTED = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
 TWICE = 2  # passes there
-VAGUE = 1.0  # rad or m, of every unknown
+VAGUE = 1.0  # rad or m, of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 HORIZONTAL = (
     "the sonar sees no horizontal face: only the boat's rolling and pitching tell its height, and a still boat tells "
@@ -25,8 +26,20 @@ HORIZONTAL = (
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a session had: distances of its passes, number of soundings by family; the families that are horizontal."""
+class Coverage:
+    """What the passes of a session, or of a plan, cover.
+
+    Attributes
+    ----------
+    distances_m : Sequence[float]
+        Distances of the passes with soundings.
+    soundings : Mapping[str, int]
+        Number of soundings by family of faces.
+    level : Collection[str]
+        The families that are horizontal.
+    speed_m_s, heading_swing_deg : float
+        Of a usual pass; the swing is an amplitude.
+    """
 
     distances_m: Sequence[float]
     soundings: Mapping[str, int]
@@ -36,82 +49,109 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Geometry:
-    """``gaps``: what the passes lack, each in words; ``remedy``: what to sail, with what it would bring."""
+class GeometryAdvice:
+    """What the passes lack, each in words (``gaps``), and what to sail, with what it would bring (``remedy``)."""
 
     gaps: list[str]
     remedy: str
 
 
-def geometry_of(setting: Setting, seen: Seen, normal: Array, solution: Solution) -> Geometry:
-    """``normal`` (u, u): the session's."""
-    bounds, gaps = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3), _gaps(seen)
-    sigma = _sigmas(normal, solution)
+def geometry_advice(
+    setting: PredictionSetting, coverage: Coverage, normal: Array, solution: Solution
+) -> GeometryAdvice:
+    """Return what the passes lack, and which passes would help.
+
+    Parameters
+    ----------
+    setting : PredictionSetting
+        Target and instruments.
+    coverage : Coverage
+        What the passes cover.
+    normal : ndarray, shape (u, u)
+        Their normal equations (rad, m).
+    solution : Solution
+        Of these equations.
+    """
+    determined = _Determined(normal, solution.free.tolist())
+    gaps, sigma = _gaps(coverage), determined.sigmas()
     pair = None if solution.deficiency else together(solution.covariance[:SIX, :SIX])
-    if not (gaps or np.any(sigma > bounds)):
-        return Geometry([], "")  # where all are sure enough, two that move together do no harm
-    among = range(SIX) if pair is None else pair[:2]
-    target = max(among, key=lambda k: sigma[k] / bounds[k])
-    return Geometry(gaps, _remedy(setting, seen, normal, solution, target, bounds))
+    if not (gaps or np.any(sigma > WANTED)):
+        return GeometryAdvice([], "")  # where all are sure enough, two that move together do no harm
+    choice = range(SIX) if pair is None else pair[:2]
+    parameter = max(choice, key=lambda k: sigma[k] / WANTED[k])
+    return GeometryAdvice(gaps, _remedy(setting, coverage, determined, parameter))
 
 
-def _sigmas(normal: Array, solution: Solution) -> Array:
-    """Of the six (6,), with :data:`VAGUE` for what is known before any pass: finite where the data leave all open."""
-    prior = np.zeros(len(normal))
-    prior[solution.free] = VAGUE**-2
-    known = solve(normal + np.diag(prior), np.zeros(len(normal)), solution.free.tolist())
-    return np.asarray(np.sqrt(np.diag(known.covariance))[:SIX])
+@dataclass(frozen=True)
+class _Determined:
+    """What the passes determine: normal equations (u, u), and the indices of the estimated parameters."""
+
+    normal: Array
+    free: list[int]
+
+    def sigmas(self) -> Array:
+        """Return the sigmas of the mount parameters (6,), rad and m.
+
+        Of every parameter :data:`VAGUE` is known before any pass, so that they are finite where the data leave all
+        open.
+        """
+        prior = np.zeros(len(self.normal))
+        prior[self.free] = VAGUE**-2
+        known = solve(self.normal + np.diag(prior), np.zeros(len(self.normal)), self.free)
+        return np.asarray(np.sqrt(np.diag(known.covariance))[:SIX])
+
+    def with_passes(self, further: Array) -> Solution:
+        """Return the solution with the normal equations of further passes."""
+        return solve(self.normal + further, np.zeros(len(self.normal)), self.free)
 
 
-def _gaps(seen: Seen) -> list[str]:
-    there = {family for family, count in seen.soundings.items() if count}
-    upright = [family for family in seen.soundings if family not in seen.level]
+def _gaps(coverage: Coverage) -> list[str]:
+    """Return what the passes lack, each in words."""
+    there = {family for family, count in coverage.soundings.items() if count}
+    upright = [family for family in coverage.soundings if family not in coverage.level]
     if len(there) == 1 and len(upright) > 1 and there <= set(upright):
         (family,) = there
-        one = SIDES.get(family, family).removesuffix(f" ({family})")
-        return [f"the sonar sees {one} alone: nothing tells where it is along it, or how high"]
-    found = []
+        side = SIDES.get(family, family).removesuffix(f" ({family})")
+        return [f"the sonar sees {side} alone: nothing tells where it is along it, or how high"]
+    gaps = []
     missing = [SIDES.get(family, family) for family in upright if family not in there]
     if missing:
-        found.append(f"the sonar sees nothing of {' and '.join(missing)}")
-    if not there & set(seen.level):
-        found.append(HORIZONTAL)
-    low, high = min(seen.distances_m, default=0.0), max(seen.distances_m, default=0.0)
-    if len(seen.distances_m) == 1:
-        found.append(f"one pass alone has soundings, at {low:.1f} m: nothing shows whether another would agree")
-    elif seen.distances_m and high - low < NEAR_M:
-        found.append(
+        gaps.append(f"the sonar sees nothing of {' and '.join(missing)}")
+    if not there & set(coverage.level):
+        gaps.append(HORIZONTAL)
+    low, high = min(coverage.distances_m, default=0.0), max(coverage.distances_m, default=0.0)
+    if len(coverage.distances_m) == 1:
+        gaps.append(f"one pass alone has soundings, at {low:.1f} m: nothing shows whether another would agree")
+    elif coverage.distances_m and high - low < NEAR_M:
+        gaps.append(
             f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart"
         )
-    return found
+    return gaps
 
 
-def _remedy(
-    setting: Setting,
-    seen: Seen,
-    normal: Array,
-    solution: Solution,
-    target: int,
-    bounds: Array,
-) -> str:
-    """The distance at which two more passes would help most, and by how much; empty if none halves the sigma."""
-    before = float(_sigmas(normal, solution)[target])
+def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determined, parameter: int) -> str:
+    """Return the distance at which two more passes would help most, and by how much.
+
+    It says how the sigma of one mount ``parameter`` falls; empty where no distance halves it.
+    """
+    before = float(determined.sigmas()[parameter])
     best: tuple[float, float, float] | None = None
     for distance in TRIED_M:
-        one = Pass(distance_m=distance, speed_m_s=seen.speed_m_s, heading_swing_deg=seen.heading_swing_deg)
-        further = predict(setting, [one], phases=1).normal
-        after = solve(normal + TWICE * further, np.zeros(len(normal)), solution.free.tolist())
+        planned = Pass(
+            distance_m=distance, speed_m_s=coverage.speed_m_s, heading_swing_deg=coverage.heading_swing_deg
+        )
+        after = determined.with_passes(TWICE * predict(setting, [planned], phases=1).normal)
         if after.deficiency:
             continue
         sigma = np.sqrt(np.diag(after.covariance))[:SIX]
-        worst = float(np.max(sigma / bounds))
+        worst = float(np.max(sigma / WANTED))
         if best is None or worst < best[0]:
-            best = worst, distance, float(sigma[target])
+            best = worst, distance, float(sigma[parameter])
     if best is None or best[2] > before / 2:
         return ""
-    was = "open" if before > VAGUE / 2 else _sized(before, target)
-    now = _sized(best[2], target)
-    return f"two more passes at {best[1]:.0f} m would bring sigma {WORDS[target]} from {was} to {now}"
+    was = "open" if before > VAGUE / 2 else _sized(before, parameter)
+    now = _sized(best[2], parameter)
+    return f"two more passes at {best[1]:.0f} m would bring sigma {WORDS[parameter]} from {was} to {now}"
 
 
 def _sized(sigma: float, which: int) -> str:

@@ -6,8 +6,8 @@ from typing import Any
 
 from pipeline.artefacts.streams import EMPTY_STREAM
 from pipeline.checking import rendering
-from pipeline.checking.check_session import examine
-from pipeline.checking.trial_calibration import Calibrated, Raw
+from pipeline.checking.check_session import check_session
+from pipeline.checking.trial_calibration import Raw, TrialCalibration
 from pipeline.config.load import load_session
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
@@ -35,16 +35,16 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     """
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
-    found = examine(session, content, pool, _calibrated)
+    found = check_session(session, content, pool, _calibrated)
     if as_json:
-        return print_answer(rendering.as_json(found), not found.faulty)
+        return print_answer(rendering.check_json(found), not found.faulty)
     used = None if content.mbes is None else content.mbes.svp_from
     cast = "" if used is None else f"mbes.svp: {in_words(used)}\n\n"
     unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"
-    return print_answer(f"{cast}{rendering.text(found)}{unasked}", not found.faulty)
+    return print_answer(f"{cast}{rendering.check_text(found)}{unasked}", not found.faulty)
 
 
-def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrated:
+def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> TrialCalibration:
     found: dict[str, Any] = {}
 
     def kept(key: str, value: Any) -> Any:
@@ -54,4 +54,4 @@ def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> Calibrate
     with suppress(PoolcalError):
         calibrate_in_memory(session, pool, raw, "adjust", kept)
     tables = (found.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
-    return Calibrated(found.get("segment/soundings_labelled", EMPTY_STREAM), *tables)
+    return TrialCalibration(found.get("segment/soundings_labelled", EMPTY_STREAM), *tables)

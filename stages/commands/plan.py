@@ -12,8 +12,9 @@ from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import mount_of
 from pipeline.planning import assessment
-from pipeline.planning.assessment import Answer, Outlook, shares_of_limits
-from pipeline.planning.prediction import Setting
+from pipeline.planning.assessment import Accuracy, PlanAssessment, shares_of_limits
+from pipeline.planning.plan_document import plan_document
+from pipeline.planning.prediction import PredictionSetting
 from pipeline.run.output_files import refuse_output
 from pipeline.run.settings import load_settings
 from pipeline.text_table import text_table
@@ -40,7 +41,7 @@ def command(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: P
     refuse_output("--rrd", rrd, session)
     settings = load_settings(session, pool_file)
     pool, wanted = settings.pool, assessment.load_plan(file, settings.session)
-    answer = assessment.judge(wanted, pool, settings.session)
+    answer = assessment.assess_plan(wanted, pool, settings.session)
     said = table(answer, pool.verdict)
     if rrd is not None:
         from stages.views.plan import save_plan
@@ -48,12 +49,12 @@ def command(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: P
         with writing(rrd):
             save_plan(answer, said, rrd)
     if out is not None:
-        write_text(out, yaml.safe_dump(assessment.as_plain(answer), sort_keys=False))
+        write_text(out, yaml.safe_dump(plan_document(answer), sort_keys=False))
     return print_answer(said, assessment.is_enough(answer, pool.verdict))
 
 
-def table(answer: Answer, limits: Verdict) -> str:
-    """For the screen."""
+def table(answer: PlanAssessment, limits: Verdict) -> str:
+    """Return a plan's assessment for the screen."""
     setting, plan = answer.setting, answer.setting.plan
     rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
     lines = ["As given:", *_passes(setting, rows), *_sigmas(setting, answer.given, limits)]
@@ -73,8 +74,8 @@ def table(answer: Answer, limits: Verdict) -> str:
     return "\n".join(lines)
 
 
-def _chosen(answer: Answer, better: Outlook, limits: Verdict) -> list[str]:
-    """The list chosen, like passes together, and what it does to the sigmas: not all of them need get smaller."""
+def _chosen(answer: PlanAssessment, better: Accuracy, limits: Verdict) -> list[str]:
+    """Return the list chosen, like passes together, and what it does to the sigmas: some of them may grow."""
     alike: dict[Pass, tuple[int, float, dict[str, assessment.Array]]] = {}
     for one, seconds, points in better.each():
         number, longest, sums = alike.get(one, (0, 0.0, dict.fromkeys(points, np.zeros(1))))
@@ -99,8 +100,8 @@ def _chosen(answer: Answer, better: Outlook, limits: Verdict) -> list[str]:
     return [*lines, f"Larger than as given: {', '.join(grown)}."] if grown else lines
 
 
-def _passes(setting: Setting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
-    """One line a kind of pass: how many, the time of one, and the points of all of them."""
+def _passes(setting: PredictionSetting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
+    """Return one line for each kind of pass: how many, the time of one, and the points of all of them."""
     families = list(dict.fromkeys(face.family for face in setting.model.faces))
     cells = []
     for number, one, seconds, points in rows:
@@ -114,13 +115,13 @@ def _passes(setting: Setting, rows: list[tuple[int, Pass, float, dict[str, asses
     return text_table(f"  >6>10>10>8>8>15{'  >7' * len(families)}>15", heads, cells)
 
 
-def _sigmas(setting: Setting, outlook: Outlook, limits: Verdict) -> list[str]:
+def _sigmas(setting: PredictionSetting, accuracy: Accuracy, limits: Verdict) -> list[str]:
     heads, layout = ("sigma", "random", "total", "limit"), "  <8>12>12>12  <1"
-    if outlook.solution.deficiency:
-        open_ones = plural(outlook.solution.deficiency, "direction")
+    if accuracy.solution.deficiency:
+        open_ones = plural(accuracy.solution.deficiency, "direction")
         return [*text_table(layout, heads, []), f"  {open_ones} of the unknowns left open: no result"]
     mounted = mount_of(setting.mbes.mount)
-    random, total = mounted.sigmas(outlook.random), mounted.sigmas(outlook.total)
+    random, total = mounted.sigmas(accuracy.random), mounted.sigmas(accuracy.total)
     rows = []
     for name, _, key, unit in PARAMETERS:
         limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, "m")

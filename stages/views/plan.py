@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 from pipeline.atomic_files import write_bytes
-from pipeline.planning.assessment import Answer, Outlook
-from pipeline.planning.prediction import track
+from pipeline.planning.assessment import Accuracy, PlanAssessment
+from pipeline.planning.prediction import planned_track
 from pipeline.results.pages.families import styles_of_families
 from stages.views.recording import COLOURS, GREY, LASER, SONAR, recording_content, text_document
 
 PLENTY = 1000  # soundings on a face, from which on it is coloured in full
 
 
-def save_plan(answer: Answer, said: str, path: Path) -> None:
-    """``said``: the table of the screen."""
+def save_plan(answer: PlanAssessment, said: str, path: Path) -> None:
+    """Write a recording of a plan to ``path``; ``said``: the text of the screen."""
     import rerun.blueprint as rrb
 
     def draw(recording: Any) -> None:
@@ -29,7 +29,7 @@ def save_plan(answer: Answer, said: str, path: Path) -> None:
     write_bytes(path, recording_content("plan", rrb.Blueprint(rrb.Horizontal(*views, column_shares=[3, 2])), draw))
 
 
-def _target(recording: Any, answer: Answer) -> None:
+def _target(recording: Any, answer: PlanAssessment) -> None:
     import rerun as rr
 
     colours = styles_of_families([family.name for family in answer.setting.model.families], COLOURS)
@@ -39,7 +39,7 @@ def _target(recording: Any, answer: Answer) -> None:
         recording.log(f"target/{face.name}", strip, static=True)
 
 
-def _list(recording: Any, answer: Answer, name: str, outlook: Outlook) -> None:
+def _list(recording: Any, answer: PlanAssessment, name: str, outlook: Accuracy) -> None:
     """Log faces coloured by their soundings over all passes, and the track of each pass."""
     import rerun as rr
 
@@ -54,6 +54,6 @@ def _list(recording: Any, answer: Answer, name: str, outlook: Outlook) -> None:
         mesh = rr.Mesh3D(vertex_positions=face.vertices_m, triangle_indices=fan, vertex_colors=colours)
         recording.log(f"{name}/faces/{face.name}", mesh, rr.AnyValues(soundings=round(count)), static=True)
     for number, sailed in enumerate(outlook.passes):
-        line = track(answer.setting, sailed, number)[::10].astype(np.float32)
+        line = planned_track(answer.setting, sailed, number)[::10].astype(np.float32)
         strip = rr.LineStrips3D([line], radii=0.02, colors=LASER, labels=[f"{sailed.distance_m:g} m"])
         recording.log(f"{name}/tracks/{number}", strip, static=True)

@@ -11,7 +11,7 @@ import pytest
 
 import stages.commands.check
 from pipeline.checking import excerpts
-from pipeline.checking.trial_calibration import Calibrated
+from pipeline.checking.trial_calibration import TrialCalibration
 from tests.support.effort import often
 from tests.support.places import edit, poolcal, simulate
 from tests.support.roots import SCENARIOS
@@ -51,7 +51,7 @@ def spoilt(good: Callable[..., Path], tmp_path: Path) -> Callable[..., Path]:
 def _calibrated(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Seconds are spent on calibrating a sample only where it is asked what that tells."""
     if not request.node.get_closest_marker("calibrates"):
-        monkeypatch.setattr(stages.commands.check, "_calibrated", lambda *_: Calibrated())
+        monkeypatch.setattr(stages.commands.check, "_calibrated", lambda *_: TrialCalibration())
 
 
 def checked(session: Path) -> tuple[int, list[dict[str, Any]]]:

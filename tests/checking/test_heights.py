@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from pipeline.checking import check_session as asked
 from pipeline.checking import target_hits, track_checks, trial_findings
-from pipeline.checking.file_survey import Seen, survey
+from pipeline.checking.file_survey import SurveyedFile, survey_files
 from pipeline.checking.findings import Finding
-from pipeline.checking.point_samples import Sample, put, sample
+from pipeline.checking.point_samples import PointSample, place_points, sample_points
 from pipeline.checking.track import Track, frame_of, joined, track_of
-from pipeline.checking.trial_calibration import Calibrated
+from pipeline.checking.trial_calibration import TrialCalibration
 from pipeline.config.load import load_pool, load_session
 from pipeline.config.mount import Mount
 from pipeline.config.pool import PoolConfig
@@ -39,18 +39,18 @@ FINE: dict[str, Any] = {"ins": {"rate_hz": 100.0}, "mbes": {"ping_rate_hz": 10.0
 class Looked:
     """A session as ``check`` has it in hand when it asks where the points fall."""
 
-    files: list[Seen]
+    files: list[SurveyedFile]
     session: SessionConfig
     pool: PoolConfig
     model: TargetModel
     closest: ClosestSurface
 
-    def samples(self, track: Track, **mounts: dict[str, float]) -> list[Sample]:
+    def samples(self, track: Track, **mounts: dict[str, float]) -> list[PointSample]:
         found = []
         for sensor in ("laser", "mbes"):
             settings = getattr(self.session, sensor)
             changed = settings.model_copy(update={"mount": settings.mount.model_copy(update=mounts.get(sensor, {}))})
-            some = sample(self.files, self.session.model_copy(update={sensor: changed}), sensor, track, 2_000)
+            some = sample_points(self.files, self.session.model_copy(update={sensor: changed}), sensor, track, 2_000)
             assert some is not None
             found.append(some)
         return found
@@ -68,7 +68,7 @@ class Looked:
         changed = {"origin": origin, "water_level_m": target.water_level_m + water_m}
         pool = self.pool.model_copy(update={"target": target.model_copy(update=changed)})
         track = self.track(pool)
-        return list(target_hits.off_target(track, self.samples(track, **mounts), self.closest, pool))
+        return list(target_hits.points_off_target(track, self.samples(track, **mounts), self.closest, pool))
 
 
 @pytest.fixture(scope="module", params=["default", "small_target", "dock"])
@@ -84,7 +84,7 @@ def blocks(tmp_path_factory: pytest.TempPathFactory) -> Looked:
 def _looked(folder: Path, scenario: str) -> Looked:
     simulate(folder, base=SCENARIOS / f"{scenario}.yaml", **FINE)
     session, pool = load_session(folder), load_pool(folder / "pool.yaml")
-    files, wrong = survey(session, folder)
+    files, wrong = survey_files(session, folder)
     assert not wrong
     model = target_of(pool.target)
     return Looked(files, session, pool, model, ClosestSurface(model))
@@ -126,10 +126,10 @@ def test_heights_of_points_that_others_placed_are_no_mount(blocks: Looked, off: 
     """The lever arm of a laser whose points are in a CRS moves none of them."""
     track = blocks.track(blocks.pool)
     laser, mbes = blocks.samples(track)
-    points = put(track, laser)
+    points = place_points(track, laser)
     rows = np.isfinite(points[:, 0])
     placed = replace(laser, t_ns=laser.t_ns[rows], points_m=points[rows] + [0.0, 0.0, off], georeferenced=True)
-    (found,) = target_hits.off_target(track, [placed, mbes], blocks.closest, blocks.pool)
+    (found,) = target_hits.points_off_target(track, [placed, mbes], blocks.closest, blocks.pool)
     assert found.words.startswith("laser: laser points miss the target, but hit it if they lay ")
     shift, way = found.words.split("if they lay ")[1].split(" m ")[:2]
     assert float(shift) == pytest.approx(abs(off), abs=0.4)
@@ -160,7 +160,7 @@ def test_a_lever_arm_in_centimetres(blocks: Looked) -> None:
 @pytest.mark.parametrize(("turn", "said"), [(90, "never passes"), (-90, "never passes"), (40, "does not sail along")])
 def test_a_wrong_azimuth_is_proposed(blocks: Looked, turn: float, said: str) -> None:
     pool = blocks.pool.model_copy(update={"target": blocks.pool.target.model_copy(update={"azimuth_deg": turn})})
-    (found,) = track_checks.sailing(blocks.track(pool), pool.target_place)
+    (found,) = track_checks.sailing_findings(blocks.track(pool), pool.target_place)
     assert said in found.words
     assert f"target.azimuth_deg is {turn:g}" in found.words
     assert "write 0," in found.words
@@ -169,7 +169,7 @@ def test_a_wrong_azimuth_is_proposed(blocks: Looked, turn: float, said: str) -> 
 @pytest.mark.parametrize("turn", [-12.0, 12.0])
 def test_an_azimuth_about_right_is_not_doubted(blocks: Looked, turn: float) -> None:
     pool = blocks.pool.model_copy(update={"target": blocks.pool.target.model_copy(update={"azimuth_deg": turn})})
-    assert list(track_checks.sailing(blocks.track(pool), pool.target_place)) == []
+    assert list(track_checks.sailing_findings(blocks.track(pool), pool.target_place)) == []
 
 
 def test_a_target_to_port_is_not_one_from_behind(blocks: Looked) -> None:
@@ -178,7 +178,8 @@ def test_a_target_to_port_is_not_one_from_behind(blocks: Looked) -> None:
 
     def said(**changed: Any) -> str:
         legs = tuple(type(leg)(**{**leg.__dict__, **changed}) for leg in track.legs)
-        (found,) = track_checks.sailing(type(track)(track.frame, track.trajectory, legs), blocks.pool.target_place)
+        turned = type(track)(track.frame, track.trajectory, legs)
+        (found,) = track_checks.sailing_findings(turned, blocks.pool.target_place)
         assert found.question == "side"
         return found.words
 
@@ -200,7 +201,7 @@ def _pose(z_m: float = 0.0, ambiguous: bool = True, within: bool = True) -> pd.D
 def _other_pose(looked: Looked, pose: pd.DataFrame, **target: Any) -> list[Finding]:
     pool = looked.pool.model_copy(update={"target": looked.pool.target.model_copy(update=target)})
     track = looked.track(pool)
-    return list(trial_findings.other_pose(track, looked.samples(track)[0], pose, target_of(pool.target), pool))
+    return list(trial_findings.pose_findings(track, looked.samples(track)[0], pose, target_of(pool.target), pool))
 
 
 @pytest.mark.parametrize("off", [-1.0, -0.5, 0.5, 1.0])
@@ -269,7 +270,7 @@ SIGNS = [
 @pytest.mark.parametrize(("wrong", "said", "severity"), SIGNS)
 def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severity: str) -> None:
     given = TRUE.model_copy(update=wrong)
-    (found,) = trial_findings.signs(given, _provisional(given), BLOCKS, 3.0)
+    (found,) = trial_findings.sign_findings(given, _provisional(given), BLOCKS, 3.0)
     assert said in found.words
     assert "roll_deg -48.8, pitch_deg 1.2, yaw_deg -2.0" in found.words
     assert found.severity == severity
@@ -278,14 +279,14 @@ def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severit
 @pytest.mark.parametrize("near", [{"pitch_deg": 2.0, "yaw_deg": -2.8}, {"yaw_deg": -4.9}, {"pitch_deg": -0.2}])
 def test_coarse_angles_are_no_wrong_signs(near: dict[str, float]) -> None:
     given = TRUE.model_copy(update=near)
-    assert list(trial_findings.signs(given, _provisional(given), BLOCKS, 3.0)) == []
+    assert list(trial_findings.sign_findings(given, _provisional(given), BLOCKS, 3.0)) == []
 
 
 def test_a_plain_wall_says_nothing_of_signs() -> None:
     """Its soundings leave yaw and more to chance."""
     given = TRUE.model_copy(update={"yaw_deg": 2.8})
     flat = TargetModel(BLOCKS.faces[:1], BLOCKS.families[:1], (), BLOCKS.water_level_m, None)
-    assert list(trial_findings.signs(given, _provisional(given), flat, 3.0)) == []
+    assert list(trial_findings.sign_findings(given, _provisional(given), flat, 3.0)) == []
 
 
 def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:
@@ -301,7 +302,7 @@ def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:
 def test_what_follows_from_a_wrong_pose_is_not_said(blocks: Looked, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of faces without soundings nothing, where the target does not stand as configured."""
     pool = blocks.pool.model_copy(update={"target": blocks.pool.target.model_copy(update={"low_side": "north"})})
-    monkeypatch.setattr(asked, "survey", lambda *_: (blocks.files, []))
-    trial: Callable[..., Calibrated] = lambda *_: Calibrated(target_pose=_pose())  # noqa: E731
-    found = asked.examine(Path("."), blocks.session, pool, trial)
+    monkeypatch.setattr(asked, "survey_files", lambda *_: (blocks.files, []))
+    trial: Callable[..., TrialCalibration] = lambda *_: TrialCalibration(target_pose=_pose())  # noqa: E731
+    found = asked.check_session(Path("."), blocks.session, pool, trial)
     assert [one.question for one in found.findings] == ["sides"]

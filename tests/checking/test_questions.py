@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from pipeline.checking import clocks, expected_soundings, file_checks, ins_quality, rendering
-from pipeline.checking.check_session import Examined
-from pipeline.checking.file_survey import Seen, survey
-from pipeline.checking.latency import latencies
+from pipeline.checking.check_session import SessionCheck
+from pipeline.checking.file_survey import SurveyedFile, survey_files
+from pipeline.checking.latency import latency_findings
 from pipeline.checking.track import Leg
 from pipeline.config.session import SessionConfig
 from pipeline.config.target import Letters, Origin
@@ -24,12 +24,12 @@ SIGMAS = {"north_m": 0.01, "east_m": 0.01, "up_m": 0.02, "roll_deg": 0.01, "pitc
 MOUNT = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.2, "y_m": 0.5, "z_m": 1.0}
 
 
-def _ins(status: np.ndarray, sigmas: dict[str, float] | None = None, **more: Any) -> Seen:
+def _ins(status: np.ndarray, sigmas: dict[str, float] | None = None, **more: Any) -> SurveyedFile:
     """An INS at 100 Hz with these states of its records."""
     t_ns = START + np.arange(len(status), dtype=np.int64) * (NS // 100)
     told = {} if sigmas is None else {"t_ns": t_ns} | {k: np.full(len(t_ns), v) for k, v in sigmas.items()}
     states = {"status": status.astype(np.uint8)} | more
-    return Seen("ins", "ins/a.gps", 1, records=len(t_ns), epochs_ns=t_ns, columns={"t_ns": t_ns}, states=states,
+    return SurveyedFile("ins", "ins/a.gps", 1, records=len(t_ns), epochs_ns=t_ns, columns={"t_ns": t_ns}, states=states,
                 sigmas=told)  # fmt: skip
 
 
@@ -38,8 +38,9 @@ def _leg(first: int, last: int) -> Leg:
     return Leg(START + first * NS // 100, START + last * NS // 100, 5.0, 0.4, 1.0, 1.3, True, ran)
 
 
-def _judged(seen: Seen, legs: list[Leg]) -> list[tuple[str, str]]:
-    return [(one.severity, one.words) for one in ins_quality.told(ins_quality.quality([seen], legs))]
+def _judged(seen: SurveyedFile, legs: list[Leg]) -> list[tuple[str, str]]:
+    quality = ins_quality.assess_ins_quality([seen], legs)
+    return [(finding.severity, finding.words) for finding in ins_quality.quality_findings(quality)]
 
 
 GOOD, COMPLETE, FREE = 3, 7, 6
@@ -49,7 +50,7 @@ def test_an_ins_that_is_good_in_the_passes_is_not_doubted() -> None:
     """That it was aligning before them is as it should be."""
     status = np.r_[np.full(900, COMPLETE), np.full(1100, GOOD)]
     assert _judged(_ins(status, SIGMAS), [_leg(1000, 1999)]) == []
-    quality = ins_quality.quality([_ins(status)], [_leg(1000, 1999)])
+    quality = ins_quality.assess_ins_quality([_ins(status)], [_leg(1000, 1999)])
     assert quality.by_file["ins/a.gps"]["status"] == {"INS_ALIGNMENT_COMPLETE": 900, "INS_SOLUTION_GOOD": 1100}
     assert quality.together["status"] == {"INS_SOLUTION_GOOD": 1000}
 
@@ -105,12 +106,12 @@ def test_the_kind_of_positions(kind: int, doubted: bool) -> None:
 
 def test_people_and_programs_see_states_and_sigmas() -> None:
     seen = _ins(np.r_[np.full(100, COMPLETE), np.full(300, GOOD)], SIGMAS)
-    examined = Examined((seen,), (), (), quality=ins_quality.quality([seen], []))
-    text = rendering.text(examined)
+    examined = SessionCheck((seen,), (), (), quality=ins_quality.assess_ins_quality([seen], []))
+    text = rendering.check_text(examined)
     assert "ins/a.gps: INS_SOLUTION_GOOD 75%, INS_ALIGNMENT_COMPLETE 25%" in text
     assert "horizontal 0.01 m" in text
     assert "heading 0.04°" in text
-    assert '"INS_ALIGNMENT_COMPLETE": 100' in rendering.as_json(examined)
+    assert '"INS_ALIGNMENT_COMPLETE": 100' in rendering.check_json(examined)
 
 
 # --- clocks ----------------------------------------------------------------------------------------------------------
@@ -126,17 +127,17 @@ def _epochs(**weeks: int) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("off", [-2, 1])
 def test_of_three_clocks_the_odd_one_is_named_with_its_week(off: int) -> None:
     weeks = {"ins": 2418 + off, "laser": None}
-    (found,) = clocks.apart(_epochs(ins=off), 5 * NS, [], weeks)
+    (found,) = clocks.clock_findings(_epochs(ins=off), 5 * NS, [], weeks)
     way = "ahead of" if off > 0 else "behind"
     assert f"ins: its clock is {'1 week' if off == 1 else '2 weeks'} {way} both sensors'" in found.words
     assert f"write ins.gps_week: 2418 in place of {2418 + off}" in found.words
 
 
 def test_a_laser_off_by_a_week_is_odd_against_ins_and_sonar() -> None:
-    (found,) = clocks.apart(_epochs(laser=1), 5 * NS, [], {"ins": 2418, "laser": 2419})
+    (found,) = clocks.clock_findings(_epochs(laser=1), 5 * NS, [], {"ins": 2418, "laser": 2419})
     assert "laser: its clock is 1 week ahead of the INS's and the sonar's" in found.words
     assert "write laser.gps_week: 2418 in place of 2419" in found.words
-    (found,) = clocks.apart(_epochs(laser=1), 5 * NS, [], {"ins": None, "laser": None})
+    (found,) = clocks.clock_findings(_epochs(laser=1), 5 * NS, [], {"ins": None, "laser": None})
     assert "check gps_week, and the GPS time flag" in found.words  # the week is the file's
 
 
@@ -144,12 +145,12 @@ def test_a_sonar_that_also_missed_the_ins_is_no_witness() -> None:
     """It ran on for a minute after the INS, for no reason that has a name."""
     epochs = _epochs(laser=1)
     epochs["mbes"] = (START + np.arange(10, 160, 0.1) * NS).astype(np.int64)
-    laser, _ = clocks.apart(epochs, 5 * NS, [])
+    laser, _ = clocks.clock_findings(epochs, 5 * NS, [])
     assert "laser: its clock is 1 week ahead of the INS's: " in laser.words
 
 
 def test_clocks_that_agree() -> None:
-    assert list(clocks.apart(_epochs(), 5 * NS, [], {})) == []
+    assert list(clocks.clock_findings(_epochs(), 5 * NS, [], {})) == []
 
 
 # --- soundings -------------------------------------------------------------------------------------------------------
@@ -161,7 +162,7 @@ def _blocks() -> Letters:
 def test_how_many_soundings_are_too_few(share: float, severity: str | None) -> None:
     model = target_of(_blocks())
     wanted = np.full(len(model.faces), 1000.0)
-    found = list(expected_soundings.missed(model, expected_soundings.Soundings(wanted, share * wanted)))
+    found = list(expected_soundings.faces_missed(model, expected_soundings.SoundingCounts(wanted, share * wanted)))
     assert {one.severity for one in found} == ({severity} if severity else set())
     assert all(f"({share:.0%}; usual: 60 to 120 %)" in one.words for one in found)
 
@@ -171,18 +172,19 @@ def test_one_face_that_is_bare_is_to_be_looked_at() -> None:
     wanted = np.full(len(model.faces), 1000.0)
     there = wanted.copy()
     there[3] = 20.0
-    (found,) = expected_soundings.missed(model, expected_soundings.Soundings(wanted, there))
+    (found,) = expected_soundings.faces_missed(model, expected_soundings.SoundingCounts(wanted, there))
     assert found.severity == "look"
     name = model.faces[3].name
     assert f"about 20 soundings on the face {name}, where these pings should give about 1000" in found.words
     wanted[3] = 100.0  # too few to tell
-    assert list(expected_soundings.missed(model, expected_soundings.Soundings(wanted, there))) == []
+    assert list(expected_soundings.faces_missed(model, expected_soundings.SoundingCounts(wanted, there))) == []
 
 
 def test_families_of_soundings_stand_in_their_order_with_their_share() -> None:
     model = target_of(_blocks())
     many = np.full(len(model.faces), 1000.0)
-    lines = rendering._soundings_lines(Examined((), (), (), model, expected_soundings.Soundings(many, 0.8 * many)))
+    counts = expected_soundings.SoundingCounts(many, 0.8 * many)
+    lines = rendering._soundings_lines(SessionCheck((), (), (), model, counts))
     assert [line.split()[0] for line in lines[2:]] == ["P1", "P2", "P3", "H"]
     assert all(line.endswith("80%") for line in lines[2:])
 
@@ -190,7 +192,7 @@ def test_families_of_soundings_stand_in_their_order_with_their_share() -> None:
 def test_a_latency_is_told_as_an_interval() -> None:
     """A guess from a sample: the adjustment of all points finds the amount."""
     row = {"unknown": "mbes_latency", "estimated": False, "value": 0.0156, "sigma": 0.0008, "considered": 0.0005}
-    (found,) = latencies(pd.DataFrame([row]))
+    (found,) = latency_findings(pd.DataFrame([row]))
     assert "mbes: its clock is 16 ms ahead of the INS's (14.0 to 17.2 ms, 95 %)" in found.words
     assert "adjust.free: [mbes_latency]" in found.words
 
@@ -199,7 +201,7 @@ def test_a_latency_is_told_as_an_interval() -> None:
 def test_a_latency_of_the_ins_is_given_with_its_sign(ahead_s: float, said: str) -> None:
     """Both sensors are ahead of an INS that is behind them; latency is taken off the recorded time."""
     of = {"estimated": False, "value": ahead_s, "sigma": 0.0008, "considered": 0.0005}
-    (found,) = latencies(pd.DataFrame([{"unknown": f"{sensor}_latency"} | of for sensor in ("laser", "mbes")]))
+    (found,) = latency_findings(pd.DataFrame([{"unknown": f"{sensor}_latency"} | of for sensor in ("laser", "mbes")]))
     assert f"ins: its clock is 20 ms {said} both sensors' (18.9 to 21.1 ms, 95 %)" in found.words
     assert f"about {-ahead_s:+.3f} s, to ins.latency_s" in found.words
 
@@ -216,26 +218,27 @@ def _session(folder: Path, **mbes: float) -> SessionConfig:
 
 @pytest.mark.parametrize(("arm_m", "doubted"), [(4.9, False), (-5.1, True), (38.0, True)])
 def test_a_lever_arm_as_long_as_a_boat_is_doubted(tmp_path: Path, arm_m: float, doubted: bool) -> None:
-    found = list(file_checks.far_arms(_session(tmp_path, x_m=arm_m)))
+    found = list(file_checks.long_lever_arms(_session(tmp_path, x_m=arm_m)))
     assert [one.severity for one in found] == (["look"] if doubted else [])
     assert all("is it in cm" in one.words for one in found)
 
 
 def test_points_of_another_zone_are_told_by_how_far_they_lie(tmp_path: Path) -> None:
-    def seen(east_m: float) -> list[Seen]:
+    def seen(east_m: float) -> list[SurveyedFile]:
         angles = np.radians([[36.0], [120.0]])
         ins = {"latitude_rad": angles[0], "longitude_rad": angles[1], "height_m": np.zeros(1)}
         at = np.array([-2583123.0, 4474100.0, 3728191.0]) + east_m * np.array([-np.sin(angles[1][0]), -0.5, 0.0])
         laser = {f"{axis}_m": at[k : k + 1] for k, axis in enumerate("xyz")}
-        return [Seen("ins", "i", 1, records=1, columns=ins), Seen("laser", "laser/a.las", 1, records=1, columns=laser)]
+        points = SurveyedFile("laser", "laser/a.las", 1, records=1, columns=laser)
+        return [SurveyedFile("ins", "i", 1, records=1, columns=ins), points]
 
     settings = _session(tmp_path).laser.model_copy(update={"frame": "EPSG:32650"})
     session = _session(tmp_path).model_copy(update={"laser": settings})
-    assert list(file_checks.frames(seen(100.0), session)) == []
-    (found,) = file_checks.frames(seen(542_000.0), session)
+    assert list(file_checks.wrong_frames(seen(100.0), session)) == []
+    (found,) = file_checks.wrong_frames(seen(542_000.0), session)
     ins, laser = seen(100.0)
     on_the_road = {name: np.r_[np.full(40, 0.6), values] for name, values in ins.columns.items()}
-    assert list(file_checks.frames([replace(ins, records=41, columns=on_the_road), laser], session)) == []
+    assert list(file_checks.wrong_frames([replace(ins, records=41, columns=on_the_road), laser], session)) == []
     assert "its points lie 542 km from the INS's track with laser.frame EPSG:32650: another zone" in found.words
 
 
@@ -253,19 +256,19 @@ def test_a_file_that_goes_away_meanwhile(tmp_path: Path, monkeypatch: pytest.Mon
             yield name, parts
 
     monkeypatch.setattr(surveying, "_parts", and_then_gone)
-    found, _ = survey(_session(tmp_path), tmp_path)
+    found, _ = survey_files(_session(tmp_path), tmp_path)
     assert len(found) == 3
     assert all("cannot be read (No such file or directory); was it moved meanwhile?" in one.complaint for one in found)
 
 
 def test_overlapping_files_are_found_among_many_quickly() -> None:
     """Ten thousand one after the other, and one of them twice: as many pairs as there are, not fifty million."""
-    def seen(number: int, name: str) -> Seen:
+    def seen(number: int, name: str) -> SurveyedFile:
         t_ns = START + number * 10 * NS + np.arange(9, dtype=np.int64) * NS
-        return Seen("laser", name, 1, records=9, epochs_ns=t_ns)
+        return SurveyedFile("laser", name, 1, records=9, epochs_ns=t_ns)
 
     many = [seen(number, f"laser/{number}.las") for number in range(10_000)] + [seen(5_000, "laser/again.las")]
     pairs = list(file_checks._overlapping(many))
     assert [(one.name, other.name) for one, other in pairs] == [("laser/5000.las", "laser/again.las")]
-    (found,) = file_checks.twice(many)
+    (found,) = file_checks.duplicate_files(many)
     assert found.words.startswith("laser/again.las: is the same recording as laser/5000.las")

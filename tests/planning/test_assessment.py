@@ -14,8 +14,9 @@ from pipeline.config.plan import Plan
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Drift, SessionConfig
 from pipeline.config.yaml_models import parse
-from pipeline.planning import assessment
+from pipeline.planning import assessment, prediction
 from pipeline.planning.assessment import shares_of_limits
+from pipeline.planning.plan_document import plan_document
 from pipeline.planning.prediction import _beams, predict
 from pipeline.simulation.beams import directions_in_mbes, swing_rad
 from stages.commands.plan import table
@@ -47,8 +48,8 @@ def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift:
     session = made({"track": {"distances_m": list(distances)}, "mbes": {"coarse_angle_deg": 0.1}}, drift, seed=6)
     result = json.loads(calibrated(session)["report/calibration.json"])["methods"]["adjustment"]
     pool, settings = parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
-    answer = assessment.judge(plan_of(*distances), pool, settings)
-    found = assessment.as_plain(answer)["given"]
+    answer = assessment.assess_plan(plan_of(*distances), pool, settings)
+    found = plan_document(answer)["given"]
     for key in ("sigma_mount", "sigma_mount_total"):
         ratio = [found[key][name] / result[key][name] for name in SETTINGS]
         assert max(abs(np.log(ratio))) < np.log(1.15), (key, dict(zip(SETTINGS, ratio, strict=True)))
@@ -61,7 +62,7 @@ def test_the_beams_of_a_plan_are_those_of_its_sectors(configs: tuple[PoolConfig,
     figures = {
         "sectors": [{"to_deg": to, "tilt_deg": tilt} for to, tilt in edges], "beams": 131, "ping_rate_hz": 10.0,
     }  # fmt: skip
-    _, rays, _ = _beams(assessment.setting_of(plan_of(4.0, mbes=figures), *configs), 0.15)
+    _, rays, _ = _beams(prediction.setting_of(plan_of(4.0, mbes=figures), *configs), 0.15)
     angles_deg = np.arange(-65.0, 66.0)
     tilts = np.radians(np.select([angles_deg <= -30, angles_deg <= 20], [8.0, -0.75], -29.5))
     swing, there = swing_rad(np.sin(np.radians(angles_deg)), tilts)
@@ -77,7 +78,7 @@ def test_the_lasers_mount_covariance_is_carried_into_the_total(configs: tuple[Po
     for name, matrix in (("one", np.outer(turn, turn)), ("apart", np.diag(turn**2)), ("none", np.zeros((6, 6)))):
         laser = session.laser.model_copy(update={"mount_covariance": tuple(map(tuple, matrix.tolist()))})
         changed = session.model_copy(update={"laser": laser})
-        totals[name] = assessment.judge(plan_of(4.0, 8.0), pool, changed).given.total
+        totals[name] = assessment.assess_plan(plan_of(4.0, 8.0), pool, changed).given.total
     added = totals["one"] - totals["none"]
     assert np.linalg.matrix_rank(added, tol=1e-6 * np.abs(added).max()) == 1
     assert np.linalg.matrix_rank(totals["apart"] - totals["none"], tol=1e-6 * np.abs(added).max()) == 3
@@ -87,7 +88,7 @@ def test_the_lasers_mount_covariance_is_carried_into_the_total(configs: tuple[Po
 def test_usable_points_are_those_that_segment_labels(configs: tuple[PoolConfig, SessionConfig]) -> None:
     session = made({"track": {"distances_m": [4.0]}}, seed=2)
     found = calibrated(session, "segment")
-    answer = assessment.judge(plan_of(4.0), *configs)
+    answer = assessment.assess_plan(plan_of(4.0), *configs)
     for sensor, stream in (("laser", "laser_labelled"), ("mbes", "soundings_labelled")):
         faces = np.concatenate([part.columns["face"] for part in found[f"segment/{stream}"].parts])
         labelled = np.bincount(faces, minlength=len(answer.setting.model.faces))
@@ -102,7 +103,7 @@ def test_without_drift_passes_add_up_and_with_it_two_tell_more(configs: tuple[Po
     pool, still = configs
     drifting = still.model_copy(update={"ins": still.ins.model_copy(update={"drift": Drift()})})
     for session in (still, drifting):
-        setting = assessment.setting_of(plan_of(4.0, 8.0), pool, session)
+        setting = prediction.setting_of(plan_of(4.0, 8.0), pool, session)
         both = predict(setting, setting.plan.passes, 10.0, phases=1).normal
         first = predict(setting, setting.plan.passes[:1], phases=1).normal
         second = both - first  # the phases of the second pass are its own
@@ -121,7 +122,7 @@ def test_without_drift_passes_add_up_and_with_it_two_tell_more(configs: tuple[Po
 def test_what_a_plan_lacks_is_said_with_its_cure(
     distances: tuple[float, ...], gap: str, remedy: str, configs: tuple[PoolConfig, SessionConfig]
 ) -> None:
-    answer = assessment.judge(plan_of(*distances), *configs)
+    answer = assessment.assess_plan(plan_of(*distances), *configs)
     assert gap in answer.gaps[0]
     assert remedy in answer.remedy
     assert not assessment.is_enough(answer, configs[0].verdict)
@@ -133,7 +134,7 @@ def test_what_a_plan_lacks_is_said_with_its_cure(
 def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, SessionConfig]) -> None:
     candidates = [{"distance_m": d} for d in (3.0, 5.5, 6.0, 9.0)]
     budget = {"seconds": 200.0, "turn_s": 60.0}
-    answer = assessment.judge(plan_of(6.0, 6.0, candidates=candidates, budget=budget), *configs)
+    answer = assessment.assess_plan(plan_of(6.0, 6.0, candidates=candidates, budget=budget), *configs)
     assert answer.better is not None
     assert answer.better.seconds + budget["turn_s"] * (len(answer.better.passes) - 1) <= budget["seconds"]
     assert {one.distance_m for one in answer.better.passes} >= {3.0}
@@ -148,7 +149,7 @@ def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, Se
     assert f"{largest[0]} as given, {largest[1]} with these" in chosen
     grown = [name for name in shares[0] if shares[1][name] > 1.05 * shares[0][name]]
     assert re.findall(r"(\w+) \([\d.]+ to", chosen) == grown
-    nothing = assessment.judge(plan_of(6.0, candidates=candidates, budget={"seconds": 5.0}), *configs)
+    nothing = assessment.assess_plan(plan_of(6.0, candidates=candidates, budget={"seconds": 5.0}), *configs)
     assert nothing.better is None
     words = table(nothing, configs[0].verdict)
     assert "and 0 s of turns, of 5 s." in words
@@ -156,12 +157,12 @@ def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, Se
 
 
 def test_out_of_sight_there_is_no_result(configs: tuple[PoolConfig, SessionConfig]) -> None:
-    answer = assessment.judge(plan_of(60.0, mbes={"max_range_m": 15.0}), *configs)
+    answer = assessment.assess_plan(plan_of(60.0, mbes={"max_range_m": 15.0}), *configs)
     assert answer.given.solution.deficiency > 0
     assert answer.gaps[:2] == [f"the {sensor} sees nothing of the target from 60 m" for sensor in ("laser", "sonar")]
     assert not any("alone has soundings" in gap for gap in answer.gaps)
     assert "left open: no result" in table(answer, configs[0].verdict)
-    assert assessment.as_plain(answer)["given"]["sigma_mount"] is None
+    assert plan_document(answer)["given"]["sigma_mount"] is None
 
 
 def test_the_command(tmp_path: Path) -> None:
@@ -225,7 +226,7 @@ def test_what_is_not_to_be_planned_or_written_over(tmp_path: Path) -> None:
 def test_what_is_freed_is_freed_in_the_prediction_too(configs: tuple[PoolConfig, SessionConfig]) -> None:
     pool, session = configs
     freed = pool.model_copy(update={"adjust": pool.adjust.model_copy(update={"free": ("mbes_latency",)})})
-    held, free = (assessment.judge(plan_of(4.0, 8.0), one, session).given.random for one in (pool, freed))
+    held, free = (assessment.assess_plan(plan_of(4.0, 8.0), one, session).given.random for one in (pool, freed))
     assert np.sqrt(free[4, 4]) > 1.1 * np.sqrt(held[4, 4])  # y, along the track
 
 
@@ -237,7 +238,7 @@ def test_no_two_columns_of_a_plan_run_together(configs: tuple[PoolConfig, Sessio
         "return-of-the-quay-in-the-north": {"corners": [[1.0, 4.3, -4], [0, 1.5, -4], [0, 1.5, 2], [1.0, 4.3, 2]]},
     }}
     other = PoolConfig.model_validate_json(json.dumps({"target": faces}))
-    said = table(assessment.judge(plan_of(4.0), other, session), other.verdict)
+    said = table(assessment.assess_plan(plan_of(4.0), other, session), other.verdict)
     head, row = said.splitlines()[1:3]
     names = [f"return-of-the-quay-in-the-{side}" for side in ("south", "north")]
     assert head.split()[-4:-2] == names

@@ -5,34 +5,35 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.checking.file_survey import survey
-from pipeline.checking.ins_quality import Quality, quality, told
+from pipeline.checking.file_survey import survey_files
+from pipeline.checking.ins_quality import InsQuality, assess_ins_quality, quality_findings
 from pipeline.config.session import Ins, Laser, SessionConfig
 from tests.support.real_files import MOUNT
 
 
-def _quality(data: Path, name: str, **more: object) -> Quality:
+def _quality(data: Path, name: str, **more: object) -> InsQuality:
     ins = Ins(files=[name], **more)  # type: ignore[arg-type]
     nothing = Laser(files=["none/*"], format="table", mount=MOUNT)
-    seen, _ = survey(SessionConfig(name="x", ins=ins, laser=nothing), data)
-    return quality(seen, [])
+    seen, _ = survey_files(SessionConfig(name="x", ins=ins, laser=nothing), data)
+    return assess_ins_quality(seen, [])
 
 
 def test_a_log_that_has_not_aligned_says_so(data: Path) -> None:
     found = _quality(data, "ins/oem7_ins2.gps", format="novatel")
     assert found.by_file["ins/oem7_ins2.gps"]["status"] == {"INS_ALIGNMENT_COMPLETE": 62}
     assert found.sigmas["heading_deg"] > 14
-    said = {one.words.split(" by the log")[0].split(" to ")[0]: one.severity for one in told(found)}
+    said = {one.words.split(" by the log")[0].split(" to ")[0]: one.severity for one in quality_findings(found)}
     assert said["ins: its heading is good"] == "fault"
     assert said["ins: its position is good"] == "fault"
-    (status,) = [one for one in told(found) if "INS_ALIGNMENT_COMPLETE in 100%" in one.words]
+    (status,) = [one for one in quality_findings(found) if "INS_ALIGNMENT_COMPLETE in 100%" in one.words]
     assert status.severity == "look"  # where the passes are is not known
 
 
 def test_a_log_processed_with_ppp_is_good_but_for_its_heading(data: Path) -> None:
     found = _quality(data, "ins/propak6-ins-ppp_payload.gps", format="novatel")
     assert found.together == {"status": {"INS_SOLUTION_GOOD": 2289}, "type": {"INS_PPP": 2289}}
-    assert [(one.severity, "heading is good to 0.24°" in one.words) for one in told(found)] == [("look", True)]
+    (finding,) = quality_findings(found)
+    assert (finding.severity, "heading is good to 0.24°" in finding.words) == ("look", True)
 
 
 def test_accuracy_files_are_read_beside_an_sbet(data: Path) -> None:

@@ -11,6 +11,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
 from pipeline.planning import assessment
+from pipeline.planning.plan_document import plan_document
 from tests.support.effort import often
 from tests.support.simulated import QUIET, THIN, calibrated, made
 
@@ -86,7 +87,7 @@ def test_a_plan_with_the_sectors_predicts_the_sigmas(key, session, carried):
     figures = {"ping_rate_hz": THIN["mbes"]["ping_rate_hz"], "sectors": symmetrical(40.0)["mbes"]["sectors"]}
     content = {"laser": THIN["laser"], "mbes": figures, "passes": [{"distance_m": d} for d in (4.0, 8.0, 5.0, 7.0)]}
     pool, settings = parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
-    found = assessment.as_plain(assessment.judge(parse(Plan, content, "plan"), pool, settings))["given"][key]
+    found = plan_document(assessment.assess_plan(parse(Plan, content, "plan"), pool, settings))["given"][key]
     ratio = [found[name] / carried["methods"]["adjustment"][key][name] for name in SETTINGS]
     assert max(abs(np.log(ratio))) < np.log(1.15), dict(zip(SETTINGS, ratio, strict=True))
 
