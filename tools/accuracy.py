@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pipeline.config.yaml_models import parse
-from pipeline.results.pages.rendering import picture, style
+from pipeline.results.pages.rendering import drawing_style, picture
 from pipeline.simulation.scenario import Scenario
 from tools.bound import bound
 from tools.montecarlo import CAMPAIGNS, FOLDER, NAMES, UNITS, Campaign, path_of, scenario_of
@@ -168,7 +168,7 @@ def mistakes_plot(table: pd.DataFrame) -> Markup:
 
 def page(found: list[Result], mistakes: pd.DataFrame | None) -> str:
     template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(PAGE)
-    with style():
+    with drawing_style():
         return template.render(found=found, mistakes=mistakes, names=NAMES, plots=plots, mistakes_plot=mistakes_plot)
 
 

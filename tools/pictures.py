@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from stages.views.viewer import silent
+from stages.views.viewer import without_statistics
 from tools.pipeline_picture import picture
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
@@ -67,7 +67,7 @@ def viewer(*recordings: Path) -> Iterator[Any]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    with tempfile.TemporaryDirectory() as home, silent() as environment:
+    with tempfile.TemporaryDirectory() as home, without_statistics() as environment:
         kept = {name: os.environ.get(name) for name in ("HOME", "PATH", "XDG_CONFIG_HOME")}
         os.environ |= dict(environment) | {"HOME": home, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
         try:

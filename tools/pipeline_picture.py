@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 from pipeline.artefacts.schema import Artefact, Document, RawFiles
-from pipeline.results.pages.rendering import INK, LASER, QUIET, SONAR, style
+from pipeline.results.pages.rendering import INK, LASER, QUIET, SONAR, drawing_style
 from pipeline.run.stage_protocol import declared, name_of
 from stages import load
 
@@ -21,7 +21,7 @@ def picture(path: Path) -> None:
     """Stages from top to bottom; left, from which earlier stages they take; right, what they write."""
     stages = load()
     place = {name_of(stage): -STEP * k for k, stage in enumerate(stages)}
-    with style():
+    with drawing_style():
         figure = Figure(figsize=(8.6, 6.6))
         axis = figure.add_axes((0, 0, 1, 1))
         axis.set(xlim=(-4.2, 7.4), ylim=(-STEP * len(stages) - 0.1, 1.35))

@@ -48,7 +48,7 @@ def marks_text(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> s
     return "\n".join(lines)
 
 
-def as_plain(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> dict[str, Any]:
+def marks_values(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> dict[str, Any]:
     """Return all of it as plain values, for YAML; ``present``: the mounts that session.yaml has."""
     first = assessment.snooped.first
     tests = {

@@ -20,9 +20,7 @@ PLACE = ("origin", "azimuth_deg", "water_level_m")  # of a target, not its shape
 NO_TOLERANCES = Tolerances()
 
 
-def run_difference(
-    first: FinishedRun, second: FinishedRun, tolerances: Tolerances = NO_TOLERANCES
-) -> dict[str, Any]:
+def run_difference(first: FinishedRun, second: FinishedRun, tolerances: Tolerances = NO_TOLERANCES) -> dict[str, Any]:
     """Return everything that differs as plain values, ``second`` (b) minus ``first`` (a).
 
     Parameters

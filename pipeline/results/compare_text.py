@@ -70,8 +70,7 @@ def own_faces_counted(changes: Sequence[Row]) -> Iterator[Row]:
     """Yield the changes of settings, with faces that one run alone has counted in place of their keys."""
     faces = [row for row in changes if row["key"].startswith(FACE_KEYS) and row["key"].endswith(".corners")]
     own = {
-        key: [row["key"].removesuffix("corners") for row in faces if row[other] is None]
-        for key, other in ("ab", "ba")
+        key: [row["key"].removesuffix("corners") for row in faces if row[other] is None] for key, other in ("ab", "ba")
     }
     for row in changes:
         if not row["key"].startswith((*own["a"], *own["b"])):

@@ -9,6 +9,17 @@ from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import setting_change
 from pipeline.text_table import text_table
 
+SIGMAS_IN_WORDS = {
+    "mbes": (
+        "sigma: the random part, from the noise of the sensors and the INS, relative to the laser.",
+        "total: with the systematic errors of the laser's mount, ranges, sound speed, clocks, target. Use the total.",
+    ),
+    "laser": (
+        "sigma: the random part, from the noise of the laser and the INS and the target's own uncertainty.",
+        "total: with the systematic errors of ranges, the clock and held values. Use the total.",
+    ),
+}
+
 
 def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
     """Return the verdict as people read it; ``fixed``: mount parameters that an accepted calibration did not estimate.
@@ -36,8 +47,7 @@ def summary(calibration: Mapping[str, Any]) -> str:
     use = "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."
     lines += ["", "Do not use these values." if rejected else use]
     if block["sigma_mount"]:
-        relative = "relative to the laser" if sensor == "mbes" else "with what is known of the target"
-        lines.append(f"sigma: from noise, {relative}; total: with what does not average.")
+        lines += SIGMAS_IN_WORDS[sensor]
     if not block["sigma_mount"] and calibration["result"] != "adjustment":
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
     lines += [f"Free: {parameter['words']}." for parameter in calibration["free"].values()]

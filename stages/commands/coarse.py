@@ -5,7 +5,7 @@ from pathlib import Path
 import yaml
 
 from pipeline.atomic_files import write_text
-from pipeline.coarse.marks_text import as_plain, marks_text
+from pipeline.coarse.marks_text import marks_text, marks_values
 from pipeline.coarse.mounts_from_marks import assess_marks, mount_blocks
 from pipeline.coarse.session_file import SENSORS, mount_origin, read_session, write_mounts
 from pipeline.config.marks import load_marks
@@ -39,7 +39,7 @@ def command(file: Path, session: Path, out: Path | None, write: bool) -> int:
     assessment = assess_marks(marks, str(file), present)
     lines = [marks_text(assessment, present)]
     if out is not None:
-        write_text(out, yaml.safe_dump(as_plain(assessment, present), sort_keys=False, allow_unicode=True))
+        write_text(out, yaml.safe_dump(marks_values(assessment, present), sort_keys=False, allow_unicode=True))
     if assessment.agrees:
         blocks = mount_blocks(assessment, mount_origin("coarse", file))
         lines.append(write_mounts(session, text, content, blocks) if write else f"{path}: not written (--no-write)")

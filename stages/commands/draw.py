@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.results.pages.currency import page_to_draw
+from pipeline.results.pages.currency import is_page_outdated
 from pipeline.run import folder
 from pipeline.run.results import PAGE, agreeing, recording_path
 from pipeline.run.settings import read_settings
@@ -70,7 +70,7 @@ def draw_missing(run: Path, wanted: Drawings, jobs: int = 1) -> list[DrawingFail
 def missing_drawings(run: Path, wanted: Drawings) -> list[str]:
     """Return what is not drawn yet: the page's name, and names of stages, of those alone that agree with each other."""
     stages = names_in(run)
-    page = [PAGE] if wanted.report and page_to_draw(run, stages) else []
+    page = [PAGE] if wanted.report and is_page_outdated(run, stages) else []
     if not wanted.recordings:
         return page
     done = agreeing(run, stages)

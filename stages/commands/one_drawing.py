@@ -49,9 +49,9 @@ def kind_of_drawing(name: str) -> str:
 
 def _draw_page(run: Path) -> None:
     from pipeline.results.pages import plots
-    from pipeline.results.pages.report import write_page
+    from pipeline.results.pages.report import write_report_page
 
-    write_page(run, names_in(run), map(partial(plots.draw, run), plots.pictures_of(run)))
+    write_report_page(run, names_in(run), map(partial(plots.draw_picture, run), plots.picture_names(run)))
 
 
 def _draw_recording(run: Path, stage: str) -> None:

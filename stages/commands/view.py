@@ -11,7 +11,7 @@ from stages.commands.answer import say_failures
 from stages.commands.diff import compare_runs, write_two_runs
 from stages.commands.draw import Drawings, draw_missing
 from stages.views.recording import recordings_of
-from stages.views.viewer import show
+from stages.views.viewer import show_recordings
 
 
 def command(first: Path, second: Path | None, stage: str | None) -> int:
@@ -37,11 +37,11 @@ def command(first: Path, second: Path | None, stage: str | None) -> int:
         read_settings(first)
         say_failures(draw_missing(first, Drawings(report=False, recordings=True)))
         copy = f"copy {first}/*/*.rrd to a machine with one, or open {first}/report/report.html"
-        return show(recordings_of(first, stage), copy)
+        return show_recordings(recordings_of(first, stage), copy)
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
     with temporary_folder() as place:
         path = place / "pair.rrd"
         write_two_runs(first, second, compare_runs(first, second, Tolerances()), path)
         copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
-        return show([path], copy)
+        return show_recordings([path], copy)

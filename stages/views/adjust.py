@@ -1,5 +1,6 @@
-"""Before and after, residuals as colours and as maps, their course over time, the sensors' fans, correlations."""
+"""Soundings before and after, residuals as colours and as maps, their course over time, fans, correlations."""
 
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -28,40 +29,65 @@ from pipeline.mount import Mounted, mount_of
 from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
-from stages.views.ingest import moments_of
-from stages.views.recording import COLOURS, DOT_M, GREY, LASER, SONAR, curve, words
+from pipeline.text_table import text_table
+from stages.views.ingest import time_column
+from stages.views.recording import COLOURS, DOT_M, GREY, LASER, SONAR, log_curve, text_document
 
 Array = NDArray[np.float64]
 Shades = dict[str, tuple[int, int, int]]  # by family
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SENSORS = {"laser": LASER, "mbes": SONAR}
 RAYS = 60  # of a fan
-MOMENT_NS = NS // 50  # points of one fan lie within this time
+FAN_NS = NS // 50  # points of one fan lie within this time
+
+
+@dataclass(frozen=True)
+class ResidualPoints:
+    """Points of the adjustment with their residuals.
+
+    Attributes
+    ----------
+    residuals
+        The artefact ``residuals``.
+    family
+        The family of each row's face.
+    span_m
+        By sensor the residual of the strongest colour.
+    steps
+        By sensor, to one in how many the points are thinned.
+    """
+
+    residuals: pd.DataFrame
+    family: NDArray[Any]
+    span_m: dict[str, float]
+    steps: dict[str, int]
 
 
 def log(recording: Any, tables: Tables) -> None:
+    """Log soundings before and after, residuals as colours and maps, fans, and the course over time."""
     faces, residuals = tables.table(FACES), tables.table(RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span, steps = _span(residuals), _steps(tables, residuals)
-    _clouds(recording, tables, residuals, family, span, steps, styles_of_families(family_names(faces), COLOURS))
+    shades = styles_of_families(family_names(faces), COLOURS)
+    _clouds(recording, tables, ResidualPoints(residuals, family, span, steps), shades)
     _maps(recording, tables.table(RESIDUAL_MAP), faces, span)
     _fans(recording, tables, residuals)
-    _over_time(recording, tables.table(RESIDUAL_BINS), steps, styles_of_families(family_names(faces), COLOURS))
-    _words(recording, tables, span)
+    _over_time(recording, tables.table(RESIDUAL_BINS), steps, shades)
+    _log_text(recording, tables, span)
 
 
 def _span(residuals: pd.DataFrame) -> dict[str, float]:
-    """Residual (m) of the strongest colour, by sensor: three times the RMS of what was not cut."""
-    found = {}
+    """Return by sensor the residual (m) of the strongest colour: three times the RMS of all points with a weight."""
+    spans_m = {}
     for sensor in SENSORS:
         rows = residuals[(residuals["sensor"] == sensor) & (residuals["weight"] > 0)]
         size = rows["residual_m"].to_numpy(np.float64)
-        found[sensor] = max(3 * float(np.sqrt(np.mean(size**2))), 1e-3) if len(size) else 1e-3
-    return found
+        spans_m[sensor] = max(3 * float(np.sqrt(np.mean(size**2))), 1e-3) if len(size) else 1e-3
+    return spans_m
 
 
 def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
-    """One in how many observations of each sensor is in the table residuals."""
+    """Return by sensor how many observations stand behind one row of the table ``residuals``."""
     total = dict.fromkeys(SENSORS, 0)
     for row in tables.table(GROUPS).to_dict("records"):
         sensor = str(row["group"]).partition("_")[0]
@@ -70,22 +96,15 @@ def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
     return {s: round(total[s] / max(1, int((residuals["sensor"] == s).sum()))) for s in SENSORS}
 
 
-def coloured(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
-    """Blue is negative, grey zero, orange positive; (n, 3)."""
+def residual_colours(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
+    """Return colours (n, 3): blue is negative, grey zero, orange positive; the strongest from ``span_m`` on."""
     share = np.clip(np.asarray(residual_m, dtype=np.float64) / span_m, -1, 1)[:, None]
     end = np.where(share < 0, LASER, SONAR)
     return np.asarray(np.round((1 - abs(share)) * np.array((205, 205, 205)) + abs(share) * end), dtype=np.uint8)
 
 
-def _clouds(
-    recording: Any,
-    tables: Tables,
-    residuals: pd.DataFrame,
-    family: Any,
-    span: dict[str, float],
-    steps: dict[str, int],
-    shades: Shades,
-) -> None:
+def _clouds(recording: Any, tables: Tables, points: ResidualPoints, shades: Shades) -> None:
+    """Log soundings before and after, and all points coloured by their residual."""
     import rerun as rr
 
     surfaces: Any = tables.table(SURFACES).to_dict("records")
@@ -93,24 +112,24 @@ def _clouds(
     normals = {row["family"]: normal_of(row) for row in surfaces}
     solved = bool(np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all())
     for sensor in SENSORS:
-        of_sensor = (residuals["sensor"] == sensor).to_numpy()
-        step = rr.AnyValues(one_in=steps[sensor])
+        of_sensor = (points.residuals["sensor"] == sensor).to_numpy()
+        step = rr.AnyValues(one_in=points.steps[sensor])
         for name, colour in shades.items():
-            rows = residuals[of_sensor & (family == name)]
-            points = rows[XYZ].to_numpy()
-            colours = coloured(rows["residual_m"].to_numpy(), span[sensor])
+            rows = points.residuals[of_sensor & (points.family == name)]
+            calibrated = rows[XYZ].to_numpy()
+            colours = residual_colours(rows["residual_m"].to_numpy(), points.span_m[sensor])
             away = rows["residual_m"].to_numpy()[:, None] * normals.get(name, np.zeros(3))
-            cloud = rr.Points3D((points - away).astype(np.float32), radii=DOT_M, colors=colours)
+            cloud = rr.Points3D((calibrated - away).astype(np.float32), radii=DOT_M, colors=colours)
             recording.log(f"residuals/{sensor}/{name}", cloud, step, static=True)
             if sensor == "mbes":
                 coarse = rows[[f"coarse_{column}" for column in XYZ]].to_numpy()
-                for when, where in (("before", coarse), *([("after", points)] if solved else [])):
+                for when, where in (("before", coarse), *([("after", calibrated)] if solved else [])):
                     cloud = rr.Points3D(where, radii=DOT_M, colors=colour)
                     recording.log(f"{when}/{name}", cloud, step, static=True)
 
 
 def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[str, float]) -> None:
-    """Square cells as coloured quads a centimetre before their face."""
+    """Log the squares of the residual map as coloured quads a centimetre before their face."""
     import rerun as rr
 
     cells = cells[np.isfinite(cells["mean_m"]) & (cells["count"] >= FEWEST)]
@@ -132,7 +151,7 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
             first = 4 * np.arange(len(quads))[:, None, None]
             triangles = (first + np.array([[[0, 1, 2], [0, 2, 3]]])).reshape(-1, 3)
             ordered = rows.sort_values("face", kind="stable")
-            colours = np.repeat(coloured(ordered["mean_m"].to_numpy(), span[sensor] / 3), 4, axis=0)
+            colours = np.repeat(residual_colours(ordered["mean_m"].to_numpy(), span[sensor] / 3), 4, axis=0)
             mesh = rr.Mesh3D(
                 vertex_positions=quads.reshape(-1, 3).astype(np.float32),
                 triangle_indices=triangles.astype(np.uint32),
@@ -142,7 +161,7 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
 
 
 def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
-    """Rays from the sensor to its points of one moment, in the middle of each pass."""
+    """Log rays from the sensor to its points of one epoch, in the middle of each pass."""
     import rerun as rr
 
     session = read_settings(tables.run).session
@@ -153,8 +172,8 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
     for (sensor, number), rows in residuals.groupby(["sensor", "pass"], sort=True):
         t_ns = rows["t_ns"].to_numpy()
         middle = int(np.median(t_ns))
-        moment = int(t_ns[np.argmin(np.abs(t_ns - middle))])
-        fan = rows[np.abs(t_ns - moment) <= MOMENT_NS]
+        epoch = int(t_ns[np.argmin(np.abs(t_ns - middle))])
+        fan = rows[np.abs(t_ns - epoch) <= FAN_NS]
         fan = fan.iloc[:: max(1, -(-len(fan) // RAYS))]
         positions, R_target_from_body = trajectory.poses_at(fan["t_ns"].to_numpy())
         origins = positions + R_target_from_body @ mounts[str(sensor)].lever_arm_body_m
@@ -164,7 +183,7 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
 
 
 def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
-    """The mount by the adjustment's estimate; the coarse one where there is none."""
+    """Return the mount of the adjustment's estimate; the coarse one where there is no estimate."""
     values = tables.table(ESTIMATE)["value"].to_numpy()[:6]
     if not np.all(np.isfinite(values)):
         return coarse
@@ -179,7 +198,7 @@ def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades
     def dots(path: str, name: str, seconds: Any, values: Any, colour: Any) -> None:
         style = rr.SeriesPoints(colors=colour, names=name, marker_sizes=2.5)
         t_ns = np.round(np.asarray(seconds, dtype=np.float64) * NS).astype(np.int64)
-        curve(recording, path, style, partial(moments_of, t_ns), values)
+        log_curve(recording, path, style, partial(time_column, t_ns), values)
 
     for sensor in SENSORS:
         rows = bins[bins["sensor"] == sensor]
@@ -198,7 +217,7 @@ def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades
                 dots(f"quality/residual/{sensor}/{name}", f"{sensor}/{name}", where, mean, shade)
 
 
-def _words(recording: Any, tables: Tables, span: dict[str, float]) -> None:
+def _log_text(recording: Any, tables: Tables, span: dict[str, float]) -> None:
     matrix = tables.table(COVARIANCE)["correlation"].to_numpy().reshape(6, 6)
     places = [place for _, place, *_ in PARAMETERS]
     lines = ["Colours: blue, grey, orange from minus to plus; the strongest at"]
@@ -206,7 +225,7 @@ def _words(recording: Any, tables: Tables, span: dict[str, float]) -> None:
     lines += ["Plus: towards the boat, of horizontal faces up.", "", "Observations, and their variance factors:"]
     for row in tables.table(GROUPS).to_dict("records"):
         lines.append(f"  {row['group']:<16}{row['count']:>10,}{row['variance_factor']:>8.3f}")
-    lines += ["", "Correlations", " " * 6 + "".join(f"{name:>7}" for name, *_ in PARAMETERS)]
-    for name, row_of, *_ in PARAMETERS:
-        lines.append(f"{name:<6}" + "".join(f"{matrix[row_of, column]:>7.2f}" for column in places))
-    recording.log("tables/residuals", words("\n".join(lines)), static=True)
+    names = [name for name, *_ in PARAMETERS]
+    rows = [(name, *(f"{matrix[place, column]:.2f}" for column in places)) for name, place, *_ in PARAMETERS]
+    lines += ["", "Correlations", *text_table("<6" + ">7" * len(names), ("", *names), rows)]
+    recording.log("tables/residuals", text_document("\n".join(lines)), static=True)

@@ -1,4 +1,4 @@
-"""The iteration, step by step: soundings swing from the coarse mount towards the laser's planes, normals close."""
+"""The patent's angle iteration, step by step: soundings and normals turn towards the laser's planes."""
 
 from functools import partial
 from typing import Any
@@ -19,8 +19,8 @@ from pipeline.mount import mount_of
 from pipeline.report.plane_agreement import lifted_moments_by_family
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
-from stages.views.fit_planes import cut_out
-from stages.views.recording import COLOURS, GREY, SONAR, curve, words
+from stages.views.fit_planes import faces_on_plane
+from stages.views.recording import COLOURS, GREY, SONAR, log_curve, text_document
 
 SOUNDINGS = 20_000  # for all the family's points of one step
 STEPS = 60  # that are replayed
@@ -29,6 +29,7 @@ ANGLE_COLOURS = dict(zip((*FAMILIES, "P4"), COLOURS.values(), strict=False))
 
 
 def log(recording: Any, tables: Tables) -> None:
+    """Log the patent's angle iteration step by step."""
     import rerun as rr
 
     faces, iterations = tables.table(FACES), tables.table(ITERATIONS)
@@ -43,7 +44,7 @@ def log(recording: Any, tables: Tables) -> None:
     laser = laser_planes(tables.table(PLANES))
     lifted = lifted_moments_by_family(faces, tables.table(SOUNDING_MOMENTS))
     _curves(recording, iterations)
-    say_why(recording, "angles", tables.table(ANGLES))
+    log_reasons(recording, "angles", tables.table(ANGLES))
     for row in iterations.iloc[:: max(1, -(-len(iterations) // STEPS))].to_dict("records"):
         recording.set_time("iteration", sequence=int(row["iteration"]))
         correction = exp_so3(np.radians(rotation_vector_deg(row)))
@@ -52,19 +53,20 @@ def log(recording: Any, tables: Tables) -> None:
         for name in FAMILIES:
             cloud = rr.Points3D(points[family == name], radii=0.01, colors=COLOURS[name])
             recording.log(f"iteration/soundings/{name}", cloud, rr.AnyValues(one_in=step))
-        seen = [name for name in FAMILIES if name in lifted and (ALL_PASSES, name) in laser]
-        planes = {name: laser[(ALL_PASSES, name)] for name in seen}
+        families = [name for name in FAMILIES if name in lifted and (ALL_PASSES, name) in laser]
+        planes = {name: laser[(ALL_PASSES, name)] for name in families}
         sonar = {
             name: fit_plane(plane_moments(lifted[name], correction, mount.lever_arm_body_m), planes[name].normal)
-            for name in seen
+            for name in families
         }
-        for name in seen:
-            outlines = [np.vstack([one, one[:1]]).astype(np.float32) for one in cut_out(faces, name, sonar[name])]
+        for name in families:
+            polygons = faces_on_plane(faces, name, sonar[name])
+            outlines = [np.vstack([corners, corners[:1]]).astype(np.float32) for corners in polygons]
             recording.log(f"iteration/planes/{name}", rr.LineStrips3D(outlines, radii=0.008, colors=SONAR))
-        for sensor, found, colour in (("laser", planes, GREY), ("mbes", sonar, SONAR)):
-            centres = np.array([planes[name].centroid_m for name in seen], dtype=np.float32).reshape(-1, 3)
-            normals = np.array([found[name].normal for name in seen], dtype=np.float32).reshape(-1, 3)
-            arrows = rr.Arrows3D(origins=centres, vectors=normals, radii=0.02, colors=colour, labels=seen)
+        for sensor, of_sensor, colour in (("laser", planes, GREY), ("mbes", sonar, SONAR)):
+            centres = np.array([planes[name].centroid_m for name in families], dtype=np.float32).reshape(-1, 3)
+            normals = np.array([of_sensor[name].normal for name in families], dtype=np.float32).reshape(-1, 3)
+            arrows = rr.Arrows3D(origins=centres, vectors=normals, radii=0.02, colors=colour, labels=families)
             recording.log(f"iteration/normals/{sensor}", arrows)
 
 
@@ -78,19 +80,29 @@ def _curves(recording: Any, iterations: pd.DataFrame) -> None:
             if column in iterations:
                 style = rr.SeriesLines(colors=colour, names=name)
                 values = iterations[column].to_numpy()
-                curve(recording, f"curves/{folder}/{name}", style, partial(steps_of, iterations), values)
+                log_curve(recording, f"curves/{folder}/{name}", style, partial(iteration_column, iterations), values)
 
 
-def say_why(recording: Any, what: str, result: pd.DataFrame) -> None:
-    """In words why the patent's step has none; a recording with nothing at all the viewer calls broken."""
+def log_reasons(recording: Any, quantity: str, result: pd.DataFrame) -> None:
+    """Log in words why the patent's step has no result; the viewer calls a recording without anything broken.
+
+    Parameters
+    ----------
+    recording
+        The rerun recording stream.
+    quantity
+        What the step would give: angles or offsets.
+    result
+        Its table, with a column ``reason``.
+    """
     reasons = [reason for reason in dict.fromkeys(result["reason"]) if reason]
     if reasons:
-        said = "\n".join([f"No {what} by the patent's steps:", *reasons])
-        recording.log(f"tables/{what}", words(said), static=True)
+        lines = "\n".join([f"No {quantity} by the patent's steps:", *reasons])
+        recording.log(f"tables/{quantity}", text_document(lines), static=True)
 
 
-def steps_of(rows: pd.DataFrame) -> Any:
-    """The timeline ``iteration``."""
+def iteration_column(rows: pd.DataFrame) -> Any:
+    """Return the steps on the timeline ``iteration``."""
     import rerun as rr
 
     return rr.TimeColumn("iteration", sequence=rows["iteration"].to_numpy())

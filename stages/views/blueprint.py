@@ -1,4 +1,4 @@
-"""The blueprint: a crew's tour, from the whole scene to the quality of the data."""
+"""The viewer's layout (Rerun calls it blueprint): tabs from the whole scene to the quality of the data."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -20,10 +20,10 @@ TABS = ("Overview", "Before and after", "Iteration", "Residuals", "Quality")
 
 
 def tabs_of(run: Path) -> tuple[str, ...]:
-    """Those of TABS that have something to show.
+    """Return those of TABS that have something to show.
 
-    A laser by itself has no soundings before and after. The patent's iteration is of targets with its roles, where it
-    came to a result; until its stage has run it is taken to come to one.
+    A run that calibrates a laser has no soundings before and after. The patent's iteration needs a target with roles,
+    and a result; until its stage has run a result is assumed.
     """
     overview, change, _, left, quality = TABS
     settings = read_settings(run)
@@ -36,9 +36,16 @@ def tabs_of(run: Path) -> tuple[str, ...]:
     return TABS
 
 
-def tour(tabs: Sequence[str], model: TargetModel) -> Any:
-    """TABS: the scene, what the calibration did, how it got there, what is left, the data. What shows the target is
-    looked at from one place, from which all of it is seen."""
+def run_blueprint(tabs: Sequence[str], model: TargetModel) -> Any:
+    """Return the layout of a run's recordings; all views of the target have one viewpoint, from which all of it shows.
+
+    Parameters
+    ----------
+    tabs
+        Those of TABS to show.
+    model
+        The target.
+    """
     import rerun.blueprint as rrb
 
     overview, change, iteration, left, quality = TABS
@@ -87,8 +94,8 @@ def tour(tabs: Sequence[str], model: TargetModel) -> Any:
     return _blueprint(*shown, timeline="iteration" if iteration in tabs else "time")
 
 
-def side_by_side() -> Any:
-    """Two runs, a and b: each on its own target, both on one, and what differs in words."""
+def two_runs_blueprint() -> Any:
+    """Return the layout for two runs, a and b: each on its own target, both on one, and their differences in words."""
     import rerun.blueprint as rrb
 
     return _blueprint(
@@ -125,7 +132,7 @@ def _scene_of(name: str, *contents: str, eye: Any = None) -> Any:
 
 
 def _eye(model: TargetModel) -> Any:
-    """In front of the target, from the south and from above, as far off as a view as high as wide needs."""
+    """Return a viewpoint before the target, from the south and above, as far off as a view as high as wide needs."""
     import rerun.blueprint as rrb
 
     corners = np.concatenate([face.vertices_m for face in model.faces])

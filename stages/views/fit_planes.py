@@ -1,4 +1,4 @@
-"""The planes found, laser's and sonar's (with the coarse mount), cut out where the faces are; with their normals."""
+"""The fitted planes of laser and sonar (with the coarse mount), cut out where the faces are; with their normals."""
 
 from typing import Any
 
@@ -16,19 +16,20 @@ SHOWN = {"laser": GREY, "mbes": SONAR}
 
 
 def log(recording: Any, tables: Tables) -> None:
+    """Log the planes of both sensors with their normals."""
     import rerun as rr
 
     faces, planes = tables.table(FACES), tables.table(PLANES)
     for sensor, colour in SHOWN.items():
-        found = planes_of_sensor(planes, sensor)
+        fitted = planes_of_sensor(planes, sensor)
         for family in family_names(faces):
-            plane = found.get((ALL_PASSES, family))
+            plane = fitted.get((ALL_PASSES, family))
             if plane is None:
                 continue
-            cut = cut_out(faces, family, plane)
-            starts = np.cumsum([0, *(len(one) for one in cut[:-1])])
-            triangles = np.concatenate([_fan(one, int(start)) for one, start in zip(cut, starts, strict=True)])
-            points = np.concatenate(cut).astype(np.float32)
+            polygons = faces_on_plane(faces, family, plane)
+            starts = np.cumsum([0, *(len(polygon) for polygon in polygons[:-1])])
+            triangles = np.concatenate([_fan(*pair) for pair in zip(polygons, starts.tolist(), strict=True)])
+            points = np.concatenate(polygons).astype(np.float32)
             patch = rr.Mesh3D(vertex_positions=points, triangle_indices=triangles, albedo_factor=(*colour, 110))
             recording.log(f"planes/{sensor}/{family}", patch, static=True)
             arrow = rr.Arrows3D(origins=[plane.centroid_m], vectors=[plane.normal], radii=0.02, colors=colour)
@@ -38,12 +39,22 @@ def log(recording: Any, tables: Tables) -> None:
             recording.log(f"planes/{sensor}/{family}/normal/name", name, static=True)
 
 
-def cut_out(faces: pd.DataFrame, family: str, plane: Plane) -> list[np.ndarray]:
-    """The family's faces by design, their corners moved along the plane's normal onto it."""
-    corners = [np.reshape(one, (-1, 3)) for one in faces.loc[faces["family"] == family, "vertices_target_m"]]
-    return [one + np.outer(plane.distance_m - one @ plane.normal, plane.normal) for one in corners]
+def faces_on_plane(faces: pd.DataFrame, family: str, plane: Plane) -> list[np.ndarray]:
+    """Return the corners of a family's faces by design, moved along a plane's normal onto it, (n, 3) each.
+
+    Parameters
+    ----------
+    faces
+        The artefact ``faces``.
+    family
+        The family's name.
+    plane
+        The plane, target frame.
+    """
+    corners = [np.reshape(outline, (-1, 3)) for outline in faces.loc[faces["family"] == family, "vertices_target_m"]]
+    return [points + np.outer(plane.distance_m - points @ plane.normal, plane.normal) for points in corners]
 
 
 def _fan(polygon: np.ndarray, start: int) -> np.ndarray:
-    """Triangles of a convex polygon whose first corner is number ``start``."""
+    """Return the triangles of a convex polygon whose first corner has the number ``start``."""
     return np.array([(start, start + k, start + k + 1) for k in range(1, len(polygon) - 1)], dtype=np.uint32)

@@ -8,7 +8,8 @@ import numpy as np
 from pipeline.artefacts.catalogue.points import FILES, TRAJECTORY
 from pipeline.gps_time import NS, unix_ns_from_gps, utc_text
 from pipeline.run.results import Tables
-from stages.views.recording import curve, words
+from pipeline.text_table import text_table
+from stages.views.recording import log_curve, text_document
 
 RECORDS = 20_000  # of a curve
 HOLE_NS = 2 * NS
@@ -28,6 +29,7 @@ Residual   mean of a second by family of faces, plus
 
 
 def log(recording: Any, tables: Tables) -> None:
+    """Log the attitude over time and a table of the raw files."""
     import rerun as rr
 
     whole = tables.table(TRAJECTORY)
@@ -44,19 +46,27 @@ def log(recording: Any, tables: Tables) -> None:
     for name, angle in values.items():
         style = rr.SeriesLines(colors=AXES[name], names=name)
         shown = np.where(broken, np.nan, np.degrees(angle))
-        moments = trajectory["t_ns"].to_numpy()
-        curve(recording, f"quality/attitude/{name}", style, partial(moments_of, moments), shown)
-    lines = [f"{'sensor':<8}{'records':>12}{'left out':>10}  {'from (UTC)':<22}{'rate, Hz':>10}  file"]
-    for row in tables.table(FILES).to_dict("records"):
-        first = utc_text(int(row["first_ns"]))
-        numbers = f"{row['records']:>12,}{row['dropped']:>10,}  {first:<22}{row['rate_hz']:>10.1f}"
-        lines.append(f"{row['sensor']:<8}{numbers}  {row['file']}")
-    recording.log("tables/files", words("\n".join(lines)), static=True)
-    recording.log("tables/how_to_read", words(HOW_TO_READ), static=True)
+        shown_ns = trajectory["t_ns"].to_numpy()
+        log_curve(recording, f"quality/attitude/{name}", style, partial(time_column, shown_ns), shown)
+    heads = ("sensor", "records", "left out", "from (UTC)", "rate, Hz", "file")
+    rows = [
+        (
+            row["sensor"],
+            f"{row['records']:,}",
+            f"{row['dropped']:,}",
+            utc_text(int(row["first_ns"])),
+            f"{row['rate_hz']:.1f}",
+            row["file"],
+        )
+        for row in tables.table(FILES).to_dict("records")
+    ]
+    lines = text_table("<8>12>10  <22>10  <4", heads, rows)
+    recording.log("tables/files", text_document("\n".join(lines)), static=True)
+    recording.log("tables/how_to_read", text_document(HOW_TO_READ), static=True)
 
 
-def moments_of(t_ns: Any) -> Any:
-    """The timeline ``time``."""
+def time_column(t_ns: Any) -> Any:
+    """Return instants (ns since the GPS epoch) on the timeline ``time``."""
     import rerun as rr
 
     return rr.TimeColumn("time", timestamp=unix_ns_from_gps(t_ns).astype("datetime64[ns]"))

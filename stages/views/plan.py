@@ -1,4 +1,4 @@
-"""A plan to look at: the target's faces by how many soundings they will get, and the tracks."""
+"""A recording of a plan: the target's faces coloured by the soundings predicted on them, and the tracks."""
 
 from pathlib import Path
 from typing import Any
@@ -9,13 +9,13 @@ from pipeline.atomic_files import write_bytes
 from pipeline.planning.assessment import Accuracy, PlanAssessment
 from pipeline.planning.prediction import planned_track
 from pipeline.results.pages.families import styles_of_families
-from stages.views.recording import COLOURS, GREY, LASER, SONAR, content, words
+from stages.views.recording import COLOURS, GREY, LASER, SONAR, recording_content, text_document
 
 PLENTY = 1000  # soundings on a face, from which on it is coloured in full
 
 
 def save_plan(answer: PlanAssessment, said: str, path: Path) -> None:
-    """``said``: the table of the screen."""
+    """Write a recording of a plan to ``path``; ``said``: the text of the screen."""
     import rerun.blueprint as rrb
 
     def draw(recording: Any) -> None:
@@ -23,10 +23,10 @@ def save_plan(answer: PlanAssessment, said: str, path: Path) -> None:
         _list(recording, answer, "given", answer.given)
         if answer.better is not None:
             _list(recording, answer, "better", answer.better)
-        recording.log("tables/plan", words(said), static=True)
+        recording.log("tables/plan", text_document(said), static=True)
 
     views = [rrb.Spatial3DView(origin="/", name="Target and tracks"), rrb.TextDocumentView(origin="tables/plan")]
-    write_bytes(path, content("plan", rrb.Blueprint(rrb.Horizontal(*views, column_shares=[3, 2])), draw))
+    write_bytes(path, recording_content("plan", rrb.Blueprint(rrb.Horizontal(*views, column_shares=[3, 2])), draw))
 
 
 def _target(recording: Any, answer: PlanAssessment) -> None:
@@ -40,7 +40,7 @@ def _target(recording: Any, answer: PlanAssessment) -> None:
 
 
 def _list(recording: Any, answer: PlanAssessment, name: str, outlook: Accuracy) -> None:
-    """Faces coloured by their soundings over all passes; a track a pass."""
+    """Log faces coloured by their soundings over all passes, and the track of each pass."""
     import rerun as rr
 
     total = np.sum([points["mbes"] for points in outlook.predicted.points], axis=0)
@@ -53,7 +53,7 @@ def _list(recording: Any, answer: PlanAssessment, name: str, outlook: Accuracy) 
         colours = [colour] * len(face.vertices_m)
         mesh = rr.Mesh3D(vertex_positions=face.vertices_m, triangle_indices=fan, vertex_colors=colours)
         recording.log(f"{name}/faces/{face.name}", mesh, rr.AnyValues(soundings=round(count)), static=True)
-    for number, one in enumerate(outlook.passes):
-        line = planned_track(answer.setting, one, number)[::10].astype(np.float32)
-        strip = rr.LineStrips3D([line], radii=0.02, colors=LASER, labels=[f"{one.distance_m:g} m"])
+    for number, sailed in enumerate(outlook.passes):
+        line = planned_track(answer.setting, sailed, number)[::10].astype(np.float32)
+        strip = rr.LineStrips3D([line], radii=0.02, colors=LASER, labels=[f"{sailed.distance_m:g} m"])
         recording.log(f"{name}/tracks/{number}", strip, static=True)

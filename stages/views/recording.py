@@ -1,8 +1,8 @@
 """Recordings for the Rerun viewer: RUN/<stage>/<stage>.rrd, drawn from Parquet alone, after the stage.
 
-A module a stage: ``log(recording, tables)``. All recordings of a run share the application's and the recording's id, so
-that opened together they are one scene. Entities (frame target unless said), * where one in so many points is shown
-(``one_in`` says how many):
+Each stage has a module here with a function ``log(recording, tables)``. All recordings of a run share the application's
+and the recording's id, so that opened together they are one scene. Entities (in the frame ``target`` unless another is
+named; * where points are thinned: ``one_in`` says to one in how many):
 
     /pool                              what is in the pool frame; a transform, known from stage segment on, places it
     /pool/trajectory/pass_<n>          georeference: track of the INS
@@ -13,8 +13,8 @@ that opened together they are one scene. Entities (frame target unless said), * 
     /before/<family> *, /after/<family> *   adjust: soundings with the coarse and with the calibrated mount
     /residuals/<sensor>/<family> *     adjust: points by distance from the adjusted surface
     /maps/<sensor>/<family>            adjust: mean residual of each cell of the faces
-    /fans/<sensor>/pass_<n>            adjust: rays of one moment in the middle of the pass
-    /tables/<name>                     what is said in words and numbers
+    /fans/<sensor>/pass_<n>            adjust: rays of one epoch in the middle of the pass
+    /tables/<name>                     text and numbers
 
 over the steps of the timeline ``iteration``:
 
@@ -22,7 +22,7 @@ over the steps of the timeline ``iteration``:
     /curves/deviation/<axis>, /curves/planes/<family>              angle_iterate: degrees
     /curves/turns/<angles or offsets>                              offsets: change in each turn of the alternation
 
-over the moments of the timeline ``time`` (UTC):
+over the timeline ``time`` (UTC):
 
     /quality/attitude/<axis>                                       ingest: degrees
     /quality/points/<sensor>, /quality/residual/<sensor>/<family>  adjust: points in a second, their mean residual, mm
@@ -43,7 +43,7 @@ from stages import ORDER, names_in
 
 APPLICATION = "poolcal"
 DRAWN = ORDER  # stages that have a recording
-AT_MOST = 300_000  # points of a cloud: dense enough to see, few enough for any laptop
+MOST_POINTS = 300_000  # of a cloud: dense enough to see, few enough for any laptop
 COLOURS = {  # for all eyes
     "P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167),
     "other": (122, 92, 0), "more": (60, 60, 60),
@@ -53,22 +53,56 @@ DOT_M = 0.008  # radius of a point
 
 
 def record(run: Path, stage: str, tabs: Sequence[str]) -> bytes:
-    """A stage's recording, as its file's content; shown in these tabs of stages.views.blueprint."""
-    from stages.views.blueprint import tour
+    """Return a stage's recording as the content of its file.
+
+    Parameters
+    ----------
+    run
+        The run folder.
+    stage
+        The stage's name.
+    tabs
+        The tabs of :mod:`stages.views.blueprint` that the viewer shows.
+    """
+    from stages.views.blueprint import run_blueprint
 
     model = target_of(read_settings(run).pool.target)
-    return content(recording_id(run), tour(tabs, model), lambda recording: log(recording, stage, Tables(run)))
+    layout = run_blueprint(tabs, model)
+    return recording_content(recording_id(run), layout, lambda recording: log_stage(recording, stage, Tables(run)))
 
 
-def log(recording: Any, stage: str, tables: Tables) -> None:
+def log_stage(recording: Any, stage: str, tables: Tables) -> None:
+    """Log what a stage has to show into a recording.
+
+    Parameters
+    ----------
+    recording
+        The rerun recording stream.
+    stage
+        The stage's name.
+    tables
+        The run's tables.
+    """
     import_module(f"stages.views.{stage}").log(recording, tables)
 
 
-def curve(recording: Any, path: str, style: Any, times: Callable[[], Any], values: Any) -> None:
-    """A curve over a timeline; ``times``: makes its rerun.TimeColumn.
+def log_curve(recording: Any, path: str, style: Any, times: Callable[[], Any], values: Any) -> None:
+    """Log a curve over a timeline, or nothing where there are no values.
 
-    Where there are no values, nothing is sent: of columns without rows the viewer makes a timeline from the beginning
-    to the end of time, and dies of it.
+    The viewer turns columns without rows into a timeline from the beginning to the end of time, and crashes.
+
+    Parameters
+    ----------
+    recording
+        The rerun recording stream.
+    path
+        The curve's entity.
+    style
+        Its rerun archetype: lines or points.
+    times
+        Makes its rerun.TimeColumn.
+    values
+        Its values, (n,).
     """
     import rerun as rr
 
@@ -77,8 +111,8 @@ def curve(recording: Any, path: str, style: Any, times: Callable[[], Any], value
         recording.send_columns(path, indexes=[times()], columns=rr.Scalars.columns(scalars=values))
 
 
-def words(text: str) -> Any:
-    """Text as it is, in letters of one width: a code block whose fence is longer than any run of ` inside."""
+def text_document(text: str) -> Any:
+    """Return text as it is, in letters of one width: a code block whose fence is longer than any run of ` inside."""
     import rerun
 
     longest = max((len(run) for run in re.findall("`+", text)), default=0)
@@ -86,8 +120,18 @@ def words(text: str) -> Any:
     return rerun.TextDocument(f"{fence}text\n{text}\n{fence}", media_type=rerun.MediaType.MARKDOWN)
 
 
-def content(identity: str, blueprint: Any, draw: Callable[[Any], None]) -> bytes:
-    """Of a recording's file. (The SDK's own writing hangs or leaves a stump when a disk is full.)"""
+def recording_content(identity: str, blueprint: Any, draw: Callable[[Any], None]) -> bytes:
+    """Return the content of a recording's file; the SDK's own writing hangs or leaves a stump when a disk is full.
+
+    Parameters
+    ----------
+    identity
+        The recording's id.
+    blueprint
+        The layout of the viewer.
+    draw
+        Logs everything into the recording stream.
+    """
     import rerun
 
     recording = rerun.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
@@ -99,14 +143,14 @@ def content(identity: str, blueprint: Any, draw: Callable[[Any], None]) -> bytes
 
 
 def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
-    """The recordings there are, in the stages' order, of stages that agree with each other."""
+    """Return the recordings of a run in the stages' order, of stages that agree; or of one ``stage`` alone."""
     wanted = agreeing(run, names_in(run)) if stage is None else (stage,)
-    found = [path for name in wanted if (path := recording_path(run, name)).is_file()]
-    if not found:
+    paths = [path for name in wanted if (path := recording_path(run, name)).is_file()]
+    if not paths:
         raise ArtefactError(f"{run}: has no recording{'' if stage is None else f' of {stage}'}; run poolcal run first")
-    return found
+    return paths
 
 
 def recording_id(*runs: Path) -> str:
-    """One a run folder, and one for two together."""
+    """Return the id of a run folder's recordings, or of a recording of two runs."""
     return str(uuid.uuid5(uuid.NAMESPACE_URL, "\n".join(run.resolve().as_uri() for run in runs)))

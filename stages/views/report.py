@@ -1,11 +1,12 @@
-"""The answer in words, as on the screen."""
+"""The result in words, as on the screen."""
 
 from typing import Any
 
 from pipeline.results.screen import summary
 from pipeline.run.results import Tables, calibration
-from stages.views.recording import words
+from stages.views.recording import text_document
 
 
 def log(recording: Any, tables: Tables) -> None:
-    recording.log("tables/summary", words(summary(calibration(tables.run))), static=True)
+    """Log the result in words."""
+    recording.log("tables/summary", text_document(summary(calibration(tables.run))), static=True)

@@ -9,10 +9,11 @@ from pipeline.artefacts.from_tables import family_names, target_frame
 from pipeline.artefacts.streams import point_array
 from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
-from stages.views.recording import AT_MOST, COLOURS, DOT_M
+from stages.views.recording import COLOURS, DOT_M, MOST_POINTS
 
 
 def log(recording: Any, tables: Tables) -> None:
+    """Log the pool's place, the target by design, and the labelled laser points."""
     import rerun as rr
 
     frame = target_frame(tables.table(TARGET_POSE))
@@ -22,7 +23,7 @@ def log(recording: Any, tables: Tables) -> None:
     faces = tables.table(FACES)
     family_of = faces["family"].to_numpy()
     laser, step = tables.sample(
-        LASER_LABELLED, AT_MOST, "face", *(f"{axis}_target_m" for axis in "xyz")
+        LASER_LABELLED, MOST_POINTS, "face", *(f"{axis}_target_m" for axis in "xyz")
     )
     points, family = point_array(laser, "target_m").astype(np.float32), family_of[laser["face"].astype(int)]
     for name, colour in styles_of_families(family_names(faces), COLOURS).items():

@@ -12,26 +12,29 @@ from pipeline.artefacts.streams import point_array
 from pipeline.atomic_files import write_bytes
 from pipeline.results.compare_text import comparison_text
 from pipeline.run.results import Tables, calibration
-from stages.views.blueprint import side_by_side
-from stages.views.recording import DOT_M, LASER, SONAR, content, log, recording_id, words
+from stages.views.blueprint import two_runs_blueprint
+from stages.views.recording import DOT_M, LASER, SONAR, log_stage, recording_content, recording_id, text_document
 
 SOUNDINGS = 200_000  # of a run, on one target
-SHOWN = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # in the target's frame
+STAGES = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # in the target's frame
 
 
-class Below:
-    """A recording in which every entity lies one level deeper."""
+class NestedRecording:
+    """A recording stream with every entity one level deeper, under ``name``."""
 
     def __init__(self, recording: Any, name: str) -> None:
         self._recording, self._name = recording, name
 
     def log(self, path: str, *parts: Any, **options: Any) -> None:
+        """Log parts of an entity, as rerun.RecordingStream.log does."""
         self._recording.log(f"{self._name}/{path}", *parts, **options)
 
     def send_columns(self, path: str, **columns: Any) -> None:
+        """Log columns of an entity, as rerun.RecordingStream.send_columns does."""
         self._recording.send_columns(f"{self._name}/{path}", **columns)
 
     def set_time(self, timeline: str, **at: Any) -> None:
+        """Set the time of what is logged next, as rerun.RecordingStream.set_time does."""
         self._recording.set_time(timeline, **at)
 
 
@@ -50,16 +53,16 @@ def save_two_runs(first: Path, second: Path, difference: dict[str, Any], path: P
 
     def draw(recording: Any) -> None:
         for name, run in (("a", first), ("b", second)):
-            for stage in SHOWN:
-                log(Below(recording, name), stage, Tables(run))
+            for stage in STAGES:
+                log_stage(NestedRecording(recording, name), stage, Tables(run))
         _on_one_target(recording, Tables(first), Tables(second))
-        recording.log("tables/comparison", words(comparison_text(difference)), static=True)
+        recording.log("tables/comparison", text_document(comparison_text(difference)), static=True)
 
-    write_bytes(path, content(recording_id(first, second), side_by_side(), draw))
+    write_bytes(path, recording_content(recording_id(first, second), two_runs_blueprint(), draw))
 
 
 def _on_one_target(recording: Any, first: Tables, second: Tables) -> None:
-    """Soundings of both runs with the mount of the first: a sonar that has moved hangs beside the faces."""
+    """Log the soundings of both runs with the first's mount: those of a sonar that has moved lie beside the faces."""
     import rerun as rr
 
     block = calibration(first.run)["mbes"]

@@ -1,4 +1,4 @@
-"""The Rerun viewer, opened for the user: on this machine's display, heard by this machine alone, telling nobody."""
+"""The Rerun viewer on this machine's display: it listens to this machine alone and reports nothing."""
 
 import contextlib
 import json
@@ -13,11 +13,24 @@ from pipeline.console import say
 from pipeline.errors import ArtefactError
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
-NO_WINDOW = ("winit", "EventLoop", "DISPLAY")  # one of these is in what the viewer says where no window can be opened
+NO_WINDOW = ("winit", "EventLoop", "DISPLAY")  # the viewer's message has one of these where no window can be opened
 
 
-def show(paths: Sequence[Path], instead: str) -> int:
-    """The viewer, until it is closed. ``instead``: what one can do where there is no display."""
+def show_recordings(paths: Sequence[Path], instead: str) -> int:
+    """Open recordings in the viewer, wait until it is closed, and return the exit status.
+
+    Parameters
+    ----------
+    paths
+        The recordings.
+    instead
+        What the user can do on a machine without a display.
+
+    Raises
+    ------
+    ArtefactError
+        There is no display, or no viewer.
+    """
     no_display = ArtefactError(f"no display here: {instead}")
     if sys.platform == "linux" and not any(map(os.environ.get, DISPLAYS)):
         raise no_display
@@ -26,25 +39,25 @@ def show(paths: Sequence[Path], instead: str) -> int:
     try:
         with (
             temporary_folder() as place,
-            silent() as environment,
-            (place / "told").open("w+", encoding="utf-8", errors="replace") as told,
+            without_statistics() as environment,
+            (place / "messages").open("w+", encoding="utf-8", errors="replace") as messages,
         ):
             command = [str(viewer), "--bind", "127.0.0.1", *places]
-            status = subprocess.run(command, check=False, env=environment, stderr=told).returncode
-            told.seek(0)
-            said = told.read()
+            status = subprocess.run(command, check=False, env=environment, stderr=messages).returncode
+            messages.seek(0)
+            message = messages.read()
     except FileNotFoundError as error:
         raise ArtefactError(f"{viewer}: there is no such program; run make setup again") from error
-    if status and any(word in said for word in NO_WINDOW):
+    if status and any(word in message for word in NO_WINDOW):
         raise no_display
     if status:
-        say(said.rstrip(), sys.stderr)
+        say(message.rstrip(), sys.stderr)
     return status and 1
 
 
 @contextlib.contextmanager
-def silent() -> Iterator[Mapping[str, str]]:
-    """An environment in which the viewer sends no usage statistics, whatever the user has chosen for other programs.
+def without_statistics() -> Iterator[Mapping[str, str]]:
+    """Give an environment in which the viewer sends no usage statistics, whatever the user has chosen elsewhere.
 
     The viewer knows no option and no variable for that, only its file analytics.json: it is given one of its own, and
     the user's is neither read nor written.
@@ -52,7 +65,7 @@ def silent() -> Iterator[Mapping[str, str]]:
     with temporary_folder() as place:
         file = place / "rerun" / "analytics.json"
         file.parent.mkdir()
-        given = {"analytics_enabled": False, "analytics_id": "none", "metadata": {}}
-        given |= {"config_file_path": str(file), "data_dir_path": str(file.parent)}
-        file.write_text(json.dumps(given), encoding="utf-8")
+        settings = {"analytics_enabled": False, "analytics_id": "none", "metadata": {}}
+        settings |= {"config_file_path": str(file), "data_dir_path": str(file.parent)}
+        file.write_text(json.dumps(settings), encoding="utf-8")
         yield os.environ | {"XDG_CONFIG_HOME": str(place)}

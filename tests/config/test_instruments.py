@@ -19,8 +19,8 @@ from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.planning import assessment
 from pipeline.report.calibration_document import instruments_block
-from pipeline.results.pages.instrument_table import figures_used
-from pipeline.results.pages.rendering import render
+from pipeline.results.pages.instrument_table import instrument_rows
+from pipeline.results.pages.rendering import render_page
 from pipeline.run.settings import Settings, read_settings, write_settings
 from tests.support.pages import Page
 
@@ -260,7 +260,7 @@ def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
     }
     mbes = {"instrument": "mine", "angle_sigma_deg": 0.09}
     found = session(tmp_path, {"mine": preset}, mbes=mbes, laser={"range_sigma_m": 0.006})
-    html = render("instrument_table.html", figures=figures_used(found))
+    html = render_page("instrument_table.html", figures=instrument_rows(found))
     shown = Page(html).table("sensor", "instrument", "figure")
     assert [row for row in shown if row[0]] == [
         ["ins", "–", "drift.horizontal_m", "0.015", "default"],

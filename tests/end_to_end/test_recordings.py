@@ -22,7 +22,7 @@ from tests.support.places import Told, poolcal
 from tests.support.recordings import Chunks, points, read, rows_in, text
 
 
-def curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:
+def log_curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:
     rows = [chunk for chunk in chunks if "Scalars:scalars" in chunk.schema.names]
     values = np.concatenate([np.ravel(chunk.column("Scalars:scalars").to_pylist()) for chunk in rows])
     return values, [moment for chunk in rows for moment in chunk.column(timeline).to_pylist()]
@@ -44,7 +44,7 @@ def test_every_point_is_there(drawn: Path) -> None:
 def test_quality_over_time_is_the_trajectorys_and_the_bins(drawn: Path) -> None:
     found = read(drawn, "ingest")
     trajectory = pd.read_parquet(drawn / "ingest" / "trajectory.parquet")
-    roll, times = curve(found["/quality/attitude/roll"], "time")
+    roll, times = log_curve(found["/quality/attitude/roll"], "time")
     step = -(-len(trajectory) // len(roll))
     shown = trajectory.iloc[::step]
     unbroken = np.isfinite(roll)
@@ -55,7 +55,7 @@ def test_quality_over_time_is_the_trajectorys_and_the_bins(drawn: Path) -> None:
     unix = shown["t_ns"].to_numpy() + (315_964_800 - leap) * 10**9
     assert [int(t.value) for t in pd.to_datetime(times)] == unix.tolist()
     bins = pd.read_parquet(drawn / "adjust" / "residual_bins.parquet").query("by == 'time' and sensor == 'mbes'")
-    count, _ = curve(read(drawn, "adjust")["/quality/points/mbes"], "time")
+    count, _ = log_curve(read(drawn, "adjust")["/quality/points/mbes"], "time")
     assert count.sum() == bins["count"].sum()
     files = text(found, "/tables/files")
     for name in pd.read_parquet(drawn / "ingest" / "files.parquet")["file"]:
@@ -136,7 +136,7 @@ def test_the_iteration_closes_the_planes(drawn: Path) -> None:
     assert between[0].max() > 0.3
     assert between[-1].max() < between[0].max() / 4
     for path, column in (("deviation/yaw", "deviation_yaw_deg"), ("planes/P3", "angle_P3_deg")):
-        values, steps = curve(found[f"/curves/{path}"], "iteration")
+        values, steps = log_curve(found[f"/curves/{path}"], "iteration")
         np.testing.assert_allclose(values, iterations[column])
         assert steps == iterations["iteration"].tolist()
     wall = found["/iteration/soundings/P2"]
@@ -145,7 +145,7 @@ def test_the_iteration_closes_the_planes(drawn: Path) -> None:
     assert len(clouds) == len(iterations)
     assert last < first / 1.5  # the wall's points swing into one plane
     turns = pd.read_parquet(drawn / "offsets" / "alternation.parquet")
-    values, steps = curve(read(drawn, "offsets")["/curves/turns/offsets"], "iteration")
+    values, steps = log_curve(read(drawn, "offsets")["/curves/turns/offsets"], "iteration")
     np.testing.assert_allclose(10**values, 1000 * turns["step_m"], rtol=1e-9)
     assert steps == turns["iteration"].tolist()
 
@@ -176,7 +176,7 @@ def test_drawn_once_and_again_when_gone(drawn: Path) -> None:
 def test_a_sample_says_so(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from stages.views import georeference
 
-    monkeypatch.setattr(georeference, "AT_MOST", 1000)
+    monkeypatch.setattr(georeference, "MOST_POINTS", 1000)
     (drawn / "georeference" / "georeference.rrd").unlink()
     assert draw_missing(drawn, Drawings(report=False, recordings=True)) == []
     (chunk,) = read(drawn, "georeference")["/pool/laser"]
@@ -339,9 +339,9 @@ def test_nothing_is_sent_of_curves_without_values() -> None:
 
         return rr.TimeColumn("iteration", sequence=[0])
 
-    stages.views.recording.curve(Recording(), "empty", None, times, np.empty(0))
+    stages.views.recording.log_curve(Recording(), "empty", None, times, np.empty(0))
     assert sent == []
-    stages.views.recording.curve(Recording(), "one", None, times, np.zeros(1))
+    stages.views.recording.log_curve(Recording(), "one", None, times, np.zeros(1))
     assert sent == ["one", "one"]
     folder = Path(stages.views.recording.__file__).parent
     callers = [path.name for path in folder.glob("*.py") if ".send_columns(" in path.read_text(encoding="utf-8")]

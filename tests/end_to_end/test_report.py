@@ -226,7 +226,7 @@ def test_a_page_that_cannot_be_drawn_spoils_nothing(
     def fails(*_: object) -> str:
         raise ValueError("no ink")
 
-    monkeypatch.setattr(pipeline.results.pages.report, "page", fails)
+    monkeypatch.setattr(pipeline.results.pages.report, "report_page", fails)
     told = done.calibrate("--report")
     assert told.status == 0
     assert told.complaints[-1] == "report.html: not drawn (ValueError: no ink); the calibration is complete"

@@ -16,7 +16,7 @@ from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.maths.target.model import TargetModel
 from pipeline.results.pages import face_maps, target_plots
-from pipeline.results.pages.rendering import style
+from pipeline.results.pages.rendering import drawing_style
 from pipeline.target.design import target_of
 from tests.support.roots import ROOT
 from tests.support.targets import by_letters
@@ -78,8 +78,8 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
 
 
 def draw(model: TargetModel, residuals: pd.DataFrame, solved: bool = True) -> None:
-    with style():
-        target_plots.sections(residuals, faces_of(model), solved)
+    with drawing_style():
+        target_plots.target_sections(residuals, faces_of(model), solved)
 
 
 @pytest.mark.parametrize(
@@ -130,10 +130,10 @@ def test_no_letters_are_printed_over_others(name: str, drawn: list[Figure]) -> N
     faces, residuals = faces_of(model), residuals_of(model)
     family = faces["family"].to_numpy()[residuals["face"]]
     draw(model, residuals)
-    with style():
-        target_plots.distances(residuals, faces, family, True)
+    with drawing_style():
+        target_plots.distance_charts(residuals, faces, family, True)
         for sensor in ("laser", "mbes"):
-            face_maps.maps(cells_of(residuals, faces), faces, sensor)
+            face_maps.residual_maps(cells_of(residuals, faces), faces, sensor)
     for figure in drawn:
         canvas = FigureCanvasAgg(figure)
         for axis in figure.axes:
@@ -155,9 +155,9 @@ def test_families_without_points_have_no_panel(drawn: list[Figure]) -> None:
     faces, residuals = faces_of(model), residuals_of(model)
     names = faces["family"].to_numpy()
     residuals = residuals[names[residuals["face"]] != "return-north"]
-    with style():
-        target_plots.distances(residuals, faces, names[residuals["face"]], True)
-        face_maps.maps(cells_of(residuals, faces), faces, "mbes")
+    with drawing_style():
+        target_plots.distance_charts(residuals, faces, names[residuals["face"]], True)
+        face_maps.residual_maps(cells_of(residuals, faces), faces, "mbes")
     for figure in drawn:
         titles = [axis.get_title(loc="left").removesuffix(" (height)") for axis in figure.axes]
         assert sorted(filter(None, titles)) == ["fronts", "ledges", "return-south"]

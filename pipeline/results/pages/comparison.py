@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from pipeline.mount import WITHIN_95
 from pipeline.results.compare_text import own_faces_counted
 from pipeline.results.mount_difference import quantity_text
-from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
+from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
 
 
 def comparison_page(difference: Mapping[str, Any]) -> str:
     """Return the page of the difference of two runs, of :func:`pipeline.results.compare.run_difference`."""
     rows = difference["parameters"]
-    return render(
+    return render_page(
         "comparison.html",
         difference=difference,
         rows=rows,
@@ -30,7 +30,7 @@ def comparison_page(difference: Mapping[str, Any]) -> str:
 
 def _difference_chart(rows: list[dict[str, Any]]) -> Markup:
     """Return a chart of each difference in its own sigmas, with its 95 % interval; red: moved."""
-    with style():
+    with drawing_style():
         figure = Figure(figsize=(WIDTH_IN, 2.0))
         axis = figure.add_axes((0.13, 0.24, 0.85, 0.72))
         z = np.array([row["z"] for row in rows])

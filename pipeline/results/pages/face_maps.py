@@ -1,4 +1,4 @@
-"""Pictures of the faces and of what passes them: maps of mean residuals, the passes' tracks."""
+"""Maps of mean residuals over the faces, and of the passes' tracks before the target."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,8 +21,18 @@ Array = NDArray[np.float64]
 MAP_HEIGHT_IN = 2.9
 
 
-def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
-    """Mean residual over each family of faces as one sees it from the boat; level ones from above."""
+def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
+    """Draw the mean residuals over each family of faces as seen from the boat; level faces from above.
+
+    Parameters
+    ----------
+    residual_map
+        The artefact ``residual_map``.
+    faces
+        The artefact ``faces``.
+    sensor
+        ``laser`` or ``mbes``.
+    """
     figure = Figure(figsize=(WIDTH_IN, MAP_HEIGHT_IN))
     where = {"left": 0.07, "right": 0.87, "bottom": 0.15, "top": 0.92, "wspace": 0.25}
     level = horizontal_families(faces)
@@ -43,7 +53,7 @@ def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup
         inside = cells[of_family == name]
         flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
         size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
-        image = _grid(axis, flat[:, 0], flat[:, 1], 1000 * inside["mean_m"].to_numpy(), size, span) or image
+        image = _grid(axis, flat, 1000 * inside["mean_m"].to_numpy(), size, span) or image
         axis.set(title=name, aspect="equal")
         axis.set_xlabel("x, m (from above)" if name in level else "to the right, m")
         if name not in level:
@@ -57,7 +67,7 @@ def maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup
 
 
 def _few_ticks(axis: Axes) -> None:
-    """Of a panel to scale, as many ticks as there is room for numbers beside each other."""
+    """Set as many ticks on a panel to scale as there is room for numbers beside each other."""
     spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
     box = axis.get_position(original=True)
     room = box.width * WIDTH_IN, box.height * MAP_HEIGHT_IN
@@ -69,9 +79,9 @@ def _few_ticks(axis: Axes) -> None:
 
 
 def _from_the_boat(faces: pd.DataFrame) -> list[str]:
-    """Families as one sees them, y growing to the left; level ones last."""
+    """Return the families from left to right as seen from the boat, y growing to the left; level ones last."""
     middle = {
-        name: np.mean([np.reshape(one, (-1, 3))[:, 1].mean() for one in of_family["vertices_target_m"]])
+        name: np.mean([np.reshape(corners, (-1, 3))[:, 1].mean() for corners in of_family["vertices_target_m"]])
         for name, of_family in faces.groupby("family", sort=False)
     }
     level = horizontal_families(faces)
@@ -79,14 +89,15 @@ def _from_the_boat(faces: pd.DataFrame) -> list[str]:
 
 
 def _panel_width(faces: pd.DataFrame, name: str) -> float:
-    """Share of the picture, by how wide the family's faces are."""
+    """Return a panel's share of the picture's width, by how wide the family's faces are."""
     outlines = faces.loc[faces["family"] == name, "vertices_target_m"]
-    x, y = np.ptp(np.concatenate([np.reshape(one, (-1, 3)) for one in outlines]), axis=0)[:2]
+    x, y = np.ptp(np.concatenate([np.reshape(outline, (-1, 3)) for outline in outlines]), axis=0)[:2]
     return float(np.clip((x if name in horizontal_families(faces) else np.hypot(x, y)) / 1.5, 0.8, 2.0))
 
 
-def _grid(axis: Axes, x: Array, y: Array, values: Array, size: float, span: float) -> Any:
-    """Cells with these centres; where several lie over each other (block over block) their mean."""
+def _grid(axis: Axes, centres: Array, values: Array, size: float, span: float) -> Any:
+    """Draw squares with these centres; where several lie over each other (block over block), their mean."""
+    x, y = centres[:, 0], centres[:, 1]
     if not len(x):
         axis.text(0.5, 0.5, "no points", transform=axis.transAxes, ha="center", color=QUIET)
         return None
@@ -100,8 +111,18 @@ def _grid(axis: Axes, x: Array, y: Array, values: Array, size: float, span: floa
     return axis.imshow(mean, origin="lower", extent=edges, cmap="RdBu_r", vmin=-span, vmax=span, interpolation="none")
 
 
-def tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_deg: float) -> Markup:
-    """The passes' tracks before the target, north shown; ``positions_m``: of the INS in the target frame, by pass."""
+def pass_tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_deg: float) -> Markup:
+    """Draw the passes' tracks before the target from above, with an arrow to north.
+
+    Parameters
+    ----------
+    positions_m
+        By pass, positions of the INS in the target frame, (n, 3).
+    faces
+        The artefact ``faces``.
+    azimuth_deg
+        Azimuth of the target.
+    """
     figure = Figure(figsize=(WIDTH_IN, 3.6))
     axis = figure.add_axes((0.08, 0.14, 0.78, 0.77))
     for corners in faces.loc[~is_horizontal(faces), "vertices_target_m"]:

@@ -17,7 +17,7 @@ from pipeline.console import plural
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.mount import WITHIN_95
 from pipeline.results.history import TEXT_COLUMNS, History, SessionFilter
-from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, picture, render, style
+from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
 
@@ -41,7 +41,7 @@ def history_page(history: History, filters: str) -> str:
     jumps = table[table["moved"] != ""]
     each = "; ".join(f"{row['session']}: {row['moved']}" for row in jumps.to_dict("records"))
     sentence = f"Significant movements: {each}." if each else "No movement of the mount is significant."
-    return render(
+    return render_page(
         "history.html",
         rows=rows,
         parameters=parameters,
@@ -78,7 +78,7 @@ def _number(value: float, digits: int) -> str:
 
 def _control_charts(table: pd.DataFrame) -> Markup:
     """Return six charts over the sessions in order of time."""
-    with style():
+    with drawing_style():
         figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
         axes = figure.subplots(3, 2, sharex=True).T.ravel()
         for axis, parameter in zip(axes, PARAMETERS, strict=True):

@@ -1,4 +1,4 @@
-"""The report's pictures, each drawn by itself from a run's tables: they can be drawn side by side."""
+"""The report's pictures. Each is drawn by itself from a run's tables, so that several processes can share them."""
 
 from pathlib import Path
 from typing import Any
@@ -15,64 +15,64 @@ from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
 from pipeline.artefacts.from_tables import family_names, trajectory_in_target
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.results.pages import face_maps, residual_plots, target_plots
-from pipeline.results.pages.rendering import style
+from pipeline.results.pages.rendering import drawing_style
 from pipeline.run.results import Tables, calibration
 from pipeline.run.settings import read_settings
 
 TRACK_POINTS = 300  # of a pass on the plan
 
 
-def draw(run: Path, name: str) -> Markup:
-    """One of :data:`PICTURES`."""
-    with style():
+def draw_picture(run: Path, name: str) -> Markup:
+    """Return a picture of a run's report; ``name``: a key of :data:`PICTURES`."""
+    with drawing_style():
         return PICTURES[name](Tables(run))
 
 
 def _residuals(tables: Tables) -> Markup:
     passes = tables.table(PASSES)
     families = family_names(tables.table(FACES))
-    return residual_plots.residuals(tables.table(RESIDUAL_BINS), tables.table(CELLS), passes, families)
+    return residual_plots.residual_charts(tables.table(RESIDUAL_BINS), tables.table(CELLS), passes, families)
 
 
 def _distances(tables: Tables) -> Markup:
     residuals = tables.table(RESIDUALS, *target_plots.DISTANCES)
     faces = tables.table(FACES)
-    return target_plots.distances(residuals, faces, _family(residuals, tables), _solved(tables))
+    return target_plots.distance_charts(residuals, faces, _family(residuals, tables), _solved(tables))
 
 
 def _sections(tables: Tables) -> Markup:
     residuals = tables.table(RESIDUALS, *target_plots.SECTIONS)
-    return target_plots.sections(residuals, tables.table(FACES), _solved(tables))
+    return target_plots.target_sections(residuals, tables.table(FACES), _solved(tables))
 
 
 def _map_laser(tables: Tables) -> Markup:
-    return face_maps.maps(tables.table(RESIDUAL_MAP), tables.table(FACES), "laser")
+    return face_maps.residual_maps(tables.table(RESIDUAL_MAP), tables.table(FACES), "laser")
 
 
 def _map_mbes(tables: Tables) -> Markup:
-    return face_maps.maps(tables.table(RESIDUAL_MAP), tables.table(FACES), "mbes")
+    return face_maps.residual_maps(tables.table(RESIDUAL_MAP), tables.table(FACES), "mbes")
 
 
 def _convergence(tables: Tables) -> Markup:
-    return residual_plots.convergence(tables.table(ITERATIONS), tables.table(ALTERNATION))
+    return residual_plots.convergence_charts(tables.table(ITERATIONS), tables.table(ALTERNATION))
 
 
 def _tracks(tables: Tables) -> Markup:
-    """The INS's track of each pass in the target frame."""
-    poses, passes, pose = (tables.table(one) for one in (POSES, PASSES, TARGET_POSE))
+    """Draw the INS's track of each pass in the target frame."""
+    poses, passes, pose = (tables.table(artefact) for artefact in (POSES, PASSES, TARGET_POSE))
     trajectory = trajectory_in_target(poses, pose)
     number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
-    found = {}
-    for one in passes["pass"].tolist():
-        track = trajectory.positions_m[number == one]
+    positions_m = {}
+    for pass_number in passes["pass"].tolist():
+        track = trajectory.positions_m[number == pass_number]
         if len(track):
-            found[int(one)] = track[:: max(1, len(track) // TRACK_POINTS)]
+            positions_m[int(pass_number)] = track[:: max(1, len(track) // TRACK_POINTS)]
     azimuth_deg = tables.table(POOL_FRAME)["azimuth_deg"].iloc[0] + pose["azimuth_correction_deg"].iloc[0]
-    return face_maps.tracks(found, tables.table(FACES), float(azimuth_deg))
+    return face_maps.pass_tracks(positions_m, tables.table(FACES), float(azimuth_deg))
 
 
 def _family(residuals: pd.DataFrame, tables: Tables) -> NDArray[Any]:
-    """The family of each residual's face."""
+    """Return the family of each residual's face."""
     family = tables.table(FACES)["family"].to_numpy()
     return np.asarray(family[residuals["face"].to_numpy().astype(int)])
 
@@ -81,8 +81,8 @@ def _solved(tables: Tables) -> bool:
     return calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
 
 
-def pictures_of(run: Path) -> list[str]:
-    """Names of those that the run's page has."""
+def picture_names(run: Path) -> list[str]:
+    """Return the names of the pictures that the run's report has."""
     laser = read_settings(run).session.calibrated == "laser"
     iterated = not laser and len(Tables(run).table(ITERATIONS)) > 0
     without = (("map_mbes",) if laser else ()) + (() if iterated else ("convergence",))

@@ -44,16 +44,16 @@ STYLE: dict[Any, Any] = {
 
 
 @contextlib.contextmanager
-def style() -> Iterator[None]:
-    """Our style on matplotlib's own defaults, whatever file of settings lies about."""
+def drawing_style() -> Iterator[None]:
+    """Set the style of all pictures on matplotlib's own defaults, whatever settings the machine has."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)
         yield
 
 
-def render(template: str, **values: Any) -> str:
-    """A page from ``pipeline/results/pages/<template>``."""
+def render_page(template: str, **values: Any) -> str:
+    """Return a page made from ``pipeline/results/pages/<template>`` with these values."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("pipeline.results", "pages"),
         autoescape=True,
@@ -67,18 +67,18 @@ def render(template: str, **values: Any) -> str:
 
 
 def css_text(text: str) -> Markup:
-    r"""Untrusted text within the quotes of a CSS string, at most a line of it: all but plain letters as numbers.
+    r"""Return untrusted text, cut to a line, for the quotes of a CSS string: all but plain letters as numbers.
 
     >>> css_text('a "} </style>')
     Markup('a \\22 \\7d  \\3c \\2f style\\3e ')
     """
     short = text if len(text) <= HEAD_LETTERS else f"{text[:HEAD_LETTERS]}…"
-    plain = (one if one == " " or (one.isascii() and one.isalnum()) else f"\\{ord(one):x} " for one in short)
+    plain = (c if c == " " or (c.isascii() and c.isalnum()) else f"\\{ord(c):x} " for c in short)
     return Markup("".join(plain))
 
 
 def breakable(text: str) -> Markup:
-    """A name that may be broken into lines after _ and -, and not within a word.
+    """Return a name that a browser may break into lines after _ and -, and not within a word.
 
     >>> breakable("harbour_<b>")
     Markup('harbour_<wbr>&lt;b&gt;')
@@ -87,7 +87,7 @@ def breakable(text: str) -> Markup:
 
 
 def picture(figure: Figure, label: str) -> Markup:
-    """The figure as an element of the page, complete in itself, with words for those who cannot see it."""
+    """Return the figure as an element of the page; ``label`` describes it to those who cannot see it."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
     data = base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -1,4 +1,4 @@
-"""RUN/report/report.html: the answer, what it rests on, and where it came from, on one page.
+"""RUN/report/report.html: the result, its evidence and its provenance on one page.
 
 Every number on it is in calibration.json, run.yaml, a manifest or a Parquet of the run, or the difference of two of
 them; nothing else is computed here but the pictures' scales, means of residuals and the intervals of means.
@@ -21,12 +21,13 @@ from pipeline.config.target import Letters
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import design_shape
-from pipeline.results.pages import mount_tables
-from pipeline.results.pages.currency import drawn_from
-from pipeline.results.pages.instrument_table import figures_used
-from pipeline.results.pages.mount_tables import METHODS
-from pipeline.results.pages.plots import pictures_of
-from pipeline.results.pages.rendering import render
+from pipeline.results.pages.currency import page_digest
+from pipeline.results.pages.instrument_table import instrument_rows
+from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows
+from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_rows
+from pipeline.results.pages.plots import picture_names
+from pipeline.results.pages.rendering import render_page
+from pipeline.results.pages.sigma_sources import sigma_source_rows
 from pipeline.results.screen import verdict_in_words
 from pipeline.run import manifest
 from pipeline.run.results import PAGE, Tables, agreeing, calibration
@@ -35,7 +36,7 @@ from pipeline.target.design import target_of
 
 Row = Mapping[str, Any]
 MOST_GAPS = 12
-SORTED_BY = {  # what residuals are sorted by, in the report
+SORTED_BY = {  # variables along which residuals are averaged, as the report calls them
     "face": "face",
     "angle": "angle",
     "step": "step at a receive angle",
@@ -49,67 +50,107 @@ SORTED_BY = {  # what residuals are sorted by, in the report
 }
 
 
-def write_page(run: Path, stages: Sequence[str], pictures: Iterable[Markup]) -> None:
-    """Write RUN/report/report.html of a finished run; ``pictures``: those of :func:`pictures_of`, in order."""
-    write_text(run / "report" / PAGE, page(Tables(run), agreeing(run, stages), pictures))
+def write_report_page(run: Path, stages: Sequence[str], pictures: Iterable[Markup]) -> None:
+    """Write RUN/report/report.html of a finished run.
+
+    Parameters
+    ----------
+    run
+        The run folder.
+    stages
+        Names of the run's stages.
+    pictures
+        The pictures of :func:`~pipeline.results.pages.plots.picture_names`, in order.
+    """
+    write_text(run / "report" / PAGE, report_page(Tables(run), agreeing(run, stages), pictures))
 
 
-def page(tables: Tables, done: Mapping[str, manifest.Manifest], pictures: Iterable[Markup]) -> str:
-    """``done``: the manifests of all stages."""
+def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pictures: Iterable[Markup]) -> str:
+    """Return the report's page.
+
+    Parameters
+    ----------
+    tables
+        The run's tables.
+    manifests
+        The manifests of all stages.
+    pictures
+        The pictures of :func:`~pipeline.results.pages.plots.picture_names`, in order.
+    """
     result, settings = calibration(tables.run), read_settings(tables.run)
-    laser = settings.session.calibrated == "laser"
-    held = result.get("held", {})
-    passes = tables.table(PASSES)
-    gaps = tables.table(GAPS).sort_values("duration_s", ascending=False)
-    calibrations, files = tables.table(CALIBRATION), tables.table(FILES)
-    estimate = tables.table(ESTIMATE)
-    closing = [] if laser else mount_tables.closing(tables)
-    return render(
+    return render_page(
         "report.html",
         result=result,
-        held=[] if result["reasons"] else list(held),
-        verdict=verdict_in_words(result["verdict"], held),
-        run=tables.run.absolute().name,
-        date=str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
-        six=mount_tables.six(calibrations, result["result"], settings.pool.verdict, held),
-        frame=tables.table(POOL_FRAME).to_dict("records")[0],
-        largest=_largest(tables.table(CELLS)),
-        tolerated=f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
-        level=f"{100 * settings.pool.adjust.test_level:g}",
-        tests=[row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
-        traced=not laser and settings.session.sonar.svp is not None,
-        given_speed=None if laser else settings.session.sonar.sound_speed_m_s,
-        speeds=_speeds(files),
         methods=METHODS,
-        laser=laser,
-        letters=isinstance(settings.pool.target, Letters),
-        ways=[method for method in METHODS if method in result["methods"] and result["methods"][method]["mount"]],
-        by_method=[] if laser else list(mount_tables.by_method(calibrations)),
-        closing=closing,
-        spread=list(dict.fromkeys(row["plane"] for row in closing if np.isnan(row["angle_deg"]))),
-        shares=list(mount_tables.shares(tables.table(FREED), estimate, settings.session)),
-        built=mount_tables.built(result["target"]["as_found"], design_shape(target_of(settings.pool.target))),
-        names=[name for name, *_ in PARAMETERS],
-        correlations=mount_tables.correlations(result),
-        groups=tables.table(GROUPS).to_dict("records"),
-        summary=tables.table(ADJUST_SUMMARY).to_dict("records")[0],
-        tracks=passes.to_dict("records"),
-        files=files.to_dict("records"),
-        gaps=gaps.head(MOST_GAPS).to_dict("records"),
-        more_gaps=max(0, len(gaps) - MOST_GAPS),
-        counts=[row | {"stage": stage} for stage, one in done.items() for row in one.counts if row["count"]],
-        figures=figures_used(settings.session),
-        changed=_changed(settings),
-        commit=done["report"].git_commit,
-        utc=lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
-        drawn_from=drawn_from(tables.run, done),
-        pictures=dict(zip(pictures_of(tables.run), pictures, strict=True)),
+        laser=settings.session.calibrated == "laser",
+        **_result_values(tables, result, settings),
+        **_residual_values(tables, result, settings),
+        **_data_values(tables, manifests, settings),
+        drawn_from=page_digest(tables.run, manifests),
+        pictures=dict(zip(picture_names(tables.run), pictures, strict=True)),
     )
 
 
-# --- tables ----------------------------------------------------------------------------------------------------------
+def _result_values(tables: Tables, result: Row, settings: Settings) -> Row:
+    """Return the template's values about the mount and the target."""
+    laser = settings.session.calibrated == "laser"
+    fixed = result.get("held", {})
+    passes, calibrations = tables.table(PASSES), tables.table(CALIBRATION)
+    planes = [] if laser else plane_agreement_rows(tables)
+    methods = [method for method in METHODS if method in result["methods"]]
+    return {
+        "fixed": [] if result["reasons"] else list(fixed),
+        "verdict": verdict_in_words(result["verdict"], fixed),
+        "run": tables.run.absolute().name,
+        "date": str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
+        "parameters": parameter_rows(calibrations, result["result"], settings.pool.verdict, fixed),
+        "names": [name for name, *_ in PARAMETERS],
+        "frame": tables.table(POOL_FRAME).to_dict("records")[0],
+        "traced": not laser and settings.session.sonar.svp is not None,
+        "configured_speed": None if laser else settings.session.sonar.sound_speed_m_s,
+        "speeds": _speeds(tables.table(FILES)),
+        "letters": isinstance(settings.pool.target, Letters),
+        "solved_methods": [method for method in methods if result["methods"][method]["mount"]],
+        "by_method": [] if laser else list(method_rows(calibrations)),
+        "planes": planes,
+        "several_planes": list(dict.fromkeys(row["plane"] for row in planes if np.isnan(row["angle_deg"]))),
+        "sigma_sources": list(sigma_source_rows(tables.table(FREED), tables.table(ESTIMATE), settings.session)),
+        "as_built": as_built_rows(result["target"]["as_found"], design_shape(target_of(settings.pool.target))),
+        "correlations": correlation_rows(result),
+    }
+
+
+def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
+    """Return the template's values about the residuals."""
+    return {
+        "largest": _largest(tables.table(CELLS)),
+        "tolerated": f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
+        "level": f"{100 * settings.pool.adjust.test_level:g}",
+        "tests": [row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
+        "groups": tables.table(GROUPS).to_dict("records"),
+        "summary": tables.table(ADJUST_SUMMARY).to_dict("records")[0],
+    }
+
+
+def _data_values(tables: Tables, manifests: Mapping[str, manifest.Manifest], settings: Settings) -> Row:
+    """Return the template's values about passes, files, counts, settings and provenance."""
+    gaps = tables.table(GAPS).sort_values("duration_s", ascending=False)
+    counts = [row | {"stage": stage} for stage, of_stage in manifests.items() for row in of_stage.counts]
+    return {
+        "tracks": tables.table(PASSES).to_dict("records"),
+        "files": tables.table(FILES).to_dict("records"),
+        "gaps": gaps.head(MOST_GAPS).to_dict("records"),
+        "more_gaps": max(0, len(gaps) - MOST_GAPS),
+        "counts": [row for row in counts if row["count"]],
+        "figures": instrument_rows(settings.session),
+        "changed": _changed(settings),
+        "commit": manifests["report"].git_commit,
+        "utc": lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
+    }
+
+
 def _largest(cells: pd.DataFrame) -> Row:
-    """The mean residual that lies off most."""
+    """Return the bin mean that is largest in size."""
     if not len(cells):
         return {"mean_m": np.nan, "sensor": "no points", "family": "", "pass": ""}
     rows: list[Any] = cells.to_dict("records")
@@ -117,7 +158,7 @@ def _largest(cells: pd.DataFrame) -> Row:
 
 
 def _speeds(files: pd.DataFrame) -> str:
-    """The sound speeds recorded, from the lowest to the highest."""
+    """Return the lowest and the highest recorded sound speed in words; nothing where there is none."""
     low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
     if not np.isfinite(low):
         return ""
@@ -125,7 +166,7 @@ def _speeds(files: pd.DataFrame) -> str:
 
 
 def _changed(settings: Settings) -> list[dict[str, str]]:
-    """What differs from the defaults, then what has none."""
+    """Return the settings that differ from their defaults, then those that have none."""
 
     def shown(value: Any) -> str:
         return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

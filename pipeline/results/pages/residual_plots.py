@@ -1,4 +1,4 @@
-"""Pictures of numbers: residuals along angle, distance and time, means by pass, convergence."""
+"""Charts of the report: residuals along angle, distance and time, means by pass, convergence."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,9 +19,20 @@ WORDS = {"angle": "swath angle", "range": "distance"}
 LABELS = {"angle": "angle across track in the {}'s frame, degrees", "range": "distance from the {}, m"}
 
 
-def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, families: Sequence[str]) -> Markup:
-    """Mean residuals of the sonar (or of the laser, where it is calibrated) by angle and distance, and of both sensors
-    by face and over time."""
+def residual_charts(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, families: Sequence[str]) -> Markup:
+    """Draw mean residuals of the calibrated sensor by angle and distance, and of both sensors by face and over time.
+
+    Parameters
+    ----------
+    bins
+        The artefact ``residual_bins``.
+    cells
+        Mean residuals by sensor, family and pass.
+    passes
+        The artefact ``passes``.
+    families
+        Names of the target's families.
+    """
     colours, marks = styles_of_families(families, FAMILY), styles_of_families(families, MARKS)
     figure = Figure(figsize=(WIDTH_IN, 6.0))
     grid = figure.add_gridspec(3, 2, left=0.08, right=0.98, bottom=0.05, top=0.91, wspace=0.2, hspace=0.55)
@@ -53,7 +64,7 @@ def residuals(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, fam
 
 
 def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
-    """The cells of the adjustment: one mark a pass, sonar and laser side by side."""
+    """Draw mean residuals by family and pass: one mark a pass, sonar and laser side by side."""
     for sensor, side, colour in (("laser", -0.18, LASER), ("mbes", 0.18, SONAR)):
         for place, name in enumerate(marks):
             rows = cells[(cells["sensor"] == sensor) & (cells["family"] == name)]
@@ -65,25 +76,25 @@ def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
                 beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALLEST_PT, "color": colour}
                 axis.annotate(f"{number}", (x, y), (2, 2), **beside)
     if len(cells):
-        inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # one cell far off must not hide the others
+        inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # one mean far off must not hide the others
         axis.set_ylim(-inner, inner)
     axis.set_xticks(range(len(marks)), list(marks))
     axis.set(title="by family and pass (laser blue, sonar orange)", ylabel="mean residual, mm")
 
 
 def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
-    """Second by second, the passes one after another without the time between them."""
+    """Draw the mean of each second, the passes one after another without the time between them."""
     start, gap = 0.0, 5.0
     middles, names = [], []
-    for one in passes.to_dict("records"):
-        first = one["start_ns"] / NS
+    for row in passes.to_dict("records"):
+        first = row["start_ns"] / NS
         for sensor, colour, size in (("laser", LASER, 2.0), ("mbes", SONAR, 2.5)):
-            inside = rows[(rows["pass"] == one["pass"]) & (rows["sensor"] == sensor)]
+            inside = rows[(rows["pass"] == row["pass"]) & (rows["sensor"] == sensor)]
             at = start + inside["low"] + inside["width"] / 2 - first
             axis.plot(at, 1000 * inside["mean_m"], ".", color=colour, markersize=size * 1.5)
-        middles.append(start + one["duration_s"] / 2)
-        names.append(f"pass {one['pass']}")
-        start += one["duration_s"] + gap
+        middles.append(start + row["duration_s"] / 2)
+        names.append(f"pass {row['pass']}")
+        start += row["duration_s"] + gap
         axis.axvline(start - gap / 2, color=QUIET, linewidth=0.4)
     if len(middles) <= 20:
         axis.set_xticks(middles, names)
@@ -91,8 +102,8 @@ def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
     axis.set(title="by time: mean of each second and family (laser blue, sonar orange)", ylabel="mean residual, mm")
 
 
-def convergence(iterations: pd.DataFrame, alternation: pd.DataFrame) -> Markup:
-    """The patent's angles step by step, and its angles and offsets in turn."""
+def convergence_charts(iterations: pd.DataFrame, alternation: pd.DataFrame) -> Markup:
+    """Draw the steps of the patent's angle iteration, and the turns of its angles and offsets."""
     figure = Figure(figsize=(WIDTH_IN, 2.5))
     where = {"left": 0.1, "right": 0.99, "bottom": 0.18, "top": 0.9, "wspace": 0.22}
     angles, turns = figure.subplots(1, 2, gridspec_kw=where)

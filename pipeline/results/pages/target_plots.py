@@ -1,8 +1,6 @@
-"""Pictures of the target's points: sections to scale, distances in millimetres."""
+"""Plots of the points on the target: sections to scale, distances in millimetres."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
 from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal
+from pipeline.results.pages.cutting_plane import CuttingPlane, cut_line, plane_through, slopes_in
 from pipeline.results.pages.rendering import COARSE, INK, LASER, SONAR, WIDTH_IN, picture
 
 Array = NDArray[np.float64]
@@ -36,32 +35,27 @@ CLOUDS: Mapping[str, tuple[Cloud, ...]] = {  # by what is calibrated, in the ord
 }
 
 
-@dataclass(frozen=True)
-class _Plane:
-    """A vertical cutting plane: where this coordinate (0: x, 1: y) is ``at``; ``along`` is the other one."""
+def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Markup:
+    """Draw the target from above, a section through it to scale, and a part of that enlarged; no panel is empty.
 
-    axis: int
-    at: float
-
-    @property
-    def along(self) -> int:
-        return 1 - self.axis
-
-    def __str__(self) -> str:
-        return f"{'xy'[self.axis]} = {self.at:.2f} m"
-
-
-def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Markup:
-    """Target from above, a section through it, to scale, and a part of that enlarged; without panels that are empty."""
-    corners = [np.reshape(one, (-1, 3)) for one in faces["vertices_target_m"]]
+    Parameters
+    ----------
+    residuals
+        The artefact ``residuals`` with the columns :data:`SECTIONS`.
+    faces
+        The artefact ``faces``.
+    solved
+        Whether the adjustment has a result to show.
+    """
+    corners = [np.reshape(outline, (-1, 3)) for outline in faces["vertices_target_m"]]
     level = is_horizontal(faces)
     face = residuals["face"].to_numpy().astype(int)
     calibrated = _calibrated(residuals)
     of_sensor = {sensor: (residuals["sensor"] == sensor).to_numpy() for sensor in ("laser", "mbes")}
     seen = np.bincount(face[of_sensor[calibrated]], minlength=len(faces)) >= FEWEST
-    plane = _plane(corners, ~level & seen)
-    cut = np.array([plane is not None and bool(_cut(points, plane)) for points in corners])
-    slope = np.zeros(len(faces)) if plane is None else _slopes(faces, plane)
+    plane = plane_through(corners, ~level & seen)
+    cut = np.array([plane is not None and bool(cut_line(points, plane)) for points in corners])
+    slope = np.zeros(len(faces)) if plane is None else slopes_in(faces, plane)
     figure = Figure(figsize=(WIDTH_IN, 3.8))
     where = {"left": 0.08, "right": 0.98, "bottom": 0.19, "top": 0.93, "wspace": 0.3}
     widths = [1.0, 2.6, 2.6] if plane is not None else [1.0]
@@ -70,7 +64,7 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Mark
     for sensor, prefix, label, colour in CLOUDS[calibrated][: None if solved else -1]:  # else nothing is calibrated
         columns = [prefix + name for name in XYZ]
         cloud = residuals.loc[of_sensor[sensor] & ~level[face], columns].to_numpy()
-        _dots(above, cloud[:, 0], cloud[:, 1], colour, label)
+        _dots(above, cloud[:, :2], colour, label)
         if plane is None:
             continue
         chosen = of_sensor[sensor] & cut[face]
@@ -79,14 +73,14 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Mark
         on_face, cloud = face[chosen][inside], cloud[inside]
         cloud[:, plane.along] += slope[on_face] * (plane.at - cloud[:, plane.axis])
         for axis, size in zip(others, (1.1, 2.2), strict=True):
-            _dots(axis, cloud[:, plane.along], cloud[:, 2], colour, label, size)
+            _dots(axis, cloud[:, [plane.along, 2]], colour, label, size)
         nearest.append(cloud[~level[on_face]][:, [plane.along, 2]])
     for points in corners:
         if np.ptp(points[:, 2]) > 0:
             above.plot(*np.vstack([points, points[:1]]).T[:2], color=INK, linewidth=0.6)
-        for one in _cut(points, plane) if plane is not None else []:
+        for line in cut_line(points, plane) if plane is not None else []:
             for axis in others:
-                axis.plot(one[:, 1 - plane.axis if plane else 0], one[:, 2], color=INK, linewidth=0.7)
+                axis.plot(line[:, 1 - plane.axis if plane else 0], line[:, 2], color=INK, linewidth=0.7)
     above.set(title="from above", xlabel="x, m", ylabel="y, along the target, m")
     above.set_aspect("equal", adjustable="datalim")  # a plain wall has no depth: its panel has
     if plane is not None:
@@ -98,9 +92,9 @@ def sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Mark
 
 
 def _section(
-    axes: Sequence[Axes], plane: _Plane, corners: Sequence[Array], seen: pd.DataFrame, drawn: Sequence[Array]
+    axes: Sequence[Axes], plane: CuttingPlane, corners: Sequence[Array], seen: pd.DataFrame, drawn: Sequence[Array]
 ) -> None:
-    """The section's own panel, and the one that enlarges: one face of it, or of a wall cut across its thickness."""
+    """Draw the section's panel, and the one that enlarges a part of it: a face, or the thickness of a wall."""
     ahead, near = axes
     ahead.set(title=f"section at {plane}", ylabel="z, height, m")
     ahead.set_aspect("equal", adjustable="datalim")
@@ -116,36 +110,14 @@ def _section(
         _across(near, seen, corners, plane, drawn)
 
 
-def _plane(corners: Sequence[Array], seen: NDArray[np.bool_]) -> _Plane | None:
-    """The plane that cuts most of the faces ``seen``: of the patent's target half the depth of its blocks, of a wall
-    one across it. None where nothing is seen."""
-    best: tuple[int, _Plane] | None = None
-    for axis in (0, 1):
-        ends = np.unique(np.concatenate([points[:, axis] for points in corners]))
-        for at in ((ends[1:] + ends[:-1]) / 2).tolist():
-            plane = _Plane(axis, at)
-            number = sum(bool(_cut(points, plane)) for points, one in zip(corners, seen, strict=True) if one)
-            if number and (best is None or number > best[0]):
-                best = number, plane
-    return None if best is None else best[1]
-
-
-def _slopes(faces: pd.DataFrame, plane: _Plane) -> Array:
-    """How far the other coordinate goes with that of the plane along each face, so that points near the plane can be
-    moved into it along their faces: of faces at 45° to it ±1, of level ones, and of those that it does not cut, 0."""
-    across, along = (faces[f"normal_{'xy'[axis]}_target_1"].to_numpy() for axis in (plane.axis, plane.along))
-    aslant = np.abs(along) > 0.1
-    return np.asarray(np.where(aslant, -across / np.where(aslant, along, 1.0), 0.0))
-
-
 def _calibrated(residuals: pd.DataFrame) -> str:
-    """The sensor of which there are two mounts to show."""
+    """Return the sensor whose coarse and calibrated mounts are shown."""
     return "mbes" if (residuals["sensor"] == "mbes").any() else "laser"
 
 
-def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: _Plane) -> None:
+def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: CuttingPlane) -> None:
     """Set the panel to the face with the most points."""
-    (cut,) = _cut(corners[int(points["face"].mode().iloc[0])], plane)
+    (cut,) = cut_line(corners[int(points["face"].mode().iloc[0])], plane)
     ends = cut[:, [plane.along, 2]]
     low, high = ends.min(axis=0), ends.max(axis=0)
     middle, half = (low + high) / 2, max(high - low) * 1.1
@@ -154,10 +126,10 @@ def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: _Pl
 
 
 def _across(
-    axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: _Plane, drawn: Sequence[Array]
+    axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: CuttingPlane, drawn: Sequence[Array]
 ) -> None:
-    """The highest of the faces with points in its whole height, its thickness stretched to where the points lie."""
-    there = [_cut(corners[number], plane)[0][:, [plane.along, 2]] for number in points["face"].astype(int).unique()]
+    """Show the highest face with points in its whole height, its thickness stretched to where the points lie."""
+    there = [cut_line(corners[number], plane)[0][:, [plane.along, 2]] for number in points["face"].astype(int).unique()]
     ends = max(there, key=lambda cut: float(np.ptp(cut[:, 1])))
     slant = np.ptp(ends[:, 0]) / 2
     middle = float(ends[:, 0].mean())
@@ -169,18 +141,20 @@ def _across(
     axis.set_title(f"{'xy'[plane.along]} stretched")
 
 
-def _cut(corners: Array, plane: _Plane) -> list[Array]:
-    """Where a face's outline crosses the plane: one line (2, 3), or none."""
-    closed = np.vstack([corners, corners[:1]])
-    found = []
-    for one, other in pairwise(closed):
-        if (one[plane.axis] - plane.at) * (other[plane.axis] - plane.at) < 0:
-            found.append(one + (other - one) * (plane.at - one[plane.axis]) / (other[plane.axis] - one[plane.axis]))
-    return [np.array(found)] if len(found) == 2 else []
+def distance_charts(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any], solved: bool) -> Markup:
+    """Draw each family's points by their distance from the adjusted surface, in mm, over the height.
 
-
-def distances(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any], solved: bool) -> Markup:
-    """Each family's points by their distance from the adjusted surface, in mm; ``family``: of each residual."""
+    Parameters
+    ----------
+    residuals
+        The artefact ``residuals`` with the columns :data:`DISTANCES`.
+    faces
+        The artefact ``faces``.
+    family
+        The family of each residual's face, (n,).
+    solved
+        Whether the adjustment has a result to show.
+    """
     names = [name for name in family_names(faces) if (family == name).any()][:MOST_PANELS]
     level = horizontal_families(faces)
     names = names or family_names(faces)[:1]
@@ -193,7 +167,7 @@ def distances(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any]
         for sensor, prefix, label, colour in clouds:
             points = residuals[(residuals["sensor"] == sensor).to_numpy() & (family == name)]
             away = 1000 * points[prefix + "residual_m"].to_numpy()
-            _dots(axis, away, points[prefix + "z_target_m"].to_numpy(), colour, label)
+            _dots(axis, np.column_stack([away, points[prefix + "z_target_m"].to_numpy()]), colour, label)
             if len(away):
                 largest = max(largest, float(np.quantile(np.abs(away), 0.995)))
         axis.axvline(0, color=INK, linewidth=0.6)
@@ -204,9 +178,9 @@ def distances(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArray[Any]
     return picture(figure, "distances of the points from the adjusted surfaces in millimetres, over the height")
 
 
-def _dots(axis: Axes, x: Any, y: Any, colour: str, label: str, size: float = 1.1) -> None:
-    step = max(1, -(-len(x) // DOTS))
-    axis.plot(x[::step], y[::step], "o", ms=size, mew=0, color=colour, label=label, rasterized=True)
+def _dots(axis: Axes, points: Array, colour: str, label: str, size: float = 1.1) -> None:
+    step = max(1, -(-len(points) // DOTS))
+    axis.plot(points[::step, 0], points[::step, 1], "o", ms=size, mew=0, color=colour, label=label, rasterized=True)
 
 
 def _legend(figure: Figure, axis: Axes) -> None:

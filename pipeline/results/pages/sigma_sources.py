@@ -1,0 +1,62 @@
+"""The report's table of what the total sigmas are made of."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.config.session import SessionConfig
+from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
+
+Row = Mapping[str, Any]
+OF_MOUNT = ("the laser's angles", "the laser's lever arm")
+SOURCES = (  # of an unknown: how its name begins, what it is called
+    ("laser_rotation", OF_MOUNT[0]),
+    ("laser_lever_arm", OF_MOUNT[1]),
+    ("laser_range", "the laser's ranges"),
+    ("laser_latency", "the laser's clock"),
+    ("mbes_range", "the sonar's ranges"),
+    ("mbes_latency", "the sonar's clock"),
+    ("sound_speed_gradient", "change of the sound speed with depth"),
+    ("sound_speed", "sound speed"),
+    ("wet", "wet faces against dry ones"),
+    ("rotation", "angles that are held"),  # of a laser that is calibrated
+    ("lever_arm", "lever arm that is held"),
+)
+
+
+def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) -> Iterator[Row]:
+    """Yield what each source of errors contributes to the mount parameters' total sigmas, noise first.
+
+    A contribution is the root of the sum of squares of its parameters' effects; for angles it is that of the rotation
+    about the body's axis. The squares of all contributions sum up to that of the total sigma. Where the laser's mount
+    has a covariance, its parameters correlate: they are one source, with what the others leave of the total.
+
+    Parameters
+    ----------
+    tests
+        The table of single-parameter tests, with the effect of each fixed parameter on the mount.
+    estimate
+        The table of estimates, with random and total sigmas.
+    session
+        The session's settings.
+    """
+    by_name = estimate.set_index("unknown").reindex(MOUNT_NAMES)
+    noise, total = (by_name[name].to_numpy(np.float64) for name in ("sigma", "sigma_total"))
+    effects = tests[[f"effect_{name}" for name in MOUNT_NAMES]].to_numpy(np.float64)
+    source = tests["unknown"].map(lambda name: next((words for start, words in SOURCES if name.startswith(start)), ""))
+    present = [words for _, words in SOURCES if (source == words).any()]
+    squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for words in present}
+    if session.calibrated == "mbes" and session.laser.mount_covariance is not None:
+        others = {words: square for words, square in squares.items() if words not in OF_MOUNT}
+        left = total**2 - noise**2 - np.sum(list(others.values()), axis=0)
+        squares = {"the laser's mount": np.maximum(left, 0.0), **others}
+    for words, of_source in {"noise (the random sigma)": noise**2, **squares}.items():
+        yield {
+            "name": words,
+            "cells": [
+                f"{np.degrees(sigma):.4f}" if unit == "deg" else f"{1000 * sigma:.2f}"
+                for sigma, unit in ((np.sqrt(of_source[place]), unit) for _, place, _, unit in PARAMETERS)
+            ],
+        }
