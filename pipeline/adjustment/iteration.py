@@ -85,8 +85,8 @@ class MountAdjustment:
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
 
-def estimated_parameters(state: State, additional: Sequence[str] = ()) -> list[int]:
-    """Return the parameters to estimate: the mount, the surfaces, and those that the config names."""
+def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]:
+    """Return the columns of the parameters to estimate: the mount, the surfaces, and those that the config names."""
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
     return sorted({*range(N_MOUNT), *surfaces, *(state.names.index(name) for name in additional)})
 
@@ -194,7 +194,7 @@ def _weighted_iteration(
     model, prior = problem.model, problem.prior
     state = _initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state)
-    estimated = np.array(estimated_parameters(state, settings.free))
+    estimated = np.array(estimated_columns(state, settings.free))
     fixed: dict[int, float] = {}
     for iteration in range(1, settings.max_iterations + 1):
         # read all points, and take the variance factors of the groups from their scatter

@@ -17,7 +17,7 @@ from pipeline.artefacts.catalogue.results import PATTERNS
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.drift_test import drift_between_passes
+from pipeline.maths.adjustment.drift_consistency import drift_between_passes
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.residual_means import (
     BinMean,

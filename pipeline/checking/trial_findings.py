@@ -88,13 +88,18 @@ def pose_findings(
             f"target: the laser's points fit it with target.origin.height_m {how}: correct it, or the target's shape",
         )
     elif not found["within"]:
-        away = ", ".join(f"{value:+.2f}" for value in origin)
-        yield Finding(
-            "origin",
-            f"target: the laser's points fit it best {away} m (x, y, z) from target.origin, turned by "
-            f"{found['azimuth_correction_deg']:+.1f}°, which is more than segment.search_... allow: correct "
-            "target.origin and target.azimuth_deg, or check laser.mount",
-        )
+        yield _beyond_search(origin, found["azimuth_correction_deg"])
+
+
+def _beyond_search(origin_m: Array, turn_deg: float) -> Finding:
+    """Return the finding of a target farther from its origin, or turned more, than the search allows."""
+    away = ", ".join(f"{value:+.2f}" for value in origin_m)
+    return Finding(
+        "origin",
+        f"target: the laser's points fit it best {away} m (x, y, z) from target.origin, turned by {turn_deg:+.1f}°, "
+        "which is more than segment.search_... allow: correct target.origin and target.azimuth_deg, or check "
+        "laser.mount",
+    )
 
 
 def _peaks(agreed: Array, shifts: Array) -> list[tuple[bool, float]]:

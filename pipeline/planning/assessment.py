@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import sonar_errors
-from pipeline.adjustment.iteration import estimated_parameters
+from pipeline.adjustment.iteration import estimated_columns
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
 from pipeline.config.pool import PoolConfig, Verdict
@@ -160,7 +160,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     depth = setting.model.depth_m
     considered = sonar_errors(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
-    free = estimated_parameters(setting.state, pool.adjust.free)
+    free = estimated_columns(setting.state, pool.adjust.free)
     adjustment = _Adjustment(setting, turn_s, considered, free)
     given = adjustment.accuracy(plan.passes)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))

@@ -136,7 +136,14 @@ def _open(
 ) -> Run:
     path = path.absolute()  # workers elsewhere have another working directory
     digests = Digests(path / folder.DIGESTS, workers.here)
-    return Run(path, settings, digests, tuple(stages), workers, progress or Progress(quiet=True))
+    return Run(
+        path=path,
+        settings=settings,
+        digests=digests,
+        stages=tuple(stages),
+        workers=workers,
+        progress=progress or Progress(quiet=True),
+    )
 
 
 def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool:

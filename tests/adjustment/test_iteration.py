@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from pipeline.adjustment.consider import sonar_errors
 from pipeline.adjustment.ins_drift import pose_noise
-from pipeline.adjustment.iteration import MountAdjustment, adjust_mount, estimated_parameters
+from pipeline.adjustment.iteration import MountAdjustment, adjust_mount, estimated_columns
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem, PriorInformation, sensor_sigmas
 from pipeline.artefacts.streams import MemoryPart, Stream
@@ -219,7 +219,7 @@ def test_what_is_considered_adds_what_it_would_move() -> None:
     """The sensitivity is the change of the answer when a held value is moved; the total adds its square."""
     found = solved(5, NOISY)
     normal, right, names = found.equations.normal, found.equations.right, found.state.names
-    free = estimated_parameters(found.state)
+    free = estimated_columns(found.state)
     for name in ("laser_rotation_y", "sound_speed_gradient", "wet_P2_shift"):
         number = names.index(name)
         place = found.solution.fixed.tolist().index(number)

@@ -34,7 +34,7 @@ def fourth_normal(first: Array, second: Array) -> Array:
     return np.asarray(cross / np.linalg.norm(cross))
 
 
-def deviations(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> Array:
+def angle_deviations(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> Array:
     """Return (pitch, roll, yaw) (3,) rad of the MBES's normals P1-P4 relative to the laser's, signed as above."""
     pitch = _angle(mbes["P4"][1], -mbes["P4"][2]) - _angle(laser["P4"][1], -laser["P4"][2])
     roll = np.arcsin(mbes["P2"][2]) - np.arcsin(laser["P2"][2])
@@ -142,7 +142,7 @@ def angle_step(passes: Sequence[PassPlanes], rotation: Array, lever_arm_m: Array
     rows, weights, turns = [], [], []
     for pass_planes in passes:
         normals, weight = pass_normals(pass_planes, rotation, lever_arm_m)
-        deviation = deviations(normals, pass_planes.laser_normals)
+        deviation = angle_deviations(normals, pass_planes.laser_normals)
         row = {f"deviation_{axis}_deg": float(np.degrees(deviation[k])) for k, axis in enumerate(AXES)}
         row |= patent_cosines(normals, pass_planes.laser_normals)
         between = angles_between(normals, pass_planes.laser_normals)

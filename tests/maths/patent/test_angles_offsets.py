@@ -9,8 +9,8 @@ from pipeline.maths.geometry.planes import PlaneMoments, fit_plane
 from pipeline.maths.patent.angles import (
     AngleTolerances,
     PassPlanes,
+    angle_deviations,
     angle_step,
-    deviations,
     fourth_normal,
     iterate_angles,
     patent_cosines,
@@ -44,7 +44,7 @@ def normals_of(turn=UNTURNED):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_turn_about_one_axis_is_that_deviation_alone(axis, index, sign):
     turn = Rotation.from_rotvec(sign * 0.01 * np.array(axis)).as_matrix()
-    found = deviations(normals_of(turn), normals_of())
+    found = angle_deviations(normals_of(turn), normals_of())
     expected = np.zeros(3)
     expected[index] = sign * 0.01
     np.testing.assert_allclose(found, expected, atol=6e-5)  # second order: 0.01² / 2
