@@ -45,6 +45,7 @@ PASS = Column("pass", I16, "1", "number of the pass, from 0; -1: none (or all of
 COUNTS = (
     Column("source", TEXT, "", "stream the points came from"),
     Column("reason", TEXT, "", "why they were left out; 'used' counts what went on"),
+    Column("code", TEXT, "", "the reason for programs: stays when its words change"),
     Column("count", I64, "1", "number of points"),
 )
 

@@ -5,6 +5,9 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
+from pipeline.artefacts.columns import COUNTS
+from pipeline.artefacts.count_codes import code_of
+
 
 def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]) -> pd.DataFrame:
     """Sum the counts of all chunks by source and reason.
@@ -17,7 +20,7 @@ def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]
     Returns
     -------
     DataFrame
-        Columns source, reason, count: reasons of a source in alphabetical order.
+        Columns source, reason, code, count: reasons of a source in alphabetical order.
     """
     rows = []
     for source, chunk_counts in partials.items():
@@ -25,8 +28,11 @@ def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]
         for _, counts in chunk_counts:
             for reason, number in counts.items():
                 total[reason] += number
-        rows += [{"source": source, "reason": reason, "count": number} for reason, number in sorted(total.items())]
-    return pd.DataFrame(rows, columns=["source", "reason", "count"])
+        rows += [
+            {"source": source, "reason": reason, "code": code_of(reason), "count": number}
+            for reason, number in sorted(total.items())
+        ]
+    return pd.DataFrame(rows, columns=[column.name for column in COUNTS])
 
 
 def used(counts: pd.DataFrame, source: str) -> float:

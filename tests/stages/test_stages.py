@@ -18,7 +18,7 @@ NS = 1_000_000_000
 
 def counts(found, stage):
     table = found[f"{stage}/counts"]
-    return {(source, reason): int(number) for source, reason, number in table.itertuples(index=False)}
+    return {(source, reason): int(number) for source, reason, _, number in table.itertuples(index=False)}
 
 
 def columns(stream, name):
