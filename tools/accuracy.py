@@ -32,10 +32,10 @@ PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>poolcal: a
 table{border-collapse:collapse}td,th{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
 td:first-child,th:first-child{text-align:left}img{max-width:100%;height:auto}</style>
 <h1>Accuracy on simulated sessions</h1>
-{% for one in found %}<h2>{{ one.rows()[0][0].replace("**", "") }}</h2>
+{% for result in results %}<h2>{{ result.rows()[0][0].replace("**", "") }}</h2>
 <table><tr><th></th>{% for name in names %}<th>{{ name }} {{ "°" if loop.index0 < 3 else "mm" }}</th>{% endfor %}</tr>
-{% for row in one.rows()[1:] %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
-{% endfor %}</table>{{ plots(one) }}{% endfor %}
+{% for row in result.rows()[1:] %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}</table>{{ plots(result) }}{% endfor %}
 {% if mistakes is not none %}<h2>What mistakes do: {{ mistakes | length }} sessions</h2>{{ mistakes_plot(mistakes) }}
 {% endif %}</html>
 """
@@ -43,7 +43,21 @@ td:first-child,th:first-child{text-align:left}img{max-width:100%;height:auto}</s
 
 @dataclass(frozen=True)
 class Result:
-    """A campaign's errors (n, 6) and random sigmas (n, 6), in degrees and millimetres, and the bound's sigmas (6,)."""
+    """The errors of a campaign's sessions against the Cramér-Rao bound.
+
+    Attributes
+    ----------
+    campaign
+        The campaign.
+    errors, sigmas
+        (n, 6): errors of the mount parameters and their random sigmas, in degrees and millimetres.
+    nse
+        (n,): normalised squared errors.
+    accepted
+        Number of accepted sessions.
+    bound
+        (6,): sigmas of the bound, in degrees and millimetres.
+    """
 
     campaign: Campaign
     errors: Array
@@ -54,10 +68,12 @@ class Result:
 
     @property
     def count(self) -> int:
+        """Number of sessions."""
         return len(self.errors)
 
     @property
     def rms(self) -> Array:
+        """RMS errors (6,) in degrees and millimetres."""
         return np.asarray(np.sqrt(np.mean(self.errors**2, axis=0)))
 
     @property
@@ -67,7 +83,7 @@ class Result:
 
     @property
     def ratio_below(self) -> Array:
-        """Its upper confidence limit: n RMS² / σ² is chi-squared with n degrees of freedom."""
+        """Upper confidence limit of the ratio: n RMS² / σ² is chi-squared with n degrees of freedom."""
         return self.ratio * float(np.sqrt(self.count / chi2.ppf(1 - LEVEL, self.count)))
 
     @property
@@ -82,7 +98,7 @@ class Result:
         return float(low), float(high)
 
     def rows(self) -> list[list[str]]:
-        """The table's lines: what, and the six."""
+        """Return the lines of the table: a heading, then a value of each mount parameter."""
         figures = [4, 4, 4, 3, 3, 3]
 
         def line(name: str, values: Array, sign: str = "") -> list[str]:
@@ -106,8 +122,9 @@ class Result:
         ]
 
 
-def results(bounds: int, jobs: int) -> list[Result]:
-    found = []
+def campaign_results(bounds: int, jobs: int) -> list[Result]:
+    """Return a result for each campaign that has rows, its bound averaged over ``bounds`` sessions."""
+    results = []
     with get_context("spawn").Pool(jobs) as pool:
         for campaign in CAMPAIGNS:
             if not campaign.name.startswith(BOUNDED) or not path_of(campaign).is_file():
@@ -115,11 +132,11 @@ def results(bounds: int, jobs: int) -> list[Result]:
             table = pd.read_parquet(path_of(campaign))
             tasks = [(campaign, number) for number in range(min(bounds, len(table)))]
             covariance = np.mean(pool.starmap(_bound, tasks), axis=0)
-            errors, sigmas = (table[[f"{what}_{name}" for name in NAMES]].to_numpy() for what in ("error", "sigma"))
-            of_bound = np.sqrt(np.diag(covariance)) / UNITS
+            errors, sigmas = (table[[f"{kind}_{name}" for name in NAMES]].to_numpy() for kind in ("error", "sigma"))
+            bound_sigmas = np.sqrt(np.diag(covariance)) / UNITS
             accepted = int(table["accepted"].sum())
-            found.append(Result(campaign, errors, sigmas, table["nse"].to_numpy(), accepted, of_bound))
-    return found
+            results.append(Result(campaign, errors, sigmas, table["nse"].to_numpy(), accepted, bound_sigmas))
+    return results
 
 
 def _bound(campaign: Campaign, number: int) -> Array:
@@ -127,29 +144,31 @@ def _bound(campaign: Campaign, number: int) -> Array:
     return bound(scenario, campaign.first_seed + number)
 
 
-def markdown(found: list[Result]) -> str:
+def markdown(results: list[Result]) -> str:
+    """Return the README's table."""
     lines = ["| | pitch ° | roll ° | yaw ° | x mm | y mm | z mm |", "|---|---:|---:|---:|---:|---:|---:|"]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for one in found for row in one.rows()])
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for result in results for row in result.rows()])
 
 
-def plots(one: Result) -> Markup:
-    """Normalised errors of the six against the normal distribution, and the NSE against chi-squared."""
+def plots(result: Result) -> Markup:
+    """Plot the normalised errors against the normal distribution, and the NSE against chi-squared."""
     figure = Figure(figsize=(15, 2.4), layout="constrained")
     axes = figure.subplots(1, 7)
     x = np.linspace(-4, 4, 161)
+    normalised = result.errors / result.sigmas
     for k, name in enumerate(NAMES):
-        axes[k].hist(one.errors[:, k] / one.sigmas[:, k], bins=np.arange(-4, 4.1, 0.5), density=True, color="#8fb8de")
+        axes[k].hist(normalised[:, k], bins=np.arange(-4, 4.1, 0.5), density=True, color="#8fb8de")
         axes[k].plot(x, norm.pdf(x), color="#333")
         axes[k].set(title=name, xlabel="error ÷ sigma", yticks=[])
     squares = np.linspace(0, 30, 151)
-    axes[6].hist(np.minimum(one.nse, 30), bins=np.arange(0, 31, 2), density=True, color="#e3b778")
+    axes[6].hist(np.minimum(result.nse, 30), bins=np.arange(0, 31, 2), density=True, color="#e3b778")
     axes[6].plot(squares, chi2.pdf(squares, 6), color="#333")
     axes[6].set(title="all six", xlabel="normalised squared error", yticks=[])
     return picture(figure, "errors in sigmas against what noise leaves")
 
 
 def mistakes_plot(table: pd.DataFrame) -> Markup:
-    """Largest error in total sigmas of each session, by mistake: what was accepted, what was not."""
+    """Plot the largest error of each session in total sigmas, by mistake and by verdict."""
     names = list(dict.fromkeys(table["mistake"]))
     figure = Figure(figsize=(11, 0.28 * len(names) + 1), layout="constrained")
     axis = figure.subplots()
@@ -166,21 +185,25 @@ def mistakes_plot(table: pd.DataFrame) -> Markup:
     return picture(figure, "largest error of each session in total sigmas, by mistake")
 
 
-def page(found: list[Result], mistakes: pd.DataFrame | None) -> str:
+def page(results: list[Result], mistakes: pd.DataFrame | None) -> str:
+    """Return the HTML page: tables and plots of the campaigns, then the mistakes."""
     template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(PAGE)
     with drawing_style():
-        return template.render(found=found, mistakes=mistakes, names=NAMES, plots=plots, mistakes_plot=mistakes_plot)
+        return template.render(
+            results=results, mistakes=mistakes, names=NAMES, plots=plots, mistakes_plot=mistakes_plot
+        )
 
 
 def main() -> None:
+    """Print the table and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bounds", type=int, default=24, help="sessions over which the bound is averaged")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    found = results(options.bounds, options.jobs)
+    results = campaign_results(options.bounds, options.jobs)
     path = FOLDER / "mistakes.parquet"
-    (FOLDER / "accuracy.html").write_text(page(found, pd.read_parquet(path) if path.is_file() else None), "utf-8")
-    print(markdown(found))
+    (FOLDER / "accuracy.html").write_text(page(results, pd.read_parquet(path) if path.is_file() else None), "utf-8")
+    print(markdown(results))
 
 
 if __name__ == "__main__":

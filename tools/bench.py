@@ -88,7 +88,7 @@ print(spent, sum(group.count for group in accumulation.groups.values()), (after 
 
 
 def measured(command: list[str]) -> tuple[float, float, str]:
-    """Seconds and peak MiB of a command, and what it printed."""
+    """Return seconds and peak MiB of a command, and its output."""
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     output = process.stdout.read() if process.stdout else ""
@@ -99,8 +99,11 @@ def measured(command: list[str]) -> tuple[float, float, str]:
 
 
 def memory_together(command: list[str]) -> float:
-    """Peak MiB of a command and its child processes at one moment; a page that several share is counted once. Looking
-    takes time: not for measuring seconds."""
+    """Return the peak MiB of a command and its child processes together.
+
+    A memory page that several processes share is counted once. The sampling takes time of its own, so this is no
+    measurement of seconds.
+    """
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     peak = 0.0
     while process.poll() is None:
@@ -114,7 +117,7 @@ def _family(pid: int) -> list[int]:
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
     except OSError:
         return [pid]
-    return [pid, *(one for child in children for one in _family(int(child)))]
+    return [pid, *(descendant for child in children for descendant in _family(int(child)))]
 
 
 def _share_mib(pid: int) -> float:
@@ -126,7 +129,7 @@ def _share_mib(pid: int) -> float:
 
 
 def session_of(size: str) -> Path:
-    """The simulated session, made once."""
+    """Return the folder of a simulated session, which is simulated once."""
     folder = FOLDER / f"session-{size}"
     if not folder.exists():
         FOLDER.mkdir(parents=True, exist_ok=True)
@@ -138,38 +141,48 @@ def session_of(size: str) -> Path:
 
 
 def bench(size: str, repeats: int, jobs: int) -> dict[str, float]:
-    """One size: medians over the repeats."""
+    """Measure one size and return the medians over the repeats, by name.
+
+    Parameters
+    ----------
+    size
+        A key of SIZES.
+    repeats
+        Number of measurements.
+    jobs
+        Number of worker processes.
+    """
     session = session_of(size)
     run = FOLDER / f"run-{size}"
     rounds: list[dict[str, float]] = []
     for _ in range(repeats):
         shutil.rmtree(run, ignore_errors=True)
-        found: dict[str, float] = {}
+        figures: dict[str, float] = {}
         _, _, text = measured([sys.executable, "-c", DECODE, str(session)])
-        found["decode_s"], found["points"] = (float(word) for word in text.split())
+        figures["decode_s"], figures["points"] = (float(word) for word in text.split())
         workers = ["--jobs", str(jobs)]
         common = [*workers, "--no-report", "--no-recordings"]
         whole = [*POOLCAL, "run", str(session), "--config", str(session / "pool.yaml"), "--run", str(run)]
-        found["drawn_mib"] = memory_together([*whole, *workers])
+        figures["drawn_mib"] = memory_together([*whole, *workers])
         shutil.rmtree(run)
-        found["drawn_s"], _, _ = measured([*whole, *workers])
+        figures["drawn_s"], _, _ = measured([*whole, *workers])
         shutil.rmtree(run)
-        found["run_s"], found["run_mib"], _ = measured([*whole, *common])
-        found["drawing_share"] = found["drawn_s"] / found["run_s"] - 1
-        found["again_s"], _, _ = measured([*whole, *common])
+        figures["run_s"], figures["run_mib"], _ = measured([*whole, *common])
+        figures["drawing_share"] = figures["drawn_s"] / figures["run_s"] - 1
+        figures["again_s"], _, _ = measured([*whole, *common])
         _, _, text = measured([sys.executable, "-c", ACCUMULATE, str(run)])
-        seconds, found["observations"], found["reading_mib"] = (float(word) for word in text.split())
-        found["reading_rate"] = found["observations"] / seconds
+        seconds, figures["observations"], figures["reading_mib"] = (float(word) for word in text.split())
+        figures["reading_rate"] = figures["observations"] / seconds
         for stage in STAGES:
-            found[f"{stage}_s"] = json.loads((run / stage / "manifest.json").read_text())["wall_s"]
+            figures[f"{stage}_s"] = json.loads((run / stage / "manifest.json").read_text())["wall_s"]
             shutil.rmtree(run / stage)
-            _, found[f"{stage}_mib"], _ = measured([*POOLCAL, "stage", stage, str(run), *common])
-        rounds.append(found)
-    return {name: statistics.median(one[name] for one in rounds) for name in rounds[0]}
+            _, figures[f"{stage}_mib"], _ = measured([*POOLCAL, "stage", stage, str(run), *common])
+        rounds.append(figures)
+    return {name: statistics.median(figures[name] for figures in rounds) for name in rounds[0]}
 
 
 def table(results: dict[str, dict[str, float]]) -> str:
-    """The figures as a Markdown table."""
+    """Return the figures of each size as a Markdown table."""
     lines = ["| | " + " | ".join(results) + " |", "|---|" + "---:|" * len(results)]
 
     def row(name: str, cells: list[str]) -> None:
@@ -193,6 +206,7 @@ def table(results: dict[str, dict[str, float]]) -> str:
 
 
 def main() -> None:
+    """Measure the sizes asked for and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", nargs="*", default=list(SIZES), choices=list(SIZES))
     parser.add_argument("--repeats", type=int, default=3)

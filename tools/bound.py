@@ -56,8 +56,23 @@ SMALL_TILT = np.cos(np.radians(5.0))
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays of one sensor in one pass that lie on the target (n,): time, plane, points in the sensor's frame, by how
-    much a sigma of each of its measurements moves them (n, 3, s), and the share of such rays that nothing spoils."""
+    """Rays of one sensor in one pass that lie on the target.
+
+    Attributes
+    ----------
+    sensor
+        "laser" or "mbes".
+    pass_number
+        Number of the pass.
+    t_ns, plane
+        (n,): times, numbers of the planes.
+    points_m
+        (n, 3) in the sensor's frame.
+    noise_m
+        (n, 3, s): displacement of each point by a sigma of each of the sensor's s measurements.
+    clean
+        (n,): share of such rays that nothing spoils.
+    """
 
     sensor: str
     pass_number: int
@@ -69,12 +84,12 @@ class Rays:
 
 
 def _ray(angle_rad: Array, tilt_rad: Array) -> Array:
-    """(n, 3) in the sonar's frame: of a receive beam and a transmit fan."""
+    """Return the directions (n, 3), in the sonar's frame, of a receive beam and a transmit fan."""
     return directions_in_mbes(swing_rad(np.sin(angle_rad), tilt_rad)[0], tilt_rad)
 
 
 class World:
-    """The simulated session's truth."""
+    """The truth of a simulated session."""
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self.scenario, self.movement, self.seed = scenario, Movement(scenario, seed), seed
@@ -90,10 +105,24 @@ class World:
                 self.family[surface] = -1
 
     def hits(self, sensor: str, k: int, t_ns: Integers, rays: Array) -> tuple[Array, Integers, Array]:
-        """Of bundles of rays (n, m, 3), the axis and, of a beam of some width, one on its rim across and one along:
-        range and plane of the point hit, how steeply the axis rises (n,). Plane -1: not on the target as the segment
-        stage's settings want it: the whole footprint on one face and a margin more, not grazed, away from the water
-        line. (What a beam may stray is not kept from the edges: a few more rays than the labels take.)"""
+        """Return range, plane and sine of elevation of each ray or beam (n,).
+
+        Plane -1: no point that stage segment would take. Its settings want the whole footprint and a margin on one
+        face, no grazing incidence, and a distance from the water line. The edges are not widened by the angle
+        noise of a beam, so that a few more rays than the labels are taken.
+
+        Parameters
+        ----------
+        sensor
+            "laser" or "mbes".
+        k
+            Number of the pass.
+        t_ns
+            (n,): times.
+        rays
+            (n, m, 3): unit vectors in the sensor's frame. The first is the axis; a beam of finite width has two more
+            on its rim, one across and one along.
+        """
         pose, mount = self.movement.pose(k, t_ns), getattr(self.scenario, sensor).mount
         start = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(mount)
         R = pose.R_target_from_body @ R_body_from_sensor(mount).as_matrix()
@@ -119,11 +148,12 @@ class World:
             toward = hit[rows] + rim + SETTINGS.margin_m * outward - start[rows]
             toward /= np.linalg.norm(toward, axis=1)[:, None]
             inside &= self.caster.cast(start[rows], toward)[1] == plane[rows]
-        found = np.full(len(plane), -1)
-        found[rows[inside]] = plane[rows[inside]]
-        return reached, found, axis[:, 2]
+        plane_on_target = np.full(len(plane), -1)
+        plane_on_target[rows[inside]] = plane[rows[inside]]
+        return reached, plane_on_target, axis[:, 2]
 
     def laser(self, k: int) -> Rays:
+        """Return the laser's rays on the target in pass ``k``."""
         s = self.scenario.laser
         start_ns, end_ns = self.movement.sensors_run_ns(k)
         number = np.arange(int((end_ns - start_ns) / NS * s.point_rate_hz))
@@ -142,6 +172,7 @@ class World:
         return Rays("laser", k, t_ns[kept], plane[kept], points, np.stack(noise, axis=2), clean)
 
     def mbes(self, k: int) -> Rays:
+        """Return the sonar's beams on the target in pass ``k``."""
         s = self.scenario.mbes
         start_ns, end_ns = self.movement.sensors_run_ns(k)
         phase = generator(self.seed, "mbes_clock", k).random()  # within a record of the INS a ping may fall anywhere
@@ -153,10 +184,10 @@ class World:
         tilt = transmit_tilts_rad(s, angles, number).ravel()
         across, along = np.radians(s.beam_deg) / 2
         ends = ((0, 0), (across, 0), (0, along))
-        _, looks = swing_rad(np.sin(angle), tilt)
-        bundle = np.stack([_ray(angle + turn, tilt + more) for turn, more in ends], axis=1)
+        _, exists = swing_rad(np.sin(angle), tilt)
+        bundle = np.stack([_ray(angle + turn, tilt + tilt_change) for turn, tilt_change in ends], axis=1)
         ranges, plane, rise = self.hits("mbes", k, t_ns, bundle)
-        kept = np.flatnonzero((plane >= 0) & (ranges <= s.max_range_m) & looks)
+        kept = np.flatnonzero((plane >= 0) & (ranges <= s.max_range_m) & exists)
         axis, angle, tilt = bundle[kept, 0], angle[kept], tilt[kept]
         turned = (_ray(angle + 1e-6, tilt) - _ray(angle - 1e-6, tilt)) / 2e-6
         noise = [s.range_sigma_m * axis, np.radians(s.angle_sigma_deg) * ranges[kept, None] * turned]
@@ -165,22 +196,36 @@ class World:
         points = ranges[kept, None] * axis
         return Rays("mbes", k, t_ns[kept], plane[kept], points, np.stack(noise, axis=2), clean)
 
-    def placed(self, rays: Rays, points_m: Array, six: Array, error: Array) -> Array:
-        """(n, 3) in the target frame, with the mount off by ``six`` and every pose by ``error``."""
+    def placed(self, rays: Rays, points_m: Array, mount_error: Array, pose_error: Array) -> Array:
+        """Return points (n, 3) in the target frame, computed with a wrong mount and wrong poses.
+
+        Parameters
+        ----------
+        rays
+            The rays, for their sensor, pass and times.
+        points_m
+            (n, 3) in the sensor's frame.
+        mount_error
+            (6,): rotation vector in rad, lever arm in m, both in the body frame.
+        pose_error
+            (6,): position in m, in the target frame; roll, pitch and azimuth in rad.
+        """
         pose, mount = self.movement.pose(rays.pass_number, rays.t_ns), getattr(self.scenario, rays.sensor).mount
         level = self.site.R_target_from_level(pose.latitude_rad, pose.longitude_rad)
-        R = level @ R_level_from_body(pose.roll_rad + error[3], pose.pitch_rad + error[4], pose.azimuth_rad + error[5])
-        turned = (Rotation.from_rotvec(six[:3]) * R_body_from_sensor(mount)).apply(points_m)
-        body = turned + lever_arm_m(mount) + six[3:]
-        return np.asarray(pose.position_target_m + error[:3] + np.einsum("nij,nj->ni", R, body))
+        R = level @ R_level_from_body(
+            pose.roll_rad + pose_error[3], pose.pitch_rad + pose_error[4], pose.azimuth_rad + pose_error[5]
+        )
+        turned = (Rotation.from_rotvec(mount_error[:3]) * R_body_from_sensor(mount)).apply(points_m)
+        body = turned + lever_arm_m(mount) + mount_error[3:]
+        return np.asarray(pose.position_target_m + pose_error[:3] + np.einsum("nij,nj->ni", R, body))
 
     def equations(self, rays: Rays, calibrated: str = "mbes") -> tuple[Array, Array, Array]:
-        """Jx (n, 18), or (n, 12) of the laser; derivatives by the pose's errors (n, 6), weights (n,)."""
+        """Return Jx (n, 18), or (n, 12) for the laser; derivatives by the pose errors (n, 6); weights (n,)."""
         normal, none, steps = self.normals[rays.plane], np.zeros(6), np.diag(STEP)
 
-        def difference(six: Array, error: Array) -> Array:
-            """Central, along the normal (n,)."""
-            ends = [self.placed(rays, rays.points_m, sign * six, sign * error) for sign in (1, -1)]
+        def difference(mount_error: Array, pose_error: Array) -> Array:
+            """Return central differences along the normal (n,)."""
+            ends = [self.placed(rays, rays.points_m, sign * mount_error, sign * pose_error) for sign in (1, -1)]
             return np.asarray(np.einsum("ni,ni->n", normal, ends[0] - ends[1]) / 2)
 
         here = self.placed(rays, rays.points_m, none, none)
@@ -202,25 +247,37 @@ class World:
 
 
 def bound(scenario: Scenario, seed: int) -> Array:
-    """(6, 6): rotation about body x, y, z in rad and lever arm in m, as in calibration.json."""
+    """Return the bound (6, 6): rotation about body x, y, z in rad and lever arm in m, as in calibration.json."""
     world = World(scenario, seed)
-    seen = [world.laser(k) for k in world.movement.passes] + [world.mbes(k) for k in world.movement.passes]
-    return _bound(scenario, seen, [world.equations(rays) for rays in seen], np.zeros(18))
+    rays = [world.laser(k) for k in world.movement.passes] + [world.mbes(k) for k in world.movement.passes]
+    return _bound(scenario, rays, [world.equations(part) for part in rays], np.zeros(18))
 
 
 def laser_bound(scenario: Scenario, seed: int, plumb_deg: float) -> Array:
-    """(6, 6) of the laser's mount; the target exactly as designed, out of plumb by a sigma."""
+    """Return the bound (6, 6) of the laser's mount, in rad and m.
+
+    Parameters
+    ----------
+    scenario
+        The simulated session, whose target is exactly as designed.
+    seed
+        Its seed.
+    plumb_deg
+        Sigma of the target's plumb.
+    """
     world = World(scenario, seed)
-    seen = [world.laser(k) for k in world.movement.passes]
-    known = np.r_[np.zeros(9), [np.radians(plumb_deg) ** -2.0] * 2, 0.0]
-    return _bound(scenario, seen, [world.equations(rays, "laser") for rays in seen], known)
+    rays = [world.laser(k) for k in world.movement.passes]
+    prior_information = np.r_[np.zeros(9), [np.radians(plumb_deg) ** -2.0] * 2, 0.0]
+    return _bound(scenario, rays, [world.equations(part, "laser") for part in rays], prior_information)
 
 
-def _bound(scenario: Scenario, seen: list[Rays], found: list[tuple[Array, Array, Array]], known: Array) -> Array:
-    """(6, 6); ``known`` (x,): what is known of the unknowns beforehand, 1 / variance."""
-    of_x, of_pose, weight = (np.concatenate([one[i] for one in found]) for i in range(3))
-    normal = of_x.T @ (weight[:, None] * of_x) + np.diag(known)
-    of_errors, prior = ins_errors(scenario, np.concatenate([rays.t_ns for rays in seen]) / NS, of_pose)
+def _bound(
+    scenario: Scenario, rays: list[Rays], equations: list[tuple[Array, Array, Array]], prior_information: Array
+) -> Array:
+    """Return the bound (6, 6); ``prior_information`` (x,) of the unknowns is 1 / variance."""
+    of_x, of_pose, weight = (np.concatenate([part[i] for part in equations]) for i in range(3))
+    normal = of_x.T @ (weight[:, None] * of_x) + np.diag(prior_information)
+    of_errors, prior = ins_errors(scenario, np.concatenate([part.t_ns for part in rays]) / NS, of_pose)
     if of_errors.shape[1]:
         inner = csc_matrix(of_errors.T @ diags(weight) @ of_errors + prior)
         across = of_errors.T @ (weight[:, None] * of_x)
@@ -231,7 +288,19 @@ def _bound(scenario: Scenario, seen: list[Rays], found: list[tuple[Array, Array,
 
 
 def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_matrix, csr_matrix]:
-    """Je (n, e), of unit variance each, and P (e, e), ordered by time, a knot behind the records it is tied to."""
+    """Return Je (n, e), by errors of unit variance, and P (e, e), both in the order of time.
+
+    A knot follows the records that it is tied to.
+
+    Parameters
+    ----------
+    scenario
+        The simulated session, for the figures of its INS.
+    seconds
+        (n,): times of the equations.
+    of_pose
+        (n, 6): derivatives of the equations by the pose errors.
+    """
     white, drift = scenario.ins.white, scenario.ins.drift
     position = drift.horizontal_m, drift.horizontal_m, drift.vertical_m
     attitude = drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg
@@ -262,7 +331,7 @@ def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_
 
 
 def _markov(seconds: Array, constant_s: float) -> csr_matrix:
-    """Inverse of the covariance exp(-|t - t'| / constant) of six processes at these times, interleaved; 0: white."""
+    """Return the inverse covariance, exp(-|t - t'| / constant), of six interleaved processes; constant 0: white."""
     f = np.exp(-np.diff(seconds) / constant_s) if constant_s else np.zeros(len(seconds) - 1)
     gain = 1 / (1 - f**2)
     diagonal = np.ones(len(seconds))
@@ -272,6 +341,7 @@ def _markov(seconds: Array, constant_s: float) -> csr_matrix:
 
 
 def main() -> None:
+    """Print the bound's sigmas of a scenario."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenario", nargs="?", type=Path)
     parser.add_argument("--seeds", type=int, default=4)

@@ -1,4 +1,4 @@
-"""Kill runs at random moments, run again, compare every byte: does a killed run leave anything that is trusted wrongly?
+"""Test that no wrong byte of a killed run is trusted: kill at random moments, run again, compare every byte.
 
 A small session is simulated and calibrated undisturbed. Then run after run is killed by SIGKILL at a random moment of
 its duration (the moments follow from the seed; what they hit does not) and started again in the same folder, after
@@ -39,7 +39,7 @@ DAMAGED = ".partial", ".old", ".new", ".keeping"  # what is under way when a sta
 
 @dataclass
 class Campaign:
-    """What came of it."""
+    """Counts of a campaign, and a line on each run that differs."""
 
     runs: int = 0
     kills: int = 0  # the other runs had ended before
@@ -54,18 +54,44 @@ class Campaign:
 
 
 def digests(run: Path) -> dict[str, str]:
-    """SHA-256 of every Parquet file, by its path in the run folder."""
+    """Return the SHA-256 of every Parquet file, by its path in the run folder."""
     paths = sorted(run.rglob("*.parquet"))
     return {path.relative_to(run).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
 
 
 def command(session: Path, config: Path, run: Path) -> list[str]:
+    """Return the command line that calibrates.
+
+    Parameters
+    ----------
+    session
+        Folder of the session.
+    config
+        The pool's config.
+    run
+        Folder of the run.
+    """
     places = [str(session), "--config", str(config), "--run", str(run)]
     return [*POOLCAL, "run", *places, "--jobs", "2", "--no-report", "--no-recordings"]
 
 
 def calibrate(session: Path, config: Path, run: Path) -> float:
-    """One run to its end; the seconds it took."""
+    """Calibrate to the end and return the seconds.
+
+    Parameters
+    ----------
+    session
+        Folder of the session.
+    config
+        The pool's config.
+    run
+        Folder of the run.
+
+    Raises
+    ------
+    SystemExit
+        The run ended with neither status 0 nor 1.
+    """
     start = time.monotonic()
     done = subprocess.run(command(session, config, run), cwd=ROOT, capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1):
@@ -74,41 +100,53 @@ def calibrate(session: Path, config: Path, run: Path) -> float:
 
 
 def campaign(session: Path, folder: Path, kills: int, seed: int) -> Campaign:
-    """``kills`` runs of ``session``, killed and run again; works in ``folder``."""
-    config, other, rng, told = session / "pool.yaml", folder / "other.yaml", np.random.default_rng(seed), Campaign()
+    """Kill runs, run them again, and return the counts.
+
+    Parameters
+    ----------
+    session
+        Folder of the session.
+    folder
+        Folder to work in.
+    kills
+        Number of runs to kill.
+    seed
+        Seed of the moments.
+    """
+    config, other, rng, counts = session / "pool.yaml", folder / "other.yaml", np.random.default_rng(seed), Campaign()
     text = yaml.safe_load(config.read_text(encoding="utf-8")) | {"segment": {"margin_m": 0.05}}
     other.write_text(yaml.safe_dump(text), encoding="utf-8")
     seconds = [calibrate(session, config, folder / "undisturbed")] * 2  # a run's duration: afresh, over a result
     right = digests(folder / "undisturbed")
     calibrate(session, other, folder / "earlier")
     earlier = (folder / "earlier" / "report" / "calibration.json").read_bytes()
-    while told.kills < kills:
-        run, over = folder / f"run_{told.runs}", told.kills % 2
+    while counts.kills < kills:
+        run, over = folder / f"run_{counts.runs}", counts.kills % 2
         if over:
             shutil.copytree(folder / "earlier", run)
-        told.runs += 1
+        counts.runs += 1
         start = time.monotonic()
         if _killed(command(session, config, run), rng.uniform(0.0, seconds[over])):
-            told.kills += 1
-            told.killed_in[_state(run)] += 1
+            counts.kills += 1
+            counts.killed_in[_state(run)] += 1
         else:
             seconds[over] = 0.5 * seconds[over] + 0.5 * (time.monotonic() - start)
         calibrate(session, config, run)
-        found = digests(run)
+        after = digests(run)
         left = [path.name for path in run.rglob("*") if path.name.endswith(DAMAGED)]
-        if found != right or left:
-            wrong = sorted(name for name in right.keys() | found.keys() if right.get(name) != found.get(name))
-            told.different.append(f"run {told.runs}: {', '.join(wrong + left)}")
+        if after != right or left:
+            wrong = sorted(name for name in right.keys() | after.keys() if right.get(name) != after.get(name))
+            counts.different.append(f"run {counts.runs}: {', '.join(wrong + left)}")
         elif over and earlier not in [path.read_bytes() for path in run.glob("report*/calibration.json")]:
             left = ["the accepted result that was there is gone"]
-            told.different.append(f"run {told.runs}: {left[0]}")
-        told.identical += found == right and not left
+            counts.different.append(f"run {counts.runs}: {left[0]}")
+        counts.identical += after == right and not left
         shutil.rmtree(run)
-    return told
+    return counts
 
 
 def _killed(words: Sequence[str], after_s: float) -> bool:
-    """Whether the process was still at work when it was killed."""
+    """Return whether the process was still at work when it was killed."""
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         process.wait(after_s)
@@ -118,7 +156,7 @@ def _killed(words: Sequence[str], after_s: float) -> bool:
 
 
 def _state(run: Path) -> str:
-    """What a killed run left behind, in a word or two."""
+    """Return what a killed run left under way, in a word or two."""
     if not run.exists():
         return "before the folder"
     torn = sorted(path.name for path in run.rglob("*") if path.name.endswith(DAMAGED))
@@ -126,6 +164,7 @@ def _state(run: Path) -> str:
 
 
 def main() -> int:
+    """Simulate a session, run the campaign, print its counts, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
@@ -135,9 +174,9 @@ def main() -> int:
         (folder / "scenario.yaml").write_text(yaml.safe_dump(SCENARIO), encoding="utf-8")
         words = [*POOLCAL, "simulate", str(folder / "session"), "--scenario", str(folder / "scenario.yaml")]
         subprocess.run(words, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-        told = campaign(folder / "session", folder, options.kills, options.seed)
-    print(told)
-    return 0 if told.identical == told.runs else 1
+        counts = campaign(folder / "session", folder, options.kills, options.seed)
+    print(counts)
+    return 0 if counts.identical == counts.runs else 1
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ BOUNDS = 12  # sessions of which the bound is taken
 
 
 def scenario_of(number: int) -> dict[str, Any]:
+    """Return the scenario of one session, with its combination of coarse errors."""
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
     keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
     error = {key: sign * size for key, sign, size in zip(keys, signs, [0.3] * 3 + [0.03] * 3, strict=True)}
@@ -45,19 +46,30 @@ def scenario_of(number: int) -> dict[str, Any]:
 
 
 def calibrate(session: dict[str, Any], pool: dict[str, Any], made: Any) -> dict[str, Any]:
+    """Calibrate in memory and return the content of calibration.json.
+
+    Parameters
+    ----------
+    session
+        Content of session.yaml.
+    pool
+        Content of pool.yaml.
+    made
+        The simulated session, for its raw data.
+    """
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
     from stages.in_memory import calibrate_in_memory
 
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
-    found = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
-    content: dict[str, Any] = json.loads(found["report/calibration.json"])
+    artefacts = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
+    content: dict[str, Any] = json.loads(artefacts["report/calibration.json"])
     return content
 
 
-def one(number: int) -> dict[str, Any]:
-    """A row: errors and sigmas of the laser, of the sonar, and what is held with the usual limits."""
+def session_row(number: int) -> dict[str, Any]:
+    """Return a row: errors and sigmas of the laser and the sonar, and what is fixed with the usual limits."""
     from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate_session
@@ -73,7 +85,7 @@ def one(number: int) -> dict[str, Any]:
     row |= {"held": " ".join(usual["held"]), "held_wide": " ".join(wide["held"])}
     random, total = np.array(block["covariance"]), np.array(block["covariance_total"])
     row |= _columns("laser", error, random)
-    # the sonar, in another session, on the laser as it was found
+    # the sonar, in another session, from the laser's result
     made = simulate_session(parse(Scenario, scenario_of(number), "laser"), SECOND_SEED + number)
     session = dict(made.session)
     session["laser"] = session["laser"] | SURE | {"mount": block["mount"], "mount_covariance": total.tolist()}
@@ -86,15 +98,16 @@ def one(number: int) -> dict[str, Any]:
     return row | {f"sonar_random_{name}": value for name, value in zip(NAMES, without, strict=True)}
 
 
-def _columns(whose: str, error: Array, covariance: Array) -> dict[str, float]:
+def _columns(sensor: str, error: Array, covariance: Array) -> dict[str, float]:
     sigma = np.sqrt(np.diag(covariance))
-    row = {f"{whose}_nse": float(error @ np.linalg.solve(covariance, error))}
+    row = {f"{sensor}_nse": float(error @ np.linalg.solve(covariance, error))}
     for k, name in enumerate(NAMES):
-        row |= {f"{whose}_error_{name}": error[k] / UNITS[k], f"{whose}_sigma_{name}": sigma[k] / UNITS[k]}
+        row |= {f"{sensor}_error_{name}": error[k] / UNITS[k], f"{sensor}_sigma_{name}": sigma[k] / UNITS[k]}
     return row
 
 
 def laser_bound_of(number: int) -> Array:
+    """Return the Cramér-Rao bound (6, 6) of the first session of a number, in rad and m."""
     from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from tools.bound import laser_bound
@@ -103,7 +116,7 @@ def laser_bound_of(number: int) -> Array:
 
 
 def report(table: pd.DataFrame, bound: Array) -> str:
-    """In README's form: RMS errors against the bound; the sonar's against its total sigmas; what was held."""
+    """Return the README's table: RMS errors against the bound and the total sigmas, and what was fixed."""
     n = len(table)
     low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
     least = np.sqrt(np.diag(bound)) / UNITS
@@ -116,9 +129,9 @@ def report(table: pd.DataFrame, bound: Array) -> str:
     def rms(stem: str) -> Array:
         return np.array([np.sqrt(np.mean(table[f"{stem}_{name}"] ** 2)) for name in NAMES])
 
-    def head(whose: str) -> None:
-        nse = table[f"{whose}_nse"].mean()
-        lines.append(f"| **{whose}**: {n} sessions, mean NSE {nse:.2f} ({low:.2f}–{high:.2f}) |  |  |  |  |  |  |")
+    def head(sensor: str) -> None:
+        nse = table[f"{sensor}_nse"].mean()
+        lines.append(f"| **{sensor}**: {n} sessions, mean NSE {nse:.2f} ({low:.2f}–{high:.2f}) |  |  |  |  |  |  |")
 
     head("laser")
     line("RMS error", rms("laser_error"))
@@ -137,6 +150,7 @@ def report(table: pd.DataFrame, bound: Array) -> str:
 
 
 def main() -> None:
+    """Simulate and calibrate the sessions, write their rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=240)
     parser.add_argument("--first", type=int, default=0)
@@ -149,7 +163,7 @@ def main() -> None:
         if not options.report:
             options.rows.parent.mkdir(parents=True, exist_ok=True)
             rows: list[dict[str, Any]] = []
-            for row in pool.imap(one, numbers):
+            for row in pool.imap(session_row, numbers):
                 rows.append(row)
                 pd.DataFrame(rows).to_parquet(options.rows, index=False)
         table = pd.read_parquet(options.rows)

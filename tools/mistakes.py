@@ -26,7 +26,7 @@ Change = Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None]  # of 
 
 
 def _scenario(**blocks: Any) -> Change:
-    """The simulated world is otherwise; the crew does not know."""
+    """Return a change of the simulated world that the configuration does not tell."""
 
     def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
         for name, values in blocks.items():
@@ -36,7 +36,7 @@ def _scenario(**blocks: Any) -> Change:
 
 
 def _laser(**values: float) -> Change:
-    """session.yaml's laser mount is wrong by so much."""
+    """Return a change that adds errors to the laser's mount in session.yaml."""
 
     def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
         mount = session.get("laser", {}).get("mount", {})
@@ -48,13 +48,14 @@ def _laser(**values: float) -> Change:
 
 
 def _swapped(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
+    """Interchange x and y of the laser's mount in session.yaml."""
     mount = session.get("laser", {}).get("mount", {})
     if mount:
         mount["x_m"], mount["y_m"] = mount["y_m"], mount["x_m"]
 
 
 def _target(**values: float) -> Change:
-    """The pool's config has a letter wrong by so much."""
+    """Return a change that adds errors to the target's letters in the pool's config."""
 
     def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
         for name, value in values.items():
@@ -65,7 +66,7 @@ def _target(**values: float) -> Change:
 
 
 def _thrice(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
-    """The INS drifts three times as far as session.yaml says."""
+    """Make the INS drift three times as far as session.yaml says."""
     figures = dict(DRIFT["drift"])
     scenario["ins"] = {"drift": figures | {key: 3 * value for key, value in figures.items() if "constant" not in key}}
     if "ins" in session:
@@ -73,7 +74,7 @@ def _thrice(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, A
 
 
 def _pool(**values: Any) -> Change:
-    """The pool's config says something else of the target."""
+    """Return a change that gives other values to the target in the pool's config."""
 
     def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
         if "target" in pool:
@@ -111,8 +112,8 @@ MISTAKES: dict[str, Change] = {
 }
 
 
-def one(task: tuple[str, int]) -> dict[str, Any]:
-    """What came of one session, as a row."""
+def session_row(task: tuple[str, int]) -> dict[str, Any]:
+    """Return the row of a session, of a mistake and a seed: verdict, errors and sigmas."""
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
@@ -128,13 +129,13 @@ def one(task: tuple[str, int]) -> dict[str, Any]:
     session, pool = copy.deepcopy(made.session), copy.deepcopy(made.pool)
     MISTAKES[name]({}, session, pool)
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
-    nothing = {f"{what}_{axis}": np.nan for what in ("error", "sigma") for axis in NAMES}
-    row: dict[str, Any] = {"mistake": name, "seed": seed, "accepted": False, "nse": np.nan, "sigmas": np.nan} | nothing
+    empty = {f"{kind}_{axis}": np.nan for kind in ("error", "sigma") for axis in NAMES}
+    row: dict[str, Any] = {"mistake": name, "seed": seed, "accepted": False, "nse": np.nan, "sigmas": np.nan} | empty
     try:
-        found = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
+        artefacts = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
     except PoolcalError as error:
         return row | {"reasons": f"refused: {error}"}
-    result = json.loads(found["report/calibration.json"])
+    result = json.loads(artefacts["report/calibration.json"])
     block = result["methods"]["adjustment"]
     row |= {"accepted": result["verdict"] == "accepted", "reasons": " | ".join(result["reasons"])}
     if block["covariance_total"] is None:
@@ -150,7 +151,7 @@ def one(task: tuple[str, int]) -> dict[str, Any]:
 
 
 def table_of(rows: pd.DataFrame) -> str:
-    """Markdown: a line a mistake."""
+    """Return the Markdown table, with a line for each mistake."""
     lines = ["| what is wrong | accepted | largest error ° | mm | NSE if accepted | in sigmas |"]
     lines.append("|---|---:|---:|---:|---:|---:|")
     for name, group in rows.groupby("mistake", sort=False):
@@ -166,15 +167,16 @@ def table_of(rows: pd.DataFrame) -> str:
 
 
 def main() -> None:
+    """Simulate and calibrate the sessions, write their rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seeds", type=int, default=SEEDS, help="sessions of each mistake")
     parser.add_argument("--only", nargs="*", help="names (or beginnings) of mistakes")
     options = parser.parse_args()
-    names = [name for name in MISTAKES if not options.only or any(name.startswith(one) for one in options.only)]
+    names = [name for name in MISTAKES if not options.only or any(name.startswith(start) for start in options.only)]
     tasks = [(name, seed) for name in names for seed in range(1, options.seeds + 1)]
     with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-        rows = pd.DataFrame(list(pool.imap(one, tasks)))
+        rows = pd.DataFrame(list(pool.imap(session_row, tasks)))
     path = Path("runs/montecarlo/mistakes.parquet")
     path.parent.mkdir(parents=True, exist_ok=True)
     rows.to_parquet(path, index=False)

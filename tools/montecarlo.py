@@ -1,4 +1,4 @@
-"""Many simulated sessions: are the results right, and the predicted sigmas true?
+"""Many simulated sessions, to see whether the results are right and the predicted sigmas true.
 
 ``make montecarlo`` prints, campaign by campaign, the errors of the adjustment's six values, their mean normalised
 squared error (its expectation is 6 if the covariance is true) with the 99 % band, and how many sessions were
@@ -73,6 +73,8 @@ TWELVE: dict[str, Any] = {"distances_m": [3.5, 6.0, 8.5] * 4, "speed_m_s": 0.18,
 
 @dataclass(frozen=True)
 class Campaign:
+    """Sessions of one kind, whose seeds are consecutive."""
+
     name: str
     sessions: int
     first_seed: int
@@ -122,12 +124,12 @@ CAMPAIGNS = (
 
 
 def path_of(campaign: Campaign) -> Path:
-    """Where its rows are kept."""
+    """Return the file of a campaign's rows."""
     return FOLDER / f"{campaign.name.replace(' ', '_').replace('/', '-').replace(',', '')}.parquet"
 
 
 def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
-    """The scenario of one session: the campaign's, thinned, with its combination of coarse errors."""
+    """Return the scenario of one session: the campaign's, thinned, with its combination of coarse errors."""
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
     keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
     sizes = (COARSE_DEG,) * 3 + (COARSE_M,) * 3
@@ -140,12 +142,25 @@ def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
 
 
 def errors_of(R_body_from_sensor: Array, lever_arm_m: Array, truth: Mapping[str, Any], sensor: str = "mbes") -> Array:
-    """(6,): ε of R_true = Exp(ε) R_body_from_sensor in rad, then the lever arm's error in m."""
+    """Return the errors (6,) of a mount: ε of R_true = Exp(ε) R_body_from_sensor in rad, lever arm in m.
+
+    Parameters
+    ----------
+    R_body_from_sensor
+        (3, 3): the estimated rotation.
+    lever_arm_m
+        (3,): the estimated lever arm, in the body frame.
+    truth
+        Content of the session's truth.json.
+    sensor
+        "mbes" or "laser".
+    """
     R_true, lever_arm_true_m = (np.array(truth[sensor][name]) for name in (f"R_body_from_{sensor}", "lever_arm_m"))
     return mount_error(R_true, lever_arm_true_m, R_body_from_sensor, lever_arm_m)
 
 
 def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
+    """Simulate and calibrate a session in memory and return its row."""
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
@@ -155,15 +170,22 @@ def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
 
     scenario = parse(Scenario, scenario_of(campaign, number), campaign.name)
     made = simulate_session(scenario, campaign.first_seed + number)
-    found = calibrate_in_memory(
+    artefacts = calibrate_in_memory(
         parse(SessionConfig, made.session, "session"),
         parse(PoolConfig, made.pool, "pool"),
         {"ins": made.ins, "laser": made.laser, "mbes": made.mbes},
     )
-    return _row(json.loads(found["report/calibration.json"]), made.truth)
+    return _row(json.loads(artefacts["report/calibration.json"]), made.truth)
 
 
 def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
+    """Simulate and calibrate a session by the command line and return its row.
+
+    Raises
+    ------
+    RuntimeError
+        A command ended with neither status 0 nor 1.
+    """
     with tempfile.TemporaryDirectory() as folder:
         scenario, session, run = Path(folder, "scenario.yaml"), Path(folder, "session"), Path(folder, "run")
         scenario.write_text(yaml.safe_dump(scenario_of(campaign, number)))
@@ -197,14 +219,15 @@ def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, 
     return row
 
 
-def one(task: tuple[Campaign, int]) -> dict[str, Any]:
+def session_row(task: tuple[Campaign, int]) -> dict[str, Any]:
+    """Return the row of a session, by its campaign and number."""
     campaign, number = task
     row = session_through_files(*task) if campaign.through_files else session_in_memory(*task)
     return {"campaign": campaign.name, "seed": campaign.first_seed + number} | row
 
 
 def report(campaign: Campaign, table: pd.DataFrame) -> str:
-    """The campaign in five lines."""
+    """Return the campaign in five lines."""
     n = len(table)
     low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
     mean = table["nse"].mean()
@@ -226,13 +249,13 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
 
 
 def pairs(table: pd.DataFrame) -> str:
-    """Sessions 0 and 1, 2 and 3, … compared as poolcal diff does: as they are, and with one of the six moved."""
+    """Compare sessions 0 and 1, 2 and 3, … as poolcal diff does: as they are, and with one mount parameter moved."""
     from pipeline.maths.comparison import MountEstimate, compare_estimates
     from pipeline.maths.geometry.rotations import exp_so3
     from pipeline.results.mount_difference import SIGNIFICANCE
 
     def estimate(row: Any, moved: Array) -> MountEstimate:
-        """As found on a mount of zero moved by ``moved``: found = Exp(-error) · true."""
+        """Return the estimate of a zero mount that is moved by ``moved``: estimated = Exp(-error) · true."""
         error = np.array([row[f"error_{name}"] for name in NAMES]) * UNITS
         covariance = np.zeros((6, 6))
         for i in range(6):
@@ -241,21 +264,25 @@ def pairs(table: pd.DataFrame) -> str:
         return MountEstimate(exp_so3(-error[:3]) @ exp_so3(moved[:3]), moved[3:] - error[3:], covariance)
 
     rows = table.to_dict("records")
-    two = list(zip(rows[::2], rows[1::2], strict=True))
-    still = np.zeros(6)
-    alarms = sum(compare_estimates(estimate(a, still), estimate(b, still)).probability < SIGNIFICANCE for a, b in two)
-    lines = [f"  compared in {len(two)} pairs: {alarms} false alarms, {100 * alarms / len(two):.1f} % (level 1 %)"]
+    pairs_of_rows = list(zip(rows[::2], rows[1::2], strict=True))
+    count, still = len(pairs_of_rows), np.zeros(6)
+    comparisons = [compare_estimates(estimate(a, still), estimate(b, still)) for a, b in pairs_of_rows]
+    alarms = sum(comparison.probability < SIGNIFICANCE for comparison in comparisons)
+    lines = [f"  compared in {count} pairs: {alarms} false alarms, {100 * alarms / count:.1f} % (level 1 %)"]
     for k, name in enumerate(NAMES):
         move = np.zeros(6)
         move[k] = np.radians(MOVED_DEG) if k < 3 else MOVED_MM / 1000
-        told = [compare_estimates(estimate(a, still), estimate(b, move)).significant(SIGNIFICANCE) for a, b in two]
-        found, named = (100 * np.mean([bool(one) for one in told]), 100 * np.mean([k in one for one in told]))
+        comparisons = [compare_estimates(estimate(a, still), estimate(b, move)) for a, b in pairs_of_rows]
+        significant = [comparison.significant(SIGNIFICANCE) for comparison in comparisons]
+        detected = 100 * np.mean([bool(parameters) for parameters in significant])
+        named = 100 * np.mean([k in parameters for parameters in significant])
         size = f"{MOVED_DEG}°" if k < 3 else f"{MOVED_MM} mm"
-        lines.append(f"  {name} moved by {size}: found in {found:.1f} % of the pairs, {name} named in {named:.1f} %")
+        lines.append(f"  {name} moved by {size}: found in {detected:.1f} % of the pairs, {name} named in {named:.1f} %")
     return "\n".join(lines)
 
 
 def main() -> None:
+    """Simulate and calibrate the campaigns, write their rows and print a report of each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="*", help="names (or beginnings) of campaigns")
     parser.add_argument("--share", type=float, default=1.0, help="share of the sessions, for a quick look")
@@ -271,7 +298,7 @@ def main() -> None:
         done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
         tasks = [(campaign, number) for number in range(done, max(2, round(campaign.sessions * options.share)))]
         with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-            for number, row in enumerate(pool.imap(one, tasks), start=done):  # written as they come: nothing is lost
+            for number, row in enumerate(pool.imap(session_row, tasks), start=done):  # written as they come: nothing is lost
                 pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
         table = pd.read_csv(path)
         table.to_parquet(path_of(campaign), index=False)

@@ -33,25 +33,25 @@ SOURCES = {"report": "pipeline/results/pages", "recordings": "stages/views"}  # 
 
 
 def missing() -> str:
-    """What is not installed, in words; empty when all is there."""
+    """Return what is not installed, in words; empty when all is there."""
     driver = any(any(Path(folder).glob("*.json")) for folder in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"))
     there = {
         "Chromium": any(map(shutil.which, CHROMIUM)),
         "pdftotext": shutil.which("pdftotext") is not None,
-        "a font with Chinese letters": _says("fc-list", ":lang=zh", "family"),
+        "a font with Chinese letters": _prints("fc-list", ":lang=zh", "family"),
         "a Vulkan driver": driver,
     }
-    lacking = " and ".join(name for name, found in there.items() if not found)
+    lacking = " and ".join(name for name, installed in there.items() if not installed)
     return f"needs {lacking}: make setup-visual" if lacking else ""
 
 
-def _says(*command: str) -> bool:
-    """Whether a program is there and answers anything."""
+def _prints(*command: str) -> bool:
+    """Return whether a program is installed and prints anything."""
     return shutil.which(command[0]) is not None and bool(subprocess.run(command, capture_output=True).stdout.strip())
 
 
 def chromium(*options: str, timeout: float = 150) -> subprocess.CompletedProcess[str]:
-    """Headless Chromium with a home of its own; what pages write to the console goes to standard error."""
+    """Run headless Chromium with a home of its own; the console of a page goes to standard error."""
     program = next(path for name in CHROMIUM if (path := shutil.which(name)))
     with tempfile.TemporaryDirectory() as home:
         fixed = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr"]
@@ -61,7 +61,7 @@ def chromium(*options: str, timeout: float = 150) -> subprocess.CompletedProcess
 
 @contextlib.contextmanager
 def viewer(*recordings: Path) -> Iterator[Any]:
-    """A headless viewer with these recordings open, its home its own."""
+    """Open recordings in a headless viewer with a home of its own."""
     from rerun.experimental import ViewerClient
 
     with socket.socket() as free:
@@ -93,13 +93,13 @@ def show_tab(client: Any, tab: str) -> None:
 
 
 def picture_of(client: Any, path: Path) -> None:
-    """The whole window, once what was changed last is drawn."""
+    """Save the whole window once the last change is drawn."""
     time.sleep(SETTLE_S)
     client.save_screenshot(str(path))
 
 
 def tabs(run: Path, out: Path) -> None:
-    """A picture of each tab; of the iteration at its beginning and at its end; of the quality over time."""
+    """Save a picture of each tab, of the iteration at its first, second and last step."""
     import pandas as pd
 
     from stages.views.blueprint import tabs_of
@@ -110,8 +110,8 @@ def tabs(run: Path, out: Path) -> None:
     with viewer(*recordings_of(run)) as client:
         for tab in tabs_of(run):
             show_tab(client, tab)
-            moments = {"-first": 0, "-second": 1, "-last": last} if tab == "Iteration" else {"": last}
-            for suffix, step in moments.items():
+            steps_shown = {"-first": 0, "-second": 1, "-last": last} if tab == "Iteration" else {"": last}
+            for suffix, step in steps_shown.items():
                 if tab == "Quality" or not len(steps):
                     client.set_time("time", play_state="paused")
                 else:
@@ -120,25 +120,39 @@ def tabs(run: Path, out: Path) -> None:
 
 
 def report(run: Path, out: Path, height: int = 1500) -> None:
-    """The beginning of the report's page."""
+    """Save the beginning of the report's page.
+
+    Parameters
+    ----------
+    run
+        Folder of the run.
+    out
+        Folder of the picture.
+    height
+        Height of the picture in pixels.
+    """
     page = (run / "report" / "report.html").resolve().as_uri()
     chromium(f"--window-size={WIDTH},{height}", f"--screenshot={(out / 'report.png').resolve()}", page)
 
 
 def drawn_from() -> str:
-    """A line each for the report and the recordings: SHA-256 of all that draws them. It changes when they may look
-    otherwise; tests/test_pictures.py compares it with that of the README's pictures."""
-    found = {}
-    for what, folder in SOURCES.items():
+    """Return a line each for the report and the recordings: SHA-256 of all sources that draw them.
+
+    The digest changes when the pictures may change; tests/test_pictures.py compares it with that of the README's
+    pictures.
+    """
+    digests = {}
+    for kind, folder in SOURCES.items():
         digest = hashlib.sha256()
         for path in sorted((ROOT / folder).glob("*")):
             if path.suffix in (".py", ".html"):
                 digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-        found[what] = digest.hexdigest()
-    return "".join(f"{what} {digest}\n" for what, digest in found.items())
+        digests[kind] = digest.hexdigest()
+    return "".join(f"{kind} {hexdigest}\n" for kind, hexdigest in digests.items())
 
 
 def main() -> None:
+    """Draw all pictures of a run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=Path)
     parser.add_argument("out", type=Path)
@@ -156,7 +170,7 @@ def main() -> None:
 
 
 def _lighten(path: Path) -> None:
-    """As wide as a README shows it, and a tenth of the size."""
+    """Save a picture as WebP, as wide as a README shows it and a tenth of the size."""
     from PIL import Image
 
     image = Image.open(path).convert("RGB")

@@ -1,4 +1,7 @@
-"""The picture of the pipeline, drawn from what the stages declare: python -m tools.pipeline_picture OUT.svg"""
+"""The picture of the pipeline, drawn from what the stages declare.
+
+    python -m tools.pipeline_picture OUT.svg
+"""
 
 import sys
 import textwrap
@@ -18,7 +21,7 @@ RAW = {"ins": "INS", "laser": "laser", "mbes": "sonar"}
 
 
 def picture(path: Path) -> None:
-    """Stages from top to bottom; left, from which earlier stages they take; right, what they write."""
+    """Draw the stages from top to bottom, arrows from earlier stages on the left, outputs on the right."""
     stages = load()
     place = {name_of(stage): -STEP * k for k, stage in enumerate(stages)}
     with drawing_style():
@@ -52,7 +55,7 @@ def picture(path: Path) -> None:
 
 
 def _arrow(axis: Axes, start: float, end: float) -> None:
-    """Straight to the next stage; to a later one round the left, the wider the farther."""
+    """Draw an arrow: straight to the next stage, round the left to a later one, wider to one farther away."""
     steps = round((start - end) / STEP)
     ends: tuple[tuple[float, float], tuple[float, float]]
     if steps == 1:
