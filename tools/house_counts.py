@@ -143,10 +143,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("checkout", type=Path, nargs="?", default=ROOT)
     parser.add_argument("--list", action="store_true", help="name what is counted")
-    given = parser.parse_args()
-    source = given.checkout.resolve()
+    options = parser.parse_args()
+    source = options.checkout.resolve()
     names, calls, way = names_with_two_meanings(source), calls_with_many_arguments(source), way_of_adjust(source)
-    if given.list:
+    if options.list:
         print("\n".join(f"{name}: {', '.join(files)}" for name, files in names.items()))
         print("\n".join(calls))
         print("\n".join(f"{file} {function}" for file, function in way))

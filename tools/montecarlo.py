@@ -298,7 +298,8 @@ def main() -> None:
         done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
         tasks = [(campaign, number) for number in range(done, max(2, round(campaign.sessions * options.share)))]
         with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-            for number, row in enumerate(pool.imap(session_row, tasks), start=done):  # written as they come: nothing is lost
+            # each row is written as it comes: nothing is lost
+            for number, row in enumerate(pool.imap(session_row, tasks), start=done):
                 pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
         table = pd.read_csv(path)
         table.to_parquet(path_of(campaign), index=False)

@@ -1,6 +1,6 @@
 """The picture of the pipeline, drawn from what the stages declare.
 
-    python -m tools.pipeline_picture OUT.svg
+Usage: python -m tools.pipeline_picture OUT.svg
 """
 
 import sys

@@ -36,8 +36,6 @@ LEVELS = (0.001, 0.05)
 SLANTED = ("P1-0", "P1-1", "P1-2", "P3-0", "P3-1", "P3-2")
 TOPS = ("P1-0-top", "P1-1-top", "P3-0-top", "P3-1-top")
 ANGLES_DEG = (10.0, 20.0, 30.0)
-
-
 DOCK = Path("configs/scenarios/dock.yaml")
 KINDS: dict[str, dict[str, Any]] = {
     "INS drift": {"ins": DRIFT},
@@ -49,8 +47,22 @@ KINDS: dict[str, dict[str, Any]] = {
 
 @dataclass
 class World:
-    """What a fault changes: soundings as recorded, what the pool's config says; ``again``: the soundings of the same
-    session with the sonar turned in its own frame by so much (rad)."""
+    """The parts of a session that a fault changes.
+
+    Attributes
+    ----------
+    number
+        Number of the session, by which faults vary.
+    mbes
+        Soundings as recorded.
+    pool
+        Content of pool.yaml.
+    truth
+        Content of truth.json.
+    again
+        Simulates the soundings of the same session again, with the sonar turned by a rotation vector (3,) in its own
+        frame, rad.
+    """
 
     number: int
     mbes: Raw
@@ -60,18 +72,20 @@ class World:
 
     @property
     def angle_deg(self) -> Array:
+        """Receive angles (n,)."""
         return np.asarray(np.degrees(self.mbes["angle_rad"]))
 
     @property
     def passes(self) -> NDArray[np.int64]:
+        """Number of each sounding's pass (n,)."""
         return np.cumsum(np.diff(self.mbes["t_ns"], prepend=self.mbes["t_ns"][0]) > APART_NS)
 
     def longer(self, rows: NDArray[np.bool_], by_m: float) -> None:
-        """Ranges."""
+        """Lengthen the ranges of some soundings (n,)."""
         self.mbes["two_way_time_s"] = self.mbes["two_way_time_s"] + rows * 2 * by_m / self.mbes["sound_speed_m_s"]
 
     def mix(self, other: Raw, taken: Callable[[Raw], NDArray[np.bool_]]) -> None:
-        """Soundings of ``other`` where they are to be taken, its own elsewhere."""
+        """Take the soundings of ``other`` that ``taken`` selects, in place of the session's own."""
         own, others = ~taken(self.mbes), taken(other)
         both = {name: np.concatenate([self.mbes[name][own], other[name][others]]) for name in other}
         order = np.lexsort((both["beam"], both["ping"]))
@@ -80,7 +94,7 @@ class World:
 
 def _face(names: tuple[str, ...]) -> Callable[[World], str]:
     def plant(world: World) -> str:
-        """The face is 20 mm farther out than the config has it."""
+        """Put a face 20 mm farther out than the config has it."""
         name = names[world.number % len(names)]
         world.pool["as_built"] = {"faces": {name: -0.02}}
         return f"on face {name} "
@@ -101,7 +115,7 @@ def _pass_ranges(world: World) -> str:
 
 
 def _pass_shifted(world: World) -> str:
-    """The sonar hangs 5 mm farther to starboard in one pass."""
+    """Move the sonar 5 mm to starboard in one pass."""
     number = world.number % 4
     rows = world.passes == number
     shift = np.array(world.truth["mbes"]["R_body_from_mbes"]).T @ [0.005, 0.0, 0.0]
@@ -115,7 +129,7 @@ def _pass_shifted(world: World) -> str:
 
 def _sectors(border_deg: float) -> Callable[[World], str]:
     def plant(world: World) -> str:
-        """The fan's middle is tilted forward against its flanks, and the file does not tell."""
+        """Tilt the middle of the fan forward against its flanks, unrecorded in the file."""
         tilted = world.again(np.array([np.radians(TILT_DEG), 0.0, 0.0]))
         world.mix(tilted, lambda raw: np.abs(np.degrees(raw["angle_rad"])) <= border_deg)
         return "steps by"
@@ -124,12 +138,13 @@ def _sectors(border_deg: float) -> Callable[[World], str]:
 
 
 def _by_turns(world: World) -> str:
-    """Every other ping is tilted forward, as of two frequencies in turn, and the file does not tell."""
+    """Tilt every other ping forward, as two frequencies in turn would, unrecorded in the file."""
     world.mix(world.again(np.array([np.radians(TILT_DEG), 0.0, 0.0])), lambda raw: raw["ping"] % 2 == 1)
     return "in one ping of 2"
 
 
-FAULTS: dict[str, Callable[[World], str]] = {  # each plants itself, and tells what must be named
+# each changes the session and returns the words that a reason must contain
+FAULTS: dict[str, Callable[[World], str]] = {
     "a slanted face 20 mm off": _face(SLANTED),
     "a top 20 mm too high": _face(TOPS),
     "ranges step by 10 mm at an angle": _step,
@@ -144,7 +159,7 @@ Task = tuple[str, str, int]  # fault or "", kind, number
 
 
 def scenario_of(kind: str, number: int) -> dict[str, Any]:
-    """Of one session, thinned, with its combination of coarse errors."""
+    """Return the scenario of one session, thinned, with its combination of coarse errors."""
     scenario: dict[str, Any] = yaml.safe_load(DOCK.read_text()) if kind == "dock" else {"name": kind, **KINDS[kind]}
     keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
@@ -152,8 +167,8 @@ def scenario_of(kind: str, number: int) -> dict[str, Any]:
     return scenario | THIN | {"mbes": {"coarse_error": coarse}}
 
 
-def one(task: Task) -> dict[str, Any]:
-    """What came of one session, as a row."""
+def session_row(task: Task) -> dict[str, Any]:
+    """Return the row of a session: verdict, reasons, and the largest deviates of each variable."""
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
@@ -177,16 +192,16 @@ def one(task: Task) -> dict[str, Any]:
 
     world = World(number, dict(made.mbes), copy.deepcopy(made.pool), made.truth, again)
     expected = FAULTS[fault](world) if fault else ""
-    found = calibrate_in_memory(
+    artefacts = calibrate_in_memory(
         parse(SessionConfig, made.session, "session"),
         parse(PoolConfig, world.pool, "pool"),
         {"ins": made.ins, "laser": made.laser, "mbes": world.mbes},
     )
-    result, patterns = json.loads(found["report/calibration.json"]), found["adjust/patterns"]
-    said = [reason for reason in result["reasons"] if reason.startswith(("residuals go with", "the passes do not"))]
+    result, patterns = json.loads(artefacts["report/calibration.json"]), artefacts["adjust/patterns"]
+    matching = [reason for reason in result["reasons"] if reason.startswith(("residuals go with", "the passes do not"))]
     row: dict[str, Any] = {"fault": fault, "kind": kind, "seed": seed, "accepted": result["verdict"] == "accepted"}
-    row |= {"reasons": " | ".join(result["reasons"]), "tests": len(patterns), "found": bool(said)}
-    row |= {"named": bool(said) and expected in said[0]}
+    row |= {"reasons": " | ".join(result["reasons"]), "tests": len(patterns), "found": bool(matching)}
+    row |= {"named": bool(matching) and expected in matching[0]}
     mean_m, sigma_m, dof = (patterns[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
     patterns = patterns.assign(bare=normal_deviates(mean_m, sigma_m, dof, tolerated=0.0))
     for by in BY:
@@ -197,21 +212,22 @@ def one(task: Task) -> dict[str, Any]:
 
 
 def seed_of(task: Task) -> int:
+    """Return the seed of a session."""
     fault, kind, number = task
     return 60000 + 1000 * list(KINDS).index(kind) + number + (10000 if fault else 0)
 
 
 def read(path: Path) -> pd.DataFrame:
-    """The rows so far."""
+    """Return the rows that are already written."""
     numbers = {f"{start}{by}": "" for start in ("u_", "bare_") for by in BY}  # none of a kind that was not judged
     return pd.read_csv(path, keep_default_na=False, na_values=numbers)
 
 
 def summary(rows: pd.DataFrame) -> str:
-    """False alarms at two levels, with and without the tolerance; then each fault."""
+    """Return two Markdown tables: false alarms at two levels, with and without the tolerance; then each fault."""
     from pipeline.maths.adjustment.mean_tests import joint_limit
 
-    heads = [f"{100 * level:g} %, {what}" for what in ("tolerance 0", "as it is") for level in LEVELS]
+    heads = [f"{100 * level:g} %, {tolerance}" for tolerance in ("tolerance 0", "as it is") for level in LEVELS]
     lines = [f"| good sessions | number | {' | '.join(heads)} | accepted |", "|---|---:|---:|---:|---:|---:|---:|"]
     good = rows[rows["fault"] == ""]
     for kind, group in [*good.groupby("kind", sort=False), ("all", good)]:
@@ -230,8 +246,10 @@ def summary(rows: pd.DataFrame) -> str:
 
 
 def tasks_of(good: int, seeds: int) -> list[Task]:
-    """Sessions of all kinds in turn: a campaign that is broken off has some of each. Faults are planted in the first
-    three kinds."""
+    """Return the sessions, of all kinds in turn, so that an interrupted campaign has some of each.
+
+    Faults are put into the first three kinds.
+    """
     kinds = list(KINDS)
     of_good: list[Task] = [("", kinds[k % len(kinds)], k // len(kinds)) for k in range(good)]
     of_faults: list[Task] = [(fault, kinds[k % 3], k) for k in range(seeds) for fault in FAULTS]
@@ -239,6 +257,7 @@ def tasks_of(good: int, seeds: int) -> list[Task]:
 
 
 def main() -> None:
+    """Simulate and calibrate the sessions, write their rows and print the summary."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--good", type=int, default=300, help="sessions in which nothing is wrong")
     parser.add_argument("--seeds", type=int, default=20, help="sessions of each fault")
@@ -254,10 +273,11 @@ def main() -> None:
         if not options.only or (task[0] or task[1]).startswith(tuple(options.only))
     ]
     done = read(path) if options.resume and path.is_file() else pd.DataFrame(columns=["fault", "seed"])
-    there = set(zip(done["fault"], done["seed"], strict=True))
-    left = [task for task in tasks if (task[0], seed_of(task)) not in there]
+    written = set(zip(done["fault"], done["seed"], strict=True))
+    left = [task for task in tasks if (task[0], seed_of(task)) not in written]
     with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-        for number, row in enumerate(pool.imap(one, left), start=len(done)):  # written as they come: nothing is lost
+        # each row is written as it comes: nothing is lost
+        for number, row in enumerate(pool.imap(session_row, left), start=len(done)):
             pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
     rows = read(path)
     rows.to_parquet(PATH, index=False)

@@ -1,4 +1,4 @@
-"""Does the tree as it is compute the same bytes as another commit?
+"""Test whether the tree as it is computes the same bytes as another commit.
 
 A worktree of BASE simulates sessions of several kinds once; BASE and the tree as it is then run the same commands on
 copies of them, each in a folder of its own: ``run`` or ``laser``, ``check --json``, ``plan --yaml``, ``coarse --yaml``,
@@ -94,7 +94,7 @@ class Tree:
         self._environment = os.environ | {"PYTHONPATH": str(source), "PYTHONDONTWRITEBYTECODE": "1"}
 
     def poolcal(self, folder: Path, *words: object) -> tuple[int, str, str]:
-        """Exit status, output and errors of a command run in ``folder``."""
+        """Run a command in ``folder`` and return its exit status, output and errors."""
         command = [sys.executable, "-P", "-m", "stages.cli", *map(str, words)]
         done = subprocess.run(
             command, cwd=folder, env=self._environment, capture_output=True, text=True, timeout=1800, check=False
@@ -105,7 +105,17 @@ class Tree:
 
 
 def simulate(tree: Tree, kind: Kind, folder: Path) -> None:
-    """Session, pool.yaml, truth, plan and marks of a kind below ``folder``."""
+    """Write session, pool.yaml, truth, plan and marks below a folder.
+
+    Parameters
+    ----------
+    tree
+        The checkout that simulates.
+    kind
+        The kind of session.
+    folder
+        A folder that does not exist yet.
+    """
     folder.mkdir(parents=True)
     scenario = {}
     if kind.base is not None:
@@ -127,7 +137,19 @@ def simulate(tree: Tree, kind: Kind, folder: Path) -> None:
 
 
 def calibrate(tree: Tree, kind: Kind, folder: Path, pages: bool) -> None:
-    """All commands on a copied session; what each prints goes to ``printed/``."""
+    """Run all commands on a copied session; the output of each goes to ``printed/``.
+
+    Parameters
+    ----------
+    tree
+        The checkout that calibrates.
+    kind
+        The kind of session.
+    folder
+        The copy.
+    pages
+        Whether the report is drawn.
+    """
     config, quiet = ("--config", "pool.yaml"), ("--no-recordings", *(() if pages else ("--no-report",)))
     calls: dict[str, tuple[object, ...]] = {
         "check": ("check", "session", *config, "--json"),
@@ -148,20 +170,30 @@ def calibrate(tree: Tree, kind: Kind, folder: Path, pages: bool) -> None:
     calls["history"] = ("history", "runs", "--out", "history")
     for name, words in calls.items():
         status, out, errors = tree.poolcal(folder, *words)
-        said = "\n".join(line for line in errors.splitlines() if not TIMES.search(line))
-        _write_text(folder / "printed" / name, f"status {status}\n{TIMES.sub('TIME', out)}\n{said}\n")
+        messages = "\n".join(line for line in errors.splitlines() if not TIMES.search(line))
+        _write_text(folder / "printed" / name, f"status {status}\n{TIMES.sub('TIME', out)}\n{messages}\n")
 
 
-def differences(kind: str, one: Path, other: Path, pages: bool) -> Iterator[str]:
-    """A line for each file that differs between two folders in which the same commands ran."""
-    files = {at: {path.relative_to(at) for path in at.rglob("*") if path.is_file()} for at in (one, other)}
-    for path in sorted(files[one] | files[other]):
+def differences(kind: str, base: Path, here: Path, pages: bool) -> Iterator[str]:
+    """Yield a line for each file that differs between two folders in which the same commands ran.
+
+    Parameters
+    ----------
+    kind
+        Name of the kind, with which the lines begin.
+    base, here
+        The folders of BASE and of this tree.
+    pages
+        Whether drawn files are compared as well.
+    """
+    files = {at: {path.relative_to(at) for path in at.rglob("*") if path.is_file()} for at in (base, here)}
+    for path in sorted(files[base] | files[here]):
         if path.name in PASSED_OVER or (path.suffix in (".html", ".svg", ".png", ".rrd") and not pages):
             continue
-        if path not in files[one] or path not in files[other]:
-            yield f"{kind}: {path}: only in {'BASE' if path in files[one] else 'this tree'}"
-        elif _digest(one / path) != _digest(other / path):
-            yield f"{kind}: {path}: {_what_differs(one / path, other / path)}"
+        if path not in files[base] or path not in files[here]:
+            yield f"{kind}: {path}: only in {'BASE' if path in files[base] else 'this tree'}"
+        elif _digest(base / path) != _digest(here / path):
+            yield f"{kind}: {path}: {_how_they_differ(base / path, here / path)}"
 
 
 def _digest(path: Path) -> str:
@@ -177,19 +209,19 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _what_differs(one: Path, other: Path) -> str:
-    """The keys, columns or lines in which two files differ, the first few."""
-    if one.suffix == ".json":
-        before, after = (_flat(json.loads(path.read_text(encoding="utf-8"))) for path in (one, other))
+def _how_they_differ(base: Path, here: Path) -> str:
+    """Return the first few keys, columns or lines in which two files differ."""
+    if base.suffix == ".json":
+        before, after = (_flat(json.loads(path.read_text(encoding="utf-8"))) for path in (base, here))
         names = [name for name in {**before, **after} if before.get(name) != after.get(name)]
         return f"keys {', '.join(sorted(name for name in names if not name.startswith('software'))[:8])}"
-    if one.suffix == ".parquet":
-        old, new = pd.read_parquet(one), pd.read_parquet(other)
+    if base.suffix == ".parquet":
+        old, new = pd.read_parquet(base), pd.read_parquet(here)
         if list(old) != list(new) or len(old) != len(new):
             return f"columns or rows: {old.shape} {list(old)} and {new.shape} {list(new)}"
         names = [str(name) for name in old if not old[name].equals(new[name])]
         return f"columns {', '.join(names)}" if names else "only what is said of its columns"
-    lines = [path.read_text(encoding="utf-8", errors="replace").splitlines() for path in (one, other)]
+    lines = [path.read_text(encoding="utf-8", errors="replace").splitlines() for path in (base, here)]
     pairs = [pair for pair in zip(*lines, strict=False) if pair[0] != pair[1]]
     first = f", first {pairs[0][0]!r} and {pairs[0][1]!r}" if pairs else ""
     return f"{len(lines[0])} and {len(lines[1])} lines{first}"
@@ -216,7 +248,19 @@ def _write_text(path: Path, text: str) -> None:
 
 
 def compare(base: str, names: list[str], pages: bool, work: Path) -> list[str]:
-    """The lines of ``differences`` of all kinds named, worked out below ``work``."""
+    """Run both trees on sessions of the kinds named and return the lines of ``differences``.
+
+    Parameters
+    ----------
+    base
+        A commit.
+    names
+        Keys of KINDS.
+    pages
+        Whether drawn files are compared as well.
+    work
+        Folder to work in.
+    """
     source = work / "source"
     subprocess.run(["git", "worktree", "add", "--detach", "-f", "-q", str(source), base], cwd=ROOT, check=True)
     try:
@@ -227,31 +271,32 @@ def compare(base: str, names: list[str], pages: bool, work: Path) -> list[str]:
             for tree in trees:
                 shutil.copytree(work / "simulated" / name, tree.work / name)
                 calibrate(tree, KINDS[name], tree.work / name, pages)
-            found = list(differences(name, trees[0].work / name, trees[1].work / name, pages))
-            print("\n".join(found) or f"{name}: the same", flush=True)
-            return found
+            lines = list(differences(name, trees[0].work / name, trees[1].work / name, pages))
+            print("\n".join(lines) or f"{name}: the same", flush=True)
+            return lines
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            return [line for found in pool.map(of_kind, names) for line in found]
+            return [line for lines in pool.map(of_kind, names) for line in lines]
     finally:
         subprocess.run(["git", "worktree", "remove", "--force", str(source)], cwd=ROOT, check=True)
 
 
 def main() -> None:
+    """Compare, print the differences, and end with status 1 if there are any."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("base", metavar="BASE", help="a commit")
     parser.add_argument("--only", nargs="+", choices=KINDS, default=list(KINDS))
     parser.add_argument("--pages", action="store_true", help="the HTML pages as well")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep both trees' results here, to look into")
-    given = parser.parse_args()
-    if given.keep is not None:
-        given.keep.mkdir(parents=True)
-        found = compare(given.base, given.only, given.pages, given.keep.resolve())
+    options = parser.parse_args()
+    if options.keep is not None:
+        options.keep.mkdir(parents=True)
+        lines = compare(options.base, options.only, options.pages, options.keep.resolve())
     else:
         with tempfile.TemporaryDirectory() as folder:
-            found = compare(given.base, given.only, given.pages, Path(folder))
-    print(f"{len(found)} files differ" if found else "the same bytes")
-    sys.exit(1 if found else 0)
+            lines = compare(options.base, options.only, options.pages, Path(folder))
+    print(f"{len(lines)} files differ" if lines else "the same bytes")
+    sys.exit(1 if lines else 0)
 
 
 if __name__ == "__main__":
