@@ -23,8 +23,8 @@ CODES = {
     "word where a number should be": "not_a_number",
     # rows of texts
     "row with another number of columns": "wrong_column_count",
-    "line without end": "endless_line",
-    "last line without line end": "unended_last_line",
+    "line without end": "unterminated_line",
+    "last line without line end": "unterminated_last_line",
     # records of binary logs
     "truncated": "truncated",
     "truncated message": "truncated_message",
