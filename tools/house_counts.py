@@ -34,33 +34,26 @@ PROTOCOLS = {
 }  # fmt: skip
 MANY_ARGUMENTS = 6
 TRACE = """
-import json, sys, tempfile
+import json, sys
 from pathlib import Path
-source, packages = Path(sys.argv[1]), ("pipeline", "stages")
-sys.path.insert(0, str(source))
+import stages.adjust
 from stages.cli import call
-order, inside = {}, [0]
+source, session, run, result = sys.argv[1:]
+folders, order, wanted = tuple(f"{source}/{name}/" for name in ("pipeline", "stages")), {}, {}
 def follow(frame, event, _):
     code = frame.f_code
+    if event == "call" and wanted.setdefault(code, code.co_filename.startswith(folders) and code.co_name[0] != "<"):
+        order.setdefault((code.co_filename.removeprefix(source + "/"), code.co_qualname), None)
+def traced(inputs, config, adjust=stages.adjust.run):
+    sys.setprofile(follow)
     try:
-        file = Path(code.co_filename).relative_to(source)
-    except ValueError:
-        return
-    if file.parts[0] not in packages or code.co_name.startswith("<"):
-        return
-    begin = file.as_posix() == "stages/adjust.py" and code.co_name == "run"
-    if event == "call":
-        inside[0] += begin
-        if inside[0]:
-            order.setdefault((file.as_posix(), code.co_qualname), None)
-    elif event == "return":
-        inside[0] -= begin
-session, run = sys.argv[2:4]
-sys.setprofile(follow)
+        return adjust(inputs, config)
+    finally:
+        sys.setprofile(None)
+stages.adjust.run = traced
 words = f"run {session} --config {session}/pool.yaml --run {run} --jobs 1 --no-report --no-recordings"
 call(words.split())
-sys.setprofile(None)
-Path(sys.argv[4]).write_text(json.dumps(list(order)))
+Path(result).write_text(json.dumps(list(order)))
 """
 SMALL = {
     "track": {"distances_m": [4.0, 7.0], "half_length_m": 3.6},
