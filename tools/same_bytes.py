@@ -48,9 +48,11 @@ PLAN = {
     "mbes": {"ping_rate_hz": 8.0},
 }
 PASSED_OVER = ("manifest.json", "digests.json", ".lock")  # digests of the source; paths and times; a process
-TIMES = re.compile(r"\d+(\.\d+)? s\b|\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d+)?)?Z?)?")
-WORK = re.compile(r"/\S*/(base|here)/")  # the folder in which a tree's commands ran
-VERSION = re.compile(r"poolcal \d+\.\d+\.\S+|\b[0-9a-f]{7,40}\b|(?<=calibration.json\", sha256: \")[0-9a-f]{64}")
+ELAPSED = re.compile(r"\d s\b")  # a message that tells how long a stage took
+VARIABLE = re.compile(  # what differs between any two runs: the day of an edit, the commit, its digests, the folder
+    r'(?<=date: ")\d{4}-\d\d-\d\d|\b[0-9a-f]{40}\b|(?<=calibration\.json", sha256: ")[0-9a-f]{64}'
+    r"|/\S*/(base|here)/"
+)
 
 
 @dataclass(frozen=True)
@@ -170,8 +172,8 @@ def calibrate(tree: Tree, kind: Kind, folder: Path, pages: bool) -> None:
     calls["history"] = ("history", "runs", "--out", "history")
     for name, words in calls.items():
         status, out, errors = tree.poolcal(folder, *words)
-        messages = "\n".join(line for line in errors.splitlines() if not TIMES.search(line))
-        _write_text(folder / "printed" / name, f"status {status}\n{TIMES.sub('TIME', out)}\n{messages}\n")
+        messages = "\n".join(line for line in errors.splitlines() if not ELAPSED.search(line))
+        _write_text(folder / "printed" / name, f"status {status}\n{out}\n{messages}\n")
 
 
 def differences(kind: str, base: Path, here: Path, pages: bool) -> Iterator[str]:
@@ -202,8 +204,7 @@ def _digest(path: Path) -> str:
         content.pop("software", None)
         data = json.dumps(content, sort_keys=False).encode()
     elif path.suffix in (".html", ".json", ".csv", ".yaml", ""):
-        text = WORK.sub("WORK", path.read_text(encoding="utf-8", errors="replace"))
-        data = VERSION.sub("VERSION", TIMES.sub("TIME", text)).encode()
+        data = VARIABLE.sub("-", path.read_text(encoding="utf-8", errors="replace")).encode()
     else:
         data = path.read_bytes()
     return hashlib.sha256(data).hexdigest()
