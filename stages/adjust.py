@@ -100,7 +100,7 @@ class Outputs:
 def run(inputs: Inputs, config: Config) -> Outputs:
     """Adjust the mount of the sensor that is calibrated."""
     # Say what is calibrated, and what is known of it.
-    session, calibration = session_data(inputs, config), config.calibration
+    calibration, session = config.calibration, session_data(inputs, config)
     problem = (
         sonar_problem(session, calibration) if isinstance(calibration, Mbes) else laser_problem(session, calibration)
     )
@@ -154,6 +154,9 @@ def weak_geometry(
     """
     if config.mbes is None:
         return fixed_parameters_table(adjustment.fixed_mount)
+    passes = inputs.passes.set_index("pass").loc[statistics.passes_of("mbes")]
+    surfaces = enumerate(adjustment.state.surfaces)
+    soundings = {surface.family: statistics.count("mbes", number) for number, surface in surfaces}
     setting = PredictionSetting(
         model=session.target,
         state=adjustment.state,
@@ -163,7 +166,4 @@ def weak_geometry(
         laser=config.laser,
         mbes=config.mbes,
     )
-    passes = inputs.passes.set_index("pass").loc[statistics.passes_of("mbes")]
-    surfaces = enumerate(adjustment.state.surfaces)
-    soundings = {surface.family: statistics.count("mbes", number) for number, surface in surfaces}
     return geometry_table(setting, passes, soundings, adjustment.equations.normal, adjustment.solution)

@@ -19,22 +19,17 @@ from pipeline.artefacts.catalogue.points import (
     TRAJECTORY,
 )
 from pipeline.artefacts.counts import by_reason, counts_table, why_none_used
-from pipeline.artefacts.streams import EMPTY_STREAM, Batch, BatchResult, Chunk, Stream, point_array
+from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream, point_array
 from pipeline.artefacts.to_tables import poses_table, xyz_columns
 from pipeline.config.pool import Georeference
 from pipeline.config.stage_settings import LaserPlacement, SonarPlacement
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
+from pipeline.georeference.placement import laser_in_pool, soundings_in_pool
+from pipeline.georeference.pool_context import PoolContext
 from pipeline.gps_time import NS
-from pipeline.maths.geometry.geodesy import PoolFrame
 from pipeline.maths.geometry.passes import pass_of
-from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_in_pool
-from pipeline.maths.sonar.ray_tracing import Cast
-from pipeline.maths.sonar.soundings import points_in_mbes, refracted_points
-from pipeline.mount import mount_of
 from pipeline.target.design import target_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -68,40 +63,11 @@ class Outputs:
     soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY_STREAM
 
 
-@dataclass(frozen=True)
-class PoolContext:
-    """The pool frame, the trajectory in it, the passes, and the box round the target (pool frame)."""
-
-    frame: PoolFrame
-    trajectory: Trajectory
-    starts_ns: NDArray[np.int64]
-    ends_ns: NDArray[np.int64]
-    box_low_m: Array
-    box_high_m: Array
-
-
 def prepare(inputs: Inputs, config: Config) -> PoolContext:
     """Turn the INS records into poses in the pool frame."""
-    origin = inputs.pool_frame.iloc[0]
-    frame = PoolFrame.at(
-        np.radians(origin["latitude_deg"]),
-        np.radians(origin["longitude_deg"]),
-        float(origin["height_m"]),
-        np.radians(origin["azimuth_deg"]),
-    )
-    names = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
-    ins = GeodeticPoses(**{name: inputs.trajectory[name].to_numpy() for name in names})
-    positions, R_pool_from_body = poses_in_pool(frame, ins)
     low, high = target_of(config.target).bounds()
     margin = config.georeference.box_margin_m
-    return PoolContext(
-        frame=frame,
-        trajectory=Trajectory.build(inputs.trajectory["t_ns"].to_numpy(), positions, R_pool_from_body),
-        starts_ns=inputs.passes["start_ns"].to_numpy(),
-        ends_ns=inputs.passes["end_ns"].to_numpy(),
-        box_low_m=low - margin,
-        box_high_m=high + margin,
-    )
+    return PoolContext.of(inputs.trajectory, inputs.passes, inputs.pool_frame, (low - margin, high + margin))
 
 
 def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) -> BatchResult:
@@ -116,10 +82,10 @@ def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) 
         columns = {name: values[rows] for name, values in columns.items()}
         t_ns, number = columns["t_ns"], number[rows]
     if source == "laser_points":
-        sensor, pool = _laser(t_ns, point_array(columns, "m"), prepared, config)
+        sensor, pool = laser_in_pool(t_ns, point_array(columns, "m"), prepared, config.laser)
         inside = np.ones(len(t_ns), dtype=bool)
     elif config.mbes is not None:
-        sensor, pool, inside = _soundings(columns, prepared, config.mbes, config.target.water_level_m)
+        sensor, pool, inside = soundings_in_pool(columns, prepared, config.mbes, config.target.water_level_m)
         counts["angle impossible with the given sound speed"] = int((~inside).sum())
     else:
         raise TypeError("soundings without a sonar")
@@ -134,47 +100,6 @@ def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) 
     frame, stream = ("laser", "laser_pool") if source == "laser_points" else ("mbes", "soundings_pool")
     kept |= xyz_columns(f"{{}}_{frame}_m", sensor[near].T) | xyz_columns("{}_pool_m", pool[near].T)
     return BatchResult({stream: kept}, counts)
-
-
-def _laser(t_ns: NDArray[np.int64], points: Array, prepared: PoolContext, config: Config) -> tuple[Array, Array]:
-    """Return points in the scanner's frame and in the pool frame, whichever of the two the files hold."""
-    mount = mount_of(config.laser.mount)
-    if config.laser.frame == "laser":
-        body = (mount.R_body_from_sensor @ points.T).T + mount.lever_arm_body_m
-        return points, prepared.trajectory.points_from_body(t_ns, body)
-    pool = prepared.frame.points_from_ecef(points)
-    positions, R_pool_from_body = prepared.trajectory.poses_at(t_ns)
-    body = np.einsum("nji,nj->ni", R_pool_from_body, pool - positions)
-    return (body - mount.lever_arm_body_m) @ mount.R_body_from_sensor, pool
-
-
-def _soundings(
-    columns: Batch, prepared: PoolContext, mbes: SonarPlacement, water_level_m: float
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return soundings in the mbes frame and in the pool frame, and which of them are possible."""
-    t_ns, recorded_m_s = columns["t_ns"], columns["sound_speed_m_s"]
-    sensor, possible = points_in_mbes(
-        columns["two_way_time_s"],
-        columns["angle_rad"],
-        columns["transmit_tilt_rad"],
-        recorded_m_s,
-        true_sound_speed_m_s=mbes.sound_speed_m_s,
-        projector_offset_m=None if mbes.projector_offset_m is None else np.array(mbes.projector_offset_m),
-    )
-    mount = mount_of(mbes.mount)
-    if mbes.svp is not None:
-        # The rays are bent by the cast; its depths are below the water's surface.
-        positions, R_pool_from_body = prepared.trajectory.poses_at(t_ns)
-        head = positions + R_pool_from_body @ mount.lever_arm_body_m
-        sensor = refracted_points(
-            sensor,
-            recorded_m_s if mbes.sound_speed_m_s is None else np.full(len(t_ns), mbes.sound_speed_m_s),
-            R_pool_from_body @ mount.R_body_from_sensor,
-            water_level_m - head[:, 2],
-            Cast(*np.array(mbes.svp, dtype=np.float64).T),
-        )
-    body = sensor @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
-    return sensor, prepared.trajectory.points_from_body(t_ns, body), possible
 
 
 def combine(prepared: PoolContext, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:

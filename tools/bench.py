@@ -64,7 +64,7 @@ from pathlib import Path
 from pipeline.adjustment.accumulation import accumulate
 from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import SessionData, sonar_problem
-from pipeline.adjustment.weighting import Weighting
+from pipeline.maths.adjustment.weighting import Weighting
 from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.target import LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.run.results import Tables

@@ -4,7 +4,7 @@
    that a protocol prescribes (PROTOCOLS) are left out.
 2. Files that a reader enters on the way of stage adjust. A small simulated session is calibrated, and each function of
    the project is taken once, in the order of first calls during ``stages.adjust.run``. An entry is a function in
-   another file than the function before it.
+   another file than the function before it. A file flat in ``pipeline/`` has no folder that tells what it is for.
 3. Calls with six or more positional arguments, in which two values are easily exchanged.
 
     python -m tools.house_counts [CHECKOUT] [--list]
@@ -144,7 +144,10 @@ def main() -> None:
         print("\n".join(calls))
         print("\n".join(f"{file} {function}" for file, function in way))
     print(f"public names defined in more than one module: {len(names)}")
-    print(f"files on the way of stage adjust: {len({file for file, _ in way})}, entered {entries(way)} times")
+    files = {file for file, _ in way}
+    flat = sum(file.startswith("pipeline/") and file.count("/") == 1 for file in files)
+    entered = f"{len(files)}, {flat} of them flat in pipeline/; entered {entries(way)} times"
+    print(f"files on the way of stage adjust: {entered}")
     print(f"calls with {MANY_ARGUMENTS} or more positional arguments: {len(calls)}")
     print(sizes(source))
 

@@ -7,12 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
-from pipeline.adjustment.weighting import GROUPS, Weighting, group_of
 from pipeline.artefacts.streams import Batch, Stream
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.robust import LEAST_SCALE, histogram, robust_scale
-from pipeline.maths.adjustment.variance_components import rescaled, scatter
+from pipeline.maths.adjustment.weighting import (
+    GROUPS,
+    LEAST_SCALE,
+    Weighting,
+    group_of,
+    histogram,
+    rescaled,
+    robust_scale,
+    scatter,
+)
 
 Array = NDArray[np.float64]
 LEAST_DOF = 30  # degrees of freedom for a variance factor

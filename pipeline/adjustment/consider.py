@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
-from pipeline.maths.adjustment.observations import SPEED_M_S
+from pipeline.maths.adjustment.design_matrix import SPEED_M_S
 from pipeline.maths.adjustment.parameters import LASER_PARAMETERS
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT

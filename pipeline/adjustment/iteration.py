@@ -9,18 +9,22 @@ from numpy.typing import NDArray
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.adjustment.weighting import Weighting
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
-from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
-from pipeline.maths.adjustment.estimability import parameters_to_fix
 from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
 from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
-from pipeline.maths.adjustment.solution import Solution, solve
-from pipeline.maths.adjustment.variance_components import EpochVarianceFactor, Scatter, epoch_variance_factor, scatter
+from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
+from pipeline.maths.adjustment.weighting import (
+    EpochVarianceFactor,
+    Scatter,
+    Weighting,
+    epoch_variance_factors,
+    noise_seen_by_laser,
+    scatter,
+)
 from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
@@ -39,7 +43,6 @@ class StepLimits:
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # no step worth another
 SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step the weights would change too little for another pass
 NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
-SURE, UNLIKELY = 0.1, 100.0  # the white noise's factor is applied if its sigma is below, within these bounds
 LEAST_PASSES = 3  # over the points: to see the drift, to see outliers against it, and to know their scale
 CLOSING_STEPS = 3  # at most, with the last weights
 INITIAL_STEPS = 10  # at most, from the coarse mount to near enough
@@ -114,8 +117,9 @@ def adjust_mount(
     converged = False
     if not weighted.deficient:
         # take the INS's white noise from the laser, and close with the weights as they are
-        factors = _epoch_factors(last, noise)
-        noise = _with_factor(noise, factors["laser"])
+        surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
+        factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
+        noise = noise_seen_by_laser(noise, factors["laser"])
         for _ in range(CLOSING_STEPS):
             last, solution = last.stepped(noise, estimated)
             converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
@@ -240,26 +244,9 @@ def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
     return state
 
 
-def _zero_drift(
-    accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float
-) -> DriftEstimate:
+def _zero_drift(accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float) -> DriftEstimate:
     record = np.unique(np.concatenate([sums.record for sums in accumulation.sums.values()]))
     return DriftEstimate.zero(place_knots(record, model.body.seconds, noise.spacing_s, gap_s))
-
-
-def _epoch_factors(last: _Iterate, noise: PoseNoise) -> dict[str, EpochVarianceFactor]:
-    """Return the variance factor of the error common to an interval's points, by sensor."""
-    surfaces = last.linearisation.state.surfaces
-    designs = pose_design(surfaces, np.arange(len(surfaces)))
-    sums_by_sensor = last.linearisation.sums
-    return {sensor: epoch_variance_factor(sums, designs, noise.white) for sensor, sums in sums_by_sensor.items()}
-
-
-def _with_factor(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
-    """Return the noise with its white part as the laser shows it, where the laser shows it well."""
-    if laser.sigma < SURE:
-        return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY), 1.0)
-    return noise
 
 
 def _is_small(solution: Solution, estimated: Integers, limits: StepLimits) -> bool:

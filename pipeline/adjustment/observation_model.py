@@ -7,19 +7,20 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.weighting import Observations, Weighting, group_of
 from pipeline.artefacts.streams import Batch, point_array
-from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
-from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
-from pipeline.maths.adjustment.observations import (
+from pipeline.maths.adjustment.design_matrix import (
     PointDesign,
     SensorSigmas,
     SoundingsOnSurface,
     laser_point_design,
+    sensor_noise,
     sonar_point_design,
 )
+from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
+from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
+from pipeline.maths.adjustment.weighting import Weighting, group_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -74,10 +75,6 @@ class SurfaceBatch:
             axes=axes,
         )
 
-    def spread(self, values: Array) -> Array:
-        """Return for each point (…, n) the value (…, g) of its interval."""
-        return self.intervals.spread(values)
-
 
 @dataclass(frozen=True)
 class LinearisedBatch:
@@ -86,6 +83,34 @@ class LinearisedBatch:
     r: Array
     v_m: Array
     design: PointDesign
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Observations of one batch (n,), ordered by surface and time, so that the points of an interval lie together.
+
+    points: their columns; record: INS record before each; share: place between that record and the next; surface,
+    group: numbers; v_m: distance from the surface less mean_m, the mean of its noise; sigma_m; common_m: the INS's
+    white noise common to the interval; features (F, n) and slopes (F - 1, n): see
+    :mod:`pipeline.maths.adjustment.design_matrix`.
+    """
+
+    points: Batch
+    record: Integers
+    share: Array
+    surface: Integers
+    group: Integers
+    v_m: Array
+    mean_m: Array
+    sigma_m: Array
+    common_m: Array
+    features: Array
+    slopes: Array
+
+    def features_at_adjusted(self, weight: Array) -> Array:
+        """Return the features (F, n) at the adjusted points: uncorrelated with the noise in v."""
+        noise = sensor_noise(self.v_m, weight, Runs.of(self.record, self.surface), self.common_m)
+        return np.concatenate([self.features[:1], self.features[1:] - self.slopes * noise])
 
 
 @dataclass(frozen=True)
@@ -135,10 +160,10 @@ class ObservationModel:
             on_surface = SurfaceBatch.of(columns, record[rows], share[rows], state.surfaces[number])
             on_plane = linearised(on_surface, state)
             r, design, place = on_plane.r, on_plane.design, on_surface.record - errors.record[0]
-            shift = on_surface.spread(shifts[place, number].T)
+            shift = on_surface.intervals.spread(shifts[place, number].T)
             v[rows] = on_plane.v_m + np.einsum("fn,fn->n", shift, design.features)
             mean[rows], sigma[rows], features[:, rows], slopes[:, rows] = design
-            turn = on_surface.spread(on_surface.axes @ turns[:, place])
+            turn = on_surface.intervals.spread(on_surface.axes @ turns[:, place])
             features[1, rows] += turn[1] * r[2] - turn[2] * r[1]  # turn × r
             features[2, rows] += turn[2] * r[0] - turn[0] * r[2]
         group = np.array([group_of(sensor, plane.level) for plane in state.surfaces])[surface]
@@ -189,9 +214,11 @@ class ObservationModel:
         is_calibrated = state.calibrated == "laser"
         points = self.points_in_target(batch.points, state) if is_calibrated else point_array(batch.points, "target_m")
         along_axes = axes @ points.T
-        r = along_axes - batch.spread(start) - batch.share * batch.spread(step)
+        r = along_axes - batch.intervals.spread(start) - batch.share * batch.intervals.spread(step)
         v = along_axes[2] - batch.surface.distance_m - self.height_of_face[batch.points["face"]]
-        return LinearisedBatch(r, v, laser_point_design(r, batch.spread(lever_arm), range_m, self.sigmas["laser"]))
+        return LinearisedBatch(
+            r, v, laser_point_design(r, batch.intervals.spread(lever_arm), range_m, self.sigmas["laser"])
+        )
 
     def _linearised_sonar(self, batch: SurfaceBatch, state: State) -> LinearisedBatch:
         points_m, axes = point_array(batch.points, "mbes_m").T, batch.axes

@@ -14,8 +14,8 @@ from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import laser_planes, trajectory_in_target
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.maths.adjustment.design_matrix import SensorSigmas
 from pipeline.maths.adjustment.normal_equations import BodyMotion
-from pipeline.maths.adjustment.observations import SensorSigmas
 from pipeline.maths.adjustment.parameters import ObservedSurface, Sensor, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, SurfacePrior

@@ -9,25 +9,24 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.iteration import MountAdjustment
-from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.observation_model import CurrentValues, ObservationModel, Observations
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.adjustment.residual_sample import residual_sample, residuals_table, sampling_step
-from pipeline.adjustment.weighting import Observations
+from pipeline.adjustment.residual_tables import residual_sample, residuals_table, sampling_step
 from pipeline.artefacts.catalogue.results import PATTERNS
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.drift_consistency import drift_between_passes
 from pipeline.maths.adjustment.mean_tests import normal_deviates
+from pipeline.maths.adjustment.pose_errors import drift_between_passes
 from pipeline.maths.adjustment.residual_means import (
     BinMean,
     BinnedResiduals,
+    Comparison,
     ResidualSums,
     bin_means,
-    differences_from_rest,
     merged_residual_sums,
     residual_sums,
-    step_differences,
+    tested_means,
 )
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.sonar.soundings import receive_angle
@@ -36,8 +35,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # degrees, m, s
 CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may take its modes in turn, from ping to ping
-REACH = 4  # bins on either side of a step
-FEWEST, FEWEST_SLOTS, FEWEST_DOF = 30, 5, 8.0  # points, slots and degrees of freedom of a mean that is tested
+COMPARED: dict[str, Comparison] = {"pass": "rest", **dict.fromkeys(CYCLES, "rest"), "step": "steps"}  # others by bin
 TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # columns of the drift
 KNOWN = 1e9  # degrees of freedom of a sigma that is not estimated
 Row = dict[str, Any]
@@ -107,8 +105,8 @@ def residual_statistics(
             sums = merged_residual_sums(parts)
             if variable == "pass":
                 pass_means |= {(sensor, *mean.key): mean for mean in bin_means(sums)}
-            means = [mean for mean in _means(variable, sums) if _is_tested(mean)]
-            patterns += [_row(variable, sensor, families[mean.key[0]], mean) for mean in means]
+            compared = COMPARED.get(variable, "bins")
+            patterns += [_row(variable, sensor, families[mean.key[0]], mean) for mean in tested_means(sums, compared)]
     patterns += _drift_rows(problem, adjustment, passes)
     return ResidualStatistics(
         pass_means, _patterns_table(patterns, settings.test_tolerance_m), residuals_table(samples)
@@ -155,17 +153,6 @@ def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, A
         yield "step", angle
         for name, pings in CYCLES.items():
             yield name, batch["ping"] % pings
-
-
-def _means(variable: str, sums: ResidualSums) -> list[BinMean]:
-    """Return the means of a variable's bins, or the differences that are tested in their stead."""
-    if variable == "pass" or variable in CYCLES:
-        return differences_from_rest(sums)
-    return step_differences(sums, REACH) if variable == "step" else bin_means(sums)
-
-
-def _is_tested(mean: BinMean) -> bool:
-    return mean.count >= FEWEST and mean.slots >= FEWEST_SLOTS and mean.dof >= FEWEST_DOF
 
 
 def _row(variable: str, sensor: str, family: str, mean: BinMean) -> Row:

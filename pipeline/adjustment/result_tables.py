@@ -14,10 +14,15 @@ from pipeline.adjustment.residual_statistics import ResidualStatistics
 from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
-from pipeline.maths.adjustment.estimability import weakest_direction
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.solution import ConsiderErrors, ParameterTest, Solution, single_parameter_tests
-from pipeline.maths.adjustment.variance_components import scatter
+from pipeline.maths.adjustment.solution import (
+    ConsiderErrors,
+    ParameterTest,
+    Solution,
+    single_parameter_tests,
+    weakest_direction,
+)
+from pipeline.maths.adjustment.weighting import scatter
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
@@ -96,8 +101,6 @@ def _values(state: State, coarse: State) -> Array:
 
 def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.DataFrame:
     solution, between = adjustment.solution, adjustment.between
-    left_open = plural(solution.deficiency, "direction")
-    reason = f"the data leave {left_open} of the unknowns open" if solution.deficiency else ""
     summary = {
         "converged": adjustment.converged,
         "iterations": adjustment.iterations,
@@ -110,9 +113,13 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
         "rank_deficiency": solution.deficiency,
         "weakest": "" if solution.deficiency else _weakest(solution),
         **{f"test_{name}": test[name] for name in ("statistic", "dof", "limit", "passed")},
-        "reason": reason,
+        "reason": _no_result(solution.deficiency) if solution.deficiency else "",
     }
     return pd.DataFrame([summary])
+
+
+def _no_result(deficiency: int) -> str:
+    return f"the data leave {plural(deficiency, 'direction')} of the unknowns open"
 
 
 def _weakest(solution: Solution) -> str:
@@ -195,7 +202,7 @@ def _groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
         for name, group in adjustment.accumulation.groups.items()
     ]
     for sensor, common in adjustment.epoch_factors.items():
-        row = {"group": COMMON_ERROR[sensor], "count": len(adjustment.accumulation.sums[sensor])}
+        row = {"group": COMMON_ERROR[sensor], "count": len(adjustment.accumulation.sums[sensor].record)}
         rows.append(row | {"variance_factor": common.factor, "scale": np.nan, "cut": 0, "reduced": 0})
     return pd.DataFrame(rows)
 

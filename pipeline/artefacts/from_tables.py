@@ -12,8 +12,7 @@ from pipeline.maths.geometry.rotations import rotation_from_quaternion
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.patent.lifted_moments import SIZE
 from pipeline.maths.target.face import HORIZONTAL_COSINE
-from pipeline.maths.target.frame import TargetFrame
-from pipeline.maths.target.model import ROLES
+from pipeline.maths.target.model import ROLES, TargetFrame
 
 Array = NDArray[np.float64]
 Row = Mapping[Any, Any] | pd.Series

@@ -21,7 +21,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.console import plural
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.observations import SPEED_M_S
+from pipeline.maths.adjustment.design_matrix import SPEED_M_S
 from pipeline.maths.sonar.soundings import points_in_mbes
 from pipeline.maths.target.model import TargetModel
 from pipeline.planning.planned_rays import Rays, label_rays

@@ -17,8 +17,7 @@ from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from pipeline.maths.adjustment.estimability import weakest_direction
-from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve
+from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve, weakest_direction
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
 from pipeline.planning.observability import VAGUE, Coverage, geometry_advice

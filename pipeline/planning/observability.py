@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.plan import Pass
-from pipeline.maths.adjustment.estimability import correlated_pair
-from pipeline.maths.adjustment.solution import Solution, solve
+from pipeline.maths.adjustment.solution import Solution, correlated_pair, solve
 from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 from pipeline.planning.prediction import predict
 from pipeline.planning.setting import PredictionSetting
@@ -125,9 +124,7 @@ def _gaps(coverage: Coverage) -> list[str]:
     if len(coverage.distances_m) == 1:
         gaps.append(f"one pass alone has soundings, at {low:.1f} m: nothing shows whether another would agree")
     elif coverage.distances_m and high - low < NEAR_M:
-        gaps.append(
-            f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart"
-        )
+        gaps.append(f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart")
     return gaps
 
 
@@ -139,9 +136,7 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
     before = float(determined.sigmas()[parameter])
     best: tuple[float, float, float] | None = None
     for distance in TRIED_M:
-        planned = Pass(
-            distance_m=distance, speed_m_s=coverage.speed_m_s, heading_swing_deg=coverage.heading_swing_deg
-        )
+        planned = Pass(distance_m=distance, speed_m_s=coverage.speed_m_s, heading_swing_deg=coverage.heading_swing_deg)
         after = determined.with_passes(TWICE * predict(setting, [planned], phases=1).normal)
         if after.deficiency:
             continue
@@ -158,5 +153,3 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
 
 def _sized(sigma: float, which: int) -> str:
     return f"{np.degrees(sigma):.3f}°" if which < 3 else f"{1000 * sigma:.1f} mm"
-
-

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.stage_settings import SonarBeams, narrow
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.observations import SPEED_M_S
+from pipeline.maths.adjustment.design_matrix import SPEED_M_S
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.sonar.soundings import points_in_mbes
 from pipeline.maths.target.beams import TargetBeams

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.datums import geocentric_crs, height_system, horizontal_part, unusable_reason
-from pipeline.readers.row_checks import RowFilter
+from pipeline.readers.row_filter import RowFilter
 
 Array = NDArray[np.float64]
 ToEcef = Callable[[Array, Array, Array], tuple[Array, Array, Array]]

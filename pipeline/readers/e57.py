@@ -31,15 +31,8 @@ from pipeline.readers.decoder_process import REMEDY, DecodedColumns
 from pipeline.readers.e57_scans import E57Scan, file_coordinates, read_scans, stored_points
 from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.raw_file import opened, size_of
-from pipeline.readers.row_checks import (
-    LASER_COLUMNS,
-    LAST_WEEK,
-    RowFilter,
-    chunk,
-    latency_ns,
-    no_rows,
-    possible_ns,
-)
+from pipeline.readers.row_checks import LAST_WEEK, latency_ns, possible_ns
+from pipeline.readers.row_filter import LASER_COLUMNS, RowFilter, chunk, no_rows
 
 _MAX_SECONDS = 1e8  # of a time stamp: three years
 _COARSEST_M = 0.001  # of coordinates in single precision

@@ -40,7 +40,7 @@ from pipeline.readers.gsf_pings import (
 from pipeline.readers.gsf_records import HEADER, PING, PROFILE, gsf_records
 from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import RepeatedPings
-from pipeline.readers.row_checks import RowFilter
+from pipeline.readers.row_filter import RowFilter
 from pipeline.readers.sounding_chunks import (
     NO_TILT_DEG,
     beam_numbers,

@@ -26,17 +26,8 @@ from pipeline.readers.inertial_explorer_rows import read_blocks
 from pipeline.readers.inertial_explorer_times import keep_possible_times
 from pipeline.readers.inertial_explorer_units import POSITION, SIGMA_COLUMN_NAMES
 from pipeline.readers.raw_file import opened
-from pipeline.readers.row_checks import (
-    INS_COLUMNS,
-    Columns,
-    RowFilter,
-    TimeOrder,
-    chunk,
-    keep_possible_poses,
-    latency_ns,
-    no_rows,
-    sigma_rows,
-)
+from pipeline.readers.row_checks import keep_possible_poses, latency_ns, sigma_rows
+from pipeline.readers.row_filter import INS_COLUMNS, Columns, RowFilter, TimeOrder, chunk, no_rows
 from pipeline.readers.sbet import running_weeks
 
 WORST_Q = 3

@@ -14,7 +14,7 @@ from pipeline.errors import RawDataError
 from pipeline.readers.inertial_explorer_layout import ExportLayout
 from pipeline.readers.inertial_explorer_names import export_column_names
 from pipeline.readers.inertial_explorer_times import SECOND_GPS_TIME, combine_gps_times, unix_days
-from pipeline.readers.row_checks import Columns
+from pipeline.readers.row_filter import Columns
 from pipeline.readers.table_files import CSV_BLOCK, MAX_LINE
 
 _NUMBER = r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.gps_time import GPS_EPOCH_UNIX_S, NS, gps_ns_from_unix_utc, gps_ns_from_week_seconds
 from pipeline.readers.inertial_explorer_names import DATE_ORDERS, HeaderColumns
-from pipeline.readers.row_checks import RowFilter, possible_ns, possible_week_time
+from pipeline.readers.row_checks import possible_ns, possible_week_time
+from pipeline.readers.row_filter import RowFilter
 
 _Array = NDArray[np.float64]
 Clock = Literal["week", "gpsdate", "utcdate", "gps_week"]

@@ -15,7 +15,7 @@ from pipeline.errors import RawDataError
 from pipeline.gps_time import NS
 from pipeline.readers.kongsberg_arrays import COINCIDENT_TRANSMITTER, SectorSoundings, Transmitter
 from pipeline.readers.raw_file import opened
-from pipeline.readers.row_checks import RowFilter
+from pipeline.readers.row_filter import RowFilter
 from pipeline.readers.sounding_chunks import (
     NO_TILT_DEG,
     beam_numbers,

@@ -28,7 +28,8 @@ from pipeline.readers.las_header import LasHeader
 from pipeline.readers.las_times import refuse_unusable_times
 from pipeline.readers.laz import decompressed_points
 from pipeline.readers.raw_file import opened
-from pipeline.readers.row_checks import LASER_COLUMNS, RowFilter, chunk, latency_ns, no_rows, possible_ns
+from pipeline.readers.row_checks import latency_ns, possible_ns
+from pipeline.readers.row_filter import LASER_COLUMNS, RowFilter, chunk, no_rows
 
 STRETCH_POINTS = 4_000_000
 _COARSEST_M = 0.01  # scale of coordinates; 1e-7 degrees are 11 mm

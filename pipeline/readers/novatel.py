@@ -20,19 +20,8 @@ from pipeline.artefacts.streams import Chunk
 from pipeline.gps_time import gps_ns_from_week_seconds
 from pipeline.readers.novatel_records import USABLE, Records, choose_records, read_records
 from pipeline.readers.raw_file import opened
-from pipeline.readers.row_checks import (
-    INS_COLUMNS,
-    SIGMA_COLUMNS,
-    Columns,
-    RowFilter,
-    TimeOrder,
-    chunk,
-    keep_possible_poses,
-    latency_ns,
-    no_rows,
-    possible_week_time,
-    sigma_rows,
-)
+from pipeline.readers.row_checks import keep_possible_poses, latency_ns, possible_week_time, sigma_rows
+from pipeline.readers.row_filter import INS_COLUMNS, SIGMA_COLUMNS, Columns, RowFilter, TimeOrder, chunk, no_rows
 
 STATUS = {
     0: "INS_INACTIVE", 1: "INS_ALIGNING", 2: "INS_HIGH_VARIANCE", 3: "INS_SOLUTION_GOOD", 6: "INS_SOLUTION_FREE",

@@ -32,7 +32,7 @@ from pipeline.gps_time import NS, gps_ns_from_unix_utc
 from pipeline.readers.r2sonic_packets import Sections, bare_packets, xtf_packets
 from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import RepeatedPings
-from pipeline.readers.row_checks import RowFilter
+from pipeline.readers.row_filter import RowFilter
 from pipeline.readers.sounding_chunks import MAX_BEAMS, beam_numbers, checked_chunk, chunks_of_pings, per_sounding
 
 H0 = struct.Struct(">28xIII4xf20xf42xH")

@@ -22,16 +22,8 @@ from pipeline.errors import RawDataError
 from pipeline.gps_time import WEEK_S, gps_ns_from_week_seconds
 from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.raw_file import opened, size_of
-from pipeline.readers.row_checks import (
-    INS_COLUMNS,
-    RowFilter,
-    TimeOrder,
-    chunk,
-    keep_possible_poses,
-    latency_ns,
-    no_rows,
-    possible_week_time,
-)
+from pipeline.readers.row_checks import keep_possible_poses, latency_ns, possible_week_time
+from pipeline.readers.row_filter import INS_COLUMNS, RowFilter, TimeOrder, chunk, no_rows
 
 SBET_RECORD = 17 * 8  # bytes
 _ROWS = 65_536  # read at a time

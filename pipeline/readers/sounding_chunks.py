@@ -9,15 +9,8 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
-from pipeline.readers.row_checks import (
-    MBES_COLUMNS,
-    RowFilter,
-    chunk,
-    keep_possible_soundings,
-    latency_ns,
-    no_rows,
-    possible_ns,
-)
+from pipeline.readers.row_checks import keep_possible_soundings, latency_ns, possible_ns
+from pipeline.readers.row_filter import MBES_COLUMNS, RowFilter, chunk, no_rows
 
 CHUNK_SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
 CHUNK_PINGS = 8_192

@@ -33,19 +33,13 @@ from pipeline.readers.crs import LaserFrame, transform_to_ecef
 from pipeline.readers.float32_checks import refuse_float32
 from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import (
-    INS_COLUMNS,
-    LASER_COLUMNS,
-    MBES_COLUMNS,
-    RowFilter,
-    TimeOrder,
-    chunk,
     keep_possible_poses,
     keep_possible_soundings,
     latency_ns,
-    no_rows,
     possible_ns,
     possible_week_time,
 )
+from pipeline.readers.row_filter import INS_COLUMNS, LASER_COLUMNS, MBES_COLUMNS, RowFilter, TimeOrder, chunk, no_rows
 from pipeline.readers.table_columns import WHOLE_NUMBERS, TableSensor
 from pipeline.readers.table_files import record_batches
 

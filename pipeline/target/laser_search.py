@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.pool import Segment
 from pipeline.maths.geometry.rotations import rotation_z
-from pipeline.maths.target.frame import TargetFrame
-from pipeline.maths.target.model import TargetModel
+from pipeline.maths.target.model import TargetFrame, TargetModel
 from pipeline.maths.target.placements import LaserMount
 from pipeline.maths.target.registration import refine
 from pipeline.mount import Mounted

@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.pool import Segment
 from pipeline.maths.geometry.rotations import rotation_z
-from pipeline.maths.target.frame import TargetFrame
-from pipeline.maths.target.model import TargetModel
+from pipeline.maths.target.model import TargetFrame, TargetModel
 from pipeline.maths.target.placements import TargetPose, TiltedTarget
 from pipeline.maths.target.registration import (
     SearchCriteria,
@@ -27,9 +26,7 @@ RIVAL_REACHES_M = (0.15, 0.1, 0.07, 0.05)
 TILT_SIGMAS = (0.1, 0.1, 0.1, 1.0, 1.0, 1.0)  # rad and m: so wide that the points alone decide
 
 
-def search_target_pose(
-    dry: LaserSample, model: TargetModel, settings: Segment, azimuth_known: bool
-) -> LocatedTarget:
+def search_target_pose(dry: LaserSample, model: TargetModel, settings: Segment, azimuth_known: bool) -> LocatedTarget:
     """Return the pose of the target in dry laser points; rivals are other poses, and the mirrored target.
 
     Where the target repeats, shifting it by one period changes nothing but its ends; and so, on the patent's, does half

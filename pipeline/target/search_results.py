@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.target.frame import TargetFrame
+from pipeline.maths.target.model import TargetFrame
 from pipeline.maths.target.registration import Refinement
 from pipeline.mount import Mounted
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation, Slerp
 
-from pipeline.adjustment.residual_sample import sampling_step
+from pipeline.adjustment.residual_tables import sampling_step
 from tests.support.places import Told, result_of
 
 XYZ = [f"{axis}_target_m" for axis in "xyz"]

@@ -12,7 +12,7 @@ from pipeline.config.session import SessionConfig
 from pipeline.config.stage_settings import laser_calibration, settings_by_name, stage_config
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
-from pipeline.maths.adjustment.estimability import parameters_to_fix
+from pipeline.maths.adjustment.solution import parameters_to_fix
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario

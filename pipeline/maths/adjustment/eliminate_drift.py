@@ -54,7 +54,7 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
         The drift at which the observations were linearised.
     """
     knots, current = drift.knots, drift.values
-    u, count = reduced.n_parameters, len(knots.record)
+    u, count = reduced.normal.shape[1] - 2 * N_POSE - 1, len(knots.record)
     scale = noise.drift
     before, after = slice(u, u + N_POSE), slice(u + N_POSE, u + 2 * N_POSE)
     sides = [*range(u), u + 2 * N_POSE]  # x and v

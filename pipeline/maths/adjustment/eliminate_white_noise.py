@@ -71,11 +71,6 @@ class ReducedIntervals:
     normal: Array
     log_determinant: float
 
-    @property
-    def n_parameters(self) -> int:
-        """Number u of parameters."""
-        return int(self.normal.shape[1] - 2 * N_POSE - 1)
-
 
 def eliminate_white_noise(
     sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array
@@ -169,7 +164,7 @@ class _RecordChain:
             (1, later, twice),  # of s²
         ):
             own_line[place + offset] += KT @ own @ K
-            spread = np.zeros((len(sums), N_POSE, width))
+            spread = np.zeros((len(place), N_POSE, width))
             spread[:, :, columns] = KT @ border
             border_line[place + offset] += spread
         ahead_line[place] += KT @ (swept - twice) @ K  # of (1 - s) s

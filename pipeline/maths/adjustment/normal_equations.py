@@ -44,23 +44,20 @@ BLOCK = 50_000  # intervals whose designs are made at a time
 class BodyMotion:
     """The motion of the body in the target frame.
 
-    trajectory of n records; rates (n, 6): velocity (m/s) and angular velocity (rad/s) at the records;
-    laser_lever_arm_m (3,), body axes.
+    trajectory of n records; seconds (n,): their times since the first; rates (n, 6): velocity (m/s) and angular
+    velocity (rad/s) there; laser_lever_arm_m (3,), body axes.
     """
 
     trajectory: Trajectory
+    seconds: Array
     rates: Array
     laser_lever_arm_m: Array
 
     @classmethod
     def of(cls, trajectory: Trajectory, laser_lever_arm_m: Array) -> "BodyMotion":
         """Return the motion along a trajectory in the target frame."""
-        return cls(trajectory, trajectory.rates(REACH_S), laser_lever_arm_m)
-
-    @property
-    def seconds(self) -> Array:
-        """Times of the records since the first (n,)."""
-        return np.asarray((self.trajectory.t_ns - self.trajectory.t_ns[0]) / NS_PER_S)
+        seconds = (trajectory.t_ns - trajectory.t_ns[0]) / NS_PER_S
+        return cls(trajectory, seconds, trajectory.rates(REACH_S), laser_lever_arm_m)
 
     def times(self, record: Integers, share: Array) -> Array:
         """Return the times (g,) s at these shares of the step from each record to the next."""
@@ -102,23 +99,26 @@ class Linearisation:
         for sensor, sums in self.sums.items():
             for surface in range(len(self.state.surfaces)):
                 rows = np.flatnonzero(sums.surface == surface)
-                yield SurfaceIntervals(self, sensor, surface, rows, selected)
+                yield SurfaceIntervals(
+                    linearisation=self,
+                    sensor=sensor,
+                    surface=surface,
+                    rows=rows,
+                    record=sums.record[rows],
+                    selected=selected,
+                )
 
 
 @dataclass(frozen=True)
 class SurfaceIntervals:
-    """The intervals ``rows`` of a sensor's sums: those on one surface."""
+    """The intervals ``rows`` of a sensor's sums: those on one surface; ``record``: the last INS record before each."""
 
     linearisation: Linearisation
     sensor: str
     surface: int
     rows: Integers
+    record: Integers
     selected: Integers | None
-
-    @property
-    def record(self) -> Integers:
-        """Last INS record before each interval's points."""
-        return np.asarray(self.linearisation.sums[self.sensor].record[self.rows])
 
     def linearised(self, rows: slice) -> LinearisedIntervals:
         """Return some of the intervals with their designs."""

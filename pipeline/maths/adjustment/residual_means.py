@@ -19,6 +19,7 @@ models and empirical Bayes methods for assessing differential expression"):
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ Integers = NDArray[np.int64]
 SPARSE = 10  # bins and slots, as a multiple of the points, above which they are not counted out one by one
 FEW = 8.0  # degrees of freedom below which the surface's other slots are used as well
 ALONE = 1.001  # equal slots, at most, of a mean without scatter
+FEWEST, FEWEST_SLOTS, FEWEST_DOF = 30, 5, 8.0  # points, slots and degrees of freedom of a mean that is tested
+REACH = 4  # bins on either side of a step
+Comparison = Literal["bins", "rest", "steps"]
 
 
 @dataclass(frozen=True)
@@ -177,11 +181,21 @@ def bin_means(sums: ResidualSums) -> list[BinMean]:
     return means
 
 
+def tested_means(sums: ResidualSums, compared: Comparison) -> list[BinMean]:
+    """Return the means to test: each bin's own, or its difference from the rest, or the steps between bins.
+
+    Those of too few points, slots or degrees of freedom are left out.
+    """
+    if compared == "rest":
+        means = differences_from_rest(sums)
+    else:
+        means = step_differences(sums, REACH) if compared == "steps" else bin_means(sums)
+    return [mean for mean in means if mean.count >= FEWEST and mean.slots >= FEWEST_SLOTS and mean.dof >= FEWEST_DOF]
+
+
 def _common_variance(bins: list[_SlotSums]) -> float:
     """Return the variance c² that points of a slot share, from the scatter of all slots about their bins' means."""
-    scatter = sum(
-        float(np.sum((slots.weighted - slots.weight * slots.mean) ** 2 - slots.weight)) for slots in bins
-    )
+    scatter = sum(float(np.sum((slots.weighted - slots.weight * slots.mean) ** 2 - slots.weight)) for slots in bins)
     return max(0.0, scatter / sum(float(slots.weight @ slots.weight) for slots in bins))
 
 

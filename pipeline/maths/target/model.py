@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.face import HORIZONTAL_COSINE, Face
 
 Array = NDArray[np.float64]
@@ -134,3 +135,24 @@ def names_in_order(families: Sequence[Family]) -> tuple[Family, ...]:
         return ROLES.index(family.name) if family.name in ROLES else len(ROLES) + family.level
 
     return tuple(sorted(families, key=place))
+
+
+@dataclass(frozen=True)
+class TargetFrame:
+    """Rotation R_target_from_pool (3, 3), and the origin of the target in the pool frame (3,) m."""
+
+    R_target_from_pool: Array
+    origin_pool_m: Array
+
+    @property
+    def shift_m(self) -> Array:
+        """Return the origin of the pool in the target frame, (3,) m."""
+        return -self.R_target_from_pool @ self.origin_pool_m
+
+    def points_from_pool(self, points_pool_m: Array) -> Array:
+        """Return points (n, 3) m of the pool frame in the target frame."""
+        return np.asarray((self.R_target_from_pool @ (points_pool_m - self.origin_pool_m).T).T)
+
+    def trajectory_from_pool(self, trajectory: Trajectory) -> Trajectory:
+        """Return a trajectory of the pool frame in the target frame."""
+        return trajectory.transformed(self.R_target_from_pool, self.shift_m)

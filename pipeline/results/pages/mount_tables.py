@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.config.pool import Verdict
-from pipeline.maths.adjustment.estimability import CORRELATION_LIMIT
+from pipeline.maths.adjustment.solution import CORRELATION_LIMIT
 from pipeline.maths.mount_parameters import PARAMETERS
 
 Row = Mapping[str, Any]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment.estimability import CORRELATION_LIMIT, correlated_pair, weakest_direction
+from pipeline.maths.adjustment.solution import CORRELATION_LIMIT, correlated_pair, weakest_direction
 
 YAW, ARM_Y = 2, 4
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
-from pipeline.maths.adjustment.variance_components import epoch_variance_factor, rescaled, scatter
+from pipeline.maths.adjustment.weighting import epoch_variance_factor, rescaled, scatter
 
 FEATURES = 5
 

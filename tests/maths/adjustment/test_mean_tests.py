@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.maths.adjustment.drift_consistency import drift_between_passes
 from pipeline.maths.adjustment.mean_tests import joint_limit, normal_deviates
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise
+from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise, drift_between_passes
 from pipeline.maths.adjustment.residual_means import (
     BinnedResiduals,
     bin_means,

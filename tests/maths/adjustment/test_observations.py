@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment.interval_sums import Runs
-from pipeline.maths.adjustment.observations import (
+from pipeline.maths.adjustment.design_matrix import (
     PointDesign,
     SensorSigmas,
     SoundingsOnSurface,
@@ -14,6 +13,7 @@ from pipeline.maths.adjustment.observations import (
     sensor_noise,
     sonar_point_design,
 )
+from pipeline.maths.adjustment.interval_sums import Runs
 from pipeline.maths.geometry.planes import tangents_of
 from pipeline.maths.sonar.soundings import points_in_mbes
 

@@ -55,7 +55,7 @@ def test_water_of_one_speed_bends_nothing() -> None:
 
 
 def test_the_first_order_of_the_adjustment_is_its_limit() -> None:
-    """(g r² / 2c)(e_z - 2 d_z d) of maths/adjustment/observations.py, z up."""
+    """(g r² / 2c)(e_z - 2 d_z d) of maths/adjustment/design_matrix.py, z up."""
     g, c, r = 0.2, 1480.0, 9.0
     cast = Cast(np.array([0.0, 30.0]), np.array([c - 15 * g, c + 15 * g]))
     for angle in np.radians([10.0, 45.0, 75.0, 100.0]):

@@ -1,0 +1,92 @@
+"""What may be wrong with a sensor's points: the clock, unit or sign with which they would hit the target."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.checking.file_checks import FAR_ARM_M
+from pipeline.checking.point_samples import AS_GIVEN, PointSample, TrialPlacement, place_points
+from pipeline.checking.track import InsTrack
+from pipeline.target.surface import ClosestSurface
+
+Array = NDArray[np.float64]
+REACH_M = 0.5  # from a face, beyond which a point counts nothing: coarse mount and origin may be wrong by that
+FARTHEST_S, STEP_S, FINE_S = 60.0, 1.0, 0.1
+UNITS = {"millimetres": 0.001, "centimetres": 0.01, "feet": 0.3048}
+SIGNS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m")  # of z: heights.py
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What may be wrong with a sensor, and how well its points fall onto the target if it is.
+
+    Attributes
+    ----------
+    score : float
+        The mean of 1 - (d / reach)², none beyond the reach.
+    clock_s : float
+        By how much the sensor's clock would be ahead.
+    words : str
+        What else would be wrong, for the finding.
+    """
+
+    score: float
+    clock_s: float = 0.0
+    words: str = ""
+
+
+def agreement(closest: ClosestSurface, points: Array) -> float:
+    """Return how well points (n, 3) m in the pool frame fall onto the target; those that are NaN do not."""
+    known = np.flatnonzero(np.isfinite(points[:, 0]))
+    if not len(known):
+        return 0.0
+    on, _ = closest(points[known])
+    squares = np.sum((points[known] - on) ** 2, axis=1) / REACH_M**2
+    return float(np.sum(np.maximum(0.0, 1.0 - squares)) / len(points))
+
+
+def hypotheses(track: InsTrack, sample: PointSample, closest: ClosestSurface) -> list[Hypothesis]:
+    """Return how well a sensor's points fit as they are, first; then with other units, signs and clocks.
+
+    Parameters
+    ----------
+    track : InsTrack
+        Of the INS.
+    sample : PointSample
+        The sensor's points.
+    closest : ClosestSurface
+        The target's surface.
+    """
+
+    def score(placing: TrialPlacement = AS_GIVEN) -> float:
+        return agreement(closest, place_points(track, sample, placing))
+
+    tried = [Hypothesis(score())]
+    if sample.georeferenced:
+        return tried
+    if sample.sensor == "laser":
+        tried += [
+            Hypothesis(score(TrialPlacement(scale=scale)), words=f"if they are in {unit}: export them in metres")
+            for unit, scale in UNITS.items()
+        ]
+    for key in SIGNS:
+        value = getattr(sample.mount, key)
+        reversed_mount = sample.mount.model_copy(update={key: -value})
+        words = f"with {sample.sensor}.mount.{key} = {-value:g} in place of {value:g}: reverse its sign"
+        tried.append(Hypothesis(score(TrialPlacement(mount=reversed_mount)), words=words))
+    for key in ("x_m", "y_m", "z_m"):
+        value = getattr(sample.mount, key)
+        if abs(value) > FAR_ARM_M:
+            words = f"with {sample.sensor}.mount.{key} = {value / 100:g} in place of {value:g}: write metres"
+            in_metres = sample.mount.model_copy(update={key: value / 100})
+            tried.append(Hypothesis(score(TrialPlacement(mount=in_metres)), words=words))
+
+    def clock_score(ahead_s: float) -> float:
+        return score(TrialPlacement(clock_ahead_s=ahead_s))
+
+    coarse = np.arange(-FARTHEST_S, FARTHEST_S + STEP_S / 2, STEP_S)
+    best = float(max(coarse, key=clock_score))
+    fine = best + np.arange(-STEP_S, STEP_S + FINE_S / 2, FINE_S)
+    clock_s = float(max(fine, key=clock_score))
+    return [*tried, Hypothesis(clock_score(clock_s), clock_s)]

@@ -1,0 +1,1 @@
+"""Points into the pool frame, as stage georeference places them."""
