@@ -22,7 +22,8 @@ from pipeline.config.yaml_models import parse
 from pipeline.results.pages.rendering import drawing_style, picture
 from pipeline.simulation.scenario import Scenario
 from tools.bound import bound
-from tools.montecarlo import CAMPAIGNS, FOLDER, NAMES, UNITS, Campaign, path_of, scenario_of
+from tools.campaigns import CAMPAIGNS, FOLDER, Campaign, path_of, scenario_of
+from tools.session_rows import NAMES, UNITS
 
 Array = NDArray[np.float64]
 BOUNDED = ("finite beams, outliers", "finite beams and INS", "twelve passes")

@@ -19,7 +19,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from tools.montecarlo import DRIFT, errors_of
+from tools.campaigns import DRIFT
+from tools.session_rows import errors_of
 
 Array = NDArray[np.float64]
 NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about body x, y, z; lever arm

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tools.montecarlo import DRIFT, NAMES, TASKS_OF_A_WORKER, THIN, UNITS, errors_of
+from tools.campaigns import DRIFT, TASKS_OF_A_WORKER, THIN
+from tools.session_rows import NAMES, UNITS, errors_of
 
 SEEDS = 3
 Change = Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None]  # of scenario, session and pool

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
-from tools.montecarlo import DRIFT, FOLDER, TASKS_OF_A_WORKER, THIN, WHITE
+from tools.campaigns import DRIFT, FOLDER, TASKS_OF_A_WORKER, THIN, WHITE
 
 Array = NDArray[np.float64]
 Raw = dict[str, NDArray[Any]]

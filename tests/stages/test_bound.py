@@ -10,7 +10,7 @@ from pipeline.simulation.scenario import Scenario
 from tests.support.effort import often
 from tests.support.simulated import THIN, calibrated, made, merged
 from tools.bound import bound
-from tools.montecarlo import DRIFT, WHITE
+from tools.campaigns import DRIFT, WHITE
 
 SECTORS = [{"to_deg": 15.0, "tilt_deg": 5.0}, {"to_deg": 90.0, "tilt_deg": -5.0}]
 KINDS = [{"ins": WHITE["ins"]}, {"ins": {}}, {"ins": DRIFT}, {"mbes": {"format": "parquet", "sectors": SECTORS}}]

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.simulation.session import SimulatedSession
 from tests.support.simulated import calibrated, made
-from tools.montecarlo import DRIFT
+from tools.campaigns import DRIFT
 from tools.residual_tests import FAULTS, World
 
 THE_FACE, THE_STEP, THE_PASS, THE_TOP = (

@@ -1,0 +1,105 @@
+"""The row of a simulated session: the errors, sigmas and verdict of its calibration."""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from pipeline.maths.comparison import mount_error
+from tools.campaigns import Campaign, scenario_of
+
+Array = NDArray[np.float64]
+NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about / along body x, y, z
+UNITS = np.array([np.radians(1.0)] * 3 + [1e-3] * 3)  # of errors and sigmas in the tables: degrees, millimetres
+
+
+def errors_of(R_body_from_sensor: Array, lever_arm_m: Array, truth: Mapping[str, Any], sensor: str = "mbes") -> Array:
+    """Return the errors (6,) of a mount: ε of R_true = Exp(ε) R_body_from_sensor in rad, lever arm in m.
+
+    Parameters
+    ----------
+    R_body_from_sensor
+        (3, 3): the estimated rotation.
+    lever_arm_m
+        (3,): the estimated lever arm, in the body frame.
+    truth
+        Content of the session's truth.json.
+    sensor
+        "mbes" or "laser".
+    """
+    R_true, lever_arm_true_m = (np.array(truth[sensor][name]) for name in (f"R_body_from_{sensor}", "lever_arm_m"))
+    return mount_error(R_true, lever_arm_true_m, R_body_from_sensor, lever_arm_m)
+
+
+def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
+    """Simulate and calibrate a session in memory and return its row."""
+    from pipeline.config.pool import PoolConfig
+    from pipeline.config.session import SessionConfig
+    from pipeline.config.yaml_models import parse
+    from pipeline.simulation.scenario import Scenario
+    from pipeline.simulation.session import simulate_session
+    from stages.in_memory import calibrate_in_memory
+
+    scenario = parse(Scenario, scenario_of(campaign, number), campaign.name)
+    made = simulate_session(scenario, campaign.first_seed + number)
+    artefacts = calibrate_in_memory(
+        parse(SessionConfig, made.session, "session"),
+        parse(PoolConfig, made.pool, "pool"),
+        {"ins": made.ins, "laser": made.laser, "mbes": made.mbes},
+    )
+    return _row(json.loads(artefacts["report/calibration.json"]), made.truth)
+
+
+def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
+    """Simulate and calibrate a session by the command line and return its row.
+
+    Raises
+    ------
+    RuntimeError
+        A command ended with neither status 0 nor 1.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        scenario, session, run = Path(folder, "scenario.yaml"), Path(folder, "session"), Path(folder, "run")
+        scenario.write_text(yaml.safe_dump(scenario_of(campaign, number)))
+        poolcal = [sys.executable, "-m", "stages.cli"]
+        seed = str(campaign.first_seed + number)
+        place = ["--config", str(session / "pool.yaml"), "--run", str(run)]
+        for command in (
+            ["simulate", str(session), "--scenario", str(scenario), "--seed", seed],
+            ["run", str(session), *place, "--jobs", "1", "--no-report", "--no-recordings"],
+        ):
+            done = subprocess.run(poolcal + command, capture_output=True, text=True)
+            if done.returncode not in (0, 1):
+                raise RuntimeError(done.stderr)
+        calibration = json.loads((run / "report" / "calibration.json").read_text())
+        return _row(calibration, json.loads(Path(f"{session}.truth.json").read_text()))
+
+
+def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:
+    block = calibration["methods"]["adjustment"]
+    covariance = np.array(block["covariance"])
+    error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), truth)
+    row: dict[str, Any] = {
+        "accepted": calibration["verdict"] == "accepted",
+        "reasons": "; ".join(calibration["reasons"]),
+    }
+    row["nse"] = float(error @ np.linalg.solve(covariance, error))
+    sigma = np.sqrt(np.diag(covariance))
+    for k, name in enumerate(NAMES):
+        row |= {f"error_{name}": error[k] / UNITS[k], f"sigma_{name}": sigma[k] / UNITS[k]}
+    row |= {f"covariance_{i}{k}": covariance[i, k] for i in range(6) for k in range(i + 1)}
+    return row
+
+
+def session_row(task: tuple[Campaign, int]) -> dict[str, Any]:
+    """Return the row of a session, by its campaign and number."""
+    campaign, number = task
+    row = session_through_files(*task) if campaign.through_files else session_in_memory(*task)
+    return {"campaign": campaign.name, "seed": campaign.first_seed + number} | row
