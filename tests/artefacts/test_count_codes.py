@@ -19,7 +19,7 @@ NOT_STREAMS = {"cast_checks.py"}  # rows of a cast are counted in messages alone
 COUNTERS = {"dropped", "wrong", "counts"}
 VARIABLE = "7"  # stands for what an f-string fills in
 PASSED_ON = {
-    ("row_checks.py", "reason"),  # RowFilter.keep's own
+    ("row_filter.py", "reason"),  # RowFilter.keep's own
     ("file_summaries.py", "sensor"),  # lists of counts by sensor
 }
 

@@ -1,4 +1,4 @@
-"""poolcal check on a target that is not where the config says: its height, its sides, its azimuth, signs of mounts."""
+"""poolcal check on a target that is not where the config says: its height, its sides, its azimuth."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,20 +19,15 @@ from pipeline.checking.point_samples import PointSample, place_points, sample_po
 from pipeline.checking.track import InsTrack, frame_of, joined, track_of
 from pipeline.checking.trial_calibration import TrialCalibration
 from pipeline.config.load import load_pool, load_session
-from pipeline.config.mount import Mount
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
-from pipeline.config.target import Letters, Origin
 from pipeline.maths.target.model import TargetModel
-from pipeline.mount import mount_of
 from pipeline.target.design import target_of
 from pipeline.target.surface import ClosestSurface
+from tests.support.checks import FINE
 from tests.support.effort import often
-from tests.support.mount_errors import rotation_error
 from tests.support.places import poolcal, simulate
 from tests.support.roots import SCENARIOS
-
-FINE: dict[str, Any] = {"ins": {"rate_hz": 100.0}, "mbes": {"ping_rate_hz": 10.0}}
 
 
 @dataclass(frozen=True)
@@ -246,47 +241,6 @@ def test_a_pose_beyond_what_is_searched(blocks: Looked) -> None:
     (found,) = _other_pose(blocks, _pose(0.0, ambiguous=False, within=False))
     assert found.question == "origin"
     assert "more than segment.search_... allow" in found.words
-
-
-TRUE = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.3, y_m=0.2, z_m=-2.0)
-
-
-BLOCKS = target_of(Letters(a=8, b=3, c=1, e=0.5, origin=Origin(latitude_deg=36, longitude_deg=120, height_m=12)))
-
-
-def _provisional(given: Mount) -> pd.DataFrame:
-    turn_deg = np.degrees(rotation_error(mount_of(TRUE).R_body_from_sensor, mount_of(given).R_body_from_sensor))
-    return pd.DataFrame([dict(zip((f"rotation_{a}_deg" for a in "xyz"), turn_deg, strict=True))])
-
-
-SIGNS = [
-    ({"pitch_deg": -2.0}, "mbes.mount.pitch_deg = 2 in place of -2", "fault"),
-    ({"pitch_deg": -1.2}, "mbes.mount.pitch_deg = 1.2 in place of -1.2", "look"),
-    ({"yaw_deg": 2.8}, "mbes.mount.yaw_deg = -2.8 in place of 2.8", "fault"),
-    ({"pitch_deg": -2.0, "yaw_deg": 2.8}, "pitch_deg = 2 in place of -2, mbes.mount.yaw_deg = -2.8", "fault"),
-]
-
-
-@pytest.mark.parametrize(("wrong", "said", "severity"), SIGNS)
-def test_wrong_signs_of_small_angles(wrong: dict[str, float], said: str, severity: str) -> None:
-    given = TRUE.model_copy(update=wrong)
-    (found,) = trial_findings.sign_findings(given, _provisional(given), BLOCKS, 3.0)
-    assert said in found.words
-    assert "roll_deg -48.8, pitch_deg 1.2, yaw_deg -2.0" in found.words
-    assert found.severity == severity
-
-
-@pytest.mark.parametrize("near", [{"pitch_deg": 2.0, "yaw_deg": -2.8}, {"yaw_deg": -4.9}, {"pitch_deg": -0.2}])
-def test_coarse_angles_are_no_wrong_signs(near: dict[str, float]) -> None:
-    given = TRUE.model_copy(update=near)
-    assert list(trial_findings.sign_findings(given, _provisional(given), BLOCKS, 3.0)) == []
-
-
-def test_a_plain_wall_says_nothing_of_signs() -> None:
-    """Its soundings leave yaw and more to chance."""
-    given = TRUE.model_copy(update={"yaw_deg": 2.8})
-    flat = TargetModel(BLOCKS.faces[:1], BLOCKS.families[:1], (), BLOCKS.water_level_m, None)
-    assert list(trial_findings.sign_findings(given, _provisional(given), flat, 3.0)) == []
 
 
 def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:

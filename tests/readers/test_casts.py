@@ -1,24 +1,16 @@
-"""Casts of sound speed from files: against values written down here, and against decoders of the test's own."""
+"""Casts of sound speed from files: formats, rows and damage, against values written down here."""
 
 import hashlib
-import os
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
-from pipeline.coarse.session_file import read_session
-from pipeline.config.load import load_session
-from pipeline.errors import ConfigError, RawDataError
-from pipeline.maths.sonar.cast_profile import MOST, ascending, one_way, thinned_profile
-from pipeline.readers.casts import read_cast, with_cast
-
-PROFILE = [(0.5, 1480.0), (1.0, 1480.3), (1.5, 1481.2), (2.0, 1481.0), (3.0, 1483.5)]  # nothing that thins
-ROWS = "\n".join(f"{depth:.3f} {speed:.3f}" for depth, speed in PROFILE) + "\n"
+from pipeline.errors import RawDataError
+from pipeline.readers.casts import read_cast
+from tests.support.files.cast_files import CARIS, PROFILE, ROWS, is_profile
 
 
 @pytest.fixture
@@ -31,12 +23,6 @@ def read(path: Path, text: str | bytes, number: int | None = None) -> tuple[list
     return read_cast(path, path.name, number)
 
 
-def is_profile(svp: Sequence[Sequence[float]], expected: Sequence[Sequence[float]] = PROFILE) -> None:
-    np.testing.assert_allclose(svp, expected, atol=1e-4)
-
-
-# --- formats ---------------------------------------------------------------------------------------------------------
-CARIS = f"[SVP_VERSION_2]\na.svp\nSection 2026-132 09:30:05 -36:30:00.00 120:15:00.00\n{ROWS}"
 ASVP = f"( SoundVelocity  1.0 0 20260512093005 -36.50000000 120.25000000 -1 0 0 PROBE_01 P 0005 )\n{ROWS}"
 COLUMNS = {
     "CARIS": CARIS,
@@ -230,121 +216,3 @@ def test_damage_is_refused_or_read(form: str, file: Path) -> None:
             depths, speeds = np.array(svp).T
             assert np.all(np.diff(depths) > 0)
             assert np.all((speeds >= 1300) & (speeds <= 1700))
-
-
-# --- thinning --------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("rows", [50, 5000])
-def test_every_row_lies_within_the_tolerance(rows: int) -> None:
-    depth, _ = ascending(np.random.default_rng(7).uniform(0, 12, rows), np.zeros(rows))
-    speed = np.round(1480 + 3 * np.tanh(depth - 5), 2)
-    profile = thinned_profile(depth, speed)
-    assert len(profile.depth_m) <= MOST
-    assert profile.averaged_m == 0.0
-    off = np.interp(depth, profile.depth_m, profile.speed_m_s) - speed
-    assert np.abs(off).max() <= 0.02
-    assert profile.scatter_m_s == pytest.approx(np.sqrt(np.mean(off**2)))
-
-
-@pytest.mark.parametrize("noise", [0.03, 0.1])
-def test_rows_that_scatter_are_averaged(noise: float) -> None:
-    """Their means lie within the tolerance, and the profile nearer to the truth than the rows."""
-    rng = np.random.default_rng(7)
-    depth, _ = ascending(rng.uniform(0, 12, 8000), np.zeros(8000))
-    truth = 1480 + 3 * np.tanh(depth - 5)
-    profile = thinned_profile(depth, truth + rng.normal(scale=noise, size=len(depth)))
-    assert 2 < len(profile.depth_m) <= MOST
-    assert profile.averaged_m > 0
-    off = np.interp(depth, profile.depth_m, profile.speed_m_s) - truth
-    assert np.sqrt(np.mean(off**2)) < noise / 3
-    assert profile.scatter_m_s == pytest.approx(noise, rel=0.1)
-
-
-def test_straight_lines_need_their_ends_alone() -> None:
-    depth = np.linspace(0, 10, 1001)
-    profile = thinned_profile(depth, 1480 + 0.3 * depth)
-    assert profile.depth_m.tolist() == [0.0, 10.0]
-    bent = thinned_profile(depth, 1480 + np.where(depth == 5.0, 0.0201, 0.0))
-    assert 5.0 in bent.depth_m.tolist()
-    level = thinned_profile(depth, 1480 + np.where(depth == 5.0, 0.0199, 0.0))
-    assert level.depth_m.tolist() == [0.0, 10.0]
-
-
-def test_one_way() -> None:
-    down, up = np.arange(0.0, 5.0), np.arange(5.0, 0.0, -1.0)
-    assert one_way(np.concatenate([down, up])).tolist() == [0, 1, 2, 3, 4, 5]
-    assert one_way(up).tolist() == [0, 1, 2, 3, 4]
-    assert one_way(np.concatenate([down, [4.0, 3.5]])).tolist() == list(range(7))  # no way up, but a pause
-
-
-# --- session.yaml ----------------------------------------------------------------------------------------------------
-MOUNT = dict.fromkeys(("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m"), 0.0)
-
-
-def session(folder: Path, **mbes: Any) -> Path:
-    (folder / "casts").mkdir(exist_ok=True)
-    (folder / "casts" / "today.svp").write_text(CARIS)
-    block = {"files": ["a"], "format": "r2sonic", "mount": dict(MOUNT), **mbes}
-    content = {
-        "ins": {"files": ["a"], "format": "novatel"}, "laser": {"files": ["a"], "format": "las", "mount": dict(MOUNT)},
-        "mbes": block,
-    }  # fmt: skip
-    (folder / "session.yaml").write_text(yaml.safe_dump(content))
-    return folder
-
-
-@pytest.mark.parametrize("given", ["casts/today.svp", "casts/*.svp", "**/*.svp"])
-def test_a_session_that_names_a_cast(given: str, tmp_path: Path) -> None:
-    mbes = load_session(session(tmp_path, svp=given), with_cast).mbes
-    assert mbes is not None
-    assert mbes.svp is not None
-    is_profile(mbes.svp)
-    assert mbes.svp_from is not None
-    assert (mbes.svp_from.file, mbes.svp_from.kind) == ("casts/today.svp", "CARIS .svp")
-
-
-@pytest.mark.parametrize(
-    ("mbes", "words"),
-    [
-        ({"svp": "casts/tomorrow.svp"}, "mbes.svp: 'casts/tomorrow.svp' matches no file"),
-        ({"svp": "../today.svp"}, "mbes.svp = '../today.svp': must be a path or pattern inside the session folder"),
-        ({"svp": "/etc/passwd"}, "mbes.svp = '/etc/passwd': must be a path"),
-        ({"svp": "casts/*"}, r"matches 2 files \(casts/other.svp, casts/today.svp\); name one"),
-        ({"svp": [[0, 1480], [1, 1480]], "svp_number": 1}, "svp_number = 1: belongs to a file.*name the file"),
-        ({"svp_from": {}}, "mbes.svp_from: is written by poolcal"),
-        ({"svp": "casts/today.svp", "svp_number": "two"}, "has no cast two"),
-    ],
-)
-def test_a_session_whose_cast_is_refused(mbes: dict[str, Any], words: str, tmp_path: Path) -> None:
-    folder = session(tmp_path, **mbes)
-    if "*" in str(mbes.get("svp")):
-        (folder / "casts" / "other.svp").write_text(CARIS)
-    with pytest.raises((ConfigError, RawDataError), match=words):
-        load_session(folder, with_cast)
-
-
-@pytest.mark.parametrize("name", ["a\nb.svp", os.fsdecode(b"\xff.svp"), "a\x1b[1m.svp"])
-def test_names_that_cannot_be_shown(name: str, tmp_path: Path) -> None:
-    folder = session(tmp_path, svp="casts/*.svp")
-    (folder / "casts" / "today.svp").rename(folder / "casts" / name)
-    with pytest.raises(RawDataError, match="letters that cannot be shown; rename") as error:
-        load_session(folder, with_cast)
-    assert str(error.value).isprintable()
-
-
-def test_the_name_of_the_file_stays_in_session_yaml(tmp_path: Path) -> None:
-    """Where poolcal coarse and poolcal laser edit it; a cast that cannot be read is told there as well."""
-    text, content = read_session(session(tmp_path, svp="casts/today.svp"))
-    assert "svp: casts/today.svp" in text
-    assert content["mbes"]["svp"] == "casts/today.svp"
-    (tmp_path / "casts" / "today.svp").write_text("1 2\n")
-    with pytest.raises(RawDataError, match=r"today\.svp: is no cast"):
-        read_session(tmp_path)
-
-
-def test_a_link_out_of_the_session(tmp_path: Path) -> None:
-    (tmp_path / "elsewhere.svp").write_text(CARIS)
-    (tmp_path / "s").mkdir()
-    folder = session(tmp_path / "s", svp="casts/link.svp")
-    (folder / "casts" / "link.svp").symlink_to(tmp_path / "elsewhere.svp")
-    with pytest.raises(RawDataError, match="leads out of the session folder"):
-        load_session(folder, with_cast)

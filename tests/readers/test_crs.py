@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import laspy
 import numpy as np
 import pytest
 from pyproj import CRS
@@ -11,12 +10,11 @@ from pipeline.config.session import Laser
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.crs import LaserFrame, frame_transform
 from tests.support.files.build import MOUNT, read, rows
+from tests.support.files.crs_files import las, placed, table
 from tests.support.files.e57_files import Scan, write
 
-AXES = ("x_m", "y_m", "z_m")
 A, F = 6_378_137.0, 1 / 298.257223563  # WGS 84
 PLACES = [(120.1, 36.0, 12.0), (123.0, 0.5, -30.0), (125.9, 59.3, 480.0), (121.4737, 31.2304, 4.5)]  # zone 51
-ADJUSTED = 4e8
 FOOT_M = 1200 / 3937  # of the US survey
 
 
@@ -49,33 +47,6 @@ def utm_of(longitude_deg: float, latitude_deg: float, zone: int) -> tuple[float,
     north = xi + sum(a * np.sin(2 * k * xi) * np.cosh(2 * k * eta) for k, a in enumerate(series, 1))
     east = eta + sum(a * np.cos(2 * k * xi) * np.sinh(2 * k * eta) for k, a in enumerate(series, 1))
     return float(500_000 + 0.9996 * radius * east), float(0.9996 * radius * north)
-
-
-def table(folder: Path, points: list[tuple[float, ...]]) -> Path:
-    path = folder / "a.csv"
-    lines = [f"{1_400_000_000_000_000_000 + k},{x!r},{y!r},{z!r}" for k, (x, y, z) in enumerate(points)]
-    path.write_text("\n".join(["gps_ns,x_m,y_m,z_m", *lines, ""]))
-    return path
-
-
-def las(folder: Path, points: list[tuple[float, ...]], crs: str | None, scale: float = 0.001, z: float = 0.001) -> Path:
-    """LAS with a CRS of its own, if any."""
-    header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = np.array([scale, scale, z]), np.floor(np.array(points[0]))
-    header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
-    if crs is not None:
-        header.add_crs(CRS.from_user_input(crs))
-    data = laspy.LasData(header)
-    data.points = laspy.ScaleAwarePointRecord.zeros(len(points), header=header)
-    data.x, data.y, data.z = np.array(points).T
-    data.gps_time = ADJUSTED + 0.0001 + np.arange(len(points))
-    path = folder / "a.las"
-    data.write(str(path))
-    return path
-
-
-def placed(columns: dict[str, np.ndarray]) -> np.ndarray:
-    return np.stack([columns[axis] for axis in AXES], axis=1)
 
 
 UTM = [(*utm_of(longitude, latitude, 51), height) for longitude, latitude, height in PLACES]

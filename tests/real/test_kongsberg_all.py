@@ -18,9 +18,7 @@ from pipeline.gps_time import GPS_EPOCH_UNIX_S, NS
 from pipeline.maths.sonar.soundings import points_in_mbes
 from tests.real.conftest import Read
 from tests.real.test_kongsberg import KONGSBERG_FROM_MBES, turned
-
-HE = "mbes/kongsberg/all_he_-3092155654265012286.all"
-TURBEAMS = "mbes/kongsberg/all_turbeams_6641182978793103390.all"
+from tests.support.real_files import HE, TURBEAMS
 
 
 class Ranges(NamedTuple):

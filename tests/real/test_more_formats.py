@@ -18,10 +18,7 @@ from pipeline.readers.gsf_pings import GsfScales, decode_gsf_ping
 from pipeline.readers.gsf_records import PING, gsf_records
 from pipeline.readers.kmall_datagrams import kmall_datagrams
 from tests.real.conftest import Read
-
-GSF = "mbes/GSF3_08_test_file.gsf"
-KMALL = "mbes/kongsberg_OS03_4033476991022010987.kmall"
-BUNNY, MOVED = "laser/bunnyInt32.e57", "laser/translationWithoutRotation.e57"
+from tests.support.real_files import BUNNY, GSF, KMALL, MOVED
 
 
 # --- Kongsberg -------------------------------------------------------------------------------------------------------

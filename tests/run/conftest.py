@@ -1,7 +1,10 @@
 """A session folder of toy raw files, and a pool's config."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,3 +38,27 @@ def contents() -> Callable[[Path], dict[str, bytes]]:
         return {p.relative_to(folder).as_posix(): p.read_bytes() for p in paths}
 
     return read
+
+
+def _verdict(inputs: Any, config: Any) -> toys.TellOutputs:
+    """Accepted up to a sigma of 1 m; the mean makes one result differ from another."""
+    verdict = "accepted" if config.verdict.max_sigma_m <= 1 else "rejected"
+    found = {"verdict": verdict, "mean": float(inputs.means["mean_m"][0]), "limit": config.verdict.max_sigma_m}
+    return toys.TellOutputs(json.dumps(found))
+
+
+@pytest.fixture
+def stages() -> tuple[ModuleType, ...]:
+    made = toys.stages()
+    made[2].run = _verdict  # type: ignore[attr-defined]
+    return made
+
+
+@pytest.fixture
+def judged(pool: Pool, stages: tuple[ModuleType, ...]) -> Pool:
+    """Accepted, with a page."""
+    pool.stages = stages
+    pool.run()
+    (pool.run_folder / "tell" / "report.html").write_text("<p>first</p>")
+    (pool.run_folder / "tell" / "calibration.yaml").write_text("first: 1\n")
+    return pool

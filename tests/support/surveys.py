@@ -78,3 +78,7 @@ def error(world: World, sensor: str, R_found: Array, lever_arm_m: Array) -> Arra
     """(ε, δl): R_true = Exp(ε) R_found; true minus found."""
     turn = rotation_error(world.rotation(sensor).as_matrix(), R_found)
     return np.concatenate([turn, world.lever_arm(sensor) - lever_arm_m])
+
+
+SHARED = World(shared=(("B1", "body", "laser"), ("B2", "body", "mbes")))
+BY_AXES = World(frames={"body": {"O": (0.0, 0.0, 0.0)} | ALONG, "laser": ON_LASER, "mbes": ON_MBES})

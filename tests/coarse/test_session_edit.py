@@ -1,11 +1,8 @@
-"""What ``poolcal coarse`` and ``laser`` write into session.yaml, and how little of it changes."""
+"""What ``poolcal coarse`` changes in session.yaml, and how little: styles, comments, odd and hostile text."""
 
-import errno
-import os
 import random
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +10,10 @@ import yaml
 
 from pipeline.coarse.session_edit import check_edit, edit_mounts
 from pipeline.config.load import load_session
-from pipeline.config.session import Laser
-from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from tests.support.marks import KEYS, PLAIN, marks_of, mounts_in, run
+from tests.support.marks import PLAIN, marks_of, mounts_in, run
 from tests.support.surveys import World
 
-# --- session.yaml as text --------------------------------------------------------------------------------------------
 NEW = r"  (mount_origin: \{.*\}|mount_covariance:|  - \[.*\])\r?\n?"
 
 
@@ -80,64 +74,6 @@ def test_a_missing_mount_of_what_was_not_surveyed_is_said(session: Path) -> None
     assert told.status == 0, told.err
     assert "But mbes still has no mount there." in told.out
     assert "mbes mount" not in told.out
-
-
-def test_twice_is_once_and_another_survey_is_kept_apart(session: Path) -> None:
-    marks = marks_of(World())
-    assert run(session, marks).status == 0
-    first = (session / "session.yaml").read_bytes()
-    told = run(session, marks)
-    assert told.status == 0
-    assert "has these mounts already; not written" in told.out
-    assert (session / "session.yaml").read_bytes() == first
-    assert sorted(path.name for path in session.iterdir()) == ["session.1.yaml", "session.yaml"]
-    (session / "session.3.yaml").write_text("mine")
-    for number, seed in ((2, 5), (4, 6)):
-        before = (session / "session.yaml").read_bytes()
-        assert f"session.{number}.yaml" in run(session, marks_of(World(), seed)).out
-        assert (session / f"session.{number}.yaml").read_bytes() == before
-    assert (session / "session.3.yaml").read_text() == "mine"
-    assert (session / "session.yaml").read_bytes().count(b"mount_origin") == 2
-
-
-def test_what_it_wrote_is_replaced_in_any_style(session: Path) -> None:
-    """As blocks, as other programs write it, and between them comments and a key of ours alone."""
-    assert run(session, marks_of(World())).status == 0
-    path = session / "session.yaml"
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    del content["mbes"]["mount_covariance"]
-    path.write_text(yaml.safe_dump(content, sort_keys=False) + "# end\n", encoding="utf-8")
-    assert run(session, marks_of(World(), None)).status == 0
-    for name, found in mounts_in(session).items():
-        np.testing.assert_allclose(found, World().mounts[name], atol=3e-6)
-    text = path.read_text(encoding="utf-8")
-    assert [text.count(f"mount_{key}:") for key in ("origin", "covariance")] == [2, 2]
-    assert text.endswith("# end\n")
-
-
-@pytest.mark.parametrize("step", ["open", "fsync", "replace"])
-def test_a_full_disk_leaves_everything_as_it_was(step: str, session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    marks, calls = marks_of(World()), []
-
-    def fails(*_: object, **__: object) -> None:
-        calls.append(1)
-        raise full
-
-    with monkeypatch.context() as patched:
-        if step == "open":
-            real = Path.open
-            patched.setattr(Path, "open", lambda self, *a, **k: fails() if "xb" in a else real(self, *a, **k))
-        else:
-            patched.setattr(*{"fsync": (os, "fsync"), "replace": (Path, "replace")}[step], fails)
-        told = run(session, marks)
-    assert calls
-    assert told.status == 2
-    assert "No space left on device" in told.err
-    assert "make room" in told.err
-    assert len(told.err.splitlines()) == 1
-    assert sorted(path.name for path in session.iterdir()) == ["session.yaml"]
-    assert (session / "session.yaml").read_text(encoding="utf-8") == PLAIN
 
 
 @pytest.mark.parametrize(
@@ -291,47 +227,3 @@ def test_hostile_text_never_ends_otherwise(session: Path) -> None:
             assert (session / "session.yaml").read_bytes() == before
         else:
             assert load_session(session).laser.mount_origin is not None
-
-
-# --- the covariance in session.yaml ----------------------------------------------------------------------------------
-LASER: dict[str, Any] = {"files": ["a"], "format": "las", "mount": dict.fromkeys(KEYS, 0.0)}
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ((0, 1, 0.5), "must be symmetric"),
-        ((0, 0, -1.0), "must be"),
-        (None, "has too few entries"),
-        ("indefinite", "must be positive semidefinite"),
-    ],
-)
-def test_a_covariance_that_is_none_is_refused(change: Any, words: str) -> None:
-    matrix = np.eye(6)
-    if isinstance(change, tuple):
-        matrix[change[:2]] = change[2]
-    elif change == "indefinite":
-        matrix[:3, :3] = [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]]
-    rows = matrix.tolist()[: 5 if change is None else 6]
-    with pytest.raises(ConfigError) as refused:
-        parse(Laser, LASER | {"mount_covariance": rows}, "session.yaml")
-    (line,) = str(refused.value).splitlines()
-    assert line.startswith("session.yaml: mount_covariance")
-    assert words in line
-
-
-def test_a_covariance_of_another_mount_is_refused() -> None:
-    """As where the mount is entered by hand, and what poolcal wrote beside it stays."""
-    six = {key: float(value) for key, value in LASER["mount"].items()}
-    origin = {"method": "fine", "file": "a", "sha256": "0" * 64, "date": "2026-05-12", "software": "p", "mount": six}
-    written = LASER | {"mount_covariance": (np.eye(6) * 1e-6).tolist(), "mount_origin": origin}
-    assert parse(Laser, written, "s").mount_origin is not None
-    by_hand = {"mount": six | {"z_m": six["z_m"] + 0.000001}}
-    with pytest.raises(ConfigError, match="mount is not the one in mount_origin, to which mount_covariance belongs"):
-        parse(Laser, written | by_hand, "s")
-    assert parse(Laser, {key: one for key, one in (written | by_hand).items() if "_" not in key}, "s")
-
-
-def test_a_covariance_without_rank_is_one() -> None:
-    for matrix in (np.zeros((6, 6)), np.ones((6, 6)) * 1e-6, np.diag([1e-6, 0, 0, 1e-6, 0, 0])):
-        assert parse(Laser, LASER | {"mount_covariance": matrix.tolist()}, "s").mount_covariance is not None

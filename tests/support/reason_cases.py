@@ -1,0 +1,130 @@
+"""Evidence of every reason to reject a result, with the reason's code and words."""
+
+from typing import Any
+
+from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.report.reason_codes import ReasonCode
+from tests.support.evidence import (
+    OFF,
+    PASS_3,
+)
+
+REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, words
+    (
+        {"pose": {"ambiguous": True}},
+        ReasonCode.AMBIGUOUS_TARGET_POSE,
+        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m²); let the laser see the wall's",
+    ),
+    (
+        {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0}},
+        ReasonCode.AMBIGUOUS_TARGET_POSE,
+        "better (11.00 against 10.00 m²); check target.origin",
+    ),
+    (
+        {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0, "rival": "left and right exchanged"}},
+        ReasonCode.AMBIGUOUS_TARGET_POSE,
+        "; check the target's left and right first, then target.origin",
+    ),
+    (
+        {"pose": {"within": False}},
+        ReasonCode.TARGET_BEYOND_SEARCH,
+        "no pose of the target within the search limits fits the laser points: target.origin or target.azimuth_deg is "
+        "farther off",
+    ),
+    (
+        {"mount": {"within": False}},
+        ReasonCode.MOUNT_BEYOND_SEARCH,
+        "no mount within 4.5° and 0.45 m of the coarse one brings the soundings onto the target: mbes.mount is farther",
+    ),
+    (
+        {"mount": {"within": False, "rotation_z_deg": -4.6, "lever_arm_z_m": 0.6}},
+        ReasonCode.MOUNT_BEYOND_SEARCH,
+        "onto the target; best fits -4.60° in yaw, +0.60 m in lever arm z: mbes.mount is farther off",
+    ),
+    ({"mount": {"ambiguous": True}}, ReasonCode.AMBIGUOUS_MOUNT, "the soundings fit two ways (score 0.100 against 0."),
+    (
+        {"summary": {"reason": "the data leave 2 directions open"}},
+        ReasonCode.NO_RESULT,
+        "the adjustment has no result: the data leave 2 directions open; two more passes at 3 m would do",
+    ),
+    ({"summary": {"converged": False}}, ReasonCode.NOT_CONVERGED, "the adjustment did not converge in 6 steps"),
+    ({"count": -371}, ReasonCode.TOO_FEW_SOUNDINGS, "only 29 soundings lie on P2: too few to trust; sail so that"),
+    (
+        {"fixed": [name for name, *_ in PARAMETERS]},
+        ReasonCode.NO_PARAMETER_ESTIMABLE,
+        "none of the six can be found: this target and these passes cannot give any within its limit",
+    ),
+    (
+        {"freed": {"unknown": "mbes_latency", "estimated": True, "value": 2.01e-3, "sigma": 3e-4, "considered": 4e-4}},
+        ReasonCode.ESTIMATE_OFF_SETTINGS,
+        "adjust.free found the sonar's clock: its latency is +2.0 ± 0.3 ms more than mbes.latency_s says: the mount "
+        "holds with that alone; correct it, there and in the survey, and run again",
+    ),
+    (
+        {"patterns": [PASS_3]},
+        ReasonCode.PASSES_DISAGREE,
+        "the passes do not agree: in pass 3 the sonar lies -12.0 mm off P2 against the other passes (4.0 sigma beyond "
+        "3 mm, limit 3.3); likely the sonar's clock, the sound speed, or a bracket that moved",
+    ),
+    (
+        {"patterns": [OFF | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "low": 1.0}]},
+        ReasonCode.INS_DRIFT_BETWEEN_PASSES,
+        "for both sensors to fit in pass 1, the INS must be wrong there by 0.115° in heading more than in the other "
+        "passes (3.5 times the drift that it is conceded, limit 3.3)",
+    ),
+    (
+        {"patterns": [OFF | {"by": "face", "low": 1.0}]},
+        ReasonCode.RESIDUALS_BY_FACE,
+        "residuals go with face: on face P2 the sonar lies +1.0 mm off P2 (3.5 sigma",
+    ),
+    (
+        {"patterns": [OFF]},
+        ReasonCode.RESIDUALS_BY_ANGLE,
+        "residuals go with angle: between receive angles 20° and 22° the sonar lies +1.0 mm off P2",
+    ),
+    (
+        {"patterns": [OFF | {"sensor": "laser"}]},
+        ReasonCode.RESIDUALS_BY_ANGLE,
+        "residuals go with angle: between elevations 20° and 22° the laser lies",
+    ),
+    (
+        {"patterns": [OFF | {"by": "step"}]},
+        ReasonCode.RESIDUALS_STEP,
+        "residuals go with angle: at a receive angle of 20° the sonar's distance from P2 steps by +1.0 mm",
+    ),
+    (
+        {"patterns": [OFF | {"by": "ping_2", "low": 1.0}]},
+        ReasonCode.RESIDUALS_BY_PING,
+        "residuals go with pings: in one ping of 2 (those whose number divided by 2 leaves 1) the sonar lies +1.0 mm",
+    ),
+    (
+        {"patterns": [OFF | {"by": "distance", "normalised": -3.5}]},
+        ReasonCode.RESIDUALS_BY_DISTANCE,
+        "residuals go with distance: from 20 to 22 m the sonar lies",
+    ),
+    (
+        {"patterns": [OFF | {"by": "time"}]},
+        ReasonCode.RESIDUALS_BY_TIME,
+        "residuals go with time: for ten seconds (GPS 20) the sonar lies",
+    ),
+    (
+        {"freed": {"value": 6e-4}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "likely cause of residuals (6 sigma): the sound speed: it is +0.06 ± 0.01 % above that recorded",
+    ),
+    (
+        {"freed": {"unknown": "mbes_latency", "value": 0.02}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the sonar's clock: its latency is +20.0 ± 0.1 ms more",
+    ),
+    (
+        {"freed": {"unknown": "laser_rotation_y", "value": -0.01}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "laser.mount: it should be turned by -0.573 ± 0.006° about body y (roll of the boat)",
+    ),
+    (
+        {"freed": {"unknown": "wet_H_shift", "value": 0.02}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the target: its wet faces that are horizontal lie higher by +20.0 ± 0.1 mm; check its shape",
+    ),
+]
