@@ -59,6 +59,10 @@ def test_no_module_needs_itself() -> None:
         pytest.fail(" -> ".join(error.args[1]))
 
 
+def _tests_and_tools() -> list[Path]:
+    return [*(ROOT / "tests").rglob("*.py"), *(ROOT / "tools").rglob("*.py")]
+
+
 def test_modules_and_functions_are_short() -> None:
     lengths = {}
     for module, path in _sources().items():
@@ -70,6 +74,26 @@ def test_modules_and_functions_are_short() -> None:
                 assert (node.end_lineno or 0) - node.lineno < MOST_LINES_OF_A_FUNCTION, (path, node.name)
     assert {name: lines for name, lines in lengths.items() if lines > MOST_LINES_OF_A_MODULE} == {}
     assert statistics.median(lengths.values()) < MEDIAN_LINES_OF_A_MODULE
+    for path in _tests_and_tools():
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= MOST_LINES_OF_A_MODULE, path
+
+
+def test_what_tests_share_is_in_support() -> None:
+    """No module imports from a module of tests: what several need is in tests/support or a conftest."""
+    for path in _tests_and_tools():
+        for name in _imports(path):
+            shared = name.startswith("tests.support.") or ".conftest." in name
+            assert not name.startswith("tests.") or shared, (path, name)
+
+
+def test_tests_are_in_the_rooms_of_what_they_test() -> None:
+    """Beside the rooms of the library: tests of the stages, of all together, of its results, and what they share."""
+    beside = {"stages", "cli", "end_to_end", "golden", "real", "visual", "support"}
+    for below, others in (("", beside), ("maths", set())):
+        rooms = {path.parent.name for path in (ROOT / "pipeline" / below).glob("*/__init__.py")}
+        folders = {path.parent.name for path in (ROOT / "tests" / below).glob("*/*.py")}
+        folders |= {path.parent.parent.name for path in (ROOT / "tests" / below).glob("*/*/*.py")}
+        assert folders - rooms - others == set()
 
 
 def test_the_library_has_rooms() -> None:

@@ -11,7 +11,8 @@ from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import simulate_session as simulate_in_memory
 from tests.support.effort import often
 from tests.support.files import ie_files
-from tests.support.places import Place, errors, poolcal, result_of, sigmas, simulate
+from tests.support.places import Place, errors, result_of, sigmas, simulate
+from tests.support.same_result import run, same
 from tests.support.tables import write_tables
 
 # Every format of each sensor; files of one sensor do not meet those of another before ingest has read them.
@@ -33,28 +34,6 @@ EQUIDISTANT: dict[str, dict[str, Any]] = {  # other beams than equi-angle ones, 
     "A2 in xtf": {"mbes": {"spacing": "equidistant"}},
     "A2 bare": {"mbes": {"spacing": "equidistant", "format": "r2s"}},
 }
-
-
-def values(block: dict[str, Any]) -> np.ndarray:
-    return np.array([*block["correction"]["rotation_vector_deg"], *block["correction"]["lever_arm_m"]])
-
-
-def run(session: Path) -> dict[str, Any]:
-    folder = session.with_name(session.name + ".run")
-    told = poolcal("run", session, "--config", session / "pool.yaml", "--run", folder, "--jobs", 1)
-    assert told.status == 0, told.err + told.out
-    return result_of(folder)
-
-
-def same(one: dict[str, Any], other: dict[str, Any], of_sigma: float) -> None:
-    """Methods with sigmas to a share of them, the patent's to the same lengths and angles."""
-    allowed = of_sigma * sigmas(one["mbes"])
-    for method in one["methods"]:
-        if one["methods"][method]["mount"] is None:
-            assert other["methods"][method]["mount"] is None
-            continue
-        difference = np.abs(values(one["methods"][method]) - values(other["methods"][method]))
-        assert np.all(difference <= allowed * (1 if method == "adjustment" else 10)), (method, difference / allowed)
 
 
 @pytest.mark.parametrize("what", often(list(FILES)[::2], list(FILES)))

@@ -12,9 +12,9 @@ from pipeline.gps_time import NS, unix_ns_from_gps
 from pipeline.simulation.scenario import load_scenario
 from pipeline.simulation.session import SimulatedSession
 from pipeline.simulation.session import simulate_session as simulate_in_memory
-from tests.end_to_end.test_formats import run, same
 from tests.support.files import e57_files, sonar_files
 from tests.support.places import Place, edit, result_of, simulate
+from tests.support.same_result import run, same
 
 STEPS = 500  # of a GSF angle in a degree: the fan's 65 degrees just fit
 

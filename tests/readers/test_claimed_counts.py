@@ -14,9 +14,9 @@ from pipeline.errors import RawDataError
 from pipeline.readers import e57_scans, las, table_columns
 from pipeline.readers.claimed_counts import RECORDS_PER_BYTE, refuse_claim
 from pipeline.readers.dispatch import raw_parts
-from tests.readers.test_e57 import POINTS, START_S, TIMES
 from tests.support.files import build, e57_files
 from tests.support.files.build import read, rows
+from tests.support.files.e57_files import POINTS, START_S, TIMES
 
 COUNT = 2_000_000
 TIME = 1_400_000_000 * 10**9

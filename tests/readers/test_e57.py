@@ -12,13 +12,10 @@ from pipeline.errors import RawDataError
 from pipeline.readers import e57_scans
 from pipeline.readers.dispatch import raw_parts
 from tests.support.files.build import MOUNT, read, rows
-from tests.support.files.e57_files import Scan, edited, write
+from tests.support.files.e57_files import POINTS, START_S, TIMES, Scan, edited, write
 
 NS = 10**9
-START_S = 1_398_556_818.25  # GPS seconds: 2024-05-01
 XYZ = ("x_m", "y_m", "z_m")
-POINTS = {"cartesianX": (1.0, 2.0, 3.0), "cartesianY": (4.0, 5.0, 6.0), "cartesianZ": (7.0, 8.0, 9.5)}
-TIMES = {"timeStamp": (0.0, 0.500001, 10.0)}
 
 
 @pytest.fixture

@@ -1,15 +1,11 @@
 """Whatever the bytes, readers end, and end with rows that make sense or with one line of advice."""
 
-import io
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import laspy
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -17,59 +13,11 @@ from hypothesis import strategies as st
 from pipeline.errors import PoolcalError
 from pipeline.readers.detect import HEAD_BYTES, kind_of_bytes
 from tests.support.effort import often
-from tests.support.files import build, e57_files, ie_files, sonar_files
+from tests.support.files import build, sonar_files
+from tests.support.files.whole_files import WHOLE
 
 WEEK_NS = 604_800 * 10**9
 OPTIONS = {"deadline": None, "suppress_health_check": list(HealthCheck), "derandomize": True, "database": None}
-TIME = 1_400_000_000 * 10**9
-
-
-def _laz() -> bytes:
-    out = io.BytesIO()
-    points = laspy.read(io.BytesIO(build.las([(k, k, k, 4e8 + k / 1000 + 0.0001) for k in range(40)])))
-    points.write(out, do_compress=True)
-    return out.getvalue()
-
-
-def _parquet() -> bytes:
-    out = io.BytesIO()
-    axes = {f"{axis}_m": [0.5] * 40 for axis in "xyz"}
-    pq.write_table(pa.table({"gps_ns": [TIME + k for k in range(40)]} | axes), out)
-    return out.getvalue()
-
-
-def _e57() -> bytes:
-    columns = {f"cartesian{axis}": [0.1 * k for k in range(40)] for axis in "XYZ"}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "a.e57"
-        e57_files.write(path, e57_files.Scan(columns | {"timeStamp": [0.01 * k for k in range(40)]}, 1.4e9))
-        return path.read_bytes()
-
-
-def _csv() -> bytes:
-    return b"gps_ns,x_m,y_m,z_m\n" + b"".join(b"%d,1.5,2.5,-3.5\n" % (TIME + k) for k in range(40))
-
-
-WHOLE: dict[str, tuple[str, str, bytes]] = {
-    "bare": ("mbes", "r2sonic", b"".join(build.ping(k) for k in range(12))),
-    "xtf": ("mbes", "r2sonic", build.xtf(*(build.ping(k) for k in range(6)))),
-    "binary": ("ins", "novatel", b"".join(build.inspvas(9.0 + k) + build.inspvax(9.0 + k) for k in range(8))),
-    "ascii": ("ins", "novatel", b"".join(build.inspvasa(9.0 + k) for k in range(12))),
-    "sbet": ("ins", "sbet", build.sbet(*(9.0 + k for k in range(12)))),
-    "ie": ("ins", "inertial_explorer", ie_files.whole("degrees", ie_files.truth(12))),
-    "ie dms": ("ins", "inertial_explorer", ie_files.whole("sixtieths", ie_files.truth(12))),
-    "ie utc": ("ins", "inertial_explorer", ie_files.whole("utc", ie_files.truth(12))),
-    "ie commas": ("ins", "inertial_explorer", ie_files.whole("commas", ie_files.truth(12))),
-    "las": ("laser", "las", build.las([(k, k, k, 4e8 + k / 1000 + 0.0001) for k in range(40)])),
-    "csv": ("laser", "table", _csv()),
-    "parquet": ("laser", "table", _parquet()),
-    "laz": ("laser", "las", _laz()),
-    "e57": ("laser", "e57", _e57()),
-    "gsf": ("mbes", "gsf", sonar_files.gsf()),
-    "kmall": ("mbes", "kmall", sonar_files.kmall()),
-    "kmall sectors": ("mbes", "kmall", sonar_files.kmall_sectors()),
-    "all": ("mbes", "all", sonar_files.kongsberg_all()),
-}
 EXAMPLES = {"laz": 15, "e57": 10}  # each in a process of its own
 
 

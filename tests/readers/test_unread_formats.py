@@ -12,8 +12,8 @@ from pipeline.errors import RawDataError
 from pipeline.readers import file_kind, unread_formats
 from pipeline.readers.detect import HEAD_BYTES, kind_of_bytes
 from pipeline.readers.dispatch import raw_parts
-from tests.readers.test_fuzz import WHOLE
 from tests.support.files import build
+from tests.support.files.whole_files import WHOLE
 
 REST = bytes(range(7, 250)) * 30
 

@@ -15,22 +15,10 @@ import pytest
 
 from pipeline.maths.sonar.soundings import points_in_mbes
 from tests.real.conftest import Columns, Read
+from tests.support.kongsberg_axes import KONGSBERG_FROM_MBES, turned
 
 OS03 = "mbes/kongsberg_OS03_4033476991022010987.kmall"
 OS01 = "mbes/kongsberg/kmall_OS01_-1927233285749584930.kmall"
-KONGSBERG_FROM_MBES = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-
-
-def turned(roll_deg: float, pitch_deg: float, heading_deg: float) -> np.ndarray:
-    """Rz(heading) Ry(pitch) Rx(roll)."""
-    (cr, cp, ch), (sr, sp, sh) = (f(np.radians([roll_deg, pitch_deg, heading_deg])) for f in (np.cos, np.sin))
-    return np.array(
-        [
-            [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
-            [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 class Array(NamedTuple):

@@ -17,7 +17,7 @@ from pipeline.errors import RawDataError
 from pipeline.gps_time import GPS_EPOCH_UNIX_S, NS
 from pipeline.maths.sonar.soundings import points_in_mbes
 from tests.real.conftest import Read
-from tests.real.test_kongsberg import KONGSBERG_FROM_MBES, turned
+from tests.support.kongsberg_axes import KONGSBERG_FROM_MBES, turned
 from tests.support.real_files import HE, TURBEAMS
 
 

@@ -11,11 +11,9 @@ from pipeline.simulation.motion import R_level_from_body
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate_session
 from pipeline.simulation.site import R_ecef_from_level
+from tests.support.level_geometry import LEVEL, LEVEL_CURVES, STILL, distance_to_model_m, range_m
 
-LEVEL = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": -2.0}
-STILL = {name: {"amplitude": 0.0, "period_s": 5.0} for name in ("surge", "sway", "heave", "roll", "pitch", "heading")}
 Change = Callable[..., Scenario]
-LEVEL_CURVES = 1e-5  # m: 5 m from the origin the local level is turned by 5 / 6.4e6 rad
 
 
 def one_pass(changed: Change, noise_free: Scenario, mount: dict[str, float], **motion: float) -> SimulatedSession:
@@ -25,15 +23,6 @@ def one_pass(changed: Change, noise_free: Scenario, mount: dict[str, float], **m
         mbes={"mount": LEVEL | mount, "beams": 131, "sector_deg": 130.0},
     )
     return simulate_session(scenario, 1)
-
-
-def range_m(session: SimulatedSession, angle_deg: float, y_m: float) -> float:
-    """The range of the beam at an angle while the INS passes y."""
-    when = session.truth["passes"][0]["start_ns"] + round((y_m + 4.5) / 0.4 * 1e9)
-    ping = session.pings["ping"][np.argmin(np.abs(session.pings["t_ns"] - when))]
-    chosen = (session.mbes["ping"] == ping) & (np.abs(session.mbes["angle_rad"] - np.radians(angle_deg)) < 1e-6)
-    assert chosen.sum() == 1
-    return float(session.mbes["two_way_time_s"][chosen][0] * session.mbes["sound_speed_m_s"][0] / 2)
 
 
 def test_level_beams_meet_wall_and_floor(changed: Change, noise_free: Scenario) -> None:
@@ -89,16 +78,6 @@ def test_attitude_and_level_are_the_conventions_rotations() -> None:
     np.testing.assert_allclose(R_level_from_body(roll, pitch, azimuth), expected, atol=1e-14)
     expected = Rotation.from_euler("ZX", np.stack([azimuth + np.pi / 2, np.pi / 2 - pitch], axis=1)).as_matrix()
     np.testing.assert_allclose(R_ecef_from_level(pitch, azimuth), expected, atol=1e-14)
-
-
-def distance_to_model_m(points: np.ndarray, a: float, b: float, c: float, e: float) -> np.ndarray:
-    """Distance to the nearest plane: wall, slanted faces, sides, tops and bottoms, back wall, floor."""
-    x, y, z = points.T
-    slanted = (np.abs(y) - b / 2 - x) / np.sqrt(2)
-    horizontal = (z + a / 2 + e / 2) % e - e / 2
-    planes = [x, slanted, np.abs(y) - b / 2, horizontal, x - c, z + a / 2 + 0.3]
-    nearest: np.ndarray = np.min(np.abs(planes), axis=0)
-    return nearest
 
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, -163.0, 71.0])

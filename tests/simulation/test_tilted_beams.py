@@ -18,8 +18,8 @@ from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.session import SimulatedSession, simulate_session, write_session
-from tests.simulation.test_forward_model import LEVEL, LEVEL_CURVES, STILL, distance_to_model_m, range_m
 from tests.support.files.build import read
+from tests.support.level_geometry import LEVEL, LEVEL_CURVES, STILL, distance_to_model_m, range_m
 
 Change = Callable[..., Scenario]
 

@@ -19,9 +19,9 @@ from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate_session
 from stages import adjust
 from stages.in_memory import calibrate_in_memory
-from tests.stages.test_faces import SCENARIOS
 from tests.support.effort import often
 from tests.support.mount_errors import mount_error, rotation_error
+from tests.support.roots import SCENARIOS
 from tests.support.simulated import THIN, made, merged
 
 OFF = {"laser": {"coarse_angle_deg": 0.3, "coarse_lever_m": 0.03}, "mbes": {"ping_rate_hz": 0.5}}

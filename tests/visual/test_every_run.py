@@ -9,7 +9,7 @@ from stages.views.blueprint import TABS, tabs_of
 from stages.views.recording import recordings_of
 from tests.support.places import poolcal, simulate
 from tests.support.roots import SCENARIOS
-from tests.visual.test_viewer import views_of
+from tests.support.viewer import views_of
 from tools.pictures import show_tab, viewer
 
 REJECTED, LASER = "rejected", "laser"  # beside the scenarios

@@ -12,6 +12,7 @@ from PIL import Image
 from stages.commands.draw import Drawings, draw_missing
 from stages.views.blueprint import TABS
 from stages.views.recording import recordings_of
+from tests.support.viewer import views_of
 from tools.pictures import picture_of, show_tab, viewer
 
 LEAST_COLOURS = 40
@@ -42,20 +43,6 @@ def test_every_view_of_every_tab_shows_something(client: Any, tab: str, tmp_path
             assert colours is not None
             assert len(colours) >= LEAST_COLOURS, view.name
             assert max(count for count, _ in colours) < 0.995 * image.width * image.height, view.name
-
-
-def views_of(blueprint: dict[str, Any], tab: str) -> set[str]:
-    """Identities of the views in a tab, however deep."""
-    containers = {path.strip("/"): fields.get("ContainerBlueprint", {}) for path, fields in blueprint.items()}
-    (start,) = (path for path, fields in containers.items() if fields.get("display_name") == tab)
-    found, left = set(), [start]
-    while left:
-        for one in containers[left.pop()].get("contents", []):
-            if one.startswith("view/"):
-                found.add(one.removeprefix("view/"))
-            else:
-                left.append(one)
-    return found
 
 
 def test_a_scrub_through_the_iteration_closes_the_planes(client: Any, tmp_path: Path) -> None:

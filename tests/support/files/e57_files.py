@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 from pye57 import libe57
 
+START_S = 1_398_556_818.25  # GPS seconds: 2024-05-01
+POINTS = {"cartesianX": (1.0, 2.0, 3.0), "cartesianY": (4.0, 5.0, 6.0), "cartesianZ": (7.0, 8.0, 9.5)}
+TIMES = {"timeStamp": (0.0, 0.500001, 10.0)}
 ALWAYS = {"cartesianInvalidState": 2, "sphericalInvalidState": 2, "isTimeStampInvalid": 1}  # flags, and their most
 
 

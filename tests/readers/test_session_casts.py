@@ -13,7 +13,6 @@ from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers.casts import with_cast
 from tests.support.files.cast_files import CARIS, is_profile
 
-# --- session.yaml ----------------------------------------------------------------------------------------------------
 MOUNT = dict.fromkeys(("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m"), 0.0)
 
 
