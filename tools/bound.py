@@ -1,22 +1,22 @@
-"""The Cramér-Rao bound of simulated sessions: no unbiased estimator's covariance can be smaller.
+"""Compute the Cramér-Rao bound of simulated sessions: no unbiased estimator has a smaller covariance.
 
-Written apart from the adjustment, and importing nothing of it: true poses, true noise, true rays; derivatives are
-differences of a forward model of its own, and the INS's errors are unknowns with a prior in one sparse matrix, record
-by record. A ray whose whole footprint lies on a plane n · X = d says
+The bound is independent of the adjustment and imports nothing from it. It uses true poses, true noise and true rays.
+Derivatives are differences of a forward model of its own. The INS errors are unknowns with a prior, record by record,
+in one sparse matrix. A ray whose whole footprint lies on a plane n · X = d gives one equation
 
-    n · X(range, angles; six, pose) - d - (two turns and a shift of the plane's family) = 0
+    n · X(range, angles; mount parameters, pose) - d - (two turns and a shift of the plane's family) = 0
 
-with the noise of its range and angles: one equation of variance Σ (n · dX/ds)² σ_s². Of the unknowns x (the six, the
-families' turns and shifts) and e (the INS's errors: white at records, Gauss-Markov at knots, straight between them) the
-information matrix is
+whose variance Σ (n · dX/ds)² σ_s² follows from the noise of its range and angles. The unknowns are x (the six mount
+parameters, the families' turns and shifts) and e (the INS errors: white at records, Gauss-Markov at knots, linear
+between them). Their information matrix is
 
     [ Jxᵀ W Jx    Jxᵀ W Je     ]
     [ Jeᵀ W Jx    Jeᵀ W Je + P ]        W: 1 / variance, P: inverse of the covariance of e,
 
-and the bound the first 6 x 6 of its inverse.
+and the bound is the first 6 x 6 block of its inverse.
 
-Of a laser that is calibrated itself (:func:`laser_bound`) the six are its own, there is no sonar, and x has in place of
-the families' turns and shifts one displacement of the whole target, plumb within a sigma.
+Where the laser itself is calibrated (:func:`laser_bound`), the mount parameters are the laser's and there is no sonar.
+One displacement of the whole target, plumb within a sigma, then takes the place of the families' turns and shifts in x.
 
     python -m tools.bound [SCENARIO.yaml] [--seeds 4]
 """
@@ -71,7 +71,7 @@ class Rays:
     noise_m
         (n, 3, s): displacement of each point by a sigma of each of the sensor's s measurements.
     clean
-        (n,): share of such rays that nothing spoils.
+        (n,): expected share of such rays that are neither outliers nor dropped.
     """
 
     sensor: str
@@ -107,9 +107,9 @@ class World:
     def hits(self, sensor: str, k: int, t_ns: Integers, rays: Array) -> tuple[Array, Integers, Array]:
         """Return range, plane and sine of elevation of each ray or beam (n,).
 
-        Plane -1: no point that stage segment would take. Its settings want the whole footprint and a margin on one
-        face, no grazing incidence, and a distance from the water line. The edges are not widened by the angle
-        noise of a beam, so that a few more rays than the labels are taken.
+        Plane -1 marks a ray that stage segment would not label. The stage's settings require the whole footprint and a
+        margin on one face, no grazing incidence, and a distance from the water line. The edges are not widened by the
+        angle noise of a beam, so that the bound takes a few more rays than the stage labels.
 
         Parameters
         ----------
@@ -142,7 +142,7 @@ class World:
         level = np.cross(normal[rows], np.where(np.abs(normal[rows, 2:]) > 0.5, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
         level /= np.linalg.norm(level, axis=1)[:, None]
         inside = np.ones(len(rows), dtype=bool)
-        for turn in np.arange(8) * np.pi / 4:  # every edge of the target has one of these directions across it
+        for turn in np.arange(8) * np.pi / 4:  # each edge of the target is normal to one of these directions
             outward = np.cos(turn) * level + np.sin(turn) * np.cross(normal[rows], level)
             rim = np.einsum("nm,nmi->ni", np.sign(np.einsum("nmi,ni->nm", widths, outward)), widths)
             toward = hit[rows] + rim + SETTINGS.margin_m * outward - start[rows]
@@ -175,7 +175,7 @@ class World:
         """Return the sonar's beams on the target in pass ``k``."""
         s = self.scenario.mbes
         start_ns, end_ns = self.movement.sensors_run_ns(k)
-        phase = generator(self.seed, "mbes_clock", k).random()  # within a record of the INS a ping may fall anywhere
+        phase = generator(self.seed, "mbes_clock", k).random()  # a ping may fall anywhere between two INS records
         period_ns = (1 + CLOCK_RATE_ERROR) / s.ping_rate_hz * NS
         number = np.arange(round((end_ns - start_ns) / period_ns))
         pings = start_ns + np.rint((number + phase) * period_ns).astype(np.int64)
@@ -274,7 +274,7 @@ def laser_bound(scenario: Scenario, seed: int, plumb_deg: float) -> Array:
 def _bound(
     scenario: Scenario, rays: list[Rays], equations: list[tuple[Array, Array, Array]], prior_information: Array
 ) -> Array:
-    """Return the bound (6, 6); ``prior_information`` (x,) of the unknowns is 1 / variance."""
+    """Return the bound (6, 6); ``prior_information`` (x,) is 1 / variance of each unknown in x."""
     of_x, of_pose, weight = (np.concatenate([part[i] for part in equations]) for i in range(3))
     normal = of_x.T @ (weight[:, None] * of_x) + np.diag(prior_information)
     of_errors, prior = ins_errors(scenario, np.concatenate([part.t_ns for part in rays]) / NS, of_pose)
@@ -288,14 +288,14 @@ def _bound(
 
 
 def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_matrix, csr_matrix]:
-    """Return Je (n, e), by errors of unit variance, and P (e, e), both in the order of time.
+    """Return Je (n, e), for errors of unit variance, and P (e, e), both sorted by time.
 
-    A knot follows the records that it is tied to.
+    In this order a knot comes after the records that depend on it.
 
     Parameters
     ----------
     scenario
-        The simulated session, for the figures of its INS.
+        The simulated session, for the noise and drift of its INS.
     seconds
         (n,): times of the equations.
     of_pose
@@ -331,7 +331,7 @@ def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_
 
 
 def _markov(seconds: Array, constant_s: float) -> csr_matrix:
-    """Return the inverse covariance, exp(-|t - t'| / constant), of six interleaved processes; constant 0: white."""
+    """Return the inverse of the covariance exp(-|t - t'| / constant) of six interleaved processes; 0: white noise."""
     f = np.exp(-np.diff(seconds) / constant_s) if constant_s else np.zeros(len(seconds) - 1)
     gain = 1 / (1 - f**2)
     diagonal = np.ones(len(seconds))
@@ -341,10 +341,12 @@ def _markov(seconds: Array, constant_s: float) -> csr_matrix:
 
 
 def main() -> None:
-    """Print the bound's sigmas of a scenario."""
+    """Print the sigmas of the bound for a scenario."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenario", nargs="?", type=Path)
-    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument(
+        "scenario", nargs="?", type=Path, metavar="SCENARIO", help="YAML file of a scenario; default: the built-in one"
+    )
+    parser.add_argument("--seeds", type=int, default=4, help="number of sessions over which the bound is averaged")
     options = parser.parse_args()
     scenario = load_scenario(options.scenario)
     sigma = np.sqrt(np.diag(np.mean([bound(scenario, seed) for seed in range(1, options.seeds + 1)], axis=0)))
