@@ -146,7 +146,7 @@ def design_surface(target: TargetModel, family: Family) -> ObservedSurface:
 
 
 def _parallel_families(target: TargetModel, as_built: AsBuilt) -> ParallelPrior | None:
-    """Return the families that are parallel, within the angle by which they may be turned as built."""
+    """Return the prior information on parallel families: parallel within the angle of the target as built."""
     if not target.parallel:
         return None
     return ParallelPrior(target.parallel, max(float(np.radians(as_built.angle_sigma_deg)), LEAST_PARALLEL_RAD))

@@ -52,7 +52,7 @@ def hypotheses(track: InsTrack, sample: PointSample, closest: ClosestSurface) ->
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     sample : PointSample
         The sensor's points.
     closest : ClosestSurface

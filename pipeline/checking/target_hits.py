@@ -32,7 +32,7 @@ def points_off_target(
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     samples : Sequence[PointSample]
         Points of each sensor.
     closest : ClosestSurface

@@ -149,7 +149,7 @@ def ins_hole_findings(
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     epochs : dict[str, Times]
         Times at which each sensor ran.
     max_interval_s : float

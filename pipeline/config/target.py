@@ -83,7 +83,7 @@ class FaceSettings(Model):
 
 
 class RelationSettings(Model):
-    """One of four things known of some faces; ``name``: of the family that they make."""
+    """One of four relations between faces; ``name`` is that of the family that they form."""
 
     same_plane: FaceNames | None = None
     distance: FaceNames | None = None  # parallel, as far apart as the corners say
@@ -99,7 +99,7 @@ class RelationSettings(Model):
 
     @property
     def given(self) -> dict[Literal["same_plane", "distance", "height", "parallel"], tuple[str, ...]]:
-        """The faces by the kind of relation; one entry."""
+        """Names of the faces, under the kind of their relation: a dictionary with one entry."""
         kinds = {
             "same_plane": self.same_plane, "distance": self.distance, "height": self.height, "parallel": self.parallel,
         }

@@ -1,4 +1,4 @@
-"""Whether the INS drifts farther than the figures that the session or its files give."""
+"""Test whether the INS drifts farther than the sigmas in session.yaml or in its files allow."""
 
 import numpy as np
 import pandas as pd

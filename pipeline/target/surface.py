@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
-THREADS = 2  # each point is looked up by itself: the answer does not depend on it
+THREADS = 2  # each point is searched by itself, so the result does not depend on the number
 
 
 class ClosestSurface:

@@ -117,7 +117,7 @@ def patent_offsets(
 
 
 def _pair_weight(first: int, second: int) -> float:
-    """Return the weight of a difference of two means of so many points."""
+    """Return the weight of a difference of the means of ``first`` and of ``second`` points."""
     return first * second / (first + second)
 
 

@@ -154,8 +154,8 @@ def label_points(
 
     A point belongs to a face if it lies within the gate of the face's plane, its ray meets the front at no less than
     the smallest grazing angle and its whole footprint, taken where the ray meets the plane, lies within the polygon
-    with the margin to spare (or what the beam may stray, where that is more), and between the heights. Of several faces
-    the nearest plane wins.
+    with the margin to spare (or the beam's largest stray, if that is more), and between the heights. If several faces
+    meet these conditions, the one with the nearest plane gets the point.
 
     Where the ray meets the plane does not depend on the measured range, nor does the footprint there. If the point
     itself were taken, a range too long would bring it in at one edge of a grazed face and out at the other, and the
