@@ -106,8 +106,8 @@ def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
     if distances and np.ptp(distances) < ALIKE_M:
         yield Finding(
             "distances",
-            f"all passes are {np.mean(distances):.1f} m from the wall (within {np.ptp(distances):.1f} m): yaw and "
-            "lever arm y are told apart by different distances; sail some more, 2 m nearer or farther",
+            f"all passes are {np.mean(distances):.1f} m from the wall (within {np.ptp(distances):.1f} m): only "
+            "different distances separate yaw from lever arm y; sail some more passes, 2 m nearer or farther",
             "look",
         )
 

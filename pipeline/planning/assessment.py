@@ -87,7 +87,7 @@ class PlanAssessment:
 
     @property
     def weakest(self) -> str:
-        """Which mount parameters are hardest to tell apart, in words; empty where there is no result."""
+        """Sentence on the most strongly correlated two mount parameters; empty where there is no result."""
         return "" if self.given.solution.deficiency else weakest_direction(self.given.random)
 
 

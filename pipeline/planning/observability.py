@@ -21,8 +21,8 @@ TWICE = 2  # passes there
 VAGUE = 1.0  # rad or m, of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 HORIZONTAL = (
-    "the sonar sees no horizontal face: only the boat's rolling and pitching tell its height, and a still boat tells "
-    "nothing"
+    "the sonar sees no horizontal face: only the boat's rolling and pitching determine its height, and a still "
+    "boat leaves it open"
 )
 
 
@@ -112,7 +112,7 @@ def _gaps(coverage: Coverage) -> list[str]:
     if len(there) == 1 and len(upright) > 1 and there <= set(upright):
         (family,) = there
         side = SIDES.get(family, family).removesuffix(f" ({family})")
-        return [f"the sonar sees {side} alone: nothing tells where it is along it, or how high"]
+        return [f"the sonar sees {side} alone: its place along it and its height are undetermined"]
     gaps = []
     missing = [SIDES.get(family, family) for family in upright if family not in there]
     if missing:
@@ -123,7 +123,7 @@ def _gaps(coverage: Coverage) -> list[str]:
     if len(coverage.distances_m) == 1:
         gaps.append(f"one pass alone has soundings, at {low:.1f} m: nothing shows whether another would agree")
     elif coverage.distances_m and high - low < NEAR_M:
-        gaps.append(f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart")
+        gaps.append(f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are strongly correlated")
     return gaps
 
 

@@ -16,7 +16,7 @@ SIGMAS_IN_WORDS = {
     ),
     "laser": (
         "sigma: the random part, from the noise of the laser and the INS and the target's own uncertainty.",
-        "total: with the systematic errors of ranges, the clock and held values. Use the total.",
+        "total: with the systematic errors of ranges, clock and fixed parameters. Use the total.",
     ),
 }
 
@@ -39,7 +39,7 @@ def summary(calibration: Mapping[str, Any]) -> str:
     lines = [f"{calibration['session']}: {verdict.upper()}{colon}{estimated}"]
     rejected = calibration["verdict"] == "rejected"
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    lines += [f"  not found, held at the coarse value: {', '.join(fixed)}"] if colon else []
+    lines += [f"  not estimated, fixed at the coarse value: {', '.join(fixed)}"] if colon else []
     lines += [f"  warning: {warning}" for warning in calibration["warnings"]]
     sensor = calibration.get("calibrated", "mbes")
     lines += ["", *_mount_table(calibration, sensor)]
@@ -73,7 +73,7 @@ def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
             f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in ("sigma_mount", "sigma_mount_total")
         )
         if parameter in fixed:
-            change, sigma = "held", "-"
+            change, sigma = "fixed", "-"
         rows.append((parameter, f"{coarse[key]:.4f} {unit}", total, change, sigma, sigma_total))
     computed = "computed" if calibration["verdict"] == "rejected" else "calibrated"
     result = f"(result: {calibration['result']})"

@@ -1,4 +1,4 @@
-"""The drift conceded to the INS: by session.yaml, or by what its files say of its accuracy."""
+"""The drift that the adjustment allows the INS: by session.yaml, or by what its files say of its accuracy."""
 
 from typing import Any
 

@@ -87,13 +87,13 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"fixed": [name for name, *_ in PARAMETERS]},
         ReasonCode.NO_PARAMETER_ESTIMABLE,
-        "none of the six can be found: this target and these passes cannot give any within its limit",
+        "no mount parameter can be estimated: this target and these passes determine none within its limit",
     ),
     (
         {"freed": {"unknown": "mbes_latency", "estimated": True, "value": 2.01e-3, "sigma": 3e-4, "considered": 4e-4}},
         ReasonCode.ESTIMATE_OFF_SETTINGS,
         "adjust.free found the sonar's clock: its latency is +2.0 ± 0.3 ms more than mbes.latency_s says: the mount "
-        "holds with that alone; correct it, there and in the survey, and run again",
+        "is valid only with that value; correct it, in the settings and in the survey, and run again",
     ),
     (
         {"patterns": [PASS_3]},
@@ -105,7 +105,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         {"patterns": [OFF | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "low": 1.0}]},
         ReasonCode.INS_DRIFT_BETWEEN_PASSES,
         "for both sensors to fit in pass 1, the INS must be wrong there by 0.115° in heading more than in the other "
-        "passes (3.5 times the drift that it is conceded, limit 3.3)",
+        "passes (3.5 times the drift that is allowed, limit 3.3)",
     ),
     (
         {"patterns": [OFF | {"by": "face", "low": 1.0}]},
@@ -205,12 +205,12 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
     (
         lambda: _one(check_ins_drift(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0)))),
         ReasonCode.INS_DRIFT_NOT_GIVEN,
-        "ins.drift concedes the INS no drift at all: give its figures before anything else is looked for",
+        "ins.drift allows the INS no drift at all: give its figures before you look for any other cause",
     ),
     (
         lambda: _one(check_ins_drift(drift(1.21), Drift())),
         ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
-        "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before anything else is looked",
+        "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before you look",
     ),
     (
         lambda: geometry_gaps(gaps("one pass alone"), SIGMA),
