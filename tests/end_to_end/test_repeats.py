@@ -166,3 +166,14 @@ def test_make_stages_twice(place: Place, right: dict[str, str]) -> None:
     assert all(f"poolcal stage {name} " in first for name in ORDER)
     assert digests(place.run) == right
     assert "poolcal" not in make(place, "stages")
+
+
+@pytest.mark.thorough
+def test_make_stages_after_a_change_of_the_program(place: Place, right: dict[str, str]) -> None:
+    """Make offers every stage to the program, which finds by content that none is out of date."""
+    make(place, "stages")
+    for name in ORDER:
+        os.utime(place.run / name / "manifest.json", (0, 0))
+    again = make(place, "stages")
+    assert all(f"poolcal stage {name} " in again and f"{name}: up to date" in again for name in ORDER)
+    assert "poolcal" not in make(place, "stages")
