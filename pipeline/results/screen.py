@@ -1,12 +1,13 @@
 """The result of a run on one screen."""
 
 import textwrap
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import setting_change
+from pipeline.report.reason_codes import verdict_in_words
 from pipeline.text_table import text_table
 
 SIGMAS_IN_WORDS = {
@@ -19,17 +20,6 @@ SIGMAS_IN_WORDS = {
         "total: with the systematic errors of ranges, clock and fixed parameters. Use the total.",
     ),
 }
-
-
-def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
-    """Return the verdict as people read it; ``fixed``: mount parameters that an accepted calibration did not estimate.
-
-    >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
-    ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
-    """
-    if verdict != "accepted" or not fixed:
-        return verdict
-    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in fixed)}"
 
 
 def summary(calibration: Mapping[str, Any]) -> str:
