@@ -82,6 +82,9 @@ class FaceSettings(Model):
     role: Literal["P1", "P2", "P3"] | None = None  # in the patent's steps
 
 
+RelationKind = Literal["same_plane", "distance", "height", "parallel"]
+
+
 class RelationSettings(Model):
     """One of four relations between faces; ``name`` is that of the family that they form."""
 
@@ -98,12 +101,12 @@ class RelationSettings(Model):
         return self
 
     @property
-    def given(self) -> dict[Literal["same_plane", "distance", "height", "parallel"], tuple[str, ...]]:
+    def given(self) -> dict[RelationKind, FaceNames]:
         """Names of the faces, under the kind of their relation: a dictionary with one entry."""
-        kinds = {
+        kinds: dict[RelationKind, FaceNames | None] = {
             "same_plane": self.same_plane, "distance": self.distance, "height": self.height, "parallel": self.parallel,
         }
-        return {kind: names for kind, names in kinds.items() if names is not None}  # type: ignore[misc]
+        return {kind: names for kind, names in kinds.items() if names is not None}
 
 
 class Faces(Model):

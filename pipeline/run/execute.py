@@ -52,7 +52,7 @@ def execute_stage(this: Run, stage: ModuleType) -> None:
         folder.swap_in(target)
         if kept is not None:
             this.progress.note(f"{name_of(stage)}: the accepted result that was there is kept in {kept}")
-    except BaseException:
+    except BaseException:  # whatever stops it, Ctrl-C included
         _remove_quietly(partial)
         raise
 

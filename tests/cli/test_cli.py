@@ -23,7 +23,7 @@ TOY = [sys.executable, str(ROOT / "tests" / "support" / "toy_poolcal.py")]
 
 
 def _toy(*words: object, **options: object) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([*TOY, *map(str, words)], capture_output=True, text=True, timeout=60, **options)  # type: ignore[call-overload,no-any-return]
+    return subprocess.run([*TOY, *map(str, words)], capture_output=True, text=True, timeout=60, **options)
 
 
 def _words(pool: Pool) -> tuple[object, ...]:

@@ -38,7 +38,7 @@ def laz_of(content: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
-def test_adjusted_standard_time(compress, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_adjusted_standard_time(compress, file: Path) -> None:
     file.write_bytes(compress(las([(1, -2, 3, ADJUSTED + 0.25), (2**31 - 1, -(2**31), 0, ADJUSTED + 0.5)])))
     columns, dropped = read("laser", file, "las")
     assert not dropped
@@ -55,7 +55,7 @@ def test_adjusted_time_needs_no_week(file: Path) -> None:
 
 
 @pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
-def test_week_seconds(compress, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_week_seconds(compress, file: Path) -> None:
     file.write_bytes(compress(las([(0, 0, 1, 1000.25), (0, 0, 2, 1000.375)], adjusted=False)))
     columns, dropped = read("laser", file, "las", gps_week=WEEK)
     assert not dropped
@@ -103,7 +103,7 @@ def test_flag_that_contradicts_the_times(file: Path) -> None:
 # --- laser.time: where the header's flag is wrong ---------------------------------------------------------------------
 @pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
 @pytest.mark.parametrize("flag", [True, False])
-def test_adjusted_times_whatever_the_flag(compress, flag: bool, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_adjusted_times_whatever_the_flag(compress, flag: bool, file: Path) -> None:
     content = bytearray(compress(las([(0, 0, 1, ADJUSTED + 0.25), (0, 0, 2, ADJUSTED + 0.5)])))
     content[6] = int(flag)
     file.write_bytes(content)
@@ -246,7 +246,7 @@ def test_laz_header_that_claims_more_than_there_is(claimed: int, file: Path) -> 
     try:
         columns, dropped = read("laser", file, "las")
     except RawDataError as error:
-        assert "a.las" in str(error)  # noqa: PT017
+        assert "a.las" in str(error)
     else:
         assert rows(columns) <= 50
         assert rows(columns) + sum(dropped.values()) == claimed
@@ -264,14 +264,14 @@ def test_damaged_header(offset: int, value: int, file: Path) -> None:
 
 @pytest.mark.parametrize("tenth", range(1, 10))
 @pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
-def test_cut_at_each_tenth(compress, tenth: int, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_cut_at_each_tenth(compress, tenth: int, file: Path) -> None:
     whole = compress(las(some(60)))
     cut = len(whole) * tenth // 10 + 1
     file.write_bytes(whole[:cut])
     try:
         columns, dropped = read("laser", file, "las")
     except PoolcalError as error:
-        assert "\n" not in str(error)  # noqa: PT017
+        assert "\n" not in str(error)
         assert compress is laz_of or cut < 375
     else:
         before = max(0, (cut - 375) // 30)
@@ -282,7 +282,7 @@ def test_cut_at_each_tenth(compress, tenth: int, file: Path) -> None:  # type: i
 @pytest.mark.parametrize(
     ("compress", "stretch"), [(bytes, 1), (bytes, 7), (bytes, 99), (bytes, 100), (bytes, 101), (laz_of, 40)]
 )
-def test_stretches_are_the_whole(compress, stretch: int, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
+def test_stretches_are_the_whole(compress, stretch: int, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file.write_bytes(compress(las(some(100))))
     whole, _ = read("laser", file, "las")
     monkeypatch.setattr(reader, "STRETCH_POINTS", stretch)

@@ -202,7 +202,7 @@ def test_where_sound_is_faster_below_tilted_beams_bend_upward(
         return float(y[0])
 
     for event in (floor, wall):
-        event.terminal = True  # type: ignore[attr-defined]
+        event.terminal = True
     end = solve_ivp(rate, (0, 0.02), np.r_[start, ray], events=(floor, wall), rtol=1e-11, atol=1e-13)
     straight = min(-3.3 / ray[2], 5.0 / ray[0] if ray[0] > 0 else np.inf)
     assert abs(speed * end.t[-1] - straight) > 3e-4

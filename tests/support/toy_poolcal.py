@@ -70,7 +70,7 @@ def install() -> None:
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
     for module in (take, sift, report):
         sys.modules[module.__name__] = module
-    stages.ORDER = ("take", "sift", "report")  # type: ignore[assignment]
+    vars(stages).update(ORDER=("take", "sift", "report"))
     pipeline.readers.dispatch.raw_files = toys.raw_files
     pipeline.readers.dispatch.raw_parts = toys.raw_parts
 
