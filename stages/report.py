@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.pool import Adjust, Method, Segment, Verdict
+from pipeline.config.pool import Adjust, Method, Segment, VerdictLimits
 from pipeline.config.session import Calibrated, Ins, Laser, Mbes
 from pipeline.config.target import Target
 from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
@@ -47,7 +47,7 @@ class Config:
     calibrated: Calibrated
     segment: Segment
     adjust: Adjust
-    verdict: Verdict
+    verdict: VerdictLimits
     result: Method
 
     @property

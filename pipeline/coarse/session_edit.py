@@ -45,7 +45,7 @@ def edit_mounts(text: str, blocks: Mapping[str, Content], path: Path) -> str:
     Parameters
     ----------
     text
-        What session.yaml says now. It is valid for :func:`~pipeline.config.yaml_models.content_of`.
+        What session.yaml says now. It is valid for :func:`~pipeline.config.yaml_file.content_of`.
     blocks
         By sensor, values of ``mount``, ``mount_origin`` and ``mount_covariance``.
     path

@@ -125,7 +125,7 @@ class LaserFit(Model):
     hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # fixed if its sigma exceeds this share of the coarse one
 
 
-class Verdict(Model):
+class VerdictLimits(Model):
     """The largest total sigmas of an accepted calibration."""
 
     max_sigma_deg: Positive = 0.05
@@ -148,7 +148,7 @@ class PoolConfig(Model):
     offsets: Offsets = Offsets()
     adjust: Adjust = Adjust()
     laser_fit: LaserFit = LaserFit()
-    verdict: Verdict = Verdict()
+    verdict: VerdictLimits = VerdictLimits()
     result: Method = "adjustment"
 
     @property

@@ -12,7 +12,7 @@ from pipeline.adjustment.consider import sonar_errors
 from pipeline.adjustment.iteration import estimated_columns
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
-from pipeline.config.pool import PoolConfig, Verdict
+from pipeline.config.pool import PoolConfig, VerdictLimits
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
@@ -205,7 +205,7 @@ def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], sec
     """
     setting, free, turn_s = adjustment.setting, adjustment.free, adjustment.turn_s
     predicted = [predict(setting, [candidate], phases=1) for candidate in candidates]
-    usual = Verdict()
+    usual = VerdictLimits()
     bounds = np.repeat([np.radians(usual.max_sigma_deg), usual.max_sigma_m], 3)
     vague = np.zeros((setting.state.size, setting.state.size))
     vague[free, free] = VAGUE**-2
@@ -232,7 +232,7 @@ def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], sec
     return adjustment.accuracy([candidates[k] for k in chosen]) if chosen else None
 
 
-def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: Verdict) -> dict[str, float]:
+def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: VerdictLimits) -> dict[str, float]:
     """Return each total sigma over the verdict's limit, by parameter; NaN where a direction is undetermined.
 
     Parameters
@@ -241,7 +241,7 @@ def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: Ver
         Target and instruments.
     accuracy : Accuracy
         Accuracy of a list of passes.
-    limits : Verdict
+    limits : VerdictLimits
         The limits.
     """
     sigma = mount_of(setting.mbes.mount).sigmas(accuracy.total)
@@ -249,7 +249,7 @@ def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: Ver
     return {name: sigma[key] / bounds[unit] for name, _, key, unit in PARAMETERS}
 
 
-def is_enough(assessment: PlanAssessment, limits: Verdict) -> bool:
+def is_enough(assessment: PlanAssessment, limits: VerdictLimits) -> bool:
     """Return whether the list as given will keep the total sigmas below the verdict's limits."""
     if assessment.given.solution.deficiency:
         return False

@@ -1,6 +1,6 @@
 """A cast of sound speed from a file: ``mbes.svp: casts/today.svp`` in session.yaml becomes depths and speeds.
 
-:class:`pipeline.config.resolved.CastUsed` (run.yaml, calibration.json) records what was done to its rows. Rows above
+:class:`pipeline.config.references.CastUsed` (run.yaml, calibration.json) records what was done to its rows. Rows above
 the surface, of speeds that no water has, or deeper than 200 m are left out and counted. A cast with a way down and a
 way up is used on its way down; it is refused if the two differ by more than 2 m/s. Rows of one depth become their mean,
 and the rest is thinned (``maths/sonar/cast_profile.py``). Nothing is filled in: beyond the cast's ends the speed stays

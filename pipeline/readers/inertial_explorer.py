@@ -1,10 +1,10 @@
-"""NovAtel Inertial Explorer's text exports (Waypoint), of any layout (:mod:`inertial_explorer_layout`).
+"""NovAtel Inertial Explorer's text exports (Waypoint), of any layout (``inertial_explorer_layout``).
 
 Its angles are those of this project: z up, y forward, x to the right; R_level_from_body = Rz(-heading) Rx(pitch)
 Ry(roll), heading clockwise from true north (Waypoint Software User Manual, OM-20000166: "yaw = -heading"); it may run
 from -180 to 180. Heights are ellipsoidal (H-Ell), or H-MSL + Undulation. Times are GPS seconds of week with Week, with
 a date, or with ``ins.gps_week`` (the week in which the file begins), or UTC with UTCDate
-(:mod:`inertial_explorer_times`). Angles of three columns have their sign at the degrees, -0 included.
+(``inertial_explorer_times``). Angles of three columns have their sign at the degrees, -0 included.
 
 Q is the quality of the position, from 1 to 6; from 4 on (0.5 to 2 m) it may be worse than the 0.5 m within which the
 target is searched, and such rows are left out. SDNorth, SDEast, SDHeight, RollSD, PitchSD and HdngSD are taken as the

@@ -1,8 +1,8 @@
 """The layout of an Inertial Explorer export: which columns its rows have, where, and in which units.
 
 The user chooses the layout (an export profile). Free lines of text come first, then one line of names, then mostly one
-of units, then the rows (:mod:`inertial_explorer_names`, :mod:`inertial_explorer_units`); columns are separated by
-blanks, or by commas. :mod:`inertial_explorer_times` chooses the columns that tell the time.
+of units, then the rows (``inertial_explorer_names``, ``inertial_explorer_units``); columns are separated by
+blanks, or by commas. ``inertial_explorer_times`` chooses the columns that tell the time.
 """
 
 import re

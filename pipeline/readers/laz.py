@@ -1,4 +1,4 @@
-"""LAZ: the number of points that a file's tables allow, and its points by way of a process (:mod:`laz_worker`).
+"""LAZ: the number of points that a file's tables allow, and its points by way of a process (``laz_worker``).
 
 LASzip specification; all little-endian. The LASzip record (user "laszip encoded", number 22204): 12 u32 points a chunk,
 32 u16 items, then each item u16 type, u16 size, u16 version. At the start of the points: i64 where the table of chunks

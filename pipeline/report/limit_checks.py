@@ -3,13 +3,13 @@
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 
 def sigmas_above_limit(
-    sigmas: Mapping[str, float] | None, limits: Verdict, fixed: Collection[str]
+    sigmas: Mapping[str, float] | None, limits: VerdictLimits, fixed: Collection[str]
 ) -> list[Statement]:
     """Return a reason for each estimated mount parameter whose total sigma is above its limit.
 
@@ -34,7 +34,7 @@ def sigmas_above_limit(
 
 
 def patent_reasons(
-    method: str, row: Any, methods: Mapping[str, Mapping[str, Any]], limits: Verdict
+    method: str, row: Any, methods: Mapping[str, Mapping[str, Any]], limits: VerdictLimits
 ) -> Iterator[Statement]:
     """Yield each reason why a form of the patent cannot be the result.
 

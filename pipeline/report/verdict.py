@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.config.pool import Method, Verdict
+from pipeline.config.pool import Method, VerdictLimits
 from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.ambiguities import MountSearch, ambiguities
@@ -35,7 +35,7 @@ class Criteria:
     sides : the setting that tells the target's left from its right, for people
     """
 
-    limits: Verdict
+    limits: VerdictLimits
     test_level: float
     tolerance_m: float
     method: Method

@@ -7,7 +7,7 @@ import yaml
 
 from pipeline.atomic_files import write_text, writing
 from pipeline.config.plan import Pass
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import mount_of
@@ -53,7 +53,7 @@ def command(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: P
     return print_answer(said, assessment.is_enough(answer, pool.verdict))
 
 
-def table(answer: PlanAssessment, limits: Verdict) -> str:
+def table(answer: PlanAssessment, limits: VerdictLimits) -> str:
     """Return a plan's assessment for the screen."""
     setting, plan = answer.setting, answer.setting.plan
     rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
@@ -74,7 +74,7 @@ def table(answer: PlanAssessment, limits: Verdict) -> str:
     return "\n".join(lines)
 
 
-def _chosen(answer: PlanAssessment, better: Accuracy, limits: Verdict) -> list[str]:
+def _chosen(answer: PlanAssessment, better: Accuracy, limits: VerdictLimits) -> list[str]:
     """Return the list chosen, like passes together, and what it does to the sigmas: some of them may grow."""
     alike: dict[Pass, tuple[int, float, dict[str, assessment.Array]]] = {}
     for one, seconds, points in better.each():
@@ -115,7 +115,7 @@ def _passes(setting: PredictionSetting, rows: list[tuple[int, Pass, float, dict[
     return text_table(f"  >6>10>10>8>8>15{'  >7' * len(families)}>15", heads, cells)
 
 
-def _sigmas(setting: PredictionSetting, accuracy: Accuracy, limits: Verdict) -> list[str]:
+def _sigmas(setting: PredictionSetting, accuracy: Accuracy, limits: VerdictLimits) -> list[str]:
     heads, layout = ("sigma", "random", "total", "limit"), "  <8>12>12>12  <1"
     if accuracy.solution.deficiency:
         open_ones = plural(accuracy.solution.deficiency, "direction")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.atomic_files import read_json
 from pipeline.config.mount import Mount
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from pipeline.errors import ConfigError
 from pipeline.maths.comparison import mount_error
 from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
@@ -122,7 +122,7 @@ def _sigma_of(values: dict[str, Any]) -> Array | None:
     return np.array([*sigma["rotation_vector_deg"], *sigma["lever_arm_m"]], dtype=np.float64)
 
 
-def _largest(verdict: Verdict) -> Array:
+def _largest(verdict: VerdictLimits) -> Array:
     return np.repeat([verdict.max_sigma_deg, verdict.max_sigma_m], 3)
 
 

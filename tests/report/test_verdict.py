@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from pipeline.adjustment.pattern_tests import passes_test, pattern_tests
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from pipeline.config.session import Drift
 from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.mount_parameters import PARAMETERS
@@ -55,12 +55,12 @@ def test_angles_to_enter_are_told_only_where_nothing_else_is_in_doubt():
 
 def test_where_labels_are_in_doubt_nothing_else_is_judged():
     doubtful = evidence(pose={"ambiguous": True}, summary={"converged": False}, patterns=[PASS_3])
-    strict = replace(ADJUSTED, limits=Verdict(max_sigma_deg=1e-6))
+    strict = replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=1e-6))
     assert codes(judged(doubtful, strict)) == [ReasonCode.AMBIGUOUS_TARGET_POSE]
 
 
 def test_sigmas_are_held_to_both_limits():
-    wide, narrow = (replace(ADJUSTED, limits=Verdict(max_sigma_deg=d, max_sigma_m=m)) for d, m in LIMITS)
+    wide, narrow = (replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=d, max_sigma_m=m)) for d, m in LIMITS)
     assert judged(evidence(), wide) == []
     reasons = judged(evidence(), narrow)
     assert codes(reasons) == [ReasonCode.SIGMA_ABOVE_LIMIT] * 2
@@ -68,7 +68,7 @@ def test_sigmas_are_held_to_both_limits():
 
 
 def test_what_is_fixed_needs_no_sigma_but_all_six_are_too_many():
-    narrow = replace(ADJUSTED, limits=Verdict(max_sigma_deg=LIMITS[1][0], max_sigma_m=LIMITS[1][1]))
+    narrow = replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=LIMITS[1][0], max_sigma_m=LIMITS[1][1]))
     assert judged(evidence(fixed=["yaw", "y"]), narrow) == []
     everything = [name for name, *_ in PARAMETERS]
     assert codes(judged(evidence(fixed=everything), narrow)) == [ReasonCode.NO_PARAMETER_ESTIMABLE]

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from pipeline.config.references import CastUsed
 from pipeline.config.session import Drift, Mbes
 from pipeline.maths.mount_parameters import PARAMETERS
@@ -178,7 +178,7 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         "the adjustment has no covariance",
     ),
     (
-        lambda: judged(evidence(), replace(ADJUSTED, limits=Verdict(max_sigma_deg=0.0059, max_sigma_m=1.0))),
+        lambda: judged(evidence(), replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=0.0059, max_sigma_m=1.0))),
         ReasonCode.SIGMA_ABOVE_LIMIT,
         "total sigma of yaw is 0.006°, above the limit of 0.0059°",
     ),

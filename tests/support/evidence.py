@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from pipeline.report.ambiguities import MountSearch
 from pipeline.report.evidence import Evidence
 from pipeline.report.reason_codes import ReasonCode, Statement
@@ -20,7 +20,7 @@ OFF = {"normalised": 3.5}  # beyond the limit of one row, 3.29
 PASS_3 = {"by": "pass", "low": 3.0, "mean_m": -0.012, "normalised": -4.0}
 SEARCH = MountSearch(sensor="mbes", max_angle_deg=4.5, max_lever_arm_m=0.45)
 ADJUSTED = Criteria(
-    limits=Verdict(), test_level=0.001, tolerance_m=0.003, method="adjustment", search=SEARCH,
+    limits=VerdictLimits(), test_level=0.001, tolerance_m=0.003, method="adjustment", search=SEARCH,
     shape="target.a, b, c, e and low_side",
 )  # fmt: skip
 

@@ -21,13 +21,13 @@ import stages
 import stages.commands.draw
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from tests.support import toys
 
 
 @dataclass(frozen=True)
 class Config:
-    verdict: Verdict
+    verdict: VerdictLimits
     name: str
 
 

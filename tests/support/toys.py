@@ -12,7 +12,7 @@ import pandas as pd
 from pipeline.artefacts.columns import F64, I16, I64, TEXT
 from pipeline.artefacts.schema import Artefact, Column, Document, Provenance, RawFiles
 from pipeline.artefacts.streams import EMPTY_STREAM, Batch, BatchResult, Chunk, Stream
-from pipeline.config.pool import Ingest, Segment, Verdict
+from pipeline.config.pool import Ingest, Segment, VerdictLimits
 from pipeline.config.session import Laser
 from pipeline.errors import RawDataError
 
@@ -131,7 +131,7 @@ def _sift_combine(
 # --- tell: a table -> a document -------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class TellConfig:
-    verdict: Verdict
+    verdict: VerdictLimits
     name: str
 
 

@@ -107,7 +107,7 @@ PLANES = Artefact(
     ),
 )
 SOUNDING_MOMENTS = Artefact(
-    "fit_planes", "sounding_moments", "table", "second moments from which any mount's planes follow (maths/moments.py)",
+    "fit_planes", "sounding_moments", "table", "second moments from which any mount's planes follow",
     (
         PASS,
         Column("face", I16, "1", "number of the face"),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.config.pool import Verdict
+from pipeline.config.pool import VerdictLimits
 from pipeline.maths.adjustment.solution import CORRELATION_LIMIT
 from pipeline.maths.mount_parameters import PARAMETERS
 
@@ -58,7 +58,9 @@ class Quantity:
         return f"{round(number, digits) + 0.0:{sign}.{digits}f} {unit}"
 
 
-def parameter_rows(table: pd.DataFrame, method: str, limits: Verdict, fixed: Collection[str]) -> list[dict[str, Any]]:
+def parameter_rows(
+    table: pd.DataFrame, method: str, limits: VerdictLimits, fixed: Collection[str]
+) -> list[dict[str, Any]]:
     """Return a row for each mount parameter: values, sigmas, limits and 95 % interval.
 
     Parameters
