@@ -79,7 +79,7 @@ def residual_statistics(
     Parameters
     ----------
     problem : CalibrationProblem
-        What is calibrated, and what is known of it.
+        The sensor to calibrate, and the prior information on it.
     adjustment : MountAdjustment
         The adjusted values.
     streams : mapping of Stream

@@ -1,4 +1,4 @@
-"""What may be wrong with a sensor's points: the clock, unit or sign with which they would hit the target."""
+"""Hypotheses on a sensor's points: the clock, unit or sign that would bring them onto the target."""
 
 from dataclasses import dataclass
 

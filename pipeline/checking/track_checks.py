@@ -125,7 +125,7 @@ def azimuth_remedy(track: InsTrack, place: TargetPlace) -> str:
 
 
 def missing_pass_findings(track: InsTrack, files: Sequence[SurveyedFile]) -> Iterator[Finding]:
-    """Yield passes of which one sensor has nothing, or not all."""
+    """Yield passes that one sensor misses, or does not cover in full."""
     there = {file.sensor for file in files if file.records} - {file.sensor for file in files if not file.ended}
     for leg in track.legs:
         if not leg.good or not {"laser", "mbes"} <= there:

@@ -1,4 +1,4 @@
-"""A plan assessed: predicted sigmas, usable points, what is lacking; and the better list of passes within a budget."""
+"""Assessment of a plan: predicted sigmas, usable points, gaps, and the better list of passes within a budget."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

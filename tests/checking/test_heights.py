@@ -299,7 +299,7 @@ def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:
 
 
 def test_what_follows_from_a_wrong_pose_is_not_said(blocks: Looked, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of faces without soundings nothing, where the target does not stand as configured."""
+    """Faces without soundings are not reported where the target does not stand as configured."""
     pool = blocks.pool.model_copy(update={"target": blocks.pool.target.model_copy(update={"low_side": "north"})})
     monkeypatch.setattr(asked, "survey_files", lambda *_: (blocks.files, []))
 

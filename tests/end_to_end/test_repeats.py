@@ -82,7 +82,7 @@ def test_a_change_that_makes_no_difference_goes_no_further(done: Place, right: d
 
 
 def test_a_changed_coarse_mount(done: Place, right: dict[str, str]) -> None:
-    """Whatever is looked at again, the canonical tables stay: nothing of the mount is in them."""
+    """The canonical tables stay, whatever else is made again: they do not depend on the mount."""
     done.edit_session("mbes", mount={"x_m": 0.37})
     told = done.calibrate()
     assert "georeference: mbes.mount.x_m 0.38 -> 0.37\n" in told.err

@@ -166,7 +166,7 @@ def test_a_huge_time_is_told_in_few_digits(file: Path) -> None:
 
 
 def test_another_time_has_the_files_read_again() -> None:
-    """What the files are read by is all in the recordings, by which stage ingest is out of date."""
+    """All settings that read the files are in the recordings; they put stage ingest out of date."""
     ins, laser = Ins(files=["a.gps"], format="novatel"), Laser(files=["a.las"], format="las", mount=build.MOUNT)
     as_told, as_said = (
         SessionConfig(name="a", ins=ins, laser=laser.model_copy(update={"time": time})).recordings

@@ -24,7 +24,7 @@ TURBEAMS = "mbes/kongsberg/all_turbeams_6641182978793103390.all"
 
 
 class Ranges(NamedTuple):
-    """Of one datagram N."""
+    """Ranges of one datagram N."""
 
     second: float  # of the day
     number: int

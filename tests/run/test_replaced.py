@@ -119,7 +119,7 @@ def test_a_full_disk_while_it_is_kept_loses_nothing(judged: Pool, monkeypatch: p
 def test_killed_at_any_step_the_accepted_result_is_there(
     judged: Pool, monkeypatch: pytest.MonkeyPatch, steps: int
 ) -> None:
-    """Every rename and every new folder is a step; what stands after so many of them is what a kill leaves."""
+    """Every rename and every new folder is a step; the folder after the first n steps is what a kill leaves."""
     before = (judged.run_folder / "tell" / "calibration.json").read_bytes()
     limit(judged, 2.0)
     left = [steps]
@@ -165,7 +165,7 @@ def test_verify_looks_past_what_is_kept(judged: Pool) -> None:
 
 # --- another session -------------------------------------------------------------------------------------------------
 def other_session(pool: Pool) -> Path:
-    """Of the same name (a session.yaml is soon copied), elsewhere, with other files."""
+    """Copy the session to another folder, under the same name, with other files."""
     other = pool.session.with_name("other")
     shutil.copytree(pool.session, other)
     for path in other.rglob("*.bin"):

@@ -103,7 +103,7 @@ def gaps(*words: str) -> pd.DataFrame:
 
 
 def drift(sigmas: float) -> pd.DataFrame:
-    """The table drift with values of so many sigmas in every component, at three knots."""
+    """The table drift with values of ``sigmas`` sigmas in every component, at three knots."""
     values = {"x": 0.015, "y": 0.015, "z": 0.02}, {"x": 0.01, "y": 0.01, "z": 0.03}
     columns = {f"{axis}_target_m": value for axis, value in values[0].items()}
     columns |= {f"turn_{axis}_target_deg": value for axis, value in values[1].items()}

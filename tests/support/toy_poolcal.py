@@ -1,4 +1,4 @@
-"""poolcal with toy stages: python toy_poolcal.py ARGUMENTS. What the toy report does is told by verdict.max_sigma_m:
+"""poolcal with toy stages: python toy_poolcal.py ARGUMENTS. verdict.max_sigma_m sets what the toy report does:
 1: accepted, 2: rejected, 3: a bug, 4: Ctrl-C, 5: hangs.
 """
 

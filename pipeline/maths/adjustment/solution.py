@@ -20,7 +20,7 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
-VAGUE = 10.0  # rad or m: prior sigma of a parameter of which nothing is known before any point
+VAGUE = 10.0  # rad or m: prior sigma of a parameter without any prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
 
@@ -166,7 +166,7 @@ def single_parameter_tests(normal: Array, right: Array, solution: Solution) -> l
 
 
 def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) -> dict[int, float]:
-    """Return the mount parameters to fix, and the sigma with which each would have come out.
+    """Return the mount parameters to fix, and the sigma that each would have had.
 
     Fix the worst parameter and solve again: fixing one of a correlated pair usually makes the second estimable.
 

@@ -63,7 +63,7 @@ class Labels:
 def hidden_in_part(
     model: TargetModel, faces: NDArray[np.int16], corners: Iterable[Array], first_met: Callable[[Array], Integers]
 ) -> Flags:
-    """Return the beams (n,) of which a corner ray meets first something else than the plane of their face.
+    """Return the beams (n,) with a corner ray that meets something else before the plane of their face.
 
     An edge before it hides part of the footprint, or another face rises out of it, and the echo is the mean of two
     things.
