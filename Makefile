@@ -63,8 +63,12 @@ view: $(SETUP) ## open a run's recordings in the Rerun viewer: RUN=
 ifeq ($(words $(SESSION) $(CONFIG) $(RUN)),3)
 stages: $(RUN)/report/manifest.json ## the same by files: one rule a stage, nothing runs when nothing is newer
 
+# Every file of the program is watched: a stage's module alone holds little of what it computes with. The program decides
+# by content which stages a change concerns, and touches the manifests of the others.
+SOURCES := $(shell find pipeline stages configs/instruments -name '*.py' -o -name '*.html' -o -name '*.yaml')
+
 define STAGE_RULE
-$(RUN)/$(1)/manifest.json: stages/$(1).py $(2)
+$(RUN)/$(1)/manifest.json: $(SOURCES) $(2)
 	$$(POOLCAL) stage $(1) $(RUN) --session $(SESSION) --config $(CONFIG) $$(if $$(JOBS),--jobs $$(JOBS))
 endef
 RAW := $(filter-out %/.simulated,$(shell find $(SESSION) -type f 2>/dev/null))

@@ -58,7 +58,7 @@ class Config:
 
     @property
     def calibration(self) -> Mbes | LaserCalibration:
-        """What is calibrated: the sonar, or the laser in this way."""
+        """The sensor to calibrate: the sonar, or the laser with these settings."""
         (calibration,) = (block for block in (self.mbes, self.laser_fit) if block is not None)
         return calibration
 
@@ -99,7 +99,7 @@ class Outputs:
 
 def run(inputs: Inputs, config: Config) -> Outputs:
     """Adjust the mount of the sensor that is calibrated."""
-    # Say what is calibrated, and what is known of it.
+    # Choose the sensor to calibrate, and collect the prior information on it.
     calibration, session = config.calibration, session_data(inputs, config)
     problem = (
         sonar_problem(session, calibration) if isinstance(calibration, Mbes) else laser_problem(session, calibration)

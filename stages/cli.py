@@ -111,8 +111,8 @@ def _laser(
 ) -> int:
     """Calibrate the laser itself, from its own passes at the target.
 
-    Of its three angles and lever arm, those are estimated which this target and these passes determine; the others stay
-    fixed, and the result names them.
+    The adjustment estimates those of the laser's angles and lever-arm components which this target and these passes
+    determine; the others stay fixed, and the result names them.
     """
     from stages.commands import laser
     from stages.commands.draw import Drawings
@@ -227,7 +227,7 @@ def _check(
 
 @app.command("plan")
 def _plan(
-    file: Annotated[Path, typer.Argument(metavar="PLAN", help="YAML file: passes, and what else README.md says")],
+    file: Annotated[Path, typer.Argument(metavar="PLAN", help="YAML file of the plan; README.md lists its keys")],
     session: SessionYaml,
     config: Pool,
     out: Annotated[Path | None, typer.Option("--yaml", metavar="FILE", help="write the prediction as YAML")] = None,

@@ -27,11 +27,11 @@ from pipeline.report.drift_check import NO_DRIFT, check_ins_drift
 from pipeline.report.evidence import Evidence
 from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
+from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sensor_report import SensorReport
 from pipeline.report.sonar_report import SonarSettings, sonar_report
 from pipeline.report.verdict import Criteria, rejections
 from pipeline.report.warnings import geometry_gaps, target_off_origin, unexpected_noise
-from pipeline.results.screen import verdict_in_words
 from pipeline.target.design import target_of
 
 

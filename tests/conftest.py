@@ -2,7 +2,7 @@
 
 import pytest
 
-import pipeline  # noqa: F401
+import pipeline  # noqa: F401  for its effect, see above
 from tests.support.effort import THOROUGH
 
 

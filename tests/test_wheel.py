@@ -69,7 +69,7 @@ def test_an_installed_wheel_simulates_and_calibrates_away_from_the_source(wheel:
     install = ["-m", "pip", "--python", str(python), "install", "--no-deps", "--no-index", "-q", str(wheel)]
     subprocess.run([sys.executable, *install], check=True, capture_output=True)
     (site,) = place.glob("lib/python*/site-packages")
-    (site / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n")  # their own .pth files are not looked at
+    (site / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n")  # their own .pth files are not read
     away = tmp_path / "away"
     away.mkdir()
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}

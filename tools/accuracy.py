@@ -1,7 +1,8 @@
-"""What the campaigns say: errors against the bound, in a table, on a page with plots.
+"""Compare the errors of the campaigns with the Cramér-Rao bound, in a table and on a page with plots.
 
-Reads runs/montecarlo/*.parquet as ``tools.montecarlo`` and ``tools.mistakes`` leave them, computes the Cramér-Rao bound
-of each kind of noise (``tools.bound``), prints the README's table and writes runs/montecarlo/accuracy.html.
+The program reads runs/montecarlo/*.parquet, which ``tools.montecarlo`` and ``tools.mistakes`` write, and computes the
+Cramér-Rao bound for each kind of noise (``tools.bound``). It prints the README's table and writes
+runs/montecarlo/accuracy.html.
 
     python -m tools.accuracy [--bounds 24] [--jobs 2]
 """
@@ -37,7 +38,7 @@ td:first-child,th:first-child{text-align:left}img{max-width:100%;height:auto}</s
 <table><tr><th></th>{% for name in names %}<th>{{ name }} {{ "°" if loop.index0 < 3 else "mm" }}</th>{% endfor %}</tr>
 {% for row in result.rows()[1:] %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}</table>{{ plots(result) }}{% endfor %}
-{% if mistakes is not none %}<h2>What mistakes do: {{ mistakes | length }} sessions</h2>{{ mistakes_plot(mistakes) }}
+{% if mistakes is not none %}<h2>Effects of mistakes: {{ mistakes | length }} sessions</h2>{{ mistakes_plot(mistakes) }}
 {% endif %}</html>
 """
 
@@ -79,17 +80,17 @@ class Result:
 
     @property
     def ratio(self) -> Array:
-        """RMS error ÷ bound."""
+        """RMS error ÷ bound (6,)."""
         return self.rms / self.bound
 
     @property
     def ratio_below(self) -> Array:
-        """Upper confidence limit of the ratio: n RMS² / σ² is chi-squared with n degrees of freedom."""
+        """Upper confidence limit (6,) of the ratio: n RMS² / σ² is chi-squared with n degrees of freedom."""
         return self.ratio * float(np.sqrt(self.count / chi2.ppf(1 - LEVEL, self.count)))
 
     @property
     def covered(self) -> Array:
-        """Share of sessions whose 95 % interval holds the truth."""
+        """Share of sessions (6,) whose 95 % interval contains the true value."""
         return np.asarray(np.mean(np.abs(self.errors) <= norm.ppf(0.975) * self.sigmas, axis=0))
 
     @property
@@ -99,7 +100,7 @@ class Result:
         return float(low), float(high)
 
     def rows(self) -> list[list[str]]:
-        """Return the lines of the table: a heading, then a value of each mount parameter."""
+        """Return the rows of the table: a heading, then rows with a value for each mount parameter."""
         figures = [4, 4, 4, 3, 3, 3]
 
         def line(name: str, values: Array, sign: str = "") -> list[str]:
@@ -124,7 +125,7 @@ class Result:
 
 
 def campaign_results(bounds: int, jobs: int) -> list[Result]:
-    """Return a result for each campaign that has rows, its bound averaged over ``bounds`` sessions."""
+    """Return a result for each campaign that has rows; its bound is the mean over ``bounds`` sessions."""
     results = []
     with get_context("spawn").Pool(jobs) as pool:
         for campaign in CAMPAIGNS:
@@ -164,8 +165,8 @@ def plots(result: Result) -> Markup:
     squares = np.linspace(0, 30, 151)
     axes[6].hist(np.minimum(result.nse, 30), bins=np.arange(0, 31, 2), density=True, color="#e3b778")
     axes[6].plot(squares, chi2.pdf(squares, 6), color="#333")
-    axes[6].set(title="all six", xlabel="normalised squared error", yticks=[])
-    return picture(figure, "errors in sigmas against what noise leaves")
+    axes[6].set(title="all parameters", xlabel="normalised squared error", yticks=[])
+    return picture(figure, "errors in sigmas against their expected distributions")
 
 
 def mistakes_plot(table: pd.DataFrame) -> Markup:
@@ -179,7 +180,7 @@ def mistakes_plot(table: pd.DataFrame) -> Markup:
         height = rows["mistake"].map(names.index).to_numpy(dtype=float) + spread
         axis.scatter(np.clip(rows["sigmas"], 0.05, 100), height, s=9, color=colour, label=word)
     axis.axvline(5, color="#c33", linewidth=1)
-    axis.set(xscale="log", xlabel="largest error of the six, in total sigmas", yticks=range(len(names)))
+    axis.set(xscale="log", xlabel="largest error of the mount parameters, in total sigmas", yticks=range(len(names)))
     axis.set_yticklabels(names)
     axis.invert_yaxis()
     axis.legend(loc="lower right")
@@ -198,8 +199,8 @@ def page(results: list[Result], mistakes: pd.DataFrame | None) -> str:
 def main() -> None:
     """Print the table and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bounds", type=int, default=24, help="sessions over which the bound is averaged")
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--bounds", type=int, default=24, help="number of sessions over which the bound is averaged")
+    parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
     options = parser.parse_args()
     results = campaign_results(options.bounds, options.jobs)
     path = FOLDER / "mistakes.parquet"

@@ -1,11 +1,16 @@
-"""Time and memory of whole runs on simulated sessions of three sizes, a factor four apart.
+"""Measure time and memory of whole runs on simulated sessions of three sizes, each four times the size before.
 
-``make bench`` prints, for each size, in one run on this machine: seconds and peak memory of each stage, the whole run
-against bare decoding of the same files (laspy, the INS and BTH0 readers, one after another in one process), the whole
-run with report and recordings (memory: of all its processes together), georeferencing in million points a second, the
-adjustment's reading of all labelled points into its sums, by one process (observations a second, peak memory), and the
-seconds of a second run, which finds nothing to do. Figures are medians of ``--repeats``; machines differ and are
-busy: trust the ratios.
+For each size the program prints:
+
+* seconds and peak memory of each stage;
+* the time of the whole run, compared with mere decoding of the same files (laspy, the INS and BTH0 readers, one after
+  another in one process);
+* time and memory of the whole run with report and recordings, the memory for all its processes together;
+* georeferencing in million points a second;
+* the accumulation of all labelled points into the adjustment's sums, by one process: observations a second and memory;
+* the seconds of a second run, in which every stage is up to date.
+
+All figures are medians. Machines differ and run other programs as well, so the ratios are more reliable than the times.
 
     python -m tools.bench [--sizes small medium large] [--repeats 3] [--jobs 2]
 """
@@ -26,8 +31,8 @@ STAGES = ("ingest", "georeference", "segment", "fit_planes", "angle_iterate", "o
 FOLDER = Path("runs/bench")
 POOLCAL = [sys.executable, "-m", "stages.cli"]
 
-# The largest has more than 20 million laser points and two million soundings; the others a quarter of it each time:
-# fewer and faster passes at the same rates of the instruments.
+# The largest has more than 20 million laser points and two million soundings. Each smaller one has a quarter of the
+# next larger: fewer and faster passes at the same rates of the instruments.
 SIZES = {
     "small": {"distances_m": [4.0, 8.0], "speed_m_s": 0.68},
     "medium": {"distances_m": [4.0, 8.0, 5.0, 7.0], "speed_m_s": 0.34},
@@ -129,7 +134,7 @@ def _share_mib(pid: int) -> float:
 
 
 def session_of(size: str) -> Path:
-    """Return the folder of a simulated session, which is simulated once."""
+    """Return the folder of a simulated session; simulate it if there is none."""
     folder = FOLDER / f"session-{size}"
     if not folder.exists():
         FOLDER.mkdir(parents=True, exist_ok=True)
@@ -199,18 +204,21 @@ def table(results: dict[str, dict[str, float]]) -> str:
     row("whole run ÷ bare decoding", [f"{v['run_s'] / v['decode_s']:.2f}" for v in values])
     row("georeferencing, million points a second", [f"{v['points'] / v['georeference_s'] / 1e6:.1f}" for v in values])
     row("observations on the target, million", [f"{v['observations'] / 1e6:.2f}" for v in values])
-    row("reading them, one process: million a second", [f"{v['reading_rate'] / 1e6:.1f}" for v in values])
+    row("accumulating them, one process: million a second", [f"{v['reading_rate'] / 1e6:.1f}" for v in values])
     row("the same: memory it adds, MiB", [f"{v['reading_mib']:.0f}" for v in values])
     row("second run, nothing to do, s", [f"{v['again_s']:.1f}" for v in values])
     return "\n".join(lines)
 
 
 def main() -> None:
-    """Measure the sizes asked for and print the table."""
+    """Measure the chosen sizes and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", nargs="*", default=list(SIZES), choices=list(SIZES))
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument(
+        "--sizes", nargs="*", default=list(SIZES), choices=list(SIZES), metavar="SIZE",
+        help=f"sizes of session: {', '.join(SIZES)}; default: all",
+    )  # fmt: skip
+    parser.add_argument("--repeats", type=int, default=3, help="number of measurements of each size; default: 3")
+    parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
     options = parser.parse_args()
     results = {size: bench(size, options.repeats, options.jobs) for size in options.sizes}
     print(f"{options.jobs} workers, {os.cpu_count()} cores, medians of {options.repeats}\n")

@@ -1,22 +1,22 @@
-"""The Cramér-Rao bound of simulated sessions: no unbiased estimator's covariance can be smaller.
+"""Compute the Cramér-Rao bound of simulated sessions: no unbiased estimator has a smaller covariance.
 
-Written apart from the adjustment, and importing nothing of it: true poses, true noise, true rays; derivatives are
-differences of a forward model of its own, and the INS's errors are unknowns with a prior in one sparse matrix, record
-by record. A ray whose whole footprint lies on a plane n · X = d says
+The bound is independent of the adjustment and imports nothing from it. It uses true poses, true noise and true rays.
+Derivatives are differences of a forward model of its own. The INS errors are unknowns with a prior, record by record,
+in one sparse matrix. A ray whose whole footprint lies on a plane n · X = d gives one equation
 
-    n · X(range, angles; six, pose) - d - (two turns and a shift of the plane's family) = 0
+    n · X(range, angles; mount parameters, pose) - d - (two turns and a shift of the plane's family) = 0
 
-with the noise of its range and angles: one equation of variance Σ (n · dX/ds)² σ_s². Of the unknowns x (the six, the
-families' turns and shifts) and e (the INS's errors: white at records, Gauss-Markov at knots, straight between them) the
-information matrix is
+whose variance Σ (n · dX/ds)² σ_s² follows from the noise of its range and angles. The unknowns are x (the six mount
+parameters, the families' turns and shifts) and e (the INS errors: white at records, Gauss-Markov at knots, linear
+between them). Their information matrix is
 
     [ Jxᵀ W Jx    Jxᵀ W Je     ]
     [ Jeᵀ W Jx    Jeᵀ W Je + P ]        W: 1 / variance, P: inverse of the covariance of e,
 
-and the bound the first 6 x 6 of its inverse.
+and the bound is the first 6 x 6 block of its inverse.
 
-Of a laser that is calibrated itself (:func:`laser_bound`) the six are its own, there is no sonar, and x has in place of
-the families' turns and shifts one displacement of the whole target, plumb within a sigma.
+Where the laser itself is calibrated (:func:`laser_bound`), the mount parameters are the laser's and there is no sonar.
+One displacement of the whole target, plumb within a sigma, then takes the place of the families' turns and shifts in x.
 
     python -m tools.bound [SCENARIO.yaml] [--seeds 4]
 """
@@ -102,7 +102,7 @@ def laser_bound(scenario: Scenario, seed: int, plumb_deg: float) -> Array:
 def _bound(
     scenario: Scenario, rays: list[Rays], equations: list[tuple[Array, Array, Array]], prior_information: Array
 ) -> Array:
-    """Return the bound (6, 6); ``prior_information`` (x,) of the unknowns is 1 / variance."""
+    """Return the bound (6, 6); ``prior_information`` (x,) is 1 / variance of each unknown in x."""
     of_x, of_pose, weight = (np.concatenate([part[i] for part in equations]) for i in range(3))
     normal = of_x.T @ (weight[:, None] * of_x) + np.diag(prior_information)
     of_errors, prior = ins_errors(scenario, np.concatenate([part.t_ns for part in rays]) / NS, of_pose)
@@ -116,14 +116,14 @@ def _bound(
 
 
 def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_matrix, csr_matrix]:
-    """Return Je (n, e), by errors of unit variance, and P (e, e), both in the order of time.
+    """Return Je (n, e), for errors of unit variance, and P (e, e), both sorted by time.
 
-    A knot follows the records that it is tied to.
+    In this order a knot comes after the records that depend on it.
 
     Parameters
     ----------
     scenario
-        The simulated session, for the figures of its INS.
+        The simulated session, for the noise and drift of its INS.
     seconds
         (n,): times of the equations.
     of_pose
@@ -159,7 +159,7 @@ def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_
 
 
 def _markov(seconds: Array, constant_s: float) -> csr_matrix:
-    """Return the inverse covariance, exp(-|t - t'| / constant), of six interleaved processes; constant 0: white."""
+    """Return the inverse of the covariance exp(-|t - t'| / constant) of six interleaved processes; 0: white noise."""
     f = np.exp(-np.diff(seconds) / constant_s) if constant_s else np.zeros(len(seconds) - 1)
     gain = 1 / (1 - f**2)
     diagonal = np.ones(len(seconds))
@@ -169,10 +169,12 @@ def _markov(seconds: Array, constant_s: float) -> csr_matrix:
 
 
 def main() -> None:
-    """Print the bound's sigmas of a scenario."""
+    """Print the sigmas of the bound for a scenario."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenario", nargs="?", type=Path)
-    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument(
+        "scenario", nargs="?", type=Path, metavar="SCENARIO", help="YAML file of a scenario; default: the built-in one"
+    )
+    parser.add_argument("--seeds", type=int, default=4, help="number of sessions over which the bound is averaged")
     options = parser.parse_args()
     scenario = load_scenario(options.scenario)
     sigma = np.sqrt(np.diag(np.mean([bound(scenario, seed) for seed in range(1, options.seeds + 1)], axis=0)))

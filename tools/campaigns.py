@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = Path("runs/montecarlo")
-TASKS_OF_A_WORKER = 20  # then a fresh process: hundreds of ray casting scenes in one make it slow and large
+TASKS_OF_A_WORKER = 20  # then a new process: hundreds of ray casting scenes make a process slow and large
 COARSE_DEG, COARSE_M = 2.5, 0.25
-THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points to leave the sonar's noise in charge
+THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points for the sonar's noise to dominate
 WHITE: dict[str, Any] = {
     "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
     "laser": {"outlier_share": 0.0, "water_return_share": 0.0},
@@ -29,7 +29,7 @@ HALF: dict[str, Any] = {  # half the pings, and passes just long enough
 
 
 def _sectors(border_deg: float) -> dict[str, Any]:
-    """Transmit sectors 0.254° apart, as of a Kongsberg EM2042, symmetrical about the array's normal; half the pings."""
+    """Return transmit sectors 0.254° apart, as a Kongsberg EM2042 has, symmetrical about the array's normal."""
     edges = ((-border_deg, -0.447), (border_deg, -0.701), (90.0, -0.447))
     return {"mbes": TABLE | {"sectors": [{"to_deg": to, "tilt_deg": tilt} for to, tilt in edges]}}
 
@@ -47,7 +47,7 @@ class Campaign:
     first_seed: int
     scenario: dict[str, Any] = field(default_factory=dict)
     through_files: bool = False
-    pairs: bool = False  # also: how often the comparison of two of these sessions says that the sonar has moved
+    pairs: bool = False  # also compare sessions in pairs: how often does the comparison report a move?
 
 
 def _target(**letters: Any) -> dict[str, Any]:
@@ -96,7 +96,7 @@ def path_of(campaign: Campaign) -> Path:
 
 
 def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
-    """Return the scenario of one session: the campaign's, thinned, with its combination of coarse errors."""
+    """Return the scenario of a session: the campaign's with thinned laser points and the session's coarse errors."""
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
     keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
     sizes = (COARSE_DEG,) * 3 + (COARSE_M,) * 3

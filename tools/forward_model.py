@@ -47,7 +47,7 @@ class Rays:
     noise_m
         (n, 3, s): displacement of each point by a sigma of each of the sensor's s measurements.
     clean
-        (n,): share of such rays that nothing spoils.
+        (n,): expected share of such rays that are neither outliers nor dropped.
     """
 
     sensor: str
@@ -83,9 +83,9 @@ class World:
     def hits(self, sensor: str, k: int, t_ns: Integers, rays: Array) -> tuple[Array, Integers, Array]:
         """Return range, plane and sine of elevation of each ray or beam (n,).
 
-        Plane -1: no point that stage segment would take. Its settings want the whole footprint and a margin on one
-        face, no grazing incidence, and a distance from the water line. The edges are not widened by the angle
-        noise of a beam, so that a few more rays than the labels are taken.
+        Plane -1 marks a ray that stage segment would not label. The stage's settings require the whole footprint and a
+        margin on one face, no grazing incidence, and a distance from the water line. The edges are not widened by the
+        angle noise of a beam, so that the bound takes a few more rays than the stage labels.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class World:
         level = np.cross(normal[rows], np.where(np.abs(normal[rows, 2:]) > 0.5, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
         level /= np.linalg.norm(level, axis=1)[:, None]
         inside = np.ones(len(rows), dtype=bool)
-        for turn in np.arange(8) * np.pi / 4:  # every edge of the target has one of these directions across it
+        for turn in np.arange(8) * np.pi / 4:  # each edge of the target is normal to one of these directions
             outward = np.cos(turn) * level + np.sin(turn) * np.cross(normal[rows], level)
             rim = np.einsum("nm,nmi->ni", np.sign(np.einsum("nmi,ni->nm", widths, outward)), widths)
             toward = hit[rows] + rim + SETTINGS.margin_m * outward - start[rows]
@@ -151,7 +151,7 @@ class World:
         """Return the sonar's beams on the target in pass ``k``."""
         s = self.scenario.mbes
         start_ns, end_ns = self.movement.sensors_run_ns(k)
-        phase = generator(self.seed, "mbes_clock", k).random()  # within a record of the INS a ping may fall anywhere
+        phase = generator(self.seed, "mbes_clock", k).random()  # a ping may fall anywhere between two INS records
         period_ns = (1 + CLOCK_RATE_ERROR) / s.ping_rate_hz * NS
         number = np.arange(round((end_ns - start_ns) / period_ns))
         pings = start_ns + np.rint((number + phase) * period_ns).astype(np.int64)

@@ -1,16 +1,16 @@
-"""How easily a checkout is found one's way in: three counts, and the sizes of its modules and functions.
+"""Measure how easy a checkout is to read: three counts, and the sizes of its modules and functions.
 
 1. Public classes and functions of ``pipeline/`` and ``stages/`` whose name is defined in more than one module. Names
    that a protocol prescribes (PROTOCOLS) are left out.
-2. Files that a reader enters on the way of stage adjust. A small simulated session is calibrated, and each function of
-   the project is taken once, in the order of first calls during ``stages.adjust.run``. An entry is a function in
-   another file than the function before it. A file flat in ``pipeline/`` has no folder that tells what it is for.
-3. Calls with six or more positional arguments, in which two values are easily exchanged.
+2. Files that a reader enters to follow stage adjust. The program calibrates a small simulated session and lists each
+   function of the project once, in the order of first calls during ``stages.adjust.run``. An entry is a function in
+   another file than the function before it. A file flat in ``pipeline/`` has no folder whose name explains it.
+3. Calls with six or more positional arguments, where two values are easily exchanged.
 
     python -m tools.house_counts [CHECKOUT] [--list]
 
-CHECKOUT is another commit's worktree, for instance that of the commit before a change; default: this one. ``--list``
-names what is counted.
+CHECKOUT is the worktree of another commit, for instance of the commit before a change; default: this one. ``--list``
+also prints every item that is counted.
 """
 
 import argparse
@@ -104,7 +104,7 @@ def way_of_adjust(source: Path) -> list[tuple[str, str]]:
 
 
 def entries(way: list[tuple[str, str]]) -> int:
-    """Return how often a file is entered on a way through functions.
+    """Return how often a reader enters a file who follows these functions in their order.
 
     >>> entries([("a", "f"), ("a", "g"), ("b", "h"), ("a", "k")])
     3
@@ -114,7 +114,7 @@ def entries(way: list[tuple[str, str]]) -> int:
 
 
 def sizes(source: Path) -> str:
-    """Return a line on the lengths of modules and functions, in lines."""
+    """Return a sentence about the lengths of modules and functions, in lines."""
     modules = {path: len((source / path).read_text(encoding="utf-8").splitlines()) for path, _ in trees(source)}
     functions = {
         f"{file}:{node.name}": (node.end_lineno or 0) - node.lineno + 1
@@ -132,10 +132,12 @@ def sizes(source: Path) -> str:
 
 
 def main() -> None:
-    """Print the counts of a checkout."""
+    """Print the counts and sizes of a checkout."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("checkout", type=Path, nargs="?", default=ROOT)
-    parser.add_argument("--list", action="store_true", help="name what is counted")
+    parser.add_argument(
+        "checkout", type=Path, nargs="?", default=ROOT, metavar="CHECKOUT", help="a worktree; default: this one"
+    )
+    parser.add_argument("--list", action="store_true", help="print every item that is counted")
     options = parser.parse_args()
     source = options.checkout.resolve()
     names, calls, way = names_with_two_meanings(source), calls_with_many_arguments(source), way_of_adjust(source)

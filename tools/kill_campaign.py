@@ -1,10 +1,10 @@
-"""Test that no wrong byte of a killed run is trusted: kill at random moments, run again, compare every byte.
+"""Kill runs at random times, run them again, and test that every Parquet file is that of an undisturbed run.
 
-A small session is simulated and calibrated undisturbed. Then run after run is killed by SIGKILL at a random moment of
-its duration (the moments follow from the seed; what they hit does not) and started again in the same folder, after
-which every Parquet file must be that of the undisturbed run. Every other run is started over an earlier complete
-result of another config, so that results are being replaced when the kill comes; that one must still be in the folder.
-A run that ended before its kill does not count: it is tried again, until there are as many kills as were asked for.
+The program simulates a small session and calibrates it undisturbed. Then it starts one run after another, kills each by
+SIGKILL after a random time and starts it again in the same folder. After that every Parquet file must have the bytes of
+the undisturbed run. Every second run replaces an earlier complete result with another config; that result must still be
+in the folder at the end. The seed fixes the times of the kills, but not which stage they interrupt. A run that ends
+before its kill is not counted; the program goes on until it has killed the requested number of runs.
 
     python -m tools.kill_campaign [--kills 50] [--seed 1]
 """
@@ -34,18 +34,18 @@ SCENARIO = {
     "mbes": {"ping_rate_hz": 8.0},
     "ins": {"rate_hz": 50.0},
 }
-DAMAGED = ".partial", ".old", ".new", ".keeping"  # what is under way when a stage or a file is being swapped in
+DAMAGED = ".partial", ".old", ".new", ".keeping"  # names in use while a stage or a file is being replaced
 
 
 @dataclass
 class Campaign:
-    """Counts of a campaign, and a line on each run that differs."""
+    """Counts of a campaign, and a line for each run whose files differ."""
 
     runs: int = 0
-    kills: int = 0  # the other runs had ended before
+    kills: int = 0  # the other runs ended before their kill
     identical: int = 0
     different: list[str] = field(default_factory=list)
-    killed_in: Counter[str] = field(default_factory=Counter)  # what the kill left under way
+    killed_in: Counter[str] = field(default_factory=Counter)  # interrupted work that the kills left, by its name
 
     def __str__(self) -> str:
         where = ", ".join(f"{name} {count}" for name, count in self.killed_in.most_common())
@@ -111,12 +111,12 @@ def campaign(session: Path, folder: Path, kills: int, seed: int) -> Campaign:
     kills
         Number of runs to kill.
     seed
-        Seed of the moments.
+        Seed of the times of the kills.
     """
     config, other, rng, counts = session / "pool.yaml", folder / "other.yaml", np.random.default_rng(seed), Campaign()
     text = yaml.safe_load(config.read_text(encoding="utf-8")) | {"segment": {"margin_m": 0.05}}
     other.write_text(yaml.safe_dump(text), encoding="utf-8")
-    seconds = [calibrate(session, config, folder / "undisturbed")] * 2  # a run's duration: afresh, over a result
+    seconds = [calibrate(session, config, folder / "undisturbed")] * 2  # duration: in a new folder, over a result
     right = digests(folder / "undisturbed")
     calibrate(session, other, folder / "earlier")
     earlier = (folder / "earlier" / "report" / "calibration.json").read_bytes()
@@ -138,7 +138,7 @@ def campaign(session: Path, folder: Path, kills: int, seed: int) -> Campaign:
             wrong = sorted(name for name in right.keys() | after.keys() if right.get(name) != after.get(name))
             counts.different.append(f"run {counts.runs}: {', '.join(wrong + left)}")
         elif over and earlier not in [path.read_bytes() for path in run.glob("report*/calibration.json")]:
-            left = ["the accepted result that was there is gone"]
+            left = ["the earlier accepted result is missing"]
             counts.different.append(f"run {counts.runs}: {left[0]}")
         counts.identical += after == right and not left
         shutil.rmtree(run)
@@ -146,7 +146,7 @@ def campaign(session: Path, folder: Path, kills: int, seed: int) -> Campaign:
 
 
 def _killed(words: Sequence[str], after_s: float) -> bool:
-    """Return whether the process was still at work when it was killed."""
+    """Kill a process and return whether it was still running then."""
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         process.wait(after_s)
@@ -156,7 +156,7 @@ def _killed(words: Sequence[str], after_s: float) -> bool:
 
 
 def _state(run: Path) -> str:
-    """Return what a killed run left under way, in a word or two."""
+    """Return the interrupted work that a killed run left, in a word or two."""
     if not run.exists():
         return "before the folder"
     torn = sorted(path.name for path in run.rglob("*") if path.name.endswith(DAMAGED))
@@ -166,8 +166,8 @@ def _state(run: Path) -> str:
 def main() -> int:
     """Simulate a session, run the campaign, print its counts, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kills", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kills", type=int, default=50, help="number of runs to kill; default: 50")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the times of the kills; default: 1")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="poolcal-kills-") as name:
         folder = Path(name)

@@ -1,9 +1,10 @@
-"""Campaign of the laser's own calibration, and of the sonar's from it.
+"""Simulate calibrations of the laser, each followed by a calibration of the sonar with its result.
 
-Each number is two sessions under INS drift. In the first the laser's mount is wrong by 0.3° and 3 cm on every axis, in
-all combinations of signs; with wide limits all six are found, with the usual ones some are held. The second has the
-mount found, with its covariance, and calibrates the sonar: its errors against the body, by a total covariance in which
-nothing is considered but the laser's mount.
+Each number stands for two sessions with INS drift. In the first the laser's coarse mount is wrong by 0.3° and 3 cm on
+every axis, in all combinations of signs. It is calibrated twice: with wide limits, which estimate all mount parameters,
+and with the usual limits, which fix some of them. The second session takes the laser's estimated mount with its
+covariance and calibrates the sonar. The errors of the sonar's mount are then compared with a total covariance whose
+only consider parameters are those of the laser's mount.
 
     python -m tools.laser [--sessions 240] [--first 0] [--jobs 2] [--rows docs/accuracy/laser.parquet]
 """
@@ -30,7 +31,7 @@ PLUMB_DEG = 0.001
 FIT = {"face_sigma_deg": 0.001, "plumb_sigma_deg": PLUMB_DEG, "face_sigma_m": 0.0002}  # the target is as designed
 WIDE = {"max_sigma_deg": 1.0, "max_sigma_m": 1.0}
 SURE = {"range_bias_sigma_m": 0.0, "latency_sigma_s": 0.0}
-BOUNDS = 12  # sessions of which the bound is taken
+BOUNDS = 12  # sessions over which the bound is averaged
 
 
 def scenario_of(number: int) -> dict[str, Any]:
@@ -70,7 +71,7 @@ def calibrate(session: dict[str, Any], pool: dict[str, Any], made: Any) -> dict[
 
 
 def session_row(number: int) -> dict[str, Any]:
-    """Return a row: errors and sigmas of the laser and the sonar, and what is fixed with the usual limits."""
+    """Return a row: errors and sigmas of laser and sonar, and the parameters fixed with usual and with wide limits."""
     from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate_session
@@ -108,7 +109,7 @@ def _columns(sensor: str, error: Array, covariance: Array) -> dict[str, float]:
 
 
 def laser_bound_of(number: int) -> Array:
-    """Return the Cramér-Rao bound (6, 6) of the first session of a number, in rad and m."""
+    """Return the Cramér-Rao bound (6, 6) of a number's first session, in rad and m."""
     from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from tools.bound import laser_bound
@@ -117,7 +118,7 @@ def laser_bound_of(number: int) -> Array:
 
 
 def report(table: pd.DataFrame, bound: Array) -> str:
-    """Return the README's table: RMS errors against the bound and the total sigmas, and what was fixed."""
+    """Return the README's table: RMS errors, the bound and the total sigmas, and the fixed parameters."""
     n = len(table)
     low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
     least = np.sqrt(np.diag(bound)) / UNITS
@@ -146,18 +147,20 @@ def report(table: pd.DataFrame, bound: Array) -> str:
     line("RMS error ÷ RMS total sigma", rms("sonar_error") / rms("sonar_sigma"), 2)
     kinds = [f"{names or 'none'} in {count}" for names, count in table["held"].value_counts().items()]
     lines.append("")
-    lines.append(f"With the usual limits {int(table['accepted'].sum())} accepted; held: {'; '.join(kinds)}.")
+    lines.append(f"With the usual limits {int(table['accepted'].sum())} accepted; fixed: {'; '.join(kinds)}.")
     return "\n".join(lines)
 
 
 def main() -> None:
     """Simulate and calibrate the sessions, write their rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sessions", type=int, default=240)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--rows", type=Path, default=Path("runs/montecarlo/laser.parquet"), help="where rows go")
-    parser.add_argument("--report", action="store_true", help="of the rows that are there, without making any")
+    parser.add_argument("--sessions", type=int, default=240, help="count of numbers, two sessions each; default: 240")
+    parser.add_argument("--first", type=int, default=0, help="first number; default: 0")
+    parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
+    parser.add_argument(
+        "--rows", type=Path, default=Path("runs/montecarlo/laser.parquet"), help="Parquet file of the rows"
+    )
+    parser.add_argument("--report", action="store_true", help="print the table of an existing file of rows")
     options = parser.parse_args()
     numbers = range(options.first, options.first + options.sessions)
     with get_context("spawn").Pool(options.jobs, maxtasksperchild=8) as pool:

@@ -1,9 +1,10 @@
-"""What a mistake does to the result, and whether the verdict sees it.
+"""Plant mistakes in simulated sessions, and tabulate their effect on the result and on the verdict.
 
-Each line is the default scenario with one thing wrong, simulated with fixed seeds and calibrated in memory. The table
-tells how many were accepted, the largest errors of the adjustment in its angles and its lever arm, and of those that
-were accepted the largest normalised squared error by the total covariance and the largest error in total sigmas: where
-the verdict is blind, the README must say so. Every session is a row of runs/montecarlo/mistakes.parquet.
+Each line of the table is the default scenario with one mistake, simulated with fixed seeds and calibrated in memory. It
+shows how many sessions were accepted and the adjustment's largest errors in angles and lever arm. For the accepted
+sessions it also shows the largest normalised squared error by the total covariance and the largest error in total
+sigmas. The README must name every mistake that the verdict does not notice. Each session is a row of
+runs/montecarlo/mistakes.parquet.
 
     python -m tools.mistakes [--jobs 2] [--seeds 27] [--only NAME ...]
 """
@@ -23,11 +24,11 @@ from tools.campaigns import DRIFT, TASKS_OF_A_WORKER, THIN
 from tools.session_rows import NAMES, UNITS, errors_of
 
 SEEDS = 3
-Change = Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None]  # of scenario, session and pool
+Change = Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None]  # changes scenario, session and pool in place
 
 
 def _scenario(**blocks: Any) -> Change:
-    """Return a change of the simulated world that the configuration does not tell."""
+    """Return a change of the scenario that session.yaml and pool.yaml do not mention."""
 
     def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
         for name, values in blocks.items():
@@ -56,7 +57,7 @@ def _swapped(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, 
 
 
 def _target(**values: float) -> Change:
-    """Return a change that adds errors to the target's letters in the pool's config."""
+    """Return a change that adds errors to the target's dimensions in the pool's config."""
 
     def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
         for name, value in values.items():
@@ -114,7 +115,7 @@ MISTAKES: dict[str, Change] = {
 
 
 def session_row(task: tuple[str, int]) -> dict[str, Any]:
-    """Return the row of a session, of a mistake and a seed: verdict, errors and sigmas."""
+    """Return the row of a session, given its mistake and seed: verdict, errors and sigmas."""
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
@@ -152,7 +153,7 @@ def session_row(task: tuple[str, int]) -> dict[str, Any]:
 
 
 def table_of(rows: pd.DataFrame) -> str:
-    """Return the Markdown table, with a line for each mistake."""
+    """Return a Markdown table with a line for each mistake."""
     lines = ["| what is wrong | accepted | largest error ° | mm | NSE if accepted | in sigmas |"]
     lines.append("|---|---:|---:|---:|---:|---:|")
     for name, group in rows.groupby("mistake", sort=False):
@@ -170,9 +171,11 @@ def table_of(rows: pd.DataFrame) -> str:
 def main() -> None:
     """Simulate and calibrate the sessions, write their rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="sessions of each mistake")
-    parser.add_argument("--only", nargs="*", help="names (or beginnings) of mistakes")
+    parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
+    parser.add_argument("--seeds", type=int, default=SEEDS, help=f"sessions of each mistake; default: {SEEDS}")
+    parser.add_argument(
+        "--only", nargs="*", metavar="NAME", help="mistakes to run, by the beginning of their names; default: all"
+    )
     options = parser.parse_args()
     names = [name for name in MISTAKES if not options.only or any(name.startswith(start) for start in options.only)]
     tasks = [(name, seed) for name in names for seed in range(1, options.seeds + 1)]

@@ -1,10 +1,10 @@
-"""Many simulated sessions, to see whether the results are right and the predicted sigmas true.
+"""Simulate and calibrate many sessions, and test whether the errors agree with the predicted sigmas.
 
-``make montecarlo`` prints, campaign by campaign, the errors of the adjustment's six values, their mean normalised
-squared error (its expectation is 6 if the covariance is true) with the 99 % band, and how many sessions were
-accepted. Seeds are fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and
-the combination of signs goes through all 64. A row a session goes to runs/montecarlo/, as CSV while it goes on and as
-Parquet in the end; ``tools.accuracy`` makes the README's table and a page of it.
+For each campaign the program prints the errors of the six mount parameters, the number of accepted sessions, and the
+mean normalised squared error with its 99 % band; the expectation of the latter is 6 if the covariance is right. Seeds
+are fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and the signs of these
+errors go through all 64 combinations. Each session is a row of a file in runs/montecarlo/, which is CSV during the
+campaign and Parquet at its end. ``tools.accuracy`` makes the README's table and an HTML page from these files.
 
     python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2] [--resume]
 """
@@ -25,7 +25,7 @@ MOVED_DEG, MOVED_MM = 0.05, 2.0
 
 
 def report(campaign: Campaign, table: pd.DataFrame) -> str:
-    """Return the campaign in five lines."""
+    """Return the summary of a campaign in five lines."""
     n = len(table)
     low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
     mean = table["nse"].mean()
@@ -47,13 +47,16 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
 
 
 def pairs(table: pd.DataFrame) -> str:
-    """Compare sessions 0 and 1, 2 and 3, … as poolcal diff does: as they are, and with one mount parameter moved."""
+    """Return the results of comparing sessions 0 and 1, 2 and 3, … as they are and with one mount parameter moved.
+
+    The comparison is that of ``poolcal diff``.
+    """
     from pipeline.maths.comparison import MountEstimate, compare_estimates
     from pipeline.maths.geometry.rotations import exp_so3
     from pipeline.results.mount_difference import SIGNIFICANCE
 
     def estimate(row: Any, moved: Array) -> MountEstimate:
-        """Return the estimate of a zero mount that is moved by ``moved``: estimated = Exp(-error) · true."""
+        """Return the estimate of a true mount of zero plus ``moved``: estimated = Exp(-error) · true."""
         error = np.array([row[f"error_{name}"] for name in NAMES]) * UNITS
         covariance = np.zeros((6, 6))
         for i in range(6):
@@ -80,12 +83,16 @@ def pairs(table: pd.DataFrame) -> str:
 
 
 def main() -> None:
-    """Simulate and calibrate the campaigns, write their rows and print a report of each."""
+    """Simulate and calibrate the campaigns, write their rows and print a summary of each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="*", help="names (or beginnings) of campaigns")
-    parser.add_argument("--share", type=float, default=1.0, help="share of the sessions, for a quick look")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--resume", action="store_true", help="go on where an interrupted campaign of this code ended")
+    parser.add_argument(
+        "--only", nargs="*", metavar="NAME", help="campaigns to run, by the beginning of their names; default: all"
+    )
+    parser.add_argument("--share", type=float, default=1.0, help="share of each campaign's sessions; default: 1")
+    parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
+    parser.add_argument(
+        "--resume", action="store_true", help="continue campaigns that were interrupted; the program must be the same"
+    )
     options = parser.parse_args()
     FOLDER.mkdir(parents=True, exist_ok=True)
     for campaign in CAMPAIGNS:
@@ -96,7 +103,7 @@ def main() -> None:
         done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
         tasks = [(campaign, number) for number in range(done, max(2, round(campaign.sessions * options.share)))]
         with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-            # each row is written as it comes: nothing is lost
+            # each row is written at once, so that an interruption loses none
             for number, row in enumerate(pool.imap(session_row, tasks), start=done):
                 pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
         table = pd.read_csv(path)

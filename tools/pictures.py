@@ -1,9 +1,9 @@
-"""Pictures of what people see, without a screen: the tabs of a run's recordings, its report, and the pipeline.
+"""Draw the README's pictures without a screen: the tabs of a run's recordings, its report, and the pipeline.
 
     make setup-visual
     make pictures
 
-Needs Chromium and a Vulkan driver in software, which ``make setup-visual`` installs where it may.
+The program needs Chromium and a software Vulkan driver. ``make setup-visual`` installs both if it has the permission.
 """
 
 import argparse
@@ -24,16 +24,16 @@ from stages.views.viewer import without_statistics
 from tools.pipeline_picture import picture
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
-SETTLE_S = 1.5  # after a change of tab or time, before the picture
+SETTLE_S = 1.5  # waiting time between a change of tab or time and the picture
 WIDTH = 1280
-TITLE_BAR_PX = 36  # of the viewer's window, with its warnings about this machine
+TITLE_BAR_PX = 36  # height of the viewer's title bar, which shows warnings about the machine
 ROOT = Path(__file__).parents[1]
-DRAWN_FROM = "drawn_from.txt"  # beside the pictures
-SOURCES = {"report": "pipeline/results/pages", "recordings": "stages/views"}  # what each is drawn by
+DRAWN_FROM = "drawn_from.txt"  # file beside the pictures
+SOURCES = {"report": "pipeline/results/pages", "recordings": "stages/views"}  # folder of the code that draws each
 
 
 def missing() -> str:
-    """Return what is not installed, in words; empty when all is there."""
+    """Return a sentence that names missing programs; empty if all are installed."""
     driver = any(any(Path(folder).glob("*.json")) for folder in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"))
     there = {
         "Chromium": any(map(shutil.which, CHROMIUM)),
@@ -51,7 +51,7 @@ def _prints(*command: str) -> bool:
 
 
 def chromium(*options: str, timeout: float = 150) -> subprocess.CompletedProcess[str]:
-    """Run headless Chromium with a home of its own; the console of a page goes to standard error."""
+    """Run headless Chromium with a home folder of its own; console messages of a page go to standard error."""
     program = next(path for name in CHROMIUM if (path := shutil.which(name)))
     with tempfile.TemporaryDirectory() as home:
         fixed = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr"]
@@ -61,7 +61,7 @@ def chromium(*options: str, timeout: float = 150) -> subprocess.CompletedProcess
 
 @contextlib.contextmanager
 def viewer(*recordings: Path) -> Iterator[Any]:
-    """Open recordings in a headless viewer with a home of its own."""
+    """Open recordings in a headless viewer with a home folder of its own."""
     from rerun.experimental import ViewerClient
 
     with socket.socket() as free:
@@ -93,13 +93,13 @@ def show_tab(client: Any, tab: str) -> None:
 
 
 def picture_of(client: Any, path: Path) -> None:
-    """Save the whole window once the last change is drawn."""
+    """Save a picture of the whole window when the last change is drawn."""
     time.sleep(SETTLE_S)
     client.save_screenshot(str(path))
 
 
 def tabs(run: Path, out: Path) -> None:
-    """Save a picture of each tab, of the iteration at its first, second and last step."""
+    """Save a picture of each tab; save the tab Iteration at its first, second and last step."""
     import pandas as pd
 
     from stages.views.blueprint import tabs_of
@@ -120,7 +120,7 @@ def tabs(run: Path, out: Path) -> None:
 
 
 def report(run: Path, out: Path, height: int = 1500) -> None:
-    """Save the beginning of the report's page.
+    """Save a picture of the upper part of the report's page.
 
     Parameters
     ----------
@@ -136,10 +136,10 @@ def report(run: Path, out: Path, height: int = 1500) -> None:
 
 
 def drawn_from() -> str:
-    """Return a line each for the report and the recordings: SHA-256 of all sources that draw them.
+    """Return one line for the report and one for the recordings: the SHA-256 of all sources that draw it.
 
-    The digest changes when the pictures may change; tests/test_pictures.py compares it with that of the README's
-    pictures.
+    A digest changes whenever the pictures may change. tests/test_pictures.py compares it with the digest stored beside
+    the README's pictures.
     """
     digests = {}
     for kind, folder in SOURCES.items():
@@ -154,8 +154,8 @@ def drawn_from() -> str:
 def main() -> None:
     """Draw all pictures of a run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("run", type=Path)
-    parser.add_argument("out", type=Path)
+    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a finished run with report and recordings")
+    parser.add_argument("out", type=Path, metavar="OUT", help="folder of the pictures")
     options = parser.parse_args()
     if why := missing():
         sys.exit(why)
@@ -170,7 +170,7 @@ def main() -> None:
 
 
 def _lighten(path: Path) -> None:
-    """Save a picture as WebP, as wide as a README shows it and a tenth of the size."""
+    """Replace a picture by a WebP, as wide as a README shows it and a tenth of the size."""
     from PIL import Image
 
     image = Image.open(path).convert("RGB")

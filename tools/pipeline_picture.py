@@ -1,4 +1,4 @@
-"""The picture of the pipeline, drawn from what the stages declare.
+"""Draw a picture of the pipeline from the inputs and outputs that the stages declare.
 
 Usage: python -m tools.pipeline_picture OUT.svg
 """
@@ -21,7 +21,7 @@ RAW = {"ins": "INS", "laser": "laser", "mbes": "sonar"}
 
 
 def picture(path: Path) -> None:
-    """Draw the stages from top to bottom, arrows from earlier stages on the left, outputs on the right."""
+    """Draw the stages from top to bottom, with arrows from earlier stages on the left and outputs on the right."""
     stages = load()
     place = {name_of(stage): -STEP * k for k, stage in enumerate(stages)}
     with drawing_style():
@@ -55,7 +55,7 @@ def picture(path: Path) -> None:
 
 
 def _arrow(axis: Axes, start: float, end: float) -> None:
-    """Draw an arrow: straight to the next stage, round the left to a later one, wider to one farther away."""
+    """Draw an arrow: straight to the next stage, round the left to any later one; the farther, the wider."""
     steps = round((start - end) / STEP)
     ends: tuple[tuple[float, float], tuple[float, float]]
     if steps == 1:

@@ -1,9 +1,10 @@
-"""Whether the tests of residuals hold their level, and what they find.
+"""Measure the false alarms and the power of the residual tests on simulated sessions.
 
-Good sessions of several kinds tell how often one is rejected in which nothing is wrong; sessions with one fault tell
-whether it is found, and by its name. All run in memory as far as the verdict. Of each the parquet has the largest
-standardised excess of every variable, with the tolerance as it is (column ``u_…``) and with none (``bare_…``): without
-a tolerance the level is met closely enough to be measured at 5 %, which 0.1 % would need thousands of sessions for.
+Sessions of several kinds without any fault show how often the tests reject a good session. Sessions with one planted
+fault show whether the tests detect it and whether the reason names it. All sessions run in memory, up to the verdict.
+Each is a row of a Parquet file with the largest normalised mean residual of every variable, with the program's
+tolerance (columns ``u_…``) and without (``bare_…``). A test without tolerance has its nominal level, which some hundred
+sessions can measure at 5 %; 0.1 % would need thousands of sessions.
 
     python -m tools.residual_tests [--good 300] [--seeds 20] [--jobs 1] [--resume] [--only NAME ...]
 """
@@ -31,7 +32,7 @@ Raw = dict[str, NDArray[Any]]
 PATH = FOLDER / "residual_tests.parquet"
 BY = ("face", "angle", "step", "ping_2", "ping_3", "ping_4", "distance", "time", "pass", "drift")
 TILT_DEG = 0.254  # between the sectors of a real head
-APART_NS = 10 * 10**9  # a longer gap divides passes
+APART_NS = 10 * 10**9  # a longer gap separates two passes
 LEVELS = (0.001, 0.05)
 SLANTED = ("P1-0", "P1-1", "P1-2", "P3-0", "P3-1", "P3-2")
 TOPS = ("P1-0-top", "P1-1-top", "P3-0-top", "P3-1-top")
@@ -47,12 +48,12 @@ KINDS: dict[str, dict[str, Any]] = {
 
 @dataclass
 class World:
-    """The parts of a session that a fault changes.
+    """The parts of a simulated session that a fault may change.
 
     Attributes
     ----------
     number
-        Number of the session, by which faults vary.
+        Number of the session; faults vary with it.
     mbes
         Soundings as recorded.
     pool
@@ -85,7 +86,7 @@ class World:
         self.mbes["two_way_time_s"] = self.mbes["two_way_time_s"] + rows * 2 * by_m / self.mbes["sound_speed_m_s"]
 
     def mix(self, other: Raw, taken: Callable[[Raw], NDArray[np.bool_]]) -> None:
-        """Take the soundings of ``other`` that ``taken`` selects, in place of the session's own."""
+        """Replace the soundings that ``taken`` selects by those of ``other``."""
         own, others = ~taken(self.mbes), taken(other)
         both = {name: np.concatenate([self.mbes[name][own], other[name][others]]) for name in other}
         order = np.lexsort((both["beam"], both["ping"]))
@@ -94,7 +95,7 @@ class World:
 
 def _face(names: tuple[str, ...]) -> Callable[[World], str]:
     def plant(world: World) -> str:
-        """Put a face 20 mm farther out than the config has it."""
+        """Plant a face that stands 20 mm farther out than the config says."""
         name = names[world.number % len(names)]
         world.pool["as_built"] = {"faces": {name: -0.02}}
         return f"on face {name} "
@@ -121,7 +122,7 @@ def _pass_shifted(world: World) -> str:
     shift = np.array(world.truth["mbes"]["R_body_from_mbes"]).T @ [0.005, 0.0, 0.0]
     range_m = world.mbes["two_way_time_s"] * world.mbes["sound_speed_m_s"] / 2
     angle = world.mbes["angle_rad"]
-    x, z = range_m * np.sin(angle) - shift[0], -range_m * np.cos(angle) - shift[2]  # what is nearer to the wall
+    x, z = range_m * np.sin(angle) - shift[0], -range_m * np.cos(angle) - shift[2]  # of a sonar nearer to the wall
     world.mbes["two_way_time_s"] = np.where(rows, np.hypot(x, z) / range_m, 1.0) * world.mbes["two_way_time_s"]
     world.mbes["angle_rad"] = np.where(rows, np.arctan2(x, -z), angle)
     return f"in pass {number}"
@@ -129,7 +130,7 @@ def _pass_shifted(world: World) -> str:
 
 def _sectors(border_deg: float) -> Callable[[World], str]:
     def plant(world: World) -> str:
-        """Tilt the middle of the fan forward against its flanks, unrecorded in the file."""
+        """Tilt the middle of the fan forward against its flanks, without a record in the file."""
         tilted = world.again(np.array([np.radians(TILT_DEG), 0.0, 0.0]))
         world.mix(tilted, lambda raw: np.abs(np.degrees(raw["angle_rad"])) <= border_deg)
         return "steps by"
@@ -138,12 +139,12 @@ def _sectors(border_deg: float) -> Callable[[World], str]:
 
 
 def _by_turns(world: World) -> str:
-    """Tilt every other ping forward, as two frequencies in turn would, unrecorded in the file."""
+    """Tilt every second ping forward, as two alternating frequencies would, without a record in the file."""
     world.mix(world.again(np.array([np.radians(TILT_DEG), 0.0, 0.0])), lambda raw: raw["ping"] % 2 == 1)
     return "in one ping of 2"
 
 
-# each changes the session and returns the words that a reason must contain
+# each function changes the session and returns words that the reason must contain
 FAULTS: dict[str, Callable[[World], str]] = {
     "a slanted face 20 mm off": _face(SLANTED),
     "a top 20 mm too high": _face(TOPS),
@@ -159,7 +160,7 @@ Task = tuple[str, str, int]  # fault or "", kind, number
 
 
 def scenario_of(kind: str, number: int) -> dict[str, Any]:
-    """Return the scenario of one session, thinned, with its combination of coarse errors."""
+    """Return the scenario of a session, with thinned laser points and its combination of coarse errors."""
     scenario: dict[str, Any] = yaml.safe_load(DOCK.read_text()) if kind == "dock" else {"name": kind, **KINDS[kind]}
     keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
@@ -168,7 +169,7 @@ def scenario_of(kind: str, number: int) -> dict[str, Any]:
 
 
 def session_row(task: Task) -> dict[str, Any]:
-    """Return the row of a session: verdict, reasons, and the largest deviates of each variable."""
+    """Return the row of a session: verdict, reasons, and the largest normalised mean residual of each variable."""
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
@@ -219,12 +220,12 @@ def seed_of(task: Task) -> int:
 
 def read(path: Path) -> pd.DataFrame:
     """Return the rows that are already written."""
-    numbers = {f"{start}{by}": "" for start in ("u_", "bare_") for by in BY}  # none of a kind that was not judged
+    numbers = {f"{start}{by}": "" for start in ("u_", "bare_") for by in BY}  # empty where a variable was not tested
     return pd.read_csv(path, keep_default_na=False, na_values=numbers)
 
 
 def summary(rows: pd.DataFrame) -> str:
-    """Return two Markdown tables: false alarms at two levels, with and without the tolerance; then each fault."""
+    """Return two Markdown tables: false alarms at two levels, without and with the tolerance; then each fault."""
     from pipeline.maths.adjustment.mean_tests import joint_limit
 
     heads = [f"{100 * level:g} %, {tolerance}" for tolerance in ("tolerance 0", "as it is") for level in LEVELS]
@@ -246,9 +247,9 @@ def summary(rows: pd.DataFrame) -> str:
 
 
 def tasks_of(good: int, seeds: int) -> list[Task]:
-    """Return the sessions, of all kinds in turn, so that an interrupted campaign has some of each.
+    """Return the sessions of all kinds in turn, so that an interrupted campaign has sessions of each kind.
 
-    Faults are put into the first three kinds.
+    Sessions with a fault are of the first three kinds.
     """
     kinds = list(KINDS)
     of_good: list[Task] = [("", kinds[k % len(kinds)], k // len(kinds)) for k in range(good)]
@@ -259,11 +260,15 @@ def tasks_of(good: int, seeds: int) -> list[Task]:
 def main() -> None:
     """Simulate and calibrate the sessions, write their rows and print the summary."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--good", type=int, default=300, help="sessions in which nothing is wrong")
-    parser.add_argument("--seeds", type=int, default=20, help="sessions of each fault")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--resume", action="store_true", help="go on where an interrupted run of this code ended")
-    parser.add_argument("--only", nargs="*", help="beginnings of faults or kinds")
+    parser.add_argument("--good", type=int, default=300, help="number of sessions without a fault; default: 300")
+    parser.add_argument("--seeds", type=int, default=20, help="number of sessions for each fault; default: 20")
+    parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
+    parser.add_argument(
+        "--resume", action="store_true", help="continue an interrupted campaign; the program must be the same"
+    )
+    parser.add_argument(
+        "--only", nargs="*", metavar="NAME", help="faults or kinds, by the beginning of their names; default: all"
+    )
     options = parser.parse_args()
     PATH.parent.mkdir(parents=True, exist_ok=True)
     path = PATH.with_suffix(".csv")
@@ -276,7 +281,7 @@ def main() -> None:
     written = set(zip(done["fault"], done["seed"], strict=True))
     left = [task for task in tasks if (task[0], seed_of(task)) not in written]
     with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-        # each row is written as it comes: nothing is lost
+        # each row is written at once, so that an interruption loses none
         for number, row in enumerate(pool.imap(session_row, left), start=len(done)):
             pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
     rows = read(path)

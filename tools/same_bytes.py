@@ -1,12 +1,14 @@
-"""Test whether the tree as it is computes the same bytes as another commit.
+"""Test whether this checkout and another commit write the same bytes.
 
-A worktree of BASE simulates sessions of several kinds once; BASE and the tree as it is then run the same commands on
-copies of them, each in a folder of its own: ``run`` or ``laser``, ``check --json``, ``plan --yaml``, ``coarse --yaml``,
-``compare``, ``diff --json``, ``verify`` and ``history``. Compared are the SHA-256 of every Parquet file and document
-that these write and of what they print, the exit statuses, and ``calibration.json`` without ``software``. Not compared:
-``manifest.json``, which holds digests of the source, and what is drawn, except with ``--pages`` the HTML pages.
+A worktree of BASE simulates sessions of several kinds once. Then BASE and this checkout run the same commands on copies
+of them, each in a folder of its own: ``run`` or ``laser``, ``check --json``, ``plan --yaml``, ``coarse --yaml``,
+``compare``, ``diff --json``, ``verify`` and ``history``. The program compares the SHA-256 of every Parquet file and
+document that the commands write, the text that they print, their exit statuses, and ``calibration.json`` without
+``software``. It leaves out ``manifest.json``, which holds digests of the source, and everything that is drawn;
+``--pages`` includes the HTML pages.
 
-Each difference is a line: session, file, and for JSON and tables what differs in it. Status 1 if anything differs.
+Each difference is one line: kind of session, file, and the keys, columns or lines that differ. The exit status is 1 if
+anything differs.
 
     python -m tools.same_bytes BASE [--only NAME ...] [--pages] [--keep FOLDER]
 """
@@ -31,9 +33,9 @@ import yaml
 from tools.session_kinds import KINDS, PLAN, Kind
 
 ROOT = Path(__file__).parents[1]
-PASSED_OVER = ("manifest.json", "digests.json", ".lock")  # digests of the source; paths and times; a process
-ELAPSED = re.compile(r"\d s\b")  # a message that tells how long a stage took
-VARIABLE = re.compile(  # what differs between any two runs: the day of an edit, the commit, its digests, the folder
+PASSED_OVER = ("manifest.json", "digests.json", ".lock")  # digests of the source; paths and times; a process number
+ELAPSED = re.compile(r"\d s\b")  # a message with the duration of a stage
+VARIABLE = re.compile(  # differs between any two runs: the day of an edit, the commit, its digests, the folder
     r'(?<=date: ")\d{4}-\d\d-\d\d|\b[0-9a-f]{40}\b|(?<=calibration\.json", sha256: ")[0-9a-f]{64}'
     r"|/\S*/(base|here)/"
 )
@@ -116,7 +118,7 @@ def calibrate(tree: Tree, kind: Kind, folder: Path, pages: bool) -> None:
         calls |= {
             "plan": ("plan", "plan.yaml", "--session", "session", *config, "--yaml", "prediction.yaml"),
             "compare": ("compare", "runs/a", "session.truth.json"),
-            "again": again,  # with the mounts that coarse wrote, which are of another boat: a result, or one line
+            "again": again,  # with the mounts that coarse wrote, those of another boat: a result or one line
             "diff": ("diff", "runs/a", "runs/a", "--json"),
             "diff_text": ("diff", "runs/a", "runs/a"),
         }
@@ -128,14 +130,14 @@ def calibrate(tree: Tree, kind: Kind, folder: Path, pages: bool) -> None:
 
 
 def differences(kind: str, base: Path, here: Path, pages: bool) -> Iterator[str]:
-    """Yield a line for each file that differs between two folders in which the same commands ran.
+    """Yield a line for each file that differs between the folders of the two checkouts.
 
     Parameters
     ----------
     kind
         Name of the kind, with which the lines begin.
     base, here
-        The folders of BASE and of this tree.
+        The folders in which BASE and this checkout ran the commands.
     pages
         Whether drawn files are compared as well.
     """
@@ -200,7 +202,7 @@ def _write_text(path: Path, text: str) -> None:
 
 
 def compare(base: str, names: list[str], pages: bool, work: Path) -> list[str]:
-    """Run both trees on sessions of the kinds named and return the lines of ``differences``.
+    """Run both checkouts on sessions of these kinds and return the lines of ``differences``.
 
     Parameters
     ----------
@@ -236,10 +238,13 @@ def compare(base: str, names: list[str], pages: bool, work: Path) -> list[str]:
 def main() -> None:
     """Compare, print the differences, and end with status 1 if there are any."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("base", metavar="BASE", help="a commit")
-    parser.add_argument("--only", nargs="+", choices=KINDS, default=list(KINDS))
-    parser.add_argument("--pages", action="store_true", help="the HTML pages as well")
-    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep both trees' results here, to look into")
+    parser.add_argument("base", metavar="BASE", help="the commit to compare with")
+    parser.add_argument(
+        "--only", nargs="+", choices=KINDS, default=list(KINDS), metavar="NAME",
+        help=f"kinds of session: {', '.join(KINDS)}; default: all",
+    )  # fmt: skip
+    parser.add_argument("--pages", action="store_true", help="compare the HTML pages as well")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="new folder in which the results of both stay")
     options = parser.parse_args()
     if options.keep is not None:
         options.keep.mkdir(parents=True)

@@ -24,7 +24,7 @@ PLAN = {
 
 @dataclass(frozen=True)
 class Kind:
-    """A session to simulate, what is then changed in its YAML files, and the command that calibrates it."""
+    """A session to simulate, the changes to its YAML files, and the command that calibrates it."""
 
     scenario: dict[str, Any]
     base: str | None = None  # a scenario of configs/scenarios

@@ -54,8 +54,8 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: per sensor, the variance factor of the error common to all
     points of an interval (the laser's factor has already been applied to the INS's white noise); equations: of all
-    parameters, fixed ones included; fixed_mount: mount parameters that the observations could not give, and the sigma
-    with which each would have come out (rad or m).
+    parameters, fixed ones included; fixed_mount: mount parameters that the observations do not determine, with the
+    sigma that each would have had (rad or m).
     """
 
     state: State
@@ -102,7 +102,7 @@ def adjust_mount(
     Parameters
     ----------
     problem : CalibrationProblem
-        What is calibrated, and what is known of it.
+        The sensor to calibrate, and the prior information on it.
     streams : mapping of Stream
         Labelled points by sensor.
     settings : Adjust

@@ -91,7 +91,7 @@ def coarse_covariance(laser: Laser, settings: LaserFit) -> Array:
 
 
 def required_sigmas(coarse: Array, settings: LaserCalibration) -> Array:
-    """Return the sigmas (6,) with which the mount parameters must come out to be estimated.
+    """Return the largest sigmas (6,) with which the mount parameters are estimated, not fixed.
 
     They are within the verdict's limits, and below a share of the sigmas of the coarse mount, covariance (6, 6).
     """

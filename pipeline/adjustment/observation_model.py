@@ -130,7 +130,7 @@ class ObservationModel:
     sigmas: Mapping[str, SensorSigmas]
 
     def linearise(self, sensor: str, batch: Batch, values: CurrentValues) -> Observations:
-        """Return the observations of a batch, v freed of the drift and of the mean of its noise.
+        """Return the observations of a batch; v is reduced by the drift and by the mean of its noise.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What is calibrated, as a value: observation model, prior information and consider errors; here for the sonar."""
+"""The calibration problem: observation model, prior information and consider errors; here for the sonar."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -43,10 +43,10 @@ class PriorInformation:
 
 @dataclass(frozen=True)
 class CalibrationProblem:
-    """What is calibrated, and what is known of it.
+    """The sensor to calibrate, and the prior information on it.
 
-    model: turns points into observations; its coarse state says which sensor is calibrated; prior: what is known beside
-    the observations; consider: errors of the parameters that are fixed.
+    model: turns points into observations, and its coarse state says which sensor is calibrated; prior: the prior
+    information; consider: a-priori errors of the fixed parameters.
     """
 
     model: ObservationModel
@@ -146,7 +146,7 @@ def design_surface(target: TargetModel, family: Family) -> ObservedSurface:
 
 
 def _parallel_families(target: TargetModel, as_built: AsBuilt) -> ParallelPrior | None:
-    """Return the families that are parallel, within the angle by which they may be turned as built."""
+    """Return the prior information on parallel families: parallel within the angle of the target as built."""
     if not target.parallel:
         return None
     return ParallelPrior(target.parallel, max(float(np.radians(as_built.angle_sigma_deg)), LEAST_PARALLEL_RAD))

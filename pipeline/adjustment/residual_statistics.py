@@ -79,7 +79,7 @@ def residual_statistics(
     Parameters
     ----------
     problem : CalibrationProblem
-        What is calibrated, and what is known of it.
+        The sensor to calibrate, and the prior information on it.
     adjustment : MountAdjustment
         The adjusted values.
     streams : mapping of Stream
@@ -139,7 +139,7 @@ def _batch(
 
 
 def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, Array | Integers]]:
-    """Yield each variable by which residuals are sorted, and its value (n,) of each point."""
+    """Yield the name of each variable that sorts residuals into bins, and its values (n,)."""
     batch = observations.points
     own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)

@@ -43,7 +43,7 @@ def result_tables(
     Parameters
     ----------
     problem : CalibrationProblem
-        What is calibrated, with the coarse state and the errors of the fixed parameters.
+        The sensor to calibrate, with the coarse state and the errors of the fixed parameters.
     adjustment : MountAdjustment
         The adjusted values.
     statistics : ResidualStatistics

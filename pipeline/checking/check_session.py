@@ -28,7 +28,7 @@ ROUGHLY, SAMPLED, FINELY = 4_000, 20_000, 60_000  # rows of a sensor: to hit the
 
 @dataclass(frozen=True)
 class SessionCheck:
-    """What the files of a session hold, and what is wrong with it."""
+    """Content of a session's files, and the findings on the session."""
 
     files: tuple[SurveyedFile, ...]
     legs: tuple[Leg, ...]

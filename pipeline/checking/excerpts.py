@@ -131,7 +131,7 @@ def _pieces(file: BinaryIO, size: int, each: int, places: int, form: str) -> Ite
 
 
 def _cut(file: BinaryIO, start: int, count: int, form: str) -> Iterator[bytes]:
-    """Yield about so many bytes from a place on: whole records, or whole lines, where the format needs it."""
+    """Yield about ``count`` bytes from ``start`` on: whole records or whole lines, if the format needs it."""
     if form == "sbet":
         start, count = -(-start // SBET_RECORD) * SBET_RECORD, count // SBET_RECORD * SBET_RECORD
         data = read_at(file, start, count)

@@ -29,8 +29,8 @@ from pipeline.planning.setting import setting_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-RAN = 0.3  # of a pass; in less of it the sonar was not on
-POOR, NONE, FEWEST = 0.4, 0.15, 200  # of what is expected: worth a look, a fault; too few to tell
+RAN = 0.3  # share of a pass; below it the sonar counts as off
+POOR, NONE, FEWEST = 0.4, 0.15, 200  # shares of the expected number; fewest soundings for a test
 USUAL = "usual: 60 to 120 %"
 NEAR_M = 0.35  # a sounding with the coarse mount belongs to the face it is nearest to
 PINGS, BEAMS = 400, 100_000  # cast as rays, and rows from which the beams' angles are taken
@@ -139,7 +139,7 @@ def _nearest_faces(track: InsTrack, sample: PointSample, model: TargetModel) -> 
 
 
 def faces_missed(model: TargetModel, counts: SoundingCounts) -> Iterator[Finding]:
-    """Yield faces of which far too little was found: by the upper and the lower half of the water, else one by one."""
+    """Yield faces with far too few soundings: in the upper or the lower half of the water, else one by one."""
     middle = [(face.vertices_m[:, 2].min() + face.vertices_m[:, 2].max()) / 2 for face in model.faces]
     deep = np.array(middle) < (model.water_level_m + model.bounds()[0][2]) / 2
     remedy = "turn the head, widen its sector, or check its range and gates"

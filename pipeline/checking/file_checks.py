@@ -24,7 +24,7 @@ GEODETIC = ("latitude_rad", "longitude_rad", "height_m")
 
 
 def unreadable_files(files: Sequence[SurveyedFile], list_faults: Sequence[str]) -> Iterator[Finding]:
-    """Yield files that a reader refuses, that are cut off, or hold nothing of use; and what is wrong with the lists."""
+    """Yield files that a reader refuses, that are cut off or without usable records; and faults of the lists."""
     for words in list_faults:
         yield Finding("files", words)
     for file in files:
@@ -209,7 +209,7 @@ def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:
 
 
 def sensors_without_records(files: Sequence[SurveyedFile], session: SessionConfig) -> Iterator[Finding]:
-    """Yield sensors of which no file at all can be used."""
+    """Yield sensors without any usable file."""
     for sensor in SENSORS:
         if getattr(session, sensor) is not None and not any(file.records for file in files if file.sensor == sensor):
             yield Finding("no records", f"{sensor}: has no file that can be used; correct {sensor}.files or the files")

@@ -118,17 +118,17 @@ def survey_files(session: SessionConfig, folder: Path) -> tuple[list[SurveyedFil
 def _with_accuracy(
     files: Sequence[SurveyedFile], list_faults: Sequence[str], ins: Ins, folder: Path
 ) -> tuple[list[SurveyedFile], list[str]]:
-    """Give the first good file of the INS what its accuracy files say; refusals of these go to the faults."""
+    """Add the sigmas of the INS's accuracy files to its first good file, and their refusals to the faults."""
     good = next((k for k, file in enumerate(files) if file.sensor == "ins" and not file.complaint), None)
     if good is None:
         return list(files), list(list_faults)
     try:
         alone = ins.model_copy(update={"files": [_escaped(files[good].name)]})
         parts = [part for part in raw_parts("ins", alone, folder) if isinstance(part, SmrmsgPart)]
-        told = [thin_sigmas(chunk.sigmas) for part in parts for chunk in part.chunks()]
+        sigmas_by_chunk = [thin_sigmas(chunk.sigmas) for part in parts for chunk in part.chunks()]
     except (RawDataError, ConfigError) as error:
         return list(files), [*list_faults, str(error)]
-    sigmas = _joined([columns for columns in told if columns])
+    sigmas = _joined([columns for columns in sigmas_by_chunk if columns])
     return [replace(file, sigmas=sigmas) if k == good else file for k, file in enumerate(files)], list(list_faults)
 
 

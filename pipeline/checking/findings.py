@@ -3,21 +3,21 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Severity = Literal["fault", "look"]  # look: may be meant, and does not change the status
+Severity = Literal["fault", "look"]  # look: may be intended, and does not change the exit status
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong, where, with which value, and what to do.
+    """A finding: the fault, its place, the value, and the remedy.
 
     Attributes
     ----------
     question : str
-        The question that led to it: a word for programs.
+        The check that found it: a word for programs.
     words : str
         The line for people.
     severity : {"fault", "look"}
-        Whether it has to be mended, or only looked at.
+        ``fault``: must be mended; ``look``: may be intended.
     """
 
     question: str

@@ -1,4 +1,4 @@
-"""Heights by which the sensors' points miss the target.
+"""Vertical offsets between the sensors' points and the target.
 
 If both sensors miss it by the same height, target.origin.height_m is wrong. If one of them does, the z of its mount is
 wrong; where others have placed the laser's points, the surface that their heights are above.
@@ -41,7 +41,7 @@ class Fit:
     sensor : str
         ``laser`` or ``mbes``.
     z_m : float
-        Of its mount.
+        Height in its mount, ``mount.z_m``.
     sided, free : ndarray, shape (k,)
         Agreement at each of SHIFTS_M as a share of the best: on the sensor's own side of the water, and anywhere.
     georeferenced : bool
@@ -79,12 +79,12 @@ class Fit:
 def height_findings(
     track: InsTrack, samples: Sequence[PointSample], closest: ClosestSurface, water_m: float, height_m: float
 ) -> Iterator[Finding]:
-    """Yield the height that is wrong, where points miss the target by one.
+    """Yield the wrong height where the points of a sensor are offset vertically from the target.
 
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     samples : Sequence[PointSample]
         Points of each sensor.
     closest : ClosestSurface

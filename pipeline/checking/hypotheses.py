@@ -1,4 +1,4 @@
-"""What may be wrong with a sensor's points: the clock, unit or sign with which they would hit the target."""
+"""Hypotheses on a sensor's points: the clock, unit or sign that would bring them onto the target."""
 
 from dataclasses import dataclass
 
@@ -52,7 +52,7 @@ def hypotheses(track: InsTrack, sample: PointSample, closest: ClosestSurface) ->
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     sample : PointSample
         The sensor's points.
     closest : ClosestSurface

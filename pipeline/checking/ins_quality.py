@@ -15,7 +15,7 @@ from pipeline.maths.geometry.passes import pass_of
 from pipeline.readers.novatel import STATES
 
 Mask = NDArray[np.bool_]
-SHARE = 0.1  # of the records: fewer in a poorer state are a moment
+SHARE = 0.1  # of the records: a smaller share in a poor state is accepted as brief
 GOOD_STATES = {"status": ("INS_SOLUTION_GOOD",), "type": ("INS_RTKFIXED", "PPP", "INS_PPP")}
 REMEDIES = {
     "INS_ALIGNMENT_COMPLETE": "its attitude has not settled: sail figures of eight before the first pass until it says "
@@ -92,10 +92,10 @@ def _counted(kind: str, numbers: NDArray[np.uint8]) -> Counter[str]:
 
 
 def quality_findings(quality: InsQuality) -> Iterator[Finding]:
-    """Yield what is poor in an INS's log.
+    """Yield the poor states and the large sigmas in an INS's log.
 
-    A poor state within the passes, and sigmas with which no mount can be found, are faults. What may yet do, and a
-    state of the log as a whole, where the passes are not known, is to be looked at.
+    A poor state within the passes is a fault, and so are sigmas too large for a calibration. Sigmas that may still do
+    are only worth a look, and so is a poor state of the whole log, if the passes are not known.
     """
     where = "in the passes" if quality.of_passes else "in the whole log"
     judged = False

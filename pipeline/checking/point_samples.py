@@ -126,7 +126,7 @@ def sample_points(
     sensor : str
         ``laser`` or ``mbes``.
     track : InsTrack
-        Of the INS; its frame is that of georeferenced points.
+        Track of the INS; its frame is that of georeferenced points.
     rows : int
         About how many.
     """

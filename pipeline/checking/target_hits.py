@@ -1,4 +1,4 @@
-"""Do the points fall onto the target? If not: with which clock, unit or sign they would."""
+"""Test whether the points fall onto the target; if not, which clock, unit or sign would bring them there."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -24,7 +24,7 @@ LEAP_WITHIN_S = 1.5  # an origin half a metre off along the track looks like a s
 def points_off_target(
     track: InsTrack, samples: Sequence[PointSample], closest: ClosestSurface, pool: PoolConfig
 ) -> Iterator[Finding]:
-    """Yield what is wrong with each sensor whose points miss the target.
+    """Yield the fault of each sensor whose points miss the target.
 
     A clock that is off by the same against both sensors is the INS's. A height that both sensors are off by is the
     target's, whatever a mount might explain of it.
@@ -32,7 +32,7 @@ def points_off_target(
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     samples : Sequence[PointSample]
         Points of each sensor.
     closest : ClosestSurface

@@ -32,13 +32,13 @@ class Leg:
     start_ns, end_ns : int
         Times at which it begins and ends.
     distance_m : float
-        Of the INS from the target's front; positive on the side to which the front looks.
+        Distance of the INS from the target's front; positive on the side to which the front looks.
     speed_m_s : float
         Along the target.
     heading_swing_deg : float
         Standard deviation of the heading.
     height_m : float
-        Of the INS in the target frame.
+        Height of the INS in the target frame.
     starboard : bool
         Whether the target is to starboard.
     ran : Mapping[str, float]

@@ -106,8 +106,8 @@ def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
     if distances and np.ptp(distances) < ALIKE_M:
         yield Finding(
             "distances",
-            f"all passes are {np.mean(distances):.1f} m from the wall (within {np.ptp(distances):.1f} m): yaw and "
-            "lever arm y are told apart by different distances; sail some more, 2 m nearer or farther",
+            f"all passes are {np.mean(distances):.1f} m from the wall (within {np.ptp(distances):.1f} m): only "
+            "different distances separate yaw from lever arm y; sail some more passes, 2 m nearer or farther",
             "look",
         )
 
@@ -125,7 +125,7 @@ def azimuth_remedy(track: InsTrack, place: TargetPlace) -> str:
 
 
 def missing_pass_findings(track: InsTrack, files: Sequence[SurveyedFile]) -> Iterator[Finding]:
-    """Yield passes of which one sensor has nothing, or not all."""
+    """Yield passes that one sensor misses, or does not cover in full."""
     there = {file.sensor for file in files if file.records} - {file.sensor for file in files if not file.ended}
     for leg in track.legs:
         if not leg.good or not {"laser", "mbes"} <= there:
@@ -149,7 +149,7 @@ def ins_hole_findings(
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     epochs : dict[str, Times]
         Times at which each sensor ran.
     max_interval_s : float

@@ -16,14 +16,14 @@ Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by se
 
 @dataclass(frozen=True)
 class TrialCalibration:
-    """Tables of a trial calibration; None where it got no farther.
+    """Tables of a trial calibration; None after the stage at which it stopped.
 
     Attributes
     ----------
     soundings : Stream
         Soundings, each with the face that it is on.
     target_pose, provisional_mount, freed : pd.DataFrame or None
-        The pose of the target, the mount that the labels are made with, and the adjustment's ``freed``.
+        The pose of the target, the mount for labelling, and the adjustment's single-parameter tests.
     """
 
     soundings: Stream = EMPTY_STREAM

@@ -42,7 +42,7 @@ def pose_findings(
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        Track of the INS.
     laser : PointSample
         The laser's points.
     pose : pd.DataFrame

@@ -153,14 +153,14 @@ def _contradictions(assessment: MarksAssessment) -> list[str]:
     words = []
     for suspect in snooped.suspects:
         rivals = "".join(f" or {_mark_name(assessment, test)}" for test in suspect.rivals)
-        which = " (which of them, the marks do not tell)" if suspect.rivals else ""
+        which = " (the marks do not show which of them)" if suspect.rivals else ""
         words.append(f"mark {_mark_name(assessment, suspect.test)}{rivals} does not fit{which}")
     if not snooped.agrees:
         remaining = [test for test in snooped.last_tests if test.frame != SURVEY]
         likely = [test for test in remaining if test.ratio > 1] or remaining[:3]
         names = ", ".join(f"{_mark_name(assessment, test)} {_normalised(test):.1f}" for test in likely[:MOST_NAMED])
         words.append(
-            f"{'still ' if words else ''}the marks do not agree, and which is wrong cannot be pinned: of three in a "
-            f"frame none can, and sigmas that are too small look alike; worst first (normalised): {names}"
+            f"{'still ' if words else ''}the marks do not agree, and the wrong one cannot be identified: three marks "
+            f"in a frame are too few for that, or sigmas are too small; worst first (normalised): {names}"
         )
     return words

@@ -123,7 +123,7 @@ def _replace_session(folder: Path, old: str, new: str) -> Path:
     kept = _keep(folder, old.encode("utf-8"))
     try:
         write_bytes(folder / "session.yaml", new.encode("utf-8"))
-    except BaseException:
+    except BaseException:  # whatever stops it, Ctrl-C included
         kept.unlink(missing_ok=True)
         raise
     return kept
@@ -142,7 +142,7 @@ def _keep(folder: Path, content: bytes) -> Path:
                     file.write(content)
                     file.flush()
                     os.fsync(file.fileno())
-            except BaseException:
+            except BaseException:  # whatever stops it, Ctrl-C included
                 path.unlink(missing_ok=True)
                 raise
             return path

@@ -179,5 +179,5 @@ def _sensor_of(name: str, folder: Path) -> Sensor | None:
     try:
         path = _path(name, folder)
         return load_instrument(path).sensor if path else None
-    except ConfigError:  # told when it is asked for
+    except ConfigError:  # reported when a session names the preset
         return None

@@ -40,14 +40,14 @@ Covariance = Annotated[  # of (ε about body x, y, z; lever arm x, y, z), R_true
 
 
 class MountOrigin(Model):
-    """Where a mount comes from: what poolcal has written beside it."""
+    """Origin of a mount, as poolcal has written it beside the mount."""
 
     method: Literal["coarse", "fine"]
     file: Annotated[str, Field(max_length=300)]
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
     software: Annotated[str, Field(max_length=100)]
-    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # of the six what a fine calibration left as it was
+    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # mount parameters that a fine calibration kept fixed
     mount: Mount | None = None  # as it was written: mount_covariance belongs to no other
 
 

@@ -103,7 +103,7 @@ class Adjust(Model):
     robust_k1: Annotated[float, Field(ge=0.5, le=1000)] = 6.0  # no weight above
     moment_s: Annotated[float, Field(ge=0.001, le=1000)] = 0.1  # observations within it share the INS's noise
     test_level: Annotated[float, Field(gt=0, lt=0.5)] = 0.001
-    test_tolerance_m: SigmaM = 0.003  # mean residual, step or difference of passes that is not held against a session
+    test_tolerance_m: SigmaM = 0.003  # largest mean residual, step or difference of passes that is accepted
 
     @model_validator(mode="after")
     def _ordered(self) -> "Adjust":
@@ -113,7 +113,7 @@ class Adjust(Model):
 
 
 class LaserFit(Model):
-    """What is known where the laser itself is calibrated: of the target, and of the coarse mount."""
+    """Prior information for the calibration of the laser itself: on the target and on its coarse mount."""
 
     face_sigma_deg: SigmaDeg = 0.02  # each family of faces against the design, about either axis
     face_sigma_m: SigmaM = 0.002  # and along its normal
@@ -122,7 +122,7 @@ class LaserFit(Model):
     azimuth_sigma_deg: SigmaDeg | None = None  # of target.azimuth_deg; null: not surveyed
     coarse_sigma_deg: SigmaDeg = 0.5  # of each coarse angle, where laser.mount_covariance does not say
     coarse_sigma_m: SigmaM = 0.05
-    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # one that comes out no surer than this of coarse is held
+    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # fixed if its sigma exceeds this share of the coarse one
 
 
 class VerdictLimits(Model):

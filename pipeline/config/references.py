@@ -26,14 +26,14 @@ class CastUsed(Model):
     file: Annotated[str, Field(max_length=1000)]  # in the session folder
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     kind: Annotated[str, Field(max_length=50)]
-    number: Annotated[int, Field(ge=1)]  # which of so many in the file
-    casts: Annotated[int, Field(ge=1)]
+    number: Annotated[int, Field(ge=1)]  # of the cast, in a file with several
+    casts: Annotated[int, Field(ge=1)]  # number of casts in the file
     taken: Annotated[str, Field(max_length=50)] | None  # by the file, whose time zone is not known
     place_deg: tuple[float, float] | None  # latitude, longitude
     rows: int
     left_out: dict[str, int]  # by reason
     first_m: float
     last_m: float
-    tolerance_m_s: float  # within which the depths that were kept have all rows, or their means
-    averaged_m: float  # over so much of depth rows that scatter were averaged first; 0: not
+    tolerance_m_s: float  # largest distance of the rows, or of their means, from the depths that were kept
+    averaged_m: float  # interval of depth over which scattering rows were averaged first; 0: not averaged
     scatter_m_s: float  # of the rows about what was kept, RMS

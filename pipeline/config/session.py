@@ -122,7 +122,7 @@ class Mbes(Model):
     max_records: MaxRecords = None
     mount: Mount
     mount_origin: MountOrigin | None = None
-    mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
+    mount_covariance: Covariance | None = None  # for information: the adjustment does not use it
     sound_speed_m_s: SoundSpeed | None = None
     svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
     svp_number: Annotated[int, Field(ge=1, le=10_000)] | None = None  # which cast of a file that holds several

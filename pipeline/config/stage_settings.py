@@ -7,7 +7,7 @@ names of session.yaml, and so do the reasons why a stage is run again.
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 
 from pydantic import BaseModel
 
@@ -16,7 +16,10 @@ from pipeline.config.pool import LaserFit, PoolConfig
 from pipeline.config.quantities import Model
 from pipeline.config.session import SessionConfig
 
-C = TypeVar("C")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+C = TypeVar("C", bound="DataclassInstance")
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -96,7 +99,7 @@ def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:
         Every setting by its name, of :func:`settings_by_name`.
     """
     annotations = get_type_hints(config)
-    names = [field.name for field in fields(config)]  # type: ignore[arg-type]
+    names = [field.name for field in fields(config)]
     return config(**{name: _as_annotated(annotations[name], settings[name]) for name in names})
 
 

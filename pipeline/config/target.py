@@ -82,8 +82,11 @@ class FaceSettings(Model):
     role: Literal["P1", "P2", "P3"] | None = None  # in the patent's steps
 
 
+RelationKind = Literal["same_plane", "distance", "height", "parallel"]
+
+
 class RelationSettings(Model):
-    """One of four things known of some faces; ``name``: of the family that they make."""
+    """One of four relations between faces; ``name`` is that of the family that they form."""
 
     same_plane: FaceNames | None = None
     distance: FaceNames | None = None  # parallel, as far apart as the corners say
@@ -98,12 +101,12 @@ class RelationSettings(Model):
         return self
 
     @property
-    def given(self) -> dict[Literal["same_plane", "distance", "height", "parallel"], tuple[str, ...]]:
-        """The faces by the kind of relation; one entry."""
-        kinds = {
+    def given(self) -> dict[RelationKind, FaceNames]:
+        """Names of the faces, under the kind of their relation: a dictionary with one entry."""
+        kinds: dict[RelationKind, FaceNames | None] = {
             "same_plane": self.same_plane, "distance": self.distance, "height": self.height, "parallel": self.parallel,
         }
-        return {kind: names for kind, names in kinds.items() if names is not None}  # type: ignore[misc]
+        return {kind: names for kind, names in kinds.items() if names is not None}
 
 
 class Faces(Model):

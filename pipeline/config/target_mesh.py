@@ -41,7 +41,7 @@ def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
     if not isinstance(mesh, str) or Path(mesh).is_absolute() or ".." in Path(mesh).parts or set(mesh) & {"\\", "\0"}:
         raise ConfigError(f"{where}: must name a file beside this one, or in a folder beside it")
     if not isinstance(given, dict) or not all(isinstance(value, dict) for value in given.values()):
-        raise ConfigError(f"{path}: target.faces: must be a mapping of names to what is said of each; correct it")
+        raise ConfigError(f"{path}: target.faces: must be a mapping of each face's name to its settings; correct it")
     found = dict(_outlines(path.parent / mesh, where))
     unknown = [key for key, value in given.items() if "corners" not in value and key not in found]
     if unknown:

@@ -85,6 +85,6 @@ def _loaded(text: str, path: Path, load: Callable[[_StrictLoader], Any]) -> Any:
         raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; correct the file") from error
     except Exception as error:  # the library alone runs here, and raises anything at a value it cannot read
         raise ConfigError(
-            f"{path}: not valid YAML: a value is not what it is said or seems to be ({type(error).__name__}: {error}); "
-            "put it in quotes, and take tags such as !!float out"
+            f"{path}: not valid YAML: a value is not of the type that its tag or form announces "
+            f"({type(error).__name__}: {error}); put it in quotes, and take tags such as !!float out"
         ) from error

@@ -4,7 +4,7 @@ MOUNT_NAMES = ("rotation_x", "rotation_y", "rotation_z", "lever_arm_x", "lever_a
 MOUNT_WORDS = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # in the same order
 N_MOUNT = len(MOUNT_NAMES)
 
-PARAMETERS = (  # as people list them: name, place among the six, setting, unit
+PARAMETERS = (  # as people list them: name, index in MOUNT_NAMES, setting, unit
     ("roll", 1, "roll_deg", "deg"),
     ("pitch", 0, "pitch_deg", "deg"),
     ("yaw", 2, "yaw_deg", "deg"),

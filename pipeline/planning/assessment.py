@@ -1,4 +1,4 @@
-"""A plan assessed: predicted sigmas, usable points, what is lacking; and the better list of passes within a budget."""
+"""Assessment of a plan: predicted sigmas, usable points, gaps, and the better list of passes within a budget."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -37,12 +37,12 @@ class Accuracy:
     passes : tuple[Pass, ...]
         The list.
     predicted : PredictedPasses
-        What they will tell.
+        Prediction for these passes.
     random, total : ndarray, shape (6, 6)
-        Covariances of the mount (rad, m): from noise alone, and with the consider parameters; NaN where a direction is
-        left open.
+        Covariances of the mount (rad, m): from noise alone, and with the consider parameters; NaN where a direction
+        is undetermined.
     solution : Solution
-        Of the normal equations.
+        Solution of the normal equations.
     """
 
     passes: tuple[Pass, ...]
@@ -63,20 +63,20 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class PlanAssessment:
-    """What a plan will give.
+    """The assessment of a plan.
 
     Attributes
     ----------
     setting : PredictionSetting
         Target and instruments.
     given : Accuracy
-        Of the passes as the plan lists them.
+        Accuracy of the passes as the plan lists them.
     gaps : list[str]
-        What these passes lack, in words.
+        Sentences on the gaps in the geometry of these passes.
     remedy : str
-        What to sail besides, in words.
+        Sentence on the passes to sail besides.
     better : Accuracy or None
-        Of the better list, where the plan has candidates and a budget.
+        Accuracy of the better list, where the plan has candidates and a budget.
     """
 
     setting: PredictionSetting
@@ -87,7 +87,7 @@ class PlanAssessment:
 
     @property
     def weakest(self) -> str:
-        """Which mount parameters are hardest to tell apart, in words; empty where there is no result."""
+        """Sentence on the most strongly correlated two mount parameters; empty where there is no result."""
         return "" if self.given.solution.deficiency else weakest_direction(self.given.random)
 
 
@@ -198,10 +198,10 @@ def soundings_by_family(setting: PredictionSetting, accuracy: Accuracy) -> dict[
 
 
 def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], seconds: float) -> Accuracy | None:
-    """Take pass after pass the candidate that brings most for its time; None where there is time for none.
+    """Return the list that takes pass after pass the candidate with the largest gain for its time; None if none fits.
 
-    A candidate may be taken more than once. What is brought down is the mean square of the six sigmas, angles against
-    lengths as the verdict's usual limits.
+    A candidate may be taken more than once. The gain is the decrease of the mean square of the six sigmas, each divided
+    by the verdict's usual limit.
     """
     setting, free, turn_s = adjustment.setting, adjustment.free, adjustment.turn_s
     predicted = [predict(setting, [candidate], phases=1) for candidate in candidates]
@@ -233,14 +233,14 @@ def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], sec
 
 
 def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: VerdictLimits) -> dict[str, float]:
-    """Return each total sigma over the verdict's limit, by parameter; NaN where a direction stays open.
+    """Return each total sigma over the verdict's limit, by parameter; NaN where a direction is undetermined.
 
     Parameters
     ----------
     setting : PredictionSetting
         Target and instruments.
     accuracy : Accuracy
-        Of a list of passes.
+        Accuracy of a list of passes.
     limits : VerdictLimits
         The limits.
     """

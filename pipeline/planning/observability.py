@@ -21,14 +21,14 @@ TWICE = 2  # passes there
 VAGUE = 1.0  # rad or m, of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 HORIZONTAL = (
-    "the sonar sees no horizontal face: only the boat's rolling and pitching tell its height, and a still boat tells "
-    "nothing"
+    "the sonar sees no horizontal face: only the boat's rolling and pitching determine its height, and a still "
+    "boat leaves it open"
 )
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the passes of a session, or of a plan, cover.
+    """The geometry that the passes of a session, or of a plan, cover.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Coverage:
     level : Collection[str]
         The families that are horizontal.
     speed_m_s, heading_swing_deg : float
-        Of a usual pass; the swing is an amplitude.
+        Speed and amplitude of the heading's swing in a usual pass.
     """
 
     distances_m: Sequence[float]
@@ -51,7 +51,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class GeometryAdvice:
-    """What the passes lack, each in words (``gaps``), and what to sail, with what it would bring (``remedy``)."""
+    """Sentences on gaps in the geometry of the passes (``gaps``) and on the gain of further passes (``remedy``)."""
 
     gaps: list[str]
     remedy: str
@@ -60,24 +60,24 @@ class GeometryAdvice:
 def geometry_advice(
     setting: PredictionSetting, coverage: Coverage, normal: Array, solution: Solution
 ) -> GeometryAdvice:
-    """Return what the passes lack, and which passes would help.
+    """Return the gaps in the geometry of the passes, and the passes that would close them.
 
     Parameters
     ----------
     setting : PredictionSetting
         Target and instruments.
     coverage : Coverage
-        What the passes cover.
+        Geometry that the passes cover.
     normal : ndarray, shape (u, u)
         Their normal equations (rad, m).
     solution : Solution
-        Of these equations.
+        Solution of these equations.
     """
     determined = _Determined(normal, solution.estimated.tolist())
     gaps, sigma = _gaps(coverage), determined.sigmas()
     pair = None if solution.deficiency else correlated_pair(solution.covariance[:N_MOUNT, :N_MOUNT])
     if not (gaps or np.any(sigma > WANTED)):
-        return GeometryAdvice([], "")  # where all are sure enough, two that move together do no harm
+        return GeometryAdvice([], "")  # a correlation does no harm where all sigmas are small enough
     choice = range(N_MOUNT) if pair is None else pair[:2]
     parameter = max(choice, key=lambda k: sigma[k] / WANTED[k])
     return GeometryAdvice(gaps, _remedy(setting, coverage, determined, parameter))
@@ -85,7 +85,7 @@ def geometry_advice(
 
 @dataclass(frozen=True)
 class _Determined:
-    """What the passes determine: normal equations (u, u), and the indices of the estimated parameters."""
+    """Information of the passes: normal equations (u, u), and the indices of the estimated parameters."""
 
     normal: Array
     free: list[int]
@@ -93,8 +93,7 @@ class _Determined:
     def sigmas(self) -> Array:
         """Return the sigmas of the mount parameters (6,), rad and m.
 
-        Of every parameter :data:`VAGUE` is known before any pass, so that they are finite where the data leave all
-        open.
+        Every parameter has the a-priori sigma :data:`VAGUE`, so that the sigmas are finite even without any pass.
         """
         prior = np.zeros(len(self.normal))
         prior[self.free] = VAGUE**-2
@@ -107,13 +106,13 @@ class _Determined:
 
 
 def _gaps(coverage: Coverage) -> list[str]:
-    """Return what the passes lack, each in words."""
+    """Return a sentence for each gap in the geometry of the passes."""
     there = {family for family, count in coverage.soundings.items() if count}
     upright = [family for family in coverage.soundings if family not in coverage.level]
     if len(there) == 1 and len(upright) > 1 and there <= set(upright):
         (family,) = there
         side = SIDES.get(family, family).removesuffix(f" ({family})")
-        return [f"the sonar sees {side} alone: nothing tells where it is along it, or how high"]
+        return [f"the sonar sees {side} alone: its place along it and its height are undetermined"]
     gaps = []
     missing = [SIDES.get(family, family) for family in upright if family not in there]
     if missing:
@@ -124,7 +123,7 @@ def _gaps(coverage: Coverage) -> list[str]:
     if len(coverage.distances_m) == 1:
         gaps.append(f"one pass alone has soundings, at {low:.1f} m: nothing shows whether another would agree")
     elif coverage.distances_m and high - low < NEAR_M:
-        gaps.append(f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are hard to tell apart")
+        gaps.append(f"all passes lie at {low:.1f} to {high:.1f} m, where yaw and lever arm y are strongly correlated")
     return gaps
 
 

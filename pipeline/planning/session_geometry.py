@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def sailed_plan(files: pd.DataFrame) -> Plan:
-    """Return a plan with the rates of a session's files (table ``files``), by which further passes are predicted."""
+    """Return a plan with the rates of a session's files (table ``files``), for the prediction of further passes."""
     rates = files.groupby("sensor")["rate_hz"].median()
     usual = Plan(passes=(Pass(distance_m=1.0),))
     return usual.model_copy(

@@ -7,7 +7,7 @@ Units stand in the names, in brackets, or in the line below; without units, m an
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import date, datetime, time
 
 from pipeline.errors import RawDataError
 from pipeline.readers.cast_values import NAN, DepthAndSpeed, RecordedCast, is_number, number_of, place_of
@@ -164,7 +164,8 @@ def _time_in(lines: Sequence[str]) -> datetime | None:
             digits = re.search(r"(\d{4})[-/](\d\d)[-/](\d\d)[ T,]+(\d\d):(\d\d):(\d\d)", line)
             if digits and zone in line.lower() and re.search(r"cast|time|date", line, re.I):
                 try:
-                    return datetime(*(int(part) for part in digits.groups()))  # type: ignore[arg-type]
+                    year, month, day, hour, minute, second = map(int, digits.groups())
+                    return datetime.combine(date(year, month, day), time(hour, minute, second))
                 except ValueError:
                     continue
     return None

@@ -35,5 +35,5 @@ def refuse_claim(claimed: int, size: int, most: int | None, sensor: str, name: s
     limit = f"more than {RECORDS_PER_BYTE} a byte" if most is None else f"{sensor}.max_records is {most}"
     raise RawDataError(
         f"{name}: claims {claimed} records in {size} bytes, {limit}: it is damaged, or not what it seems; export it "
-        f"again, or, if it really holds so many, write {sensor}.max_records: {max(claimed, 0)} in session.yaml"
+        f"again, or, if it really has that many, write {sensor}.max_records: {max(claimed, 0)} in session.yaml"
     )

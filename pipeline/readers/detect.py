@@ -35,7 +35,7 @@ from pipeline.readers.r2sonic_packets import BTH0, OTHER_PACKETS, packet_size
 from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.table_columns import csv_header
 
-HEAD_BYTES = 65_536  # of a file, by which its kind is known
+HEAD_BYTES = 65_536  # of a file, enough to recognise its kind
 
 _MAGICS = ((0, b"LASF", LAS), (0, b"PAR1", PARQUET), (0, b"ASTM-E57", E57), (8, b"GSF-v", GSF))
 RDBX = FileKind("a RIEGL .rdbx file", advice=f"{unread_formats.EXPORT_LAS} (RiSCAN PRO or RiPROCESS)")

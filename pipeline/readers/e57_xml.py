@@ -59,8 +59,9 @@ def _refuse_fetching(xml: bytes, name: str) -> None:
     reference = FETCHING.search(xml)
     if reference is not None:
         raise RawDataError(
-            f"{name}: its XML part has {reference[0].decode()!r}, by which it could read other files of this computer "
-            "and send them away; no scanner writes that: find out where the file comes from, and export it again"
+            f"{name}: its XML part has {reference[0].decode()!r}, through which it could read other files of "
+            "this computer and send them away; no scanner writes that: find out where the file comes from, and export "
+            "it again"
         )
     text = xml.removeprefix(b"\xef\xbb\xbf")
     if not _is_utf8(text) or (text.startswith(b"<?xml") and DECLARATION.match(text) is None):

@@ -73,7 +73,7 @@ def names_and_units(names: str, units: str | None, file: str) -> HeaderColumns:
     Raises
     ------
     RawDataError
-        Units stand under no name, or it cannot be told to which name they belong.
+        Units stand under no name, or the name to which they belong is ambiguous.
     """
     words = _words(names)
     printed = [word for word, _ in words]

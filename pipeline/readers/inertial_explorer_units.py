@@ -60,7 +60,7 @@ def complete_units(header: HeaderColumns, row: str) -> list[str]:
     Returns
     -------
     list of str
-        Units by column; "?dy": a date whose day and month cannot be told apart.
+        Units by column; "?dy": a date in which day and month are ambiguous.
     """
     filled = []
     for column, unit in zip(header.names, header.units, strict=True):

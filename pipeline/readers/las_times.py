@@ -67,7 +67,7 @@ def refuse_wrong_time_type(seconds: NDArray[np.float64], name: str, adjusted: bo
 
 
 def _refuse(name: str, first: float, adjusted: bool, declared: LasTime, likely: bool) -> None:
-    """Refuse times, the first of which is ``first``; ``likely``: they are possible as the other type."""
+    """Refuse times that begin with ``first``; ``likely``: they are possible as the other type."""
     source = "its header" if declared is None else f"laser.time: {declared} in session.yaml"
     other = f"it seems to be {_TITLES[not adjusted]}" if likely else "it is neither of the two times that LAS has"
     remedy = "export it again with GPS time stamps"

@@ -12,7 +12,7 @@ from pipeline.errors import RawDataError
 from pipeline.readers.row_checks import keep_possible_soundings, latency_ns, possible_ns
 from pipeline.readers.row_filter import MBES_COLUMNS, RowFilter, chunk, no_rows
 
-CHUNK_SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
+CHUNK_SOUNDINGS = 131_072  # minimum of a chunk; it has at most one ping more
 CHUNK_PINGS = 8_192
 MAX_BEAMS = np.iinfo(np.int16).max  # of a ping: the type of the column beam
 NO_TILT_DEG = 0.005  # a sector is not tilted if its tilt is no larger

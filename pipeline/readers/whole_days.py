@@ -24,7 +24,7 @@ class WholeDays:
 def whole_days_apart(
     ins: tuple[int, int], sensor: tuple[int, int], fits: Callable[[int], bool]
 ) -> WholeDays | None:
-    """Find the whole days, fewer than a week, by which a sensor's times must move to meet those of the INS.
+    """Return the shift in whole days, less than a week, that brings a sensor's times onto those of the INS.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether the INS drifts farther than the figures that the session or its files give."""
+"""Test whether the INS drifts farther than the sigmas in session.yaml or in its files allow."""
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,7 @@ from pipeline.report.reason_codes import ReasonCode, Statement
 MAX_DRIFT_RATIO = 1.2  # estimated drift over its sigma: more is a drift that the figures do not allow
 NO_DRIFT = Statement(
     ReasonCode.INS_DRIFT_NOT_GIVEN,
-    "ins.drift concedes the INS no drift at all: give its figures before anything else is looked for",
+    "ins.drift allows the INS no drift at all: give its figures before you look for any other cause",
 )
 
 
@@ -36,6 +36,6 @@ def check_ins_drift(drift: pd.DataFrame, allowed: Drift, source: str = "ins.drif
         return None
     return Statement(
         ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
-        f"the INS drifts at least {ratio:.1f} times as far as {source}: give its figures before anything else is "
-        "looked for",
+        f"the INS drifts at least {ratio:.1f} times as far as {source}: give its figures before you look for "
+        "any other cause",
     )

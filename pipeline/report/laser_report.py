@@ -51,7 +51,7 @@ def _advice(fixed: Mapping[str, float]) -> str:
         for name, sigma in fixed.items()
     ]
     return (
-        f"{', '.join(with_sigmas)} {verb} held at the coarse {values}: this target and these passes cannot give "
-        f"{pronoun} within the verdict's limits; a surveyed target (laser_fit.origin_sigma_m, azimuth_sigma_deg), more "
-        "passes at other distances, or a less drifting INS would"
+        f"{', '.join(with_sigmas)} {verb} fixed at the coarse {values}: this target and these passes cannot "
+        f"determine {pronoun} within the verdict's limits; a surveyed target (laser_fit.origin_sigma_m, "
+        "azimuth_sigma_deg), more passes at other distances, or a less drifting INS would"
     )

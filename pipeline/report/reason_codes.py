@@ -1,11 +1,14 @@
-"""Stable codes of everything that a verdict says: why a calibration is rejected, and what it warns of.
+"""Codes and words of a verdict: the stable codes of its reasons and warnings, and the verdict in words.
 
 The words beside a code are for people and may be mended; a code is for programs and stays.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Self
+
+from pipeline.maths.mount_parameters import PARAMETERS
 
 
 class ReasonCode(StrEnum):
@@ -77,3 +80,14 @@ class Statement:
 
     code: ReasonCode
     words: str
+
+
+def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
+    """Return the verdict as people read it; ``fixed``: mount parameters that an accepted calibration did not estimate.
+
+    >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
+    ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
+    """
+    if verdict != "accepted" or not fixed:
+        return verdict
+    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in fixed)}"

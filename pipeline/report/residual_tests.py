@@ -14,7 +14,7 @@ from pipeline.adjustment.pattern_tests import OF_PASSES, limit_for
 from pipeline.report.reason_codes import Statement
 from pipeline.report.residual_words import ExceededTests, ResidualTests, Row, describe_pass, describe_pattern
 
-LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # variables by which a part of the points may deviate
+LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # a deviation may concern a part of the points
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class ExceededTests:
         excess = abs(float(row["normalised"]))
         beyond = f"{excess:.1f} sigma beyond {1000 * self.tests.tolerance_m:g} mm"
         if row["by"] == "drift":
-            beyond = f"{excess:.1f} times the drift that it is conceded"
+            beyond = f"{excess:.1f} times the drift that is allowed"
         return f"{beyond}, limit {self.limit:.1f}"
 
 

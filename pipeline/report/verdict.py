@@ -82,7 +82,7 @@ def rejections(
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += _estimates_off_settings(evidence.freed)
     if len(evidence.fixed) == len(PARAMETERS):
-        words = "none of the six can be found: this target and these passes cannot give any within its limit"
+        words = "no mount parameter can be estimated: this target and these passes determine none within its limit"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
     reasons += sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, evidence.fixed)
     if criteria.method != "adjustment" and evidence.corrections is not None:
@@ -144,8 +144,8 @@ def _estimates_off_settings(freed: pd.DataFrame) -> list[Statement]:
     return [
         Statement(
             ReasonCode.ESTIMATE_OFF_SETTINGS,
-            f"adjust.free found {parameter.words}: the mount holds with that alone; correct it, there and in the "
-            "survey, and run again",
+            f"adjust.free found {parameter.words}: the mount is valid only with that value; correct it, in the "
+            "settings and in the survey, and run again",
         )
         for parameter in estimated_parameters(freed)
         if parameter.is_significant

@@ -1,4 +1,4 @@
-"""What does not reject a calibration, and still is to be looked at before anyone leaves."""
+"""Warnings: deviations that do not reject a calibration, but need attention before the crew leaves."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 MAX_VARIANCE_FACTOR = 2.0  # of a group of observations: above this, or below its inverse, its sigmas are wrong
-MAX_COMMON_VARIANCE_FACTOR = 4.0  # of what an epoch's points share; a small one is a good INS
+MAX_COMMON_VARIANCE_FACTOR = 4.0  # of the error common to an epoch's points; a small one means a good INS
 MAX_OUTLIER_SHARE = 0.01  # of a group of observations
 MAX_TARGET_OFFSET_M = 0.1  # from target.origin, along each axis
 MAX_TARGET_TILT_DEG = 0.1  # out of plumb

@@ -1,12 +1,13 @@
 """The result of a run on one screen."""
 
 import textwrap
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import setting_change
+from pipeline.report.reason_codes import verdict_in_words
 from pipeline.text_table import text_table
 
 SIGMAS_IN_WORDS = {
@@ -16,20 +17,9 @@ SIGMAS_IN_WORDS = {
     ),
     "laser": (
         "sigma: the random part, from the noise of the laser and the INS and the target's own uncertainty.",
-        "total: with the systematic errors of ranges, the clock and held values. Use the total.",
+        "total: with the systematic errors of ranges, clock and fixed parameters. Use the total.",
     ),
 }
-
-
-def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
-    """Return the verdict as people read it; ``fixed``: mount parameters that an accepted calibration did not estimate.
-
-    >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
-    ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
-    """
-    if verdict != "accepted" or not fixed:
-        return verdict
-    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in fixed)}"
 
 
 def summary(calibration: Mapping[str, Any]) -> str:
@@ -39,7 +29,7 @@ def summary(calibration: Mapping[str, Any]) -> str:
     lines = [f"{calibration['session']}: {verdict.upper()}{colon}{estimated}"]
     rejected = calibration["verdict"] == "rejected"
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    lines += [f"  not found, held at the coarse value: {', '.join(fixed)}"] if colon else []
+    lines += [f"  not estimated, fixed at the coarse value: {', '.join(fixed)}"] if colon else []
     lines += [f"  warning: {warning}" for warning in calibration["warnings"]]
     sensor = calibration.get("calibrated", "mbes")
     lines += ["", *_mount_table(calibration, sensor)]
@@ -73,7 +63,7 @@ def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
             f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in ("sigma_mount", "sigma_mount_total")
         )
         if parameter in fixed:
-            change, sigma = "held", "-"
+            change, sigma = "fixed", "-"
         rows.append((parameter, f"{coarse[key]:.4f} {unit}", total, change, sigma, sigma_total))
     computed = "computed" if calibration["verdict"] == "rejected" else "calibrated"
     result = f"(result: {calibration['result']})"

@@ -1,1 +1,1 @@
-"""Run folders: what is out of date and why, stages run and written whole, no result lost."""
+"""Run folders: which stages are out of date and why; stages run and written whole; no result lost."""

@@ -52,13 +52,13 @@ def execute_stage(this: Run, stage: ModuleType) -> None:
         folder.swap_in(target)
         if kept is not None:
             this.progress.note(f"{name_of(stage)}: the accepted result that was there is kept in {kept}")
-    except BaseException:
+    except BaseException:  # whatever stops it, Ctrl-C included
         _remove_quietly(partial)
         raise
 
 
 def _raw_has_changed(this: Run, stage: ModuleType) -> bool:
-    """Return whether a raw file that the stage has read is not what it was when this run first looked at it."""
+    """Return whether a raw file that the stage has read has changed since this run first hashed it."""
     sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, RawFiles)]
     return any(raw_digests(this, sensor) != raw_of(this, sensor) for sensor in sensors)
 

@@ -119,7 +119,7 @@ def recover(stage: Path) -> None:
 
 
 def touch(stage: Path) -> None:
-    """Tell make that a result was looked at and found current."""
+    """Set a manifest's time of change, so that make takes the result for current."""
     with writing(stage / manifest.NAME):
         (stage / manifest.NAME).touch()
 

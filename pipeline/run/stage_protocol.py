@@ -31,7 +31,7 @@ def name_of(stage: ModuleType) -> str:
 
 
 def declared(fields_of: type) -> dict[str, Marker]:
-    """Return the artefacts with which the fields of a stage's Inputs or Outputs are annotated."""
+    """Return the artefacts that annotate the fields of a stage's Inputs or Outputs."""
     artefacts: dict[str, Marker] = {}
     for name, hint in get_type_hints(fields_of, include_extras=True).items():
         markers = [m() if m is Provenance else m for m in getattr(hint, "__metadata__", ())]

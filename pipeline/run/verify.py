@@ -15,7 +15,7 @@ from pipeline.run.workers import SERIAL, Workers
 
 
 def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
-    """Hash again everything that a run read and wrote; return what is not as recorded, a line each.
+    """Hash again everything that a run read and wrote; return a line for each file that has changed.
 
     Parameters
     ----------

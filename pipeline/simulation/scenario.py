@@ -103,7 +103,7 @@ class LaserScenario(Model):
     mount: Mount = Mount(roll_deg=0.35, pitch_deg=-0.22, yaw_deg=0.41, x_m=0.21, y_m=0.48, z_m=1.10)  # the truth
     coarse_angle_deg: NotNegative = 0.0  # error of each angle in session.yaml, its sign random
     coarse_lever_m: NotNegative = 0.0  # the same of the lever arm
-    coarse_error: Mount | None = None  # instead: the six errors, session.yaml's minus true
+    coarse_error: Mount | None = None  # instead: the error of each mount parameter, session.yaml's minus true
     point_rate_hz: Annotated[float, Field(ge=1, le=1e6)] = 20000.0
     line_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 50.0
     field_deg: tuple[Angle, Angle] = (30.0, 130.0)  # from the scanner's zenith
@@ -126,7 +126,7 @@ class MbesScenario(Model):
     mount: Mount = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.30, y_m=0.20, z_m=-2.01)  # the truth
     coarse_angle_deg: NotNegative = 0.8  # error of each coarse angle, its sign random
     coarse_lever_m: NotNegative = 0.08  # the same of the coarse lever arm
-    coarse_error: Mount | None = None  # instead: the six errors, coarse minus true
+    coarse_error: Mount | None = None  # instead: the error of each mount parameter, coarse minus true
     ping_rate_hz: Annotated[float, Field(gt=0, le=100)] = 20.0
     beams: Annotated[int, Field(ge=2, le=1024)] = 256
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0

@@ -166,7 +166,7 @@ def _refuse_existing(folder: Path) -> None:
     try:
         taken = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
     except OSError as error:
-        raise ConfigError(f"{folder}: cannot be looked at ({error.strerror}); choose another folder") from error
+        raise ConfigError(f"{folder}: cannot be read ({error.strerror}); choose another folder") from error
     if taken or not folder.name:
         raise ConfigError(f"{folder}: exists already; choose another name, or remove it first")
 

@@ -19,7 +19,7 @@ from pipeline.target.samples import LaserPoses
 from pipeline.target.search_results import LocatedTarget, ProvisionalMount
 
 Array = NDArray[np.float64]
-LARGEST_TURN = 3.0  # sigmas of what is searched, within which a laser's mount is taken
+LARGEST_TURN = 3.0  # a laser's mount is accepted within this multiple of the searched sigmas
 
 
 def refine_target_and_laser(

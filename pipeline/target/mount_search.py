@@ -1,4 +1,4 @@
-"""Search for the sonar's provisional mount, with which the soundings fall onto the target's wet faces."""
+"""Search for the sonar's provisional mount, which brings the soundings onto the target's wet faces."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ BEHIND_M = 0.15  # farther behind a face than this is no noise
 def search_mount(
     sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: SonarBeams, settings: Segment
 ) -> ProvisionalMount:
-    """Return the correction of the coarse mount with which the soundings fall onto the wet faces.
+    """Return the correction of the coarse mount that brings the soundings onto the wet faces.
 
     The coarse mount may be wrong by up to the search limits. First comes the front (the patent's wall): roll turns it
     about the track and x shifts it, and no other parameter moves it. So both follow from a vote over the part of it

@@ -1,4 +1,4 @@
-"""Samples of the points, with which the pose of the target and the mounts are searched."""
+"""Samples of the points for the searches of the target's pose and of the mounts."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from pipeline.maths.geometry.trajectory import Trajectory
 Array = NDArray[np.float64]
 VOXEL_M = 0.1  # laser points are averaged over cubes of this size
 SOUNDING_SAMPLE = 8_000  # soundings to search with
-LASER_SAMPLE = 2_000_000  # laser points, of which voxels are then made
+LASER_SAMPLE = 2_000_000  # laser points, before they are averaged in voxels
 RAW_SAMPLE = 50_000  # of these taken singly
 
 

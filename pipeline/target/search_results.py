@@ -56,7 +56,7 @@ class LocatedTarget:
 
 @dataclass(frozen=True)
 class ProvisionalMount:
-    """The mount with which points are labelled, as a correction of the coarse mount.
+    """The mount for labelling, as a correction of the coarse mount.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
-THREADS = 2  # each point is looked up by itself: the answer does not depend on it
+THREADS = 2  # each point is searched by itself, so the result does not depend on the number
 
 
 class ClosestSurface:
@@ -33,7 +33,7 @@ class ClosestSurface:
         return ClosestSurface, (self._model,)
 
     def around(self, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
-        """Return which points (n, 3) m can be within reach of the surface at all: those in its box, so much larger."""
+        """Return which points (n, 3) m may be within reach of the surface: those in its box, enlarged by the reach."""
         low, high = self._model.bounds()
         return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=1))
 

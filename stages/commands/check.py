@@ -1,4 +1,4 @@
-"""``poolcal check``: what a session's files are, and what is wrong with them, before it is calibrated."""
+"""``poolcal check``: the content and the faults of a session's files, before it is calibrated."""
 
 from contextlib import suppress
 from pathlib import Path

@@ -63,7 +63,7 @@ def draw_missing(run: Path, wanted: Drawings, jobs: int = 1) -> list[DrawingFail
             return []
         with folder.locked(run, ORDER):
             return _draw_all(run, missing_drawings(run, wanted), jobs // 2)
-    except Exception as error:
+    except Exception as error:  # a failed drawing, whatever its cause, must not end a run that has its result
         return [DrawingFailure.of(" and ".join(wanted.kinds), error)]
 
 

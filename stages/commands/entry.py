@@ -49,7 +49,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
     except typer.TyperException as error:
         say(f"poolcal: {_usage(error)}", sys.stderr)
         return 2
-    except Exception as error:
+    except Exception as error:  # anything else is a bug of the program, status 3
         if interrupts:  # a library that was being loaded has made another error of it
             say(STOPPED, sys.stderr)
             return INTERRUPTED
@@ -87,8 +87,8 @@ def prepare_process() -> None:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupted)
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the shell; open to the end
-            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
+        if getattr(sys, name) is None:  # closed by the shell
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115  stays open until the process ends
     for stream in (sys.stdout, sys.stderr):
         reconfigure: Any = getattr(stream, "reconfigure", None)
         if reconfigure is not None:

@@ -37,7 +37,7 @@ def draw_one(run: Path, name: str) -> DrawingFailure | None:
             _draw_page(run)
         else:
             _draw_recording(run, name)
-    except Exception as error:
+    except Exception as error:  # a failed drawing, whatever its cause, must not stop the others
         return DrawingFailure.of(kind_of_drawing(name), error)
     return None
 

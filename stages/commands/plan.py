@@ -69,8 +69,8 @@ def table(answer: PlanAssessment, limits: VerdictLimits) -> str:
     if answer.better is not None:
         lines += ["", *_chosen(answer, answer.better, limits)]
     elif plan.candidates:
-        short = "no candidate helps within the budget" if plan.budget else "candidates want a budget to be chosen for"
-        lines += ["", f"Nothing better was looked for: {short}."]
+        short = "no candidate helps within the budget" if plan.budget else "candidates need a budget"
+        lines += ["", f"No better list of passes: {short}."]
     return "\n".join(lines)
 
 

@@ -95,7 +95,7 @@ def read_truth(path: Path) -> tuple[Array, Array]:
 
 
 def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) -> Array | None:
-    """Return what is still wrong, true minus calibrated; None if there is no result.
+    """Return the remaining errors, true minus calibrated; None if there is no result.
 
     Parameters
     ----------

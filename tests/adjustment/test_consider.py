@@ -13,7 +13,7 @@ MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.
 
 def sonar(svp: list[list[float]] | None = None, **more: float) -> Mbes:
     cast = None if svp is None else tuple((depth, speed) for depth, speed in svp)
-    return Mbes(files=["a"], format="table", mount=MOUNT, svp=cast, **more)  # type: ignore[arg-type]
+    return Mbes(files=["a"], format="table", mount=MOUNT, svp=cast, **more)
 
 
 def test_it_is_the_scatter_of_the_slope_between_the_ends() -> None:

@@ -1,4 +1,4 @@
-"""The drift conceded to the INS: by session.yaml, or by what its files say of its accuracy."""
+"""The drift that the adjustment allows the INS: by session.yaml, or by what its files say of its accuracy."""
 
 from typing import Any
 
@@ -53,7 +53,7 @@ def test_whose_figures_go_first(keys: dict[str, Any], source: str) -> None:
 
 
 def test_medians_within_the_passes() -> None:
-    """Of a plane position and of roll and pitch: the root mean square of the two."""
+    """A plane position, and roll and pitch, have the root mean square of their two sigmas."""
     found = drift_model(ins(), ROWS, PASSES)
     half = np.sqrt(0.5)
     assert found.horizontal_m == pytest.approx(0.05 * half)

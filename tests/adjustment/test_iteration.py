@@ -1,4 +1,4 @@
-"""The adjustment on points made by a forward model of its own: signs, covariance, what is freed, what is considered."""
+"""The adjustment on points of an own forward model: signs, covariance, single-parameter tests, consider parameters."""
 
 from typing import Any
 
@@ -168,7 +168,7 @@ def test_without_noise_the_truth_comes_back() -> None:
 
 @pytest.mark.parametrize("ins", [QUIET, NOISY], ids=["sensors alone", "INS white noise and drift"])
 def test_errors_are_as_large_as_the_covariance_says(ins: Ins) -> None:
-    """Mean normalised squared error of the six over repeats within its 99.9 % band, and each factor near one."""
+    """Mean normalised squared error of the mount over repeats within its 99.9 % band, and each factor near one."""
     repeats = often(16, 40)
     squared, factors, left = [], [], []
     for seed in range(100, 100 + repeats):
@@ -199,7 +199,7 @@ def test_drift_taken_for_granted_would_be_seen() -> None:
     [("mbes_latency", {"latency_s": 0.02}, 0.02), ("sound_speed", {"faster": 0.003}, 0.003)],
 )
 def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str, float], value: float) -> None:
-    """Tested while held, far beyond its sigma; estimated when the config frees it, and the six are right again."""
+    """While fixed, its test is far beyond its sigma; estimated by adjust.free, it leaves the mount right again."""
     held = solved(3, NOISY, **options)
     equations, names = held.equations, held.state.names
     found_tests = single_parameter_tests(equations.normal, equations.right, held.solution)
@@ -216,7 +216,7 @@ def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str
 
 
 def test_what_is_considered_adds_what_it_would_move() -> None:
-    """The sensitivity is the change of the answer when a held value is moved; the total adds its square."""
+    """The sensitivity is the change of the result when a fixed value is moved; the total adds its square."""
     found = solved(5, NOISY)
     normal, right, names = found.equations.normal, found.equations.right, found.state.names
     free = estimated_columns(found.state)
@@ -238,7 +238,7 @@ def test_what_is_considered_adds_what_it_would_move() -> None:
 
 
 def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None:
-    """C + S Q Sᵀ, Q the six by six of session.yaml, in its order: rotation x, y, z, lever arm x, y, z."""
+    """C + S Q Sᵀ, Q the (6, 6) of session.yaml, in its order: rotation x, y, z, lever arm x, y, z."""
     found = solved(5, NOISY)
     names, held = found.state.names, found.solution.fixed.tolist()
     root = np.tril(np.random.default_rng(1).normal(size=(6, 6))) * np.repeat([1e-4, 2e-3], 3)[:, None]

@@ -1,6 +1,5 @@
 """poolcal check on a target that is not where the config says: its height, its sides, its azimuth."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -254,9 +253,12 @@ def test_run_points_to_check_where_nothing_hits(tmp_path: Path) -> None:
 
 
 def test_what_follows_from_a_wrong_pose_is_not_said(blocks: Looked, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of faces without soundings nothing, where the target does not stand as configured."""
+    """Faces without soundings are not reported where the target does not stand as configured."""
     pool = blocks.pool.model_copy(update={"target": blocks.pool.target.model_copy(update={"low_side": "north"})})
     monkeypatch.setattr(asked, "survey_files", lambda *_: (blocks.files, []))
-    trial: Callable[..., TrialCalibration] = lambda *_: TrialCalibration(target_pose=_pose())  # noqa: E731
+
+    def trial(*_: object) -> TrialCalibration:
+        return TrialCalibration(target_pose=_pose())
+
     found = asked.check_session(Path("."), blocks.session, pool, trial)
     assert [one.question for one in found.findings] == ["sides"]

@@ -169,7 +169,7 @@ def test_with_three_marks_a_misfit_names_candidates(session: Path) -> None:
     marks["survey"]["marks"]["L1"][0] += 0.05
     told = run(session, marks)
     assert told.status == 1
-    assert "which is wrong cannot be pinned: of three in a frame none can" in told.out
+    assert "the wrong one cannot be identified: three marks in a frame are too few for that" in told.out
     assert all(f"L{k} (laser)" in told.out for k in (1, 2, 3))
     assert "The mounts above are with all marks." in told.out
 

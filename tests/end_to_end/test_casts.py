@@ -33,7 +33,7 @@ def traced(done: Place) -> Place:
 
 
 def test_a_cast_from_its_file(traced: Place) -> None:
-    """What was used is told; a list of the same depths gives the same numbers; and changing the file ends the peace."""
+    """The result names the cast; a list of the same depths gives the same numbers; a changed file is noticed."""
     result, path = traced.result(), traced.session / "cast.svp"
     used = yaml.safe_load((traced.run / "run.yaml").read_text())["session"]["mbes"]
     assert result["cast"] | {"depths": 0, "sigma_m_s": 0.0} == used["svp_from"] | {"depths": 0, "sigma_m_s": 0.0}
@@ -85,7 +85,7 @@ def test_a_casts_own_error_goes_into_the_total(traced: Place) -> None:
 
 
 def _gradient(place: Place) -> dict[str, float]:
-    """What is held against the calibration for a change of the sound speed with depth, and what comes of it."""
+    """Row of the single-parameter test of the sound speed's gradient."""
     table = pd.read_parquet(place.run / "adjust" / "freed.parquet").set_index("unknown")
     return table.loc["sound_speed_gradient"].to_dict()
 

@@ -166,7 +166,7 @@ def test_rank_deficient_is_an_answer(small: Path, tmp_path: Path) -> None:
 
 
 def test_weak_geometry_is_an_answer_with_values(small: Path, tmp_path: Path) -> None:
-    """One pass at one distance: yaw and lever arm y can hardly be told apart."""
+    """One pass at one distance: yaw and lever arm y are strongly correlated."""
     place = Place(small, tmp_path)
     place.mend()
     for path in (place.session / "mbes" / "pass_1.xtf", place.session / "laser" / "pass_1.las"):

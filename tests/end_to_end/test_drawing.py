@@ -144,7 +144,7 @@ def test_a_full_disk_is_one_line_and_no_stump(done: Place, monkeypatch: pytest.M
 
 
 def test_nothing_missing_nothing_said(done: Place) -> None:
-    """A folder that is in use, or that cannot be written, is looked at all the same."""
+    """A folder that is in use, or that cannot be written, is checked all the same."""
     assert done.calibrate("--recordings").status == 0
     with locked(done.run, ORDER):
         assert draw_missing(done.run, RECORDINGS) == []

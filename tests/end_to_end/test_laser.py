@@ -75,7 +75,7 @@ def test_nothing_is_written_where_it_is_only_looked_at_or_rejected(laser: Place)
     laser.edit_config("verdict", max_sigma_deg=1e-6, max_sigma_m=1e-7)
     told = calibrate(laser)
     assert told.status == 1
-    assert "none of the six can be found" in told.out
+    assert "no mount parameter can be estimated" in told.out
     assert (laser.session / "session.yaml").read_bytes() == before
     assert not (laser.session / "session.1.yaml").exists()
 
@@ -116,12 +116,12 @@ def test_its_page_and_recordings_show_the_laser_alone(laser: Place) -> None:
     found = ", ".join(name for name in ("roll", "pitch", "yaw", "x", "y", "z") if name not in held)
     assert (result["verdict"], result["verdict_in_words"]) == ("accepted", f"accepted in part: {found}")
     for said in (told.out, text(read(laser.run, "report"), "/tables/summary")):
-        assert f": ACCEPTED IN PART: {found}\n  not found, held at the coarse value: {', '.join(held)}\n" in said
+        assert f": ACCEPTED IN PART: {found}\n  not estimated, fixed at the coarse value: {', '.join(held)}\n" in said
     (shown,) = [attributes["class"] for attributes in page.named("span") if attributes.get("class") in BADGES]
     assert shown == "part"
     assert f"accepted in part: {found}" in page.text
-    assert f"Not found, and held at the coarse value: {', '.join(held)}." in page.text
-    assert "held at the coarse value" in page.text
-    for word in ("Three ways", "How the planes close", "soundings on"):
+    assert f"Not estimated, but fixed at the coarse value: {', '.join(held)}." in page.text
+    assert "fixed at the coarse value" in page.text
+    for word in ("Three ways", "Agreement of the planes", "soundings on"):
         assert word not in page.text
     assert sorted(path.stem for path in laser.run.glob("*/*.rrd")) == sorted(STAGES)

@@ -240,7 +240,7 @@ def test_two_runs_in_one_recording(undisturbed: tuple[Path, Told], tmp_path: Pat
 
 
 def test_nothing_is_sent_of_curves_without_values() -> None:
-    """Of columns without rows the viewer makes a timeline without an end, and dies; one place alone sends columns."""
+    """From columns without rows the viewer makes a timeline without an end, and dies; one place alone sends columns."""
     sent: list[str] = []
 
     class Recording:

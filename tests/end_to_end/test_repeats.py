@@ -82,7 +82,7 @@ def test_a_change_that_makes_no_difference_goes_no_further(done: Place, right: d
 
 
 def test_a_changed_coarse_mount(done: Place, right: dict[str, str]) -> None:
-    """Whatever is looked at again, the canonical tables stay: nothing of the mount is in them."""
+    """The canonical tables stay, whatever else is made again: they do not depend on the mount."""
     done.edit_session("mbes", mount={"x_m": 0.37})
     told = done.calibrate()
     assert "georeference: mbes.mount.x_m 0.38 -> 0.37\n" in told.err
@@ -165,4 +165,15 @@ def test_make_stages_twice(place: Place, right: dict[str, str]) -> None:
     first = make(place, "stages")
     assert all(f"poolcal stage {name} " in first for name in ORDER)
     assert digests(place.run) == right
+    assert "poolcal" not in make(place, "stages")
+
+
+@pytest.mark.thorough
+def test_make_stages_after_a_change_of_the_program(place: Place, right: dict[str, str]) -> None:
+    """Make offers every stage to the program, which finds by content that none is out of date."""
+    make(place, "stages")
+    for name in ORDER:
+        os.utime(place.run / name / "manifest.json", (0, 0))
+    again = make(place, "stages")
+    assert all(f"poolcal stage {name} " in again and f"{name}: up to date" in again for name in ORDER)
     assert "poolcal" not in make(place, "stages")

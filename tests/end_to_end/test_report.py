@@ -68,7 +68,7 @@ def test_files_counts_settings_and_origin_are_listed(undisturbed: tuple[Path, To
     assert changed["target.a"] == ("8.0", "")
     assert changed["ins.drift.heading_deg"] == ("0.0", "0.03")
     assert "segment.margin_m" not in changed
-    assert dict(page.table("raw file", "SHA-256")) == result["inputs"]  # type: ignore[arg-type]
+    assert dict(page.table("raw file", "SHA-256")) == result["inputs"]
 
 
 def test_the_target_by_design_and_as_found(undisturbed: tuple[Path, Told]) -> None:

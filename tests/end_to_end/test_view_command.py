@@ -39,7 +39,7 @@ def test_the_viewer_tells_nobody_that_it_is_used(
     """Asked itself, in the environment in which it is opened; the user's own choice stays what it is."""
     home = tmp_path / "home"
     home.mkdir()
-    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "CI"):  # where CI is set, nothing is ever told
+    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "CI"):  # where CI is set, nothing is ever sent
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", str(home))
     monkeypatch.setenv("DISPLAY", ":0")

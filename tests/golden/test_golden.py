@@ -1,6 +1,6 @@
 """Tables of one fixed session, with a tolerance a column: what changes here has changed for users.
 
-Made anew, after looking at why, by ``python -m tests.golden.test_golden``.
+``python -m tests.golden.test_golden`` writes them anew, once the change is understood.
 """
 
 from pathlib import Path

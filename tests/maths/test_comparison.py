@@ -41,7 +41,7 @@ def test_the_second_minus_the_first():
 @pytest.mark.parametrize("yaw", [0.0, 90.0, 180.0, -135.0])
 @pytest.mark.parametrize(("place", "angle"), [(0, "pitch"), (1, "roll"), (2, "yaw")])
 def test_what_moved_is_named_as_it_is_set(yaw, place, angle):
-    """Of a head that looks aft or athwart as well: the setting that was changed, with its sign, and no other."""
+    """The setting that was changed is named, with its sign, and no other; also for a head that looks aft or athwart."""
     settings = {"yaw": yaw, "pitch": 5.0, "roll": -20.0}
     moved = settings | {angle: settings[angle] + 0.3}
     one, other = (

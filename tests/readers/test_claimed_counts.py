@@ -88,7 +88,7 @@ def test_the_other_sensors_tables(sensor: str, tmp_path: Path) -> None:
     names = table_columns.INS_TABLE_COLUMNS if sensor == "ins" else (*table_columns.MBES_TABLE_COLUMNS, "range_m")
     columns = {name: np.full(COUNT, 5 if name in table_columns.WHOLE_NUMBERS else 5.0) for name in names}
     pq.write_table(pa.table({"gps_ns": np.full(COUNT, TIME)} | columns), tmp_path / "a.parquet", compression="zstd")
-    (part,) = raw_parts(sensor, build.settings(sensor, ["a.parquet"], "table"), tmp_path)  # type: ignore[arg-type]
+    (part,) = raw_parts(sensor, build.settings(sensor, ["a.parquet"], "table"), tmp_path)
     with pytest.raises(RawDataError, match=rf"a\.parquet: claims .* write {sensor}\.max_records"):
         next(iter(part.chunks()))
 

@@ -138,7 +138,7 @@ def test_a_file_that_says_otherwise(declared: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("declared", [None, "EPSG:32651", "+proj=utm +zone=51 +ellps=GRS80"])
 def test_a_file_that_says_nothing_or_nearly_the_same(declared: str | None, tmp_path: Path) -> None:
-    """Another datum on as good as the same ellipsoid is not held against it."""
+    """Another datum on nearly the same ellipsoid is no reason to refuse a file."""
     columns, _ = read("laser", las(tmp_path, UTM[:1], declared), "las", frame="EPSG:32651", heights="ellipsoidal")
     assert np.abs(placed(columns) - np.array(ECEF[:1])).max() < 0.001
 

@@ -173,7 +173,7 @@ def test_every_page_is_checked(page: int, content: bytes, file: Path) -> None:
 
 
 def test_points_that_are_claimed_without_bytes(content: bytes, file: Path) -> None:
-    """A count of points is held against the size of the file; all checksums fit."""
+    """A count of points is compared with the size of the file; all checksums fit."""
     file.write_bytes(edited(content, b'recordCount="300"', b'recordCount="9999999999999999"'))
     _refused(file, r"claims 9999999999999999 records in .*laser\.max_records")
     file.write_bytes(edited(content, b'recordCount="300"', b'recordCount="310"'))

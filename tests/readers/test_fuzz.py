@@ -30,8 +30,8 @@ def check(sensor: str, kind: str, content: bytes) -> None:
         try:
             columns, dropped = build.read(sensor, path, kind, **more)
         except PoolcalError as error:
-            assert "\n" not in str(error)  # noqa: PT017
-            assert "data.bin" in str(error) or "session.yaml" in str(error)  # noqa: PT017
+            assert "\n" not in str(error)
+            assert "data.bin" in str(error) or "session.yaml" in str(error)
             return
     assert all(isinstance(number, int) and number > 0 for number in dropped.values())
     for name, values in columns.items():

@@ -198,6 +198,6 @@ def test_damage_is_refused_or_counted(what: str, commas: bool, file: Path) -> No
         try:
             found, _ = read(file, gps_week=WEEK)
         except PoolcalError as error:
-            assert "\n" not in str(error)  # noqa: PT017
+            assert "\n" not in str(error)
         else:
             assert np.all(np.diff(found["t_ns"]) > 0) if found else True

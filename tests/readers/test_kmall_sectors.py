@@ -176,8 +176,8 @@ def test_without_an_installation_times_and_angles_stay_as_recorded(file: Path) -
 
 @pytest.mark.parametrize(("kind", "read_again"), [("kmall", True), ("all", True), ("r2sonic", False)])
 def test_files_are_read_again_where_their_reading_takes_the_transmitter_s_place(kind: str, read_again: bool) -> None:
-    """Of other sonars its place is put in afterwards, without reading."""
-    sonar = Mbes(files=["a"], format=kind, mount=MOUNT)  # type: ignore[arg-type]
+    """Where a format has no place of the transmitter, it is added afterwards, without reading."""
+    sonar = Mbes(files=["a"], format=kind, mount=MOUNT)
     session = SessionConfig(
         name="a", ins=Ins(files=["i"], format="sbet"), laser=Laser(files=["l"], format="las", mount=MOUNT), mbes=sonar
     )

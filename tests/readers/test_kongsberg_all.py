@@ -117,7 +117,7 @@ def test_sectors_of_an_em_2040_send_from_their_own_parts(file: Path) -> None:
 
 
 def test_the_installation_of_the_receiver_s_serial_number(file: Path) -> None:
-    """Of one transmitter and two receivers, the second: S3. It looks aft."""
+    """With one transmitter and two receivers, S3 is the second receiver. It looks aft."""
     third = RECEIVER.replace("S2", "S3").replace("S3H=0", "S3H=180")
     file.write_bytes(
         all_installation(f"STC=3,{TRANSMITTER},{RECEIVER},{third},R1S=77,R2S=78", model=710)

@@ -23,7 +23,7 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
-def test_adjusted_standard_time(compress, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_adjusted_standard_time(compress, file: Path) -> None:
     file.write_bytes(compress(las([(1, -2, 3, ADJUSTED + 0.25), (2**31 - 1, -(2**31), 0, ADJUSTED + 0.5)])))
     columns, dropped = read("laser", file, "las")
     assert not dropped
@@ -40,7 +40,7 @@ def test_adjusted_time_needs_no_week(file: Path) -> None:
 
 
 @pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
-def test_week_seconds(compress, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_week_seconds(compress, file: Path) -> None:
     file.write_bytes(compress(las([(0, 0, 1, 1000.25), (0, 0, 2, 1000.375)], adjusted=False)))
     columns, dropped = read("laser", file, "las", gps_week=WEEK)
     assert not dropped
@@ -88,7 +88,7 @@ def test_flag_that_contradicts_the_times(file: Path) -> None:
 # --- laser.time: where the header's flag is wrong ---------------------------------------------------------------------
 @pytest.mark.parametrize("compress", [bytes, laz_of], ids=["las", "laz"])
 @pytest.mark.parametrize("flag", [True, False])
-def test_adjusted_times_whatever_the_flag(compress, flag: bool, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_adjusted_times_whatever_the_flag(compress, flag: bool, file: Path) -> None:
     content = bytearray(compress(las([(0, 0, 1, ADJUSTED + 0.25), (0, 0, 2, ADJUSTED + 0.5)])))
     content[6] = int(flag)
     file.write_bytes(content)
@@ -151,7 +151,7 @@ def test_a_huge_time_is_told_in_few_digits(file: Path) -> None:
 
 
 def test_another_time_has_the_files_read_again() -> None:
-    """What the files are read by is all in the recordings, by which stage ingest is out of date."""
+    """All settings that read the files are in the recordings; they put stage ingest out of date."""
     ins, laser = Ins(files=["a.gps"], format="novatel"), Laser(files=["a.las"], format="las", mount=build.MOUNT)
     as_told, as_said = (
         SessionConfig(name="a", ins=ins, laser=laser.model_copy(update={"time": time})).recordings

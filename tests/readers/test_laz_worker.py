@@ -123,4 +123,4 @@ def test_worker_ends_with_its_reader(content: bytes, tmp_path: Path) -> None:
     (part,) = raw_parts("laser", settings, tmp_path)
     chunks = part.chunks()
     assert len(next(chunks).columns["t_ns"])
-    chunks.close()  # type: ignore[attr-defined]
+    chunks.close()

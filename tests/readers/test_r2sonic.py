@@ -125,7 +125,7 @@ BROKEN = {
 
 @pytest.mark.parametrize("what", BROKEN)
 @pytest.mark.parametrize("shell", [b"".join, lambda packets: xtf(*packets)], ids=["bare", "xtf"])
-def test_damaged_packet_between_good_ones(what: str, shell, file: Path) -> None:  # type: ignore[no-untyped-def]
+def test_damaged_packet_between_good_ones(what: str, shell, file: Path) -> None:
     file.write_bytes(shell([ping(1), BROKEN[what], ping(3)]))
     columns, dropped = read("mbes", file, "r2sonic")
     assert np.unique(columns["ping"]).tolist() == [1, 3]
@@ -261,7 +261,7 @@ def test_cut_at_each_tenth(shell: str, tenth: int, file: Path) -> None:
         columns, dropped = read("mbes", file, "r2sonic")
     except PoolcalError as error:
         assert before == 0
-        assert "\n" not in str(error)  # noqa: PT017
+        assert "\n" not in str(error)
         return
     pings = np.unique(columns["ping"]).tolist()
     assert pings[:before] == list(range(before))

@@ -81,7 +81,7 @@ def test_link_in_a_circle(session: Path) -> None:
     try:
         assert names(session, "ins/*.gps") == ["ins/a.gps", "ins/b.gps"]
     except RawDataError as error:
-        assert "\n" not in str(error)  # noqa: PT017
+        assert "\n" not in str(error)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no FIFOs here")
@@ -122,10 +122,10 @@ def test_content_decides(sensor: str, kind: str, name: str, tmp_path: Path) -> N
     more = {"gps_week": 2300} if sensor != "mbes" else {}
     settings = build.settings(sensor, ["data.bin"], kind, **more)
     if (own_sensor, own_kind) == (sensor, kind):
-        assert len(raw_parts(sensor, settings, tmp_path)) == 1  # type: ignore[arg-type]
+        assert len(raw_parts(sensor, settings, tmp_path)) == 1
         return
     with pytest.raises(RawDataError, match=r"data\.bin: is .*format") as error:
-        raw_parts(sensor, settings, tmp_path)  # type: ignore[arg-type]
+        raw_parts(sensor, settings, tmp_path)
     assert kind in str(error.value)
 
 
@@ -149,7 +149,7 @@ def test_what_is_not_read_is_refused_with_advice(
     (tmp_path / "data.bin").write_bytes(content)
     more = {"gps_week": 2300} if sensor != "mbes" else {}
     with pytest.raises(RawDataError, match=rf"data\.bin: is .*({words})"):
-        raw_parts(sensor, build.settings(sensor, ["data.bin"], kind, **more), tmp_path)  # type: ignore[arg-type]
+        raw_parts(sensor, build.settings(sensor, ["data.bin"], kind, **more), tmp_path)
 
 
 POSPAC = """\

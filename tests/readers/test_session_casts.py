@@ -68,7 +68,7 @@ def test_names_that_cannot_be_shown(name: str, tmp_path: Path) -> None:
 
 
 def test_the_name_of_the_file_stays_in_session_yaml(tmp_path: Path) -> None:
-    """Where poolcal coarse and poolcal laser edit it; a cast that cannot be read is told there as well."""
+    """poolcal coarse and poolcal laser edit that file; there too a cast that cannot be read is refused."""
     text, content = read_session(session(tmp_path, svp="casts/today.svp"))
     assert "svp: casts/today.svp" in text
     assert content["mbes"]["svp"] == "casts/today.svp"

@@ -65,7 +65,7 @@ def test_inspvax_has_its_own(tmp_path: Path) -> None:
 
 
 def test_inspvax_beside_inspvas_tells_them(tmp_path: Path) -> None:
-    """Of usable records alone."""
+    """The sigmas are those of usable records alone."""
     records = [inspvas(10.0 + k) + inspvax(10.0 + k, sigmas=SIGMAS, status=ALIGNING if k == 1 else 3) for k in range(4)]
     (tmp_path / "a.gps").write_bytes(b"".join(records))
     sigmas, dropped = told(tmp_path, "novatel")
@@ -191,7 +191,7 @@ def test_whatever_the_bytes(seed: int, session: Path) -> None:
     try:
         sigmas, _ = told(session, "sbet", **SBET)
     except PoolcalError as error:
-        assert "\n" not in str(error)  # noqa: PT017
+        assert "\n" not in str(error)
         return
     for name in NAMES if sigmas else ():
         assert np.all((sigmas[name] > 0) & (sigmas[name] <= 45)), name

@@ -124,7 +124,7 @@ FORMATS = {"ins": "novatel", "laser": "las", "mbes": "r2sonic"}
 def refusal(content: bytes, sensor: str, folder: Path) -> str:
     (folder / "data.bin").write_bytes(content)
     with pytest.raises(RawDataError) as error:
-        raw_parts(sensor, build.settings(sensor, ["data.bin"], FORMATS[sensor]), folder)  # type: ignore[arg-type]
+        raw_parts(sensor, build.settings(sensor, ["data.bin"], FORMATS[sensor]), folder)
     return str(error.value)
 
 

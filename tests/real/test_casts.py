@@ -9,7 +9,7 @@ from pipeline.readers.casts import read_cast
 
 
 def test_a_real_cast_against_a_decoder_of_its_own(data: Path) -> None:
-    """Two floats a line behind the section; every row within the tolerance that is told, by interpolation."""
+    """Two floats a line behind the section; every row within the stated tolerance, by interpolation."""
     path = data / "casts" / "caris" / "cidco_s20200713.svp"
     if not path.is_file():
         pytest.skip(f"no real cast: {path}")

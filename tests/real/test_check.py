@@ -12,7 +12,7 @@ from tests.support.real_files import MOUNT
 
 
 def _quality(data: Path, name: str, **more: object) -> InsQuality:
-    ins = Ins(files=[name], **more)  # type: ignore[arg-type]
+    ins = Ins(files=[name], **more)
     nothing = Laser(files=["none/*"], format="table", mount=MOUNT)
     seen, _ = survey_files(SessionConfig(name="x", ins=ins, laser=nothing), data)
     return assess_ins_quality(seen, [])

@@ -7,7 +7,6 @@ Their frames differ from ours (CONVENTIONS.md), so every case also tests how the
 * MBES-lib: level is north, east, down; the body forward, starboard, down; roll, pitch and heading are ours.
 """
 
-from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 
@@ -254,7 +253,9 @@ def test_mbes_lib_ecef_to_ned() -> None:
 
 
 def test_mbes_lib_ellipsoid() -> None:
-    at: Callable[..., np.ndarray] = lambda *place: ecef_from_geodetic(*(np.array([float(v)]) for v in place))[0]  # noqa: E731
+    def at(*place: float) -> np.ndarray:
+        return ecef_from_geodetic(*(np.array([float(v)]) for v in place))[0]
+
     assert at(0, 0, 0) == pytest.approx([6378137.0, 0.0, 0.0], abs=1e-9)
     assert at(np.pi / 2, 0, 0)[2] == pytest.approx(6356752.3142, abs=5e-5)
     assert pytest.approx(6356752.3142, abs=5e-5) == SEMI_MAJOR_M * (1 - FLATTENING)

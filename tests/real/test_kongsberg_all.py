@@ -22,7 +22,7 @@ from tests.support.real_files import HE, TURBEAMS
 
 
 class Ranges(NamedTuple):
-    """Of one datagram N."""
+    """Ranges of one datagram N."""
 
     second: float  # of the day
     number: int

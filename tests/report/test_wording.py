@@ -86,12 +86,12 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
     (
         lambda: _one(check_ins_drift(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0)))),
         ReasonCode.INS_DRIFT_NOT_GIVEN,
-        "ins.drift concedes the INS no drift at all: give its figures before anything else is looked for",
+        "ins.drift allows the INS no drift at all: give its figures before you look for any other cause",
     ),
     (
         lambda: _one(check_ins_drift(drift(1.21), Drift())),
         ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
-        "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before anything else is looked",
+        "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before you look",
     ),
     (
         lambda: geometry_gaps(gaps("one pass alone"), SIGMA),

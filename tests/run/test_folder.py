@@ -128,7 +128,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_complete(
     before = contents(pool.run_folder)
     pool.margin(0.5)
 
-    class Full(parquet.pq.ParquetWriter):  # type: ignore[misc]
+    class Full(parquet.pq.ParquetWriter):
         def write_table(self, *arguments: object, **options: object) -> None:
             raise OSError("Error writing bytes to file. Detail: [errno 28] No space left on device")
 
@@ -246,7 +246,7 @@ def test_two_runs_at_once_end_as_one_error_and_one_result(pool: Pool) -> None:
             seen.append(str(error))
         return good(*arguments)
 
-    pool.stages[0].combine = meanwhile  # type: ignore[attr-defined]
+    pool.stages[0].combine = meanwhile
     start = time.monotonic()
     assert pool.run() == ["take", "sift", "tell"]
     assert "in use by process" in seen[0]

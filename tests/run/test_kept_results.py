@@ -90,7 +90,7 @@ def test_a_full_disk_while_it_is_kept_loses_nothing(judged: Pool, monkeypatch: p
 def test_killed_at_any_step_the_accepted_result_is_there(
     judged: Pool, monkeypatch: pytest.MonkeyPatch, steps: int
 ) -> None:
-    """Every rename and every new folder is a step; what stands after so many of them is what a kill leaves."""
+    """Every rename and every new folder is a step; the folder after the first n steps is what a kill leaves."""
     before = (judged.run_folder / "tell" / "calibration.json").read_bytes()
     limit(judged, 2.0)
     left = [steps]

@@ -16,7 +16,7 @@ from tests.support.toy_run import Pool
 
 # --- another session -------------------------------------------------------------------------------------------------
 def other_session(pool: Pool) -> Path:
-    """Of the same name (a session.yaml is soon copied), elsewhere, with other files."""
+    """Copy the session to another folder, under the same name, with other files."""
     other = pool.session.with_name("other")
     shutil.copytree(pool.session, other)
     for path in other.rglob("*.bin"):

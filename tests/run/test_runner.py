@@ -134,7 +134,7 @@ def test_workers_that_share_no_memory_give_the_same_bytes(pool: Pool, contents: 
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
         pool.run(Workers(2, executor, local=False))
         pool.margin(0.5)
-        pool.stages[1].run_batch = toys.refuse  # type: ignore[attr-defined]
+        pool.stages[1].run_batch = toys.refuse
         with pytest.raises(RawDataError, match=r"cannot be used"):
             pool.run(Workers(2, executor, local=False))
     assert contents(pool.run_folder) == one
@@ -162,7 +162,7 @@ def test_a_failed_rerun_keeps_the_complete_result(pool: Pool, contents: Contents
     before = contents(pool.run_folder)
 
     good = pool.stages[1].run_batch
-    pool.stages[1].run_batch = toys.refuse  # type: ignore[attr-defined]
+    pool.stages[1].run_batch = toys.refuse
     pool.margin(0.5)
     with workers(2) as two, pytest.raises(RawDataError):
         pool.run(two)
@@ -170,7 +170,7 @@ def test_a_failed_rerun_keeps_the_complete_result(pool: Pool, contents: Contents
     assert sorted(p.name for p in pool.run_folder.iterdir()) == [
         ".lock", "digests.json", "run.yaml", "sift", "take", "tell",
     ]  # fmt: skip
-    pool.stages[1].run_batch = good  # type: ignore[attr-defined]
+    pool.stages[1].run_batch = good
     pool.margin(0.05)
     assert pool.run() == []
 
@@ -182,7 +182,7 @@ def test_raw_files_that_change_while_they_are_read_are_refused(pool: Pool) -> No
         np.ones(1).tofile(pool.session / "laser" / "0.bin")
         return good(prepared, partials, config)
 
-    pool.stages[0].combine = late  # type: ignore[attr-defined]
+    pool.stages[0].combine = late
     with pytest.raises(RawDataError, match="changed while they were read"):
         pool.run()
     assert not (pool.run_folder / "take").exists()

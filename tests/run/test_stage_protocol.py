@@ -53,8 +53,8 @@ def test_a_stream_without_any_row(pool: Pool) -> None:
 
 def test_only_named_sources_are_mapped() -> None:
     stage = toys.stages()[1]
-    stage.SOURCES = ()  # type: ignore[attr-defined]
-    stage.combine = lambda prepared, partials, config: toys.SiftOutputs(  # type: ignore[attr-defined]
+    stage.SOURCES = ()
+    stage.combine = lambda prepared, partials, config: toys.SiftOutputs(
         pd.DataFrame({"face": [0], "mean_m": [float(len(partials))]})
     )
     assert run_in_memory(stage, toys.SiftInputs(_points(10)), SETTINGS).means["mean_m"][0] == 0.0
@@ -116,7 +116,7 @@ def _stage_of_options(pool: Pool) -> None:
         return OptionalOutputs(f"{inputs.means is not None}\n", counts)
 
     last = pool.stages[2]
-    last.Inputs, last.Outputs, last.run = OptionalInputs, OptionalOutputs, tell  # type: ignore[attr-defined]
+    last.Inputs, last.Outputs, last.run = OptionalInputs, OptionalOutputs, tell
 
 
 def test_an_optional_table_is_left_out_where_no_stage_makes_it(pool: Pool) -> None:
@@ -146,7 +146,7 @@ def test_without_it_nothing_is_written_and_the_stage_is_current(pool: Pool) -> N
         means: Annotated[pd.DataFrame | None, elsewhere] = None
 
     _stage_of_options(pool)
-    pool.stages[2].Inputs = Inputs  # type: ignore[attr-defined]
+    pool.stages[2].Inputs = Inputs
     pool.run()
     assert (pool.run_folder / "tell" / "calibration.json").read_text() == "False\n"
     assert not (pool.run_folder / "tell" / "counts.parquet").exists()
@@ -163,7 +163,7 @@ def test_dropped_records_reach_the_stage() -> None:
         seen.append(chunk.dropped["bad"])
         return BatchResult({}, 0)
 
-    stage.run_batch = keep  # type: ignore[attr-defined]
+    stage.run_batch = keep
     path = Path(toys.__file__).with_name("nothing.bin")
     with pytest.raises(FileNotFoundError):
         run_in_memory(stage, toys.TakeInputs(Stream((toys.RawPart(path),))), None)

@@ -69,7 +69,7 @@ def _rz(angle: float) -> np.ndarray:
 
 def _ray(across: float, forward: float) -> np.ndarray:
     """The ray of the receive beam across (its sine), turned about the receiving array until it looks so far forward:
-    about x, by which it stays in its beam."""
+    about x, and so stays in its beam."""
     upright = np.array([across, 0.0, -np.cos(np.arcsin(across))])
     return np.asarray(_rx(np.arcsin(forward / -upright[2])) @ upright)
 

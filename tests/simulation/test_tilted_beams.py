@@ -48,7 +48,7 @@ def test_a_ray_by_hand() -> None:
 
 @pytest.mark.parametrize("tilt_deg", [-45.0, -10.0, -0.75, 0.3, 10.0])
 def test_rays_keep_both_angles_with_the_arrays(tilt_deg: float) -> None:
-    """Of a cone round an axis every ray has the same angle with it: 90° - θ with x, 90° - τ with y."""
+    """Every ray of a cone has the same angle with its axis: 90° - θ with x, 90° - τ with y."""
     sines = np.linspace(-0.999, 0.999, 41)
     tilts = np.full(41, np.radians(tilt_deg))
     swing, there = swing_rad(sines, tilts)
@@ -202,7 +202,7 @@ def test_where_sound_is_faster_below_tilted_beams_bend_upward(
         return float(y[0])
 
     for event in (floor, wall):
-        event.terminal = True  # type: ignore[attr-defined]
+        event.terminal = True
     end = solve_ivp(rate, (0, 0.02), np.r_[start, ray], events=(floor, wall), rtol=1e-11, atol=1e-13)
     straight = min(-3.3 / ray[2], 5.0 / ray[0] if ray[0] > 0 else np.inf)
     assert abs(speed * end.t[-1] - straight) > 3e-4

@@ -93,7 +93,7 @@ def test_each_surface_and_pass_has_its_redundancy_and_its_scatter(noisy_found):
     assert set(many["sensor"]) == {"laser", "mbes"}
     assert len(set(many["pass"])) == 4
     assert (many["redundancy"] < many["count"]).all()
-    wall = many[many["family"] == "P2"]  # on the smaller faces some moments have too few points to tell
+    wall = many[many["family"] == "P2"]  # on the smaller faces some time slots have too few points for a test
     assert (wall["redundancy"] > wall["count"] / 2).all()
     assert np.abs(many["variance_factor"] - 1).max() < 0.3
     assert cells["redundancy"].sum() < noisy_found["adjust/summary"]["redundancy"].iloc[0]

@@ -1,4 +1,4 @@
-"""The laser's own calibration through its stages: what comes back, what is held, what is refused."""
+"""The laser's own calibration through its stages: results, fixed parameters, refusals."""
 
 import json
 from typing import Any

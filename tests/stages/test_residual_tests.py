@@ -66,7 +66,7 @@ def test_a_pass_that_differs_is_found_where_drift_could_explain_it():
 
 
 def test_what_was_judged_is_told(noisy_found):
-    """Of each variable, with one limit for all; the steps and angles are those of the sonar's fan."""
+    """The result lists each variable, with one limit for all; the steps and angles are those of the sonar's fan."""
     geometry = json.loads(noisy_found["report/calibration.json"])["geometry"]
     patterns = noisy_found["adjust/patterns"]
     assert {row["by"] for row in geometry["patterns"]} == {

@@ -65,7 +65,7 @@ def evidence(
     nothing = {"unknown": "sound_speed", "estimated": False, "considered": 1e-4, "value": 2e-4, "sigma": 1e-4}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     geometry = [("remedy", "two more passes at 3 m would do", 0.0)] + [("held", name, 0.1) for name in fixed]
-    tables: dict[str, pd.DataFrame | None] = {field.name: pd.DataFrame() for field in fields(Evidence)}
+    tables: dict[str, Any] = {field.name: pd.DataFrame() for field in fields(Evidence)}
     tables |= {
         "faces": pd.DataFrame({"name": ["P1-0", "P2"]}),
         "target_pose": pd.DataFrame([pose_row | dict(pose or {})]),
@@ -77,7 +77,7 @@ def evidence(
         "freed": pd.DataFrame([nothing | dict(freed or {})]),
         "patterns": pd.DataFrame([pattern | {"normalised": 0.3} | dict(changes) for changes in patterns]),
     }
-    return Evidence(**tables)  # type: ignore[arg-type]
+    return Evidence(**tables)
 
 
 def judged(tables: Evidence, criteria: Criteria = ADJUSTED) -> list[Statement]:
@@ -103,7 +103,7 @@ def gaps(*words: str) -> pd.DataFrame:
 
 
 def drift(sigmas: float) -> pd.DataFrame:
-    """The table drift with values of so many sigmas in every component, at three knots."""
+    """The table drift with values of ``sigmas`` sigmas in every component, at three knots."""
     values = {"x": 0.015, "y": 0.015, "z": 0.02}, {"x": 0.01, "y": 0.01, "z": 0.03}
     columns = {f"{axis}_target_m": value for axis, value in values[0].items()}
     columns |= {f"turn_{axis}_target_deg": value for axis, value in values[1].items()}

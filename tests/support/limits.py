@@ -11,7 +11,7 @@ GIB = 2**30
 
 @contextlib.contextmanager
 def limited(seconds: int = 60, more_bytes: int = GIB) -> Iterator[None]:
-    """A TimeoutError after so many seconds, a MemoryError beyond so much more memory than there is now."""
+    """Raise TimeoutError after ``seconds``, and MemoryError beyond ``more_bytes`` above the present use."""
 
     def late(*_: object) -> None:
         raise TimeoutError

@@ -22,12 +22,12 @@ BUNNY, MOVED = "laser/bunnyInt32.e57", "laser/translationWithoutRotation.e57"
 MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
 
 
-def settings_of(sensor: Sensor, name: str, kind: str, **more: Any) -> Ins | Laser | Mbes:
+def settings_of(sensor: Sensor, name: str, kind: Any, **more: Any) -> Ins | Laser | Mbes:
     if sensor == "ins":
-        return Ins(files=[name], format=kind, **more)  # type: ignore[arg-type]
+        return Ins(files=[name], format=kind, **more)
     if sensor == "laser":
-        return Laser(files=[name], format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
-    return Mbes(files=[name], format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
+        return Laser(files=[name], format=kind, mount=MOUNT, **more)
+    return Mbes(files=[name], format=kind, mount=MOUNT, **more)
 
 
 def one_line(error: pytest.ExceptionInfo[Any], *words: str) -> None:

@@ -52,13 +52,13 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"fixed": [name for name, *_ in PARAMETERS]},
         ReasonCode.NO_PARAMETER_ESTIMABLE,
-        "none of the six can be found: this target and these passes cannot give any within its limit",
+        "no mount parameter can be estimated: this target and these passes determine none within its limit",
     ),
     (
         {"freed": {"unknown": "mbes_latency", "estimated": True, "value": 2.01e-3, "sigma": 3e-4, "considered": 4e-4}},
         ReasonCode.ESTIMATE_OFF_SETTINGS,
         "adjust.free found the sonar's clock: its latency is +2.0 ± 0.3 ms more than mbes.latency_s says: the mount "
-        "holds with that alone; correct it, there and in the survey, and run again",
+        "is valid only with that value; correct it, in the settings and in the survey, and run again",
     ),
     (
         {"patterns": [PASS_3]},
@@ -70,7 +70,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         {"patterns": [OFF | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "low": 1.0}]},
         ReasonCode.INS_DRIFT_BETWEEN_PASSES,
         "for both sensors to fit in pass 1, the INS must be wrong there by 0.115° in heading more than in the other "
-        "passes (3.5 times the drift that it is conceded, limit 3.3)",
+        "passes (3.5 times the drift that is allowed, limit 3.3)",
     ),
     (
         {"patterns": [OFF | {"by": "face", "low": 1.0}]},

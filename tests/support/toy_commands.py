@@ -9,8 +9,9 @@ from tests.support.toy_run import Pool
 TOY = [sys.executable, str(ROOT / "tests" / "support" / "toy_poolcal.py")]
 
 
-def toy_poolcal(*words: object, **options: object) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([*TOY, *map(str, words)], capture_output=True, text=True, timeout=60, **options)  # type: ignore[call-overload,no-any-return]
+def toy_poolcal(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    command = [*TOY, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, env=env, check=False)
 
 
 def run_words(pool: Pool) -> tuple[object, ...]:

@@ -1,4 +1,4 @@
-"""poolcal with toy stages: python toy_poolcal.py ARGUMENTS. What the toy report does is told by verdict.max_sigma_m:
+"""poolcal with toy stages: python toy_poolcal.py ARGUMENTS. verdict.max_sigma_m sets what the toy report does:
 1: accepted, 2: rejected, 3: a bug, 4: Ctrl-C, 5: hangs.
 """
 
@@ -70,7 +70,7 @@ def install() -> None:
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
     for module in (take, sift, report):
         sys.modules[module.__name__] = module
-    stages.ORDER = ("take", "sift", "report")  # type: ignore[assignment]
+    vars(stages).update(ORDER=("take", "sift", "report"))
     pipeline.readers.dispatch.raw_files = toys.raw_files
     pipeline.readers.dispatch.raw_parts = toys.raw_parts
 

@@ -1,4 +1,4 @@
-"""Pages and recordings looked at. Without the visual packages these tests say what is missing."""
+"""Pages and recordings in a browser and a viewer. Without these programs the tests name what is missing."""
 
 from pathlib import Path
 

@@ -61,7 +61,7 @@ def measured(page: Path) -> dict[str, Any]:
     harness.write_text(MEASURE.replace("PAGE", page.name), encoding="utf-8")
     options = ("--allow-file-access-from-files", "--virtual-time-budget=10000", "--dump-dom")
     dom = chromium(*options, harness.as_uri()).stdout
-    found: dict[str, Any] = json.loads(unescape(re.search(r'<pre id="out">(.*?)</pre>', dom, re.DOTALL)[1]))  # type: ignore[index]
+    found: dict[str, Any] = json.loads(unescape(re.search(r'<pre id="out">(.*?)</pre>', dom, re.DOTALL)[1]))
     return found
 
 
@@ -100,9 +100,9 @@ def test_on_paper_nothing_is_cut(page: Path, tmp_path: Path) -> None:
     chromium("--no-pdf-header-footer", f"--print-to-pdf={pdf}", page.as_uri())
     boxes = subprocess.run(["pdftotext", "-bbox", pdf, "-"], capture_output=True, text=True, check=True).stdout
     sheets: list[str] = []
-    title = unescape(re.search("<title>(.*?)</title>", page.read_text(encoding="utf-8"), re.DOTALL)[1])  # type: ignore[index]
+    title = unescape(re.search("<title>(.*?)</title>", page.read_text(encoding="utf-8"), re.DOTALL)[1])
     for sheet in re.split(r"<page ", boxes)[1:]:
-        width, height = (float(one) for one in re.search(r'width="(.*?)" height="(.*?)"', sheet).groups())  # type: ignore[union-attr]
+        width, height = (float(one) for one in re.search(r'width="(.*?)" height="(.*?)"', sheet).groups())
         assert (width, height) == (pytest.approx(595, abs=2), pytest.approx(842, abs=2))  # A4
         words = re.findall(r'<word xMin="(.*?)" yMin="(.*?)" xMax="(.*?)" yMax="(.*?)">(.*?)</word>', sheet)
         for left, top, right, bottom, word in words:

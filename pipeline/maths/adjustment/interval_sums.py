@@ -84,7 +84,8 @@ class IntervalSums:
 class Runs:
     """Points that follow one another and belong together: place of the first of each run (g,), and their number (g,).
 
-    Sums over neighbours cost a quarter of sums by number (bincount), and what a run shares is spread, not looked up.
+    Sums over neighbours cost a quarter of sums by number (bincount), and values common to a run are repeated instead of
+    indexed.
     """
 
     starts: Integers

@@ -48,7 +48,7 @@ def normal_deviates(mean: Array, sigma: Array, dof: Array, tolerated: Array | fl
 
 
 def joint_limit(number: int, level: float) -> float:
-    """Return the |u| that one of so many means exceeds with a chance of ``level``, if all are within their tolerance.
+    """Return the |u| that any of ``number`` means exceeds with probability ``level`` if all are within their tolerance.
 
     >>> round(joint_limit(1, 0.05), 2), round(joint_limit(500, 0.001), 2)
     (1.96, 4.75)

@@ -1,12 +1,10 @@
 """The parameters of the adjustment, in one order: mount, instruments, surfaces, and the surfaces' parts under water.
 
 * the sonar's: rotation ε and lever arm λ (the six mount parameters, body axes), latency τ (s, added to the recorded
-  one), range (m, added to every range), sound speed (the share by which it is higher), and its gradient ((m/s)/m,
-  downward);
+  one), range (m, added to every range), sound speed (relative increase), and its gradient ((m/s)/m, downward);
 * the laser's: ε, λ, latency and range, with the same meaning;
 * each surface's: two turns of the normal (rad) and a shift (m), shared by both sensors;
-* each surface's part under water: a further two turns and a shift, by which the wet faces stand off the dry ones as
-  built.
+* each surface's part under water: a further two turns and a shift of the wet faces, as built, against the dry ones.
 
 A run that calibrates the laser has no sonar: the mount parameters are the laser's, and no face is wet.
 

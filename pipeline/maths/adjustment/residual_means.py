@@ -136,12 +136,12 @@ class _SlotSums:
 
     @property
     def effective(self) -> float:
-        """Number of equally heavy slots that tell as much."""
+        """Number of slots of equal weight with the same information."""
         return float(self.weight.sum() ** 2 / (self.weight @ self.weight))
 
     @property
     def parts(self) -> Array:
-        """Each slot's contribution (k,) to the error of the mean, freed of what the mean took from the scatter."""
+        """Contribution (k,) of each slot to the error of the mean, with the correction n / (n - 1) of the scatter."""
         n = self.effective
         unbiased = np.sqrt(n / (n - 1)) if n > ALONE else 1.0
         return np.asarray((self.weighted - self.weight * self.mean) / self.weight.sum()) * unbiased

@@ -20,7 +20,7 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
-VAGUE = 10.0  # rad or m: prior sigma of a parameter of which nothing is known before any point
+VAGUE = 10.0  # rad or m: prior sigma of a parameter without any prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
 
@@ -166,7 +166,7 @@ def single_parameter_tests(normal: Array, right: Array, solution: Solution) -> l
 
 
 def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) -> dict[int, float]:
-    """Return the mount parameters to fix, and the sigma with which each would have come out.
+    """Return the mount parameters to fix, and the sigma that each would have had.
 
     Fix the worst parameter and solve again: fixing one of a correlated pair usually makes the second estimable.
 
@@ -195,10 +195,10 @@ def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) 
 
 
 def correlated_pair(covariance: Array) -> tuple[int, int, float] | None:
-    """Return the two mount parameters in (6, 6) that are hardest to tell apart, and their correlation ρ, or None.
+    """Return the most strongly correlated two mount parameters in (6, 6) and their correlation ρ, or None.
 
-    Were one of them known, the sigma of the second would be √(1 - ρ²) of what it is: half of it at ρ = √3/2 = 0.866.
-    From there on two are said to move together. A weaker correlation costs less than another pass.
+    If one of them were known, the sigma of the other would fall by the factor √(1 - ρ²), which is 1/2 at ρ = √3/2 =
+    0.866. From there on the two are reported to move together. A weaker correlation costs less than another pass.
     """
     sigma = np.sqrt(np.diag(covariance))
     above = np.triu(covariance / np.outer(sigma, sigma), 1)
@@ -208,11 +208,12 @@ def correlated_pair(covariance: Array) -> tuple[int, int, float] | None:
 
 
 def weakest_direction(covariance: Array) -> str:
-    """Return, in words, the two mount parameters in (6, 6) that are hardest to tell apart."""
+    """Return a sentence on the most strongly correlated two mount parameters in (6, 6)."""
     sigma, pair = np.sqrt(np.diag(covariance)), correlated_pair(covariance)
     if pair is None:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))
-        return f"no two are hard to tell apart; least sure are {MOUNT_WORDS[worst[0]]} and {MOUNT_WORDS[worst[1]]}"
+        first, second = (MOUNT_WORDS[k] for k in worst)
+        return f"no two are strongly correlated; the least certain are {first} and {second}"
     row, column, rho = pair
     times = 1 / np.sqrt(max(1 - rho**2, 1e-6))
     return (

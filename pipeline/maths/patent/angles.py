@@ -8,7 +8,7 @@ right-handed turn (α about x, β about y, γ about z) of the cloud in the targe
 * n4 = (0, 0, -1) gets the y component +α: pitch deviation = its turn about x.
 
 These are signed components, not the full angles between normals (which contain the other two axes and stop converging
-at 0.01°), and no published sign rule is looked up: [0025] and [0113] contradict each other. The patent's cosines are
+at 0.01°), and they follow no published sign rule: [0025] and [0113] contradict each other. The patent's cosines are
 recorded beside them. The correction is minus the deviation, turned into the body frame by the mean attitude, and
 composed (not added) onto the rotation so far.
 """

@@ -117,7 +117,7 @@ def patent_offsets(
 
 
 def _pair_weight(first: int, second: int) -> float:
-    """Return the weight of a difference of two means of so many points."""
+    """Return the weight of a difference of the means of ``first`` and of ``second`` points."""
     return first * second / (first + second)
 
 
@@ -137,7 +137,7 @@ def _height_pairs(
     dry, wet = observations.dry, observations.wet
     if not dry or not wet:
         sensor = "laser" if not dry else "sonar"
-        raise DegenerateGeometryError(f"the {sensor} sees no horizontal face well enough: Z cannot be told")
+        raise DegenerateGeometryError(f"the {sensor} sees no horizontal face well enough: Z cannot be determined")
     pairs: list[dict[str, float | str]] = []
     rows = []
     for below in wet:

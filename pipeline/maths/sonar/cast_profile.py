@@ -73,7 +73,7 @@ def thinned_profile(depth_m: Array, speed_m_s: Array) -> Profile:
 
 
 def _averaged(depth: Array, speed: Array, height: float) -> tuple[Array, Array]:
-    """Return the means of depth and speed over layers of so much height."""
+    """Return the means of depth and speed over layers of ``height``."""
     _, layer = np.unique(np.floor((depth - depth[0]) / height), return_inverse=True)
     count = np.bincount(layer)
     return np.bincount(layer, depth) / count, np.bincount(layer, speed) / count

@@ -63,7 +63,7 @@ class Labels:
 def hidden_in_part(
     model: TargetModel, faces: NDArray[np.int16], corners: Iterable[Array], first_met: Callable[[Array], Integers]
 ) -> Flags:
-    """Return the beams (n,) of which a corner ray meets first something else than the plane of their face.
+    """Return the beams (n,) with a corner ray that meets something else before the plane of their face.
 
     An edge before it hides part of the footprint, or another face rises out of it, and the echo is the mean of two
     things.
@@ -154,8 +154,8 @@ def label_points(
 
     A point belongs to a face if it lies within the gate of the face's plane, its ray meets the front at no less than
     the smallest grazing angle and its whole footprint, taken where the ray meets the plane, lies within the polygon
-    with the margin to spare (or what the beam may stray, where that is more), and between the heights. Of several faces
-    the nearest plane wins.
+    with the margin to spare (or the beam's largest stray, if that is more), and between the heights. If several faces
+    meet these conditions, the one with the nearest plane gets the point.
 
     Where the ray meets the plane does not depend on the measured range, nor does the footprint there. If the point
     itself were taken, a range too long would bring it in at one edge of a grazed face and out at the other, and the

@@ -50,7 +50,8 @@ def planes_with_points(
 ) -> Iterator[NearPlane]:
     """Yield each plane of the model with the points (of those ``among``) within ``reach_m``, parallel planes together.
 
-    Of parallel planes a point goes to the nearest: one projection and one search for all tops and bottoms, not forty.
+    Where planes are parallel, a point goes to the nearest one: one projection and one search serve all tops and
+    bottoms, in place of forty.
 
     Parameters
     ----------

@@ -137,8 +137,8 @@ def search(
 ) -> SearchResult:
     """Return the best pose from many starts: all are scored with a wide reach, the best converge and are compared.
 
-    Starts are scored, and converge within the coarse reaches, with ROUGH of the points: more do not tell starts apart
-    any better. Of several that converge to the same pose one goes on.
+    The scores and the convergence within the coarse reaches use the share ROUGH of the points; more points do not
+    separate the starts any better. If several starts converge to the same pose, only one of them goes on.
 
     Parameters
     ----------

@@ -42,4 +42,4 @@ def _difference_chart(rows: list[dict[str, Any]]) -> Markup:
         axis.set(xlim=(-widest, widest), xlabel="b - a, in sigmas of the difference, with 95 % intervals")
         axis.set_yticks(range(len(rows)), [row["parameter"] for row in rows])
         axis.invert_yaxis()
-        return picture(figure, "differences of the six values in sigmas")
+        return picture(figure, "differences of the mount parameters in sigmas")

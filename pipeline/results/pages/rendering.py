@@ -16,7 +16,7 @@ import matplotlib
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-# Colours after Okabe and Ito, told apart by all eyes and in grey print.
+# Colours after Okabe and Ito, distinct for all eyes and in grey print.
 INK, QUIET, ALARM = "#1a1a1a", "#8a8f98", "#b00020"
 LASER, COARSE, SONAR = "#3aa0dc", "#b9bcc1", "#d55e00"
 FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a", "other": "#7a5c00", "more": "#1a1a1a"}
@@ -37,7 +37,7 @@ STYLE: dict[Any, Any] = {
     "axes.linewidth": 0.8,
     "axes.titlesize": 9,
     "axes.titlelocation": "left",
-    "axes.titley": 1.0,  # where it stands anyway; looking for ticks in its way takes time
+    "axes.titley": 1.0,  # the default position; searching for ticks in its way takes time
     "xtick.color": INK,
     "ytick.color": INK,
 }

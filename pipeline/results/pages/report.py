@@ -21,6 +21,7 @@ from pipeline.config.target import Letters
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import design_shape
+from pipeline.report.reason_codes import verdict_in_words
 from pipeline.results.pages.currency import page_digest
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows
@@ -28,7 +29,6 @@ from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_r
 from pipeline.results.pages.plots import picture_names
 from pipeline.results.pages.rendering import render_page
 from pipeline.results.pages.sigma_sources import sigma_source_rows
-from pipeline.results.screen import verdict_in_words
 from pipeline.run import manifest
 from pipeline.run.results import PAGE, Tables, agreeing, calibration
 from pipeline.run.settings import Settings, read_settings

@@ -21,8 +21,8 @@ SOURCES = (  # of an unknown: how its name begins, what it is called
     ("sound_speed_gradient", "change of the sound speed with depth"),
     ("sound_speed", "sound speed"),
     ("wet", "wet faces against dry ones"),
-    ("rotation", "angles that are held"),  # of a laser that is calibrated
-    ("lever_arm", "lever arm that is held"),
+    ("rotation", "fixed angles"),  # of a laser that is calibrated
+    ("lever_arm", "fixed components of the lever arm"),
 )
 
 

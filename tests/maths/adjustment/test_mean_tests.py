@@ -25,7 +25,7 @@ def sums_of(bins, slots, v_m, sigma_m=0.01, surface=0):
 
 
 def session(rng, bins=40, slots=15, points=4, common_m=0.005, sigma_m=0.01):
-    """Points by bin and moment, with noise of their own and noise that a moment's points share."""
+    """Points by bin and time slot, with noise of their own and noise common to a slot's points."""
     bin_, slot, _ = np.indices((bins, slots, points)).reshape(3, -1)
     slot += 1000 * bin_
     shared = rng.normal(0, common_m, (bins * slots,))[np.repeat(np.arange(bins * slots), points)]
@@ -48,8 +48,8 @@ def alarms(rng, sessions, offset_m, tolerated, level, **figures):
     ("offset_m", "tolerated", "slots"), [(0.0, 0.0, 15), (TOLERATED, TOLERATED, 15), (0.0, 0.0, 5)]
 )
 def test_the_level_over_all_bins_is_as_promised(offset_m, tolerated, slots):
-    """300 sessions of 40 bins, 5 or 15 moments each: false alarms at 10 % within what chance allows; at the tolerance's
-    edge half of them. With five moments, taken together with the others', fewer."""
+    """300 sessions of 40 bins, 5 or 15 slots each: false alarms at 10 % within what chance allows; at the tolerance's
+    edge half of them. With five slots, taken together with the others', fewer."""
     level, sessions = 0.1, 300
     found = alarms(np.random.default_rng(7), sessions, offset_m, tolerated, level, slots=slots)
     assert found <= stats.binom.ppf(0.999, sessions, level)
@@ -57,7 +57,7 @@ def test_the_level_over_all_bins_is_as_promised(offset_m, tolerated, slots):
 
 
 def test_moments_that_share_noise_count_as_one_each():
-    """Taken point by point, noise that moments share would raise the alarm in nearly every session."""
+    """Taken point by point, noise common to time slots would raise the alarm in nearly every session."""
     rng = np.random.default_rng(8)
     assert alarms(rng, 60, 0.0, 0.0, 0.01, points=50, common_m=0.01) <= stats.binom.ppf(0.999, 60, 0.01)
     bins, slots, v = session(rng, points=50, common_m=0.01)
@@ -95,7 +95,7 @@ def test_the_limit_over_many_bins_leaves_the_level_to_all_of_them_together():
 
 
 def test_a_mean_of_unequal_moments():
-    """Against its definition, by hand: three moments of 1, 2 and 4 points."""
+    """Against its definition, by hand: three time slots of 1, 2 and 4 points."""
     v = np.array([0.010, 0.02, 0.04, 0.00, 0.02, 0.00, 0.02])
     slots = np.array([0, 1, 1, 2, 2, 2, 2])
     (cell,) = bin_means(sums_of(np.zeros(7, dtype=int), slots, v, sigma_m=0.001))
@@ -116,7 +116,7 @@ def test_moments_that_agree_by_chance_are_no_surer_than_their_points():
 
 
 def test_a_face_seen_for_half_a_second_is_held_against_what_the_others_scatter():
-    """33 mm off with six moments that scatter by several millimetres: Student's t of five would pass it."""
+    """33 mm off with six time slots that scatter by several millimetres: Student's t of five would pass it."""
     rng = np.random.default_rng(2)
     bins, slots, v = session(rng, bins=10, slots=80, points=15, common_m=0.001, sigma_m=0.005)
     few = (bins < 9) | (slots < 9006)

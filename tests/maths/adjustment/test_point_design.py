@@ -31,7 +31,7 @@ def beams(angles: np.ndarray, ranges: np.ndarray, tilts: np.ndarray | float = 0.
 
 
 def seen(points: np.ndarray) -> PointDesign:
-    """Of points on the surface."""
+    """Observations of points on the surface."""
     n = points.shape[1]
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)

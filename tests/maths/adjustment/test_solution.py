@@ -1,4 +1,4 @@
-"""Which of the six are said to move together: both sides of the limit, and what it does to a sigma."""
+"""Mount parameters that are reported to move together: both sides of the limit, and the effect on a sigma."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ YAW, ARM_Y = 2, 4
 
 
 def covariance_of(rho: float) -> np.ndarray:
-    """Of the six, with that correlation of yaw and lever arm y; the others have weaker ones."""
+    """Covariance of the mount with this correlation of yaw and lever arm y; all others are weaker."""
     correlation = np.eye(6)
     correlation[0, 1] = correlation[1, 0] = 0.3
     correlation[YAW, ARM_Y] = correlation[ARM_Y, YAW] = rho
@@ -21,7 +21,7 @@ def covariance_of(rho: float) -> np.ndarray:
 def test_two_move_together_from_where_it_doubles_their_sigma(sign: float) -> None:
     below, above = covariance_of(sign * (CORRELATION_LIMIT - 0.001)), covariance_of(sign * (CORRELATION_LIMIT + 0.001))
     assert correlated_pair(below) is None
-    assert weakest_direction(below) == "no two are hard to tell apart; least sure are yaw and lever arm y"
+    assert weakest_direction(below) == "no two are strongly correlated; the least certain are yaw and lever arm y"
     found = correlated_pair(above)
     assert found is not None
     assert found[:2] == (YAW, ARM_Y)

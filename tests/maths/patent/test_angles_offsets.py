@@ -67,7 +67,7 @@ def test_the_patents_pitch_cosine_takes_in_roll():
 def straight_pass(distance, number, mount_error, lever_error, swing_deg=0.0, azimuth=0.0, noise=0.0):
     """A pass along +y at x = -distance: soundings on the faces, generated from the truth; and the laser's planes.
 
-    The forward model is its own: for each moment the fan's plane is cut with the faces in the target frame, and the
+    The forward model is its own: for each ping the fan's plane is cut with the faces in the target frame, and the
     sonar coordinates follow by inverting the *true* mount. The lifted features then use the wrong, coarse mount.
     """
     rng = np.random.default_rng(number)

@@ -141,7 +141,7 @@ def test_the_receive_angle_comes_back_whatever_the_tilt() -> None:
 
 
 def difference(by: str, step: float = 1e-6) -> np.ndarray:
-    """(n, 3) central difference of the points by one of the two angles, the other held."""
+    """(n, 3) central difference of the points by one of the two angles, with the other fixed."""
     angles, tilts = np.radians(ANGLES_DEG), np.radians(TILTS_DEG)
     turn = np.array([step, 0.0]) if by == "angle" else np.array([0.0, step])
     ends = [points(angles + sign * turn[0], tilts + sign * turn[1]) for sign in (1, -1)]

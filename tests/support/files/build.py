@@ -18,12 +18,12 @@ GPS_2024 = UTC_2024 - 315_964_800 + 18
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------
-def settings(sensor: str, files: Iterable[str], kind: str, **more: Any) -> Ins | Laser | Mbes:
+def settings(sensor: str, files: Iterable[str], kind: Any, **more: Any) -> Ins | Laser | Mbes:
     if sensor == "ins":
-        return Ins(files=list(files), format=kind, **more)  # type: ignore[arg-type]
+        return Ins(files=list(files), format=kind, **more)
     if sensor == "laser":
-        return Laser(files=list(files), format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
-    return Mbes(files=list(files), format=kind, mount=MOUNT, **more)  # type: ignore[arg-type]
+        return Laser(files=list(files), format=kind, mount=MOUNT, **more)
+    return Mbes(files=list(files), format=kind, mount=MOUNT, **more)
 
 
 def read(sensor: Any, path: Path, kind: str, **more: Any) -> tuple[dict[str, np.ndarray], dict[str, int]]:
