@@ -198,7 +198,7 @@ class ObservationModel:
         return {name: column[order] for name, column in batch.items()}, surface[order]
 
     def _pose_errors(self, drift: DriftEstimate | None, record: Integers) -> RecordErrors:
-        """Return the drift in the middle of each interval from the batch's first to its last; zero without an estimate."""
+        """Return the drift in the middle of each interval from the batch's first to its last, zero if it is None."""
         first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
         seconds = self.body.seconds[first : last + 1]
         error = np.zeros((last - first, N_POSE))

@@ -33,8 +33,8 @@ from pipeline.maths.sonar.soundings import receive_angle
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # of bins: 1, degrees, m, s
-CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # pings: a sonar may change its mode from ping to ping
+WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # of bins: degrees, m, s
+CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may change its mode from ping to ping
 COMPARED: dict[str, Comparison] = {"pass": "rest", **dict.fromkeys(CYCLES, "rest"), "step": "steps"}  # else: bins
 TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # components of the drift
 KNOWN = 1e9  # degrees of freedom of a sigma that is not estimated
