@@ -44,7 +44,7 @@ class PassSums:
 
 @dataclass(frozen=True)
 class PredictedPasses:
-    """Prediction for passes: normal matrix (u, u) of all parameters; for each pass points by sensor and face, time (s)."""
+    """Prediction for passes: normal matrix (u, u) of all parameters; points by sensor and face, and time, by pass."""
 
     normal: Array
     points: list[dict[str, Array]]
@@ -151,7 +151,7 @@ def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Arr
 
 
 def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, number: int) -> Trajectory:
-    """Return poses along +y past the target at x = -distance. Every coordinate but y has a wave of its own phase."""
+    """Return poses along +y past the target at x = -distance. All coordinates except y have a wave of their own."""
     plan, unrest = setting.plan, setting.plan.unrest
     t = np.arange(0.0, seconds + 1 / plan.ins_rate_hz, 1 / plan.ins_rate_hz)
     half = planned.half_length_m or setting.half_length_m
