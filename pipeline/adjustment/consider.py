@@ -17,7 +17,7 @@ from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
-LEAST_SPAN_M = 0.1  # depths and spans below this count as this
+LEAST_SPAN_M = 0.1  # smallest depth and smallest span that count
 LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
 
 

@@ -95,7 +95,7 @@ class MountAdjustment:
 
 
 def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]:
-    """Return the numbers of the parameters to estimate: mount, surfaces, and the additional ones by name."""
+    """Return the numbers of the parameters to estimate: mount, surfaces, and the ones named in ``additional``."""
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
     return sorted({*range(N_MOUNT), *surfaces, *(state.names.index(name) for name in additional)})
 
@@ -114,7 +114,7 @@ def adjust_mount(
     settings : Adjust
         Limits of the iteration, robust weights, additional parameters to estimate.
     gap_s : float
-        Longest time without observations over which the knots of the drift go on.
+        A longer time (s) without observations interrupts the knots of the drift.
     """
     noise = problem.prior.noise
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
@@ -122,7 +122,7 @@ def adjust_mount(
     factors: dict[str, EpochVarianceFactor] = {}
     converged = False
     if not weighted.deficient:
-        # take the INS's white noise from the laser's points; step on with the last weights, without a reading
+        # take the INS's white noise from the laser's points; further steps have the last weights
         surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
         factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
         noise = noise_seen_by_laser(noise, factors["laser"])
@@ -131,7 +131,7 @@ def adjust_mount(
             converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
             if converged:
                 break
-    # solve the equations with the fixed parameters among them, for the total covariance and the tests
+    # solve with the equations of all parameters: total covariance and tests need those of the fixed ones
     equations = last.equations(noise)
     solution = solve(equations.normal, equations.right, estimated.tolist())
     return MountAdjustment(

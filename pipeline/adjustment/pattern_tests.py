@@ -10,7 +10,7 @@ OF_PASSES = ("drift", "pass")
 
 
 def limit_for(patterns: pd.DataFrame, level: float) -> float:
-    """Return the limit of |normalised| that any row exceeds with the chance ``level`` if all errors are tolerated."""
+    """Return the limit of |normalised|. If all errors are tolerated, any row exceeds it with the chance ``level``."""
     return joint_limit(len(patterns), level)
 
 
@@ -26,7 +26,7 @@ def pattern_tests(patterns: pd.DataFrame, level: float) -> list[dict[str, Any]]:
 
 
 def passes_test(patterns: pd.DataFrame, level: float) -> dict[str, Any]:
-    """Return the test whether the passes agree, by the largest |normalised| of all rows by pass or drift."""
+    """Return the test whether the passes agree: the largest |normalised| by pass or drift, and the common limit."""
     rows, limit = patterns[patterns["by"].isin(OF_PASSES)], limit_for(patterns, level)
     statistic = float(rows["normalised"].abs().max()) if len(rows) else 0.0
     return {"statistic": statistic, "dof": len(rows), "limit": limit, "passed": statistic <= limit}

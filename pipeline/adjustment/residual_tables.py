@@ -18,10 +18,10 @@ from pipeline.maths.geometry.face_grid import BinStatistics, bin_statistics, cel
 from pipeline.maths.sonar.soundings import receive_angle
 
 SENSORS = ("laser", "mbes")
-WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # degrees, m, s
+WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # of bins: degrees, m, s
 CELL_M = 0.1
 FEWEST = 10  # points: the report shows no mean of fewer
-AT_MOST = 100_000  # points of a sensor in table residuals, about
+AT_MOST = 100_000  # about the largest number of points of a sensor in table residuals
 
 
 def bins_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:

@@ -73,7 +73,7 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
     If the data leave a direction open, the mount's values and both covariances are NaN.
     """
     state, solution = adjustment.state, adjustment.solution
-    numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, also where it is fixed
+    numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, even if it is fixed
     random = solution.total_covariance(ConsiderErrors(np.zeros(state.size)), numbers)
     total = solution.total_covariance(problem.consider, numbers)
     values = _values(state, problem.model.coarse)[numbers]
@@ -123,7 +123,7 @@ def _no_result(deficiency: int) -> str:
 
 
 def _weakest(solution: Solution) -> str:
-    """Return the weakest direction of the mount in words; empty where a mount parameter is fixed."""
+    """Return the weakest direction of the mount in words; empty if a mount parameter is fixed."""
     is_whole = np.all(solution.estimated[:N_MOUNT] == np.arange(N_MOUNT))
     return weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]) if is_whole else ""
 

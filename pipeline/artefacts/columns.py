@@ -29,7 +29,7 @@ def coordinate_columns(frame: str, unit: str = "m", stem: str = "", type_: pa.Da
 
 
 def float32_coordinates(frame: str) -> tuple[Column, ...]:
-    """Return the columns of x, y, z in single precision. Within 16 m of the origin its error is at most 0.5 µm."""
+    """Return the columns of x, y, z in single precision. Within 16 m its rounding error is at most 0.5 µm."""
     return coordinate_columns(frame, type_=F32)
 
 

@@ -80,7 +80,7 @@ CODES = {
     "ray too flat": "grazing_ray",
 }
 
-# Codes of reasons with a variable part, by a pattern of the reason. CODES goes before these.
+# Codes of reasons with a variable part, by a pattern of the reason. CODES has precedence.
 CODES_OF_PATTERNS = {
     r"ins status .+": "ins_status",
     r"quality Q .+": "quality",

@@ -48,7 +48,7 @@ def rotation_vector_deg(row: Row) -> Array:
 
 
 def target_frame(target_pose: pd.DataFrame) -> TargetFrame:
-    """Return the target frame as it lies in the pool, from the table ``target_pose`` (one row)."""
+    """Return the target frame relative to the pool frame, from the table ``target_pose`` (one row)."""
     row = target_pose.iloc[0]
     R_target_from_pool = np.array(row["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
     return TargetFrame(R_target_from_pool, vector_of(row, "origin_{}_pool_m"))

@@ -186,7 +186,7 @@ class PartWriter:
 
 
 def write_empty_part(folder: Path, artefact: Artefact) -> Path:
-    """Write a file without rows, with which an empty stream is a readable folder, and return the file's path."""
+    """Write a file without rows and return its path. With it the folder of an empty stream can be read."""
     path = folder / "part-00000-000.parquet"
     with writing(path), _writer(path, artefact.schema):
         pass

@@ -44,7 +44,7 @@ def voxel_sums(points: _Array, voxel_m: float) -> Voxels:
 
 
 def voxel_means(partials: Iterable[Voxels]) -> _Array:
-    """Return the mean points (n, 3) of voxels. Sparse voxels, which contain outliers, are left out.
+    """Return the mean points (n, 3) of voxels. Sparse voxels, mostly of outliers, are left out.
 
     A voxel must have at least 2 points, and at least 2 % of the points of a typical voxel.
     """
@@ -66,7 +66,7 @@ def _sums(group: NDArray[np.int64], groups: int, rows: _Array) -> _Array:
 
 
 def sample_rows(batch: Batch, one_in: float) -> Batch:
-    """Return about one in ``one_in`` rows. A hash of time and beam chooses them, whatever the batches are."""
+    """Return about one in ``one_in`` rows. A hash of time and beam chooses them, so the batches do not matter."""
     if one_in <= 1:
         return batch
     mixed = batch["t_ns"].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)

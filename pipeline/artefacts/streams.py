@@ -53,7 +53,7 @@ class Chunk:
 
 
 class Part(Protocol):
-    """The unit of work. Parts are picklable and hold no open file."""
+    """The unit of work of a worker. Parts are picklable and have no open file."""
 
     @property
     def name(self) -> str:

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 def laser_in_pool(
     t_ns: NDArray[np.int64], points: Array, context: PoolContext, laser: LaserPlacement
 ) -> tuple[Array, Array]:
-    """Return laser points (n, 3) m in the scanner's frame and in the pool frame, from either frame of the files.
+    """Return laser points (n, 3) m in the scanner's frame and in the pool frame.
 
     Parameters
     ----------

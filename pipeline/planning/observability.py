@@ -51,7 +51,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class GeometryAdvice:
-    """Advice in words: the gaps in the geometry, and a remedy, further passes and their effect."""
+    """Advice in words: ``gaps`` in the geometry, and a ``remedy``, which names further passes and their effect."""
 
     gaps: list[str]
     remedy: str

@@ -32,7 +32,7 @@ class Rays:
 
 
 def laser_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]:
-    """Return the laser's rays in a time (s), thinned, and the number of points that each ray represents."""
+    """Return the laser's rays during ``seconds``, thinned, and the number of points that each ray represents."""
     figures = setting.plan.laser
     each = max(1, int(figures.point_rate_hz / (setting.plan.ins_rate_hz * RAYS)))
     number = np.arange(0, int(seconds * figures.point_rate_hz), each)
@@ -44,7 +44,7 @@ def laser_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]
 
 
 def sonar_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]:
-    """Return the sonar's rays in a time (s), every beam of every ping, and the number of soundings for each: one."""
+    """Return the sonar's rays during ``seconds``, and the number of soundings that each represents: one."""
     figures = setting.plan.mbes
     half = np.radians(figures.sector_deg) / 2
     angle = np.linspace(-half, half, figures.beams)

@@ -1,8 +1,8 @@
 """Prediction of the normal equations of passes before they are sailed, from points without noise.
 
-The sums and the equations are those of a real session. Candidates for a pass are computed one by one and their normal
-equations are added; this is exact except for the drift, which goes on from one pass to the next. The laser's rays are
-thinned, and each has the weight of the rays that it represents. The INS records are not thinned, because each record
+It forms the same sums and equations as a session does. Candidates for a pass are computed one by one, and their normal
+equations are added. This is exact except for the drift, which goes on from one pass to the next. The laser's rays are
+thinned, and each has the weight of all rays that it represents. The INS records are not thinned, because each record
 has its own white noise.
 """
 
@@ -151,7 +151,7 @@ def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Arr
 
 
 def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, number: int) -> Trajectory:
-    """Return poses along +y past the target at x = -distance. All coordinates except y have a wave of their own."""
+    """Return poses along +y past the target at x = -distance, with waves of golden-ratio phases on all except y."""
     plan, unrest = setting.plan, setting.plan.unrest
     t = np.arange(0.0, seconds + 1 / plan.ins_rate_hz, 1 / plan.ins_rate_hz)
     half = planned.half_length_m or setting.half_length_m

@@ -16,8 +16,8 @@ class MountSearch:
     Attributes
     ----------
     sensor : the sensor that is calibrated
-    max_angle_deg, max_lever_arm_m : largest differences from the coarse mount of a mount used for labelling
-    angles_advice : the angles to enter as the coarse mount; it appears only if nothing else is in doubt
+    max_angle_deg, max_lever_arm_m : a mount farther from the coarse one than this is not used for labelling
+    angles_advice : advice to enter other angles; it appears only if nothing except the angles is in doubt
     """
 
     sensor: Calibrated

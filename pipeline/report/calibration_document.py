@@ -75,7 +75,7 @@ def geometry_block(evidence: Evidence, advice: str, test_level: float) -> dict[s
     Parameters
     ----------
     evidence : tables of the run
-    advice : gaps in the geometry and their remedy, in words
+    advice : weaknesses of the geometry and their remedy, in words
     test_level : level of the tests
     """
     summary = evidence.summary.iloc[0]

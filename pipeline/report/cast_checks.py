@@ -14,8 +14,8 @@ from pipeline.report.reason_codes import ReasonCode, Statement
 
 MAX_APART_H = 36.0  # between the cast and the soundings; more than any error of the time zone
 MAX_APART_KM = 5.0  # between the cast and the session
-MAX_SPEED_GAP_M_S = 3.0  # of the head's sound speed beyond the cast's: with more it is other water
-MAX_MOUNT_ERROR_DEG = 2.0  # of the coarse mount: with more the rays must be traced again
+MAX_SPEED_GAP_M_S = 3.0  # between the head's sound speed and those of the cast: more means other water
+MAX_MOUNT_ERROR_DEG = 2.0  # of the coarse mount: with a larger one the rays must be traced again
 EARTH_KM = 6371.0
 
 

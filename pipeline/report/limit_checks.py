@@ -43,7 +43,7 @@ def patent_reasons(
 
     Parameters
     ----------
-    method : the patent's form
+    method : name of the form, patent_sequential or patent_alternating
     row : row of this form in the table ``corrections``
     methods : blocks of calibration.json by method
     limits : limits of the total sigmas

@@ -50,7 +50,7 @@ class ReasonCode(StrEnum):
     PATENT_NOT_CONVERGED = "patent_not_converged", "the patent's form did not converge"
     PATENT_OFF_ADJUSTMENT = "patent_off_adjustment", "the patent's form differs from the adjustment beyond the limits"
 
-    # Drift of the INS: these reject beside deviating residuals or a suspected cause. Otherwise the second warns.
+    # Drift of the INS: beside deviating residuals or a suspected cause these reject. Otherwise the second one warns.
     INS_DRIFT_NOT_GIVEN = "ins_drift_not_given", "ins.drift allows the INS no drift at all"
     INS_DRIFT_ABOVE_SETTINGS = "ins_drift_above_settings", "the INS drifts farther than its figures say"
 

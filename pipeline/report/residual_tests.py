@@ -3,8 +3,8 @@
 Every row of the table ``patterns`` is a mean or the difference of two means. Its column ``normalised`` is the normal
 deviate of the excess over the tolerance (``maths/adjustment/mean_tests.py``). All rows have one limit. If no true mean
 exceeds the tolerance, the chance that any row exceeds the limit is at most the test's level. A row beyond the limit
-deviates. There is one reason for the passes and one for all other variables. Each describes the row that deviates most,
-and names the other variables.
+deviates. There is at most one reason for the passes, and one for all other variables. Each describes the row that
+deviates most, and names the other variables.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from pipeline.adjustment.pattern_tests import OF_PASSES, limit_for
 from pipeline.report.reason_codes import Statement
 from pipeline.report.residual_words import ExceededTests, ResidualTests, Row, describe_pass, describe_pattern
 
-LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # variables that divide the points into separate parts
+LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # a deviation by these concerns only a part of the points
 
 
 @dataclass(frozen=True)

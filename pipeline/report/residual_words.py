@@ -54,7 +54,7 @@ class ExceededTests:
 
 # --- passes ------------------------------------------------------------------------------------------------------
 def describe_pass(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe the pass that deviates most, and whether the other sensor deviates there as well."""
+    """Return a reason that describes a pass that deviates, and whether the other sensor deviates there, too."""
     if row["by"] == "drift":
         return _drift(row, exceeded)
     patterns = exceeded.tests.patterns
@@ -80,7 +80,7 @@ def describe_pass(row: Row, exceeded: ExceededTests) -> Statement:
 
 
 def _drift(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe a pass in which the INS would have to drift too far."""
+    """Return a reason that describes a pass in which the INS would have to drift too far."""
     turn = f"{abs(np.degrees(row['mean_m'])):.3f}° in {TURNS[str(row['family'])]}"
     return Statement(
         ReasonCode.INS_DRIFT_BETWEEN_PASSES,
@@ -92,7 +92,7 @@ def _drift(row: Row, exceeded: ExceededTests) -> Statement:
 
 # --- everything else ---------------------------------------------------------------------------------------------
 def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe a deviation by face, angle, ping, distance or time."""
+    """Return a reason that describes a deviation by face, angle, ping, distance or time."""
     variable, low, high = row["by"], row["low"], row["low"] + row["width"]
     if variable == "step":
         return _step(row, exceeded)
@@ -117,7 +117,7 @@ def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
 
 
 def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe pings that deviate in turn.
+    """Return a reason that describes pings that deviate in a cycle.
 
     If a sonar changes its mode from ping to ping, and the fans of the modes have different tilts, whole pings are
     displaced along the track.
@@ -134,7 +134,7 @@ def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
 
 
 def _step(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe a step of the sonar's distances at one receive angle.
+    """Return a reason that describes a step of the sonar's distances at one receive angle.
 
     If the steps of two families at one angle have opposite signs, soundings are displaced along the track: a face that
     looks to one side then seems too near, and a face that looks to the other side too far.

@@ -25,7 +25,7 @@ class SensorReport:
     method : the method that is the result
     search : the search for its provisional mount
     sides : name of the setting of the target's left and right, in words
-    advice : gaps in the geometry and their remedy, in words
+    advice : weaknesses of the geometry and their remedy, in words
     result_keys : keys of calibration.json that follow ``result``
     data_keys : keys of calibration.json that follow ``passes``
     instruments : settings of the sonar, by sensor, for the block ``instruments``; empty for the laser

@@ -1,4 +1,4 @@
-"""Suspected causes: fixed parameters that the residuals contradict. Parameters that are additionally estimated.
+"""Suspected causes (fixed parameters that the residuals contradict), and the parameters that adjust.free names.
 
 Table ``freed`` has the single-parameter test of each fixed parameter. A parameter is a suspected cause if its estimate
 is farther from zero than noise and its a-priori sigma explain. One error often moves the estimates of several
@@ -47,7 +47,7 @@ class EstimatedParameter:
 
 
 def suspected_causes(freed: pd.DataFrame) -> list[SuspectedCause]:
-    """Return the fixed parameters of table ``freed`` that differ significantly from zero, the most probable first."""
+    """Return the suspected causes from table ``freed``, the one with the largest value over sigma first."""
     causes = [
         SuspectedCause(_words(row), abs(row["value"]) / row["sigma"])
         for row in freed[~freed["estimated"]].to_dict("records")

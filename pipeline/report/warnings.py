@@ -90,7 +90,10 @@ def target_off_origin(target: Mapping[str, Any]) -> list[Statement]:
 
 
 def passes_with_one_sensor(passes: Sequence[Mapping[str, Any]]) -> Iterator[Statement]:
-    """Yield a warning for each sensor that missed the target in passes (rows of calibration.json) of the other one."""
+    """Yield a warning for each sensor that did not see the target in passes in which the other one did.
+
+    ``passes``: rows of the key ``passes`` of calibration.json.
+    """
     laser_alone = "the laser saw the target, and there are no soundings on it"
     sonar_alone = "the sonar saw the target, and there are no laser points on it"
     for present, missing, code, words in (

@@ -27,8 +27,8 @@ def refine_target_and_laser(
 ) -> tuple[LocatedTarget, ProvisionalMount]:
     """Return the pose of the target and the laser's provisional mount, starting from the pose with the coarse mount.
 
-    The mount's rotation is estimated. Its lever arm stays, because the points are the same with the laser 3 cm farther
-    to starboard as with the target 3 cm nearer.
+    The mount's rotation is estimated. Its lever arm stays, because a laser 3 cm farther to starboard and a target 3 cm
+    nearer would give the same points.
 
     Parameters
     ----------

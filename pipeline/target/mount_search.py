@@ -27,10 +27,11 @@ def search_mount(
     """Return the correction of the coarse mount with which the soundings fall onto the wet faces.
 
     The coarse mount may be wrong by up to the search limits. First the soundings on the front (the patent's wall) give
-    roll and x: roll turns the front about the track, x shifts it, and no other parameter moves it. The middle of the
-    front takes part in a vote for both values; its soundings are on the front whatever the other parameters are. If
-    there is no front, the search includes roll. Then follows a search over yaw, y and z. The blocks repeat in height,
-    so another z may fit as well. It is searched within the limits of the lever arm, and the best rival is reported.
+    roll and x: roll turns the front about the track, x shifts it, and no other parameter moves it. A vote decides: the
+    roll and x that bring most soundings into one plane. Only soundings near the front's middle vote, because they are
+    on the front whatever the other parameters are. Without a front the search includes roll. Then follows a search over
+    yaw, y and z. Blocks repeat in height, so another z may fit as well. The search covers all z within the limits of
+    the lever arm, and the best rival is reported.
 
     Parameters
     ----------
