@@ -60,7 +60,7 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
     laser : Laser
         The session's laser.
     as_built : AsBuilt
-        Sigmas of the wet faces against the dry ones.
+        Sigmas of the wet faces against the dry faces.
     """
     mount, covariance = laser.mount_sigma, laser.mount_covariance
     mount_sigmas = [float(np.radians(mount.angle_deg))] * 3 + [mount.lever_arm_m] * 3

@@ -15,7 +15,7 @@ from pipeline.config.session import Drift, Ins
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.geometry.passes import pass_of
 
-AXES = {  # for each figure of the drift the columns of ins_sigmas whose root mean square it is
+AXES = {  # a figure of the drift is the root mean square of these columns of ins_sigmas
     "horizontal_m": ["north_m", "east_m"],
     "vertical_m": ["up_m"],
     "roll_pitch_deg": ["roll_deg", "pitch_deg"],
@@ -52,7 +52,7 @@ def median_sigmas(sigmas: Mapping[str, NDArray[Any]]) -> dict[str, float]:
 
 
 def drift_model(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Drift:
-    """Return the drift model: sigmas from the files where available, otherwise from session.yaml.
+    """Return the drift model: sigmas from the files if available, otherwise from session.yaml.
 
     The time constant is always that of session.yaml.
 

@@ -53,7 +53,7 @@ class MountAdjustment:
     """Result of the iteration.
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
-    points of an interval (empty without a solution; the laser's factor, where it is well known, is already in the INS's
+    points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
     the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
     """
@@ -131,7 +131,7 @@ def adjust_mount(
             converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
             if converged:
                 break
-    # solve with the equations of all parameters: total covariance and tests need those of the fixed ones
+    # solve with the equations of all parameters: total covariance and tests need the fixed parameters
     equations = last.equations(noise)
     solution = solve(equations.normal, equations.right, estimated.tolist())
     return MountAdjustment(
@@ -239,7 +239,7 @@ def _weighted_iteration(
 
 
 def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
-    """Return the state whose mount is stepped from the coarse one until the soundings lie near the surfaces."""
+    """Return the state after steps of the coarse mount alone, which bring the soundings near the surfaces."""
     state = model.coarse
     for _ in range(INITIAL_STEPS):
         sums = accumulate({"mbes": soundings}, model, CurrentValues(state)).sums

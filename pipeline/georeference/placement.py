@@ -24,7 +24,7 @@ def laser_in_pool(
     t_ns
         Times (n,).
     points
-        Points (n, 3) m of the files: in the scanner's frame or in ECEF, as ``laser.frame`` says.
+        Points (n, 3) m of the files: in the scanner's frame or in ECEF, by ``laser.frame``.
     context
         The trajectory in the pool.
     laser

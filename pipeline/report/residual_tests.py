@@ -15,7 +15,7 @@ from pipeline.adjustment.pattern_tests import OF_PASSES, limit_for
 from pipeline.report.reason_codes import Statement
 from pipeline.report.residual_words import ExceededTests, ResidualTests, Row, describe_pass, describe_pattern
 
-LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # a deviation by these concerns only a part of the points
+LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # a deviation by these concerns a part of the points
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ RAW_SAMPLE = 50_000  # about this many of them at most, as single points
 
 @dataclass(frozen=True)
 class LaserSample:
-    """Dry laser points in the pool frame: means over voxels (n, 3) m, and a sample of the points themselves (k, 3) m.
+    """Dry laser points in the pool frame: means over voxels (n, 3) m, and a sample of single points (k, 3) m.
 
     The search uses the means, because their density is even. They are biased if a face lies along the sides of voxels:
     the points before and behind the face then have separate means. So the pose is estimated from the points.
