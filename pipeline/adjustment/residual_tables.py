@@ -89,7 +89,7 @@ def _family_number(residuals: pd.DataFrame, faces: pd.DataFrame, families: list[
 
 
 def sampling_step(total: int, at_most: int = AT_MOST) -> int:
-    """Return n for a sample of every n-th point. It is odd: an even n could miss one of two alternating kinds of points."""
+    """Return n for a sample of every n-th point. An odd n cannot miss one of two alternating kinds of points."""
     step = -(-total // at_most)
     return step if step <= 1 else step | 1
 
