@@ -23,10 +23,10 @@ uncorrelated with e.
 * Laser: range and angles are measured, and the least squares correction of a point is -Σ n e / (nᵀ Σ n)
   (Gauss-Helmert). So the slopes of α and β are t_k · Σ n / (nᵀ Σ n).
 * Sonar: the recorded angle is not measured. It is the angle at which the beam is formed, and the beam's true axis
-  strays from it (Berkson's model of errors in variables). The expected point is where the *recorded* ray meets the
-  surface. So all of e is corrected along the ray, d e / (n · d). The labels choose points in the same way; with the
-  laser's correction these points would turn a grazed face by 0.2°. (Without any correction 20 000 soundings at one
-  distance give a sound speed that is wrong by 0.1 %, five sigmas.)
+  strays from it (Berkson's model of errors in variables). The expected point is the intersection of the *recorded* ray
+  with the surface. So all of e is corrected along the ray, d e / (n · d). The labels choose points in the same way;
+  with the laser's correction these points would turn a grazed face by 0.2°. (Without any correction 20 000 soundings at
+  one distance give a sound speed that is wrong by 0.1 %, five sigmas.)
 
 Two effects of the sonar's angle are of second order. They still reach a fifth of the sigma of roll, because more
 soundings do not average them out. (1) A stray axis meets the surface further away on average. With
@@ -73,7 +73,7 @@ from pipeline.maths.sonar.soundings import across_beam
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SPEED_M_S = 1480.0  # sound speed for small effects, whose size alone depends on it
+SPEED_M_S = 1480.0  # sound speed for the gradient's feature: a nominal value, as the effect is small
 FLATTEST = 0.05  # smallest |n · d|, 3°: flatter than any labelled ray, once the mount is nearly right
 STEEPEST = 0.02  # smallest |c| for the feature of the sound speed, which divides by c
 FLATTEST_FAN = 0.25  # smallest |c| for the curvature of a tilted fan: 15° from the array's plane

@@ -74,7 +74,7 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
     coupling -= (phi / variance)[:, None, None] * unit
     xi = np.divide(current, scale, out=np.zeros_like(current), where=scale > 0)  # the drift in units of σ
     innovation = xi[1:] - phi[:, None] * xi[:-1]  # part of the drift that does not follow from the knot before
-    weighted = innovation / variance[:, None]
+    weighted = innovation / variance[:, None]  # innovation times its weight
     border[0, :, u] += xi[0]
     border[1:, :, u] += weighted
     border[:-1, :, u] -= phi[:, None] * weighted

@@ -49,7 +49,9 @@ def normal_deviates(mean: Array, sigma: Array, dof: Array, tolerated: Array | fl
 
 
 def joint_limit(number: int, level: float) -> float:
-    """Return the limit of |u| that one of ``number`` means exceeds with probability ``level`` without a true excess.
+    """Return the limit of |u| for ``number`` means.
+
+    If no true mean exceeds its tolerance, at least one |u| exceeds the limit with a probability of at most ``level``.
 
     >>> round(joint_limit(1, 0.05), 2), round(joint_limit(500, 0.001), 2)
     (1.96, 4.75)

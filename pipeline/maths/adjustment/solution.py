@@ -20,7 +20,7 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
-VAGUE = 10.0  # rad or m: prior sigma of a parameter without any prior information
+VAGUE = 10.0  # rad or m: prior sigma that stands for no prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
 

@@ -136,8 +136,8 @@ class AngleStep:
 def angle_step(passes: Sequence[PassPlanes], rotation: Array, lever_arm_m: Array) -> AngleStep:
     """Compare the planes pass by pass with this mount, and combine the deviations by weight.
 
-    Each pass is compared alone. In one straight pass a yaw error turns the planes in a known direction, by 0 to 1 times
-    the error; this factor is the *gain*. For all passes together the direction is not certain.
+    Each pass is compared alone. In one straight pass a yaw error turns the planes in a known direction, by the error
+    times a factor, the *gain*: 0 < gain <= 1. For all passes together the direction is not certain.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Data snooping: tests of an adjustment's residuals mark by mark, repeated without the worst mark.
 
-The alternative hypothesis is that an error ∇ (3,) of one mark shifts the residuals by G ∇. G (n, 3) are the derivatives
+The alternative hypothesis is that an error ∇ (3,) of one mark shifts the residuals by G ∇. G (n, 3) has the derivatives
 of the residuals by the mark's coordinates, in one frame (error of the drawing) or in all (error of the survey). With
 W = Σ⁻¹ and Q_v the residuals' cofactors, the likelihood ratio is
 
@@ -164,7 +164,7 @@ def snoop(survey: MarkSurvey, frames: Sequence[RigidFrame]) -> SnoopingResult:
 
 
 def _without(frames: tuple[RigidFrame, ...], test: MarkTest) -> tuple[RigidFrame, ...]:
-    """Return the frames without the mark of a test: the test's frame, or all for SURVEY. Frames with axes keep it."""
+    """Return the frames, the mark of a test left out of the test's frame, or of all for SURVEY (axes keep theirs)."""
     fewer = []
     for number, frame in enumerate(frames):
         places = np.flatnonzero(frame.marks == test.mark)

@@ -248,8 +248,8 @@ def _level(R: Array, along: int) -> tuple[float, Array]:
 def _start(survey: MarkSurvey, frame: RigidFrame) -> FramePose:
     """Return the pose from which the iteration starts.
 
-    It is the closed form, with the mean variance of each mark. A frame with axes starts from its axis and the vertical,
-    made orthogonal to it, turned by the INS's reading.
+    It is the closed form, weighted by the mean variance of each mark. A frame with axes starts from its axis and the
+    vertical, made orthogonal to the axis, turned by the INS's reading.
     """
     at, axes = survey.at_m[frame.marks], frame.axes
     if axes is None:

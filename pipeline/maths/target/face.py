@@ -81,7 +81,7 @@ class Face:
         margin_m
             Margin from every edge.
         stray_m
-            How far the footprints may stray (n, 3).
+            Vectors (n, 3) by which the footprints may stray.
         """
 
         def reach(axis: Array) -> Array | float:

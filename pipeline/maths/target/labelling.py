@@ -49,8 +49,8 @@ class LabelSettings:
 class Labels:
     """Face number (n,) of each point or -1, the cosine of its incidence, and masks (n,) of the points without a face.
 
-    off_surface: within the gate the ray meets no face's polygon; grazing: it meets one too flat, or from behind;
-    near_edge: it meets one, but the footprint with its margin does not lie within the polygon.
+    off_surface: the ray meets no face's polygon within the gate and the heights; grazing: it meets one too flat, or
+    from behind; near_edge: it meets one, and the footprint with its margin does not lie within the polygon.
     """
 
     face: NDArray[np.int16]
