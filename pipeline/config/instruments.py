@@ -42,7 +42,7 @@ class Instrument(Model):
     sensor: Sensor
     settings: Block = Field(default_factory=dict)  # keys of the sensor's block
     rates: Block = Field(default_factory=dict)  # keys of PLAN.yaml for the sensor
-    unverified: tuple[str, ...] = Field(default=(), max_length=100)  # keys, such as drift.heading_deg, rates.beams
+    unverified: tuple[str, ...] = Field(default=(), max_length=100)  # keys without a document, such as rates.beams
 
 
 def _part(model: type[BaseModel], names: tuple[str, ...]) -> type[Model]:

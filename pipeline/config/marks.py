@@ -49,8 +49,8 @@ class Drawing(Model):
 class Axes(Model):
     """The body axes from two marks and one angle of the INS.
 
-    Either the y axis runs through the marks ``forward`` (aft, forward) and ``roll_deg`` is the INS's roll. Or the x axis
-    runs through the marks ``starboard`` (port, starboard) and ``pitch_deg`` is the INS's pitch.
+    Either the y axis runs through the marks ``forward`` (aft, forward), and ``roll_deg`` is the INS's roll. Or the x
+    axis runs through the marks ``starboard`` (port, starboard), and ``pitch_deg`` is the INS's pitch.
     """
 
     origin: Name

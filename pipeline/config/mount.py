@@ -47,7 +47,7 @@ class MountOrigin(Model):
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
     software: Annotated[str, Field(max_length=100)]
-    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # mount parameters that a fine calibration fixed
+    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # mount parameters that a fine calibration kept fixed
     mount: Mount | None = None  # the mount as written: mount_covariance belongs to this mount only
 
 

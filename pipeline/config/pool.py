@@ -13,7 +13,7 @@ from pipeline.config.target import Origin, Target
 
 
 class AsBuilt(Model):
-    """The target as surveyed: offsets of faces from their design, and sigmas of a family's wet faces beside its dry ones."""
+    """The target as surveyed: offsets of faces from the design, and sigmas of the wet faces against the dry ones."""
 
     faces: dict[str, Annotated[float, Field(ge=-0.05, le=0.05)]] = Field(default_factory=dict)  # m outward, by name
     offset_sigma_m: SigmaM = 0.001
@@ -21,7 +21,7 @@ class AsBuilt(Model):
 
 
 class TargetPlace(Model):
-    """Settings of the target that the readers need. A change of another one must not make them read the files again."""
+    """Settings of the target that the readers need. Another letter must not make them read the files again."""
 
     origin: Origin
     azimuth_deg: float | None
@@ -56,7 +56,7 @@ class Segment(Model):
     search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # the same of the laser's, if it is calibrated
     ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # of the wall that a pose half a period off must lose
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
-        0.02  # another mount is as good if its share of explained soundings is less than this part smaller
+        0.02  # the mount is ambiguous if a rival's score is smaller by less than this share
     )
 
     @property

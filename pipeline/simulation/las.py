@@ -15,14 +15,14 @@ _CHUNK = 1_000_000
 
 
 def write_las(path: Path, laser: Columns, scenario: LaserScenario, day: date) -> None:
-    """Write one file.
+    """Write one LAS or LAZ file.
 
     Parameters
     ----------
     path : Path
         The file.
     laser : Columns
-        Points.
+        Points and their times.
     scenario : LaserScenario
         Format, scale, kind of times.
     day : date

@@ -47,9 +47,9 @@ def packet_dtype(scenario: MbesScenario) -> np.dtype[np.void]:
 
 
 def bth0_packets(mbes: Columns, pings: Columns, fan: FanAngles, scenario: MbesScenario) -> np.ndarray:
-    """Return the packets of some pings.
+    """Return one packet per ping.
 
-    Beams without detection have range 0. Ranges use all 16 bits of section R0.
+    Beams without a detection have range 0. Ranges use all 16 bits of section R0.
 
     Parameters
     ----------
