@@ -66,7 +66,7 @@ class Offset:
     weeks: int = 0
 
     def words(self, to_the_ins: bool, week: int | None, key: str, whose: str = "the INS's") -> str:
-        """Return the sentence that says how far one clock is ahead of or behind another.
+        """Return the text that states how far one clock is ahead of or behind another, the cause and the remedy.
 
         Parameters
         ----------

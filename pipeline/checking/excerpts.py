@@ -19,10 +19,10 @@ from pipeline.readers.las import LasPart
 from pipeline.readers.raw_file import opened, read_at, size_of
 from pipeline.readers.sbet import SBET_RECORD
 
-POINTS = 4_000_000  # about the most points read of a laser's files together
+POINTS = 4_000_000  # upper limit, about, of the points read of a laser's files together
 STRETCH = 8_192  # points read at one place
 PACKED_STRETCH, PACKED_PLACES = 50_000, 24  # points at one place of LAZ, and places: each place costs a process
-BYTES = {"ins": 64 << 20, "mbes": 48 << 20}  # about the most bytes read of a sensor's files together
+BYTES = {"ins": 64 << 20, "mbes": 48 << 20}  # upper limit, about, of the bytes read of a sensor's files together
 PLACES = 128  # most places in one file
 LEAST = {"ins": 1 << 16, "mbes": 1 << 19}  # least bytes at one place: several records, and a sonar's are large
 HEAD = 1 << 18  # bytes of a file's start

@@ -21,7 +21,7 @@ from pipeline.checking.track import InsTrack
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-REACH_M = 0.5  # distance from a face beyond which a point counts nothing
+REACH_M = 0.5  # distance from a face beyond which a point counts 0
 FARTHEST_M, STEP_M = 50.0, 0.25  # largest shift that is tried, and the step between shifts
 SHIFTS_M = np.arange(-FARTHEST_M, FARTHEST_M + STEP_M / 2, STEP_M)
 HERE = len(SHIFTS_M) // 2  # index of the shift 0
@@ -185,7 +185,7 @@ def profile(
     side : SideOfWater or None
         The side of the water on which points count; None: both sides.
     reach_m : float
-        Distance from a face beyond which a point counts nothing.
+        Distance from a face beyond which a point counts 0.
     """
     scores = []
     for shift in shifts_m:

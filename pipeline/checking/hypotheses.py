@@ -11,7 +11,7 @@ from pipeline.checking.track import InsTrack
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-REACH_M = 0.5  # distance from a face beyond which a point counts nothing: the coarse mount and origin may be so wrong
+REACH_M = 0.5  # distance from a face beyond which a point counts 0: coarse mount and origin may be wrong by as much
 FARTHEST_S, STEP_S, FINE_S = 60.0, 1.0, 0.1  # clock offsets that are tried: the largest, coarse and fine steps
 UNITS = {"millimetres": 0.001, "centimetres": 0.01, "feet": 0.3048}
 SIGNS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m")  # heights.py tries the sign of z

@@ -21,7 +21,7 @@ from pipeline.mount import corrected_mount, mount_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-REACH_M = 0.15  # distance from a face beyond which a point counts nothing, in the estimated pose (x and y are known)
+REACH_M = 0.15  # distance from a face beyond which a point counts 0; small, because the pose's x and y are known
 STEP_M = 0.05
 SHIFTS_M = np.arange(-5.0, 5.0 + STEP_M / 2, STEP_M)
 CLEARLY = 0.95  # a pose with a smaller share of the best agreement is clearly worse

@@ -35,7 +35,7 @@ class MarksAssessment:
     mounts
         By sensor its mount, with covariance (6, 6) in the order of CONVENTIONS.md.
     warnings
-        Sentences about doubts that stop nothing.
+        Sentences about doubts that do not stop the program.
     """
 
     frames: MarkFrames

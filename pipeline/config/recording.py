@@ -11,7 +11,7 @@ FIRST_WEEK = 1000  # March 1999
 
 
 def inside_session(pattern: str) -> str:
-    """Return a path or pattern that stays inside the session folder; raise ValueError where it does not."""
+    """Return a path or pattern that stays inside the session folder; raise ValueError if it does not."""
     path = PurePosixPath(pattern)
     if not pattern or path.is_absolute() or ".." in path.parts or "\\" in pattern or "\0" in pattern:
         raise ValueError("must be a path or pattern inside the session folder, with / between its parts")

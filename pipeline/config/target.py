@@ -78,7 +78,7 @@ class FaceSettings(Model):
     """A planar convex polygon: corners in the target frame, counter-clockwise as the sensors see it."""
 
     corners: Annotated[tuple[tuple[Lever, Lever, Lever], ...], Field(min_length=3, max_length=60)]
-    seen: Literal["both", "dry", "wet"] = "both"  # by the laser alone: dry; by the sonar alone: wet
+    seen: Literal["both", "dry", "wet"] = "both"  # dry: by the laser only; wet: by the sonar only
     role: Literal["P1", "P2", "P3"] | None = None  # in the patent's steps
 
 
@@ -86,8 +86,8 @@ class RelationSettings(Model):
     """A known relation between faces, of one of four kinds; ``name``: the name of the family that they form."""
 
     same_plane: FaceNames | None = None
-    distance: FaceNames | None = None  # parallel, as far apart as the corners say
-    height: FaceNames | None = None  # horizontal, as high above each other as the corners say
+    distance: FaceNames | None = None  # parallel, with the distances that follow from the corners
+    height: FaceNames | None = None  # horizontal, with the height differences that follow from the corners
     parallel: FaceNames | None = None  # at an unknown distance
     name: FaceName | None = None
 

@@ -138,7 +138,7 @@ class _SonarPass:
         return paths * (1 - gradient * depths / (2 * speed)), directions
 
     def _corners(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
-        """Return the paths, some of those near an inner corner replaced by the path to the corner's line.
+        """Return the paths, some of them near an inner corner replaced by the path to the corner's line.
 
         The echo comes from the nearest point of the line within the beam.
         """
@@ -158,7 +158,7 @@ class _SonarPass:
         return result
 
     def _surface(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
-        """Return the paths, some replaced by the path to the water surface: along the beam if they meet, else upright."""
+        """Return the paths, some replaced by the path to the water surface: along the beam, or else straight up."""
         dice = self.random["surface"].random(paths.shape)
         chosen = (dice < self.scenario.surface_share) & (directions[..., 2] > np.sin(UPWARD_RAD))
         depth = np.broadcast_to((self.pool.water_level_m - origins[:, 2])[:, None], paths.shape)

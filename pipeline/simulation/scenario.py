@@ -45,7 +45,7 @@ class Surroundings(Model):
 
     half_length_m: Annotated[float, Field(gt=0, le=200)] = 15.0  # back wall and floor reach this far along y
     floor_gap_m: NotNegative = 0.3  # the floor lies this much below the target's foot
-    back_wall: bool = True  # false: nothing stands behind the target
+    back_wall: bool = True  # false: no wall stands behind the target
     wall_above_m: NotNegative = 0.5  # the back wall ends this much above the target's top
     tilt_deg: tuple[Angle, Angle] = (0.0, 0.0)  # the target as built, turned about its x and y axes
     origin_error_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # configured minus true, target axes
@@ -110,8 +110,8 @@ class LaserScenario(Model):
     max_range_m: Annotated[float, Field(ge=1, le=1000)] = 40.0
     range_sigma_m: NotNegative = 0.005
     angle_sigma_deg: NotNegative = 0.003
-    outlier_share: Share = 0.005  # of the rays, which get a random range
-    water_return_share: Share = 0.02  # of the rays that meet the water, which give a point up to 0.3 m beyond its surface
+    outlier_share: Share = 0.005  # of the rays: they get a random range
+    water_return_share: Share = 0.02  # of the rays that meet the water: they give a point up to 0.3 m beyond it
     latency_s: Latency = 0.0  # recorded time = true time + latency
     latency_declared_s: Latency = 0.0
     frame: Literal["laser", "EPSG:4978"] = "laser"  # EPSG:4978: placed in ECEF with the recorded INS
@@ -139,10 +139,10 @@ class MbesScenario(Model):
     beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # across, along track
     point_beams: bool = False  # true: beams without width
     sub_rays: tuple[Count, Count] = (5, 3)  # rays per beam, across and along; odd
-    corner_share: Share = 0.3  # of the beams within corner_reach_m of an inner corner, which get the corner's range
+    corner_share: Share = 0.3  # of the beams within corner_reach_m of an inner corner: they get its range
     corner_reach_m: NotNegative = 0.1
-    outlier_share: Share = 0.02  # of the beams, which get a random range
-    surface_share: Share = 0.04  # of the beams above 30° below the horizon, which get the water surface's range
+    outlier_share: Share = 0.02  # of the beams: they get a random range
+    surface_share: Share = 0.04  # of the beams above 30° below the horizon: they get the water surface's range
     dropped_ping_share: Share = 0.01
     sound_speed_true_m_s: SoundSpeed = 1500.0
     sound_speed_recorded_m_s: SoundSpeed = 1500.0

@@ -36,7 +36,7 @@ class SimulatedSession:
     """Records of the instruments as canonical raw columns, and the documents that go with them."""
 
     ins: Columns  # t_ns, latitude_rad, longitude_rad, height_m, roll_rad, pitch_rad, azimuth_rad
-    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF if the scenario says so
+    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF by the scenario's laser.frame
     mbes: Columns  # t_ns, ping, beam, two_way_time_s, angle_rad, transmit_tilt_rad, sound_speed_m_s; detections only
     session: dict[str, Any]  # session.yaml
     pool: dict[str, Any]  # pool.yaml
