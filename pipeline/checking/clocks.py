@@ -77,7 +77,7 @@ class Offset:
         key : str
             The setting that holds the week.
         whose : str
-            Name of the clock that serves as the reference, for the sentence.
+            Name of the clock that serves as the reference, for the text.
         """
         ahead = self.ahead == to_the_ins
         why = self.why

@@ -103,7 +103,7 @@ def count_soundings(
 
 
 def _beams_that_meet(pings: PingsOnTarget, t_ns: Times) -> Array:
-    """Return by face (f,) the number of beams, of pings at these times, whose soundings would be labelled with it."""
+    """Return, for each face (f,), the number of beams that would be labelled with the face, of pings at these times."""
     model, session = pings.model, pings.session
     rows = sampled_rows(pings.files, "mbes", BEAMS)
     fan = _fan(rows)

@@ -45,7 +45,7 @@ def unreadable_files(files: Sequence[SurveyedFile], list_faults: Sequence[str]) 
 
 
 def duplicate_files(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
-    """Yield a finding for each two files of a sensor that share half or more of the times of one of them."""
+    """Yield a finding for each pair of files of a sensor with half or more of one file's times in common."""
     for first, second in _overlapping([file for file in files if len(file.epochs_ns) > 1]):
         start_ns = max(first.span_ns[0], second.span_ns[0])
         common = np.count_nonzero(np.isin(first.epochs_ns, second.epochs_ns, assume_unique=True))

@@ -139,7 +139,7 @@ def _with_accuracy(
 
 
 def _listed(settings: SensorSettings, folder: Path) -> tuple[list[str], list[str]]:
-    """Return the names of the files that the patterns match, and the refusals of patterns that match none."""
+    """Return the names of the files that the patterns match, and the errors for patterns that match none."""
     names: list[str] = []
     faults = []
     for pattern in settings.files:

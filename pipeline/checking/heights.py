@@ -74,7 +74,8 @@ class Fit:
     def off(self) -> bool:
         """Whether the points fit clearly better at another height.
 
-        With only a wrong water level, ``free`` stays high without a shift. Then only a reversed sign of z counts.
+        With only a wrong water level, ``free`` is high without any shift. In this case a better height counts only if a
+        reversed sign of z explains it.
         """
         far = abs(self.shift_m) >= LEAST_M and self.sided[HERE] < WORSE
         return far and (self.sign or self.free[HERE] < WORSE)

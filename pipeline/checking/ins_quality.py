@@ -94,8 +94,8 @@ def _counted(kind: str, numbers: NDArray[np.uint8]) -> Counter[str]:
 def quality_findings(quality: InsQuality) -> Iterator[Finding]:
     """Yield findings for large sigmas and poor states in an INS's log.
 
-    Sigmas above the second limit are a fault. An attitude that has not settled within the passes is a fault if the log
-    states no sigma of the heading and no sigma is a fault. All other findings are a ``look``.
+    Sigmas above the second limit are a fault. An attitude that has not settled within the passes is a fault too, unless
+    the log states a sigma of the heading or another sigma is a fault already. All other findings are a ``look``.
     """
     where = "in the passes" if quality.of_passes else "in the whole log"
     judged = False

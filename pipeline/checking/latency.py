@@ -13,7 +13,7 @@ import pandas as pd
 from pipeline.checking.findings import Finding
 from pipeline.mount import WITHIN_95
 
-SIGMAS, LEAST_S = 4.0, 0.005  # a latency counts above both: its statistic (in sigmas) and its size
+SIGMAS, LEAST_S = 4.0, 0.005  # least statistic (in sigmas) and least size of a latency that counts
 SAME = 3.0  # two offsets that differ by fewer sigmas are one offset of the INS's clock
 
 

@@ -138,7 +138,7 @@ def _global_line(assessment: MarksAssessment) -> str:
 
 
 def _normalised(test: MarkTest) -> float:
-    """Return the test's statistic as a normalised residual, near one where the mark is right."""
+    """Return the test's statistic as a normalised residual, about one if the mark is right."""
     return float(np.sqrt(test.statistic / test.rank))
 
 

@@ -36,7 +36,7 @@ MARKER = re.compile("([\U000f0000-\U0010fffd])\\1*")
 TEXT_BLOCK = ("|", ">")
 TAGS = {str: "tag:yaml.org,2002:str", float: "tag:yaml.org,2002:float", dict: "tag:yaml.org,2002:map",
         list: "tag:yaml.org,2002:seq"}  # fmt: skip
-DIGITS = {"mount_covariance": ".9e"}  # always with a point: YAML takes 1e-06 for a word
+DIGITS = {"mount_covariance": ".9e"}  # with a decimal point, because YAML reads 1e-06 as text
 
 
 def edit_mounts(text: str, blocks: Mapping[str, Content], path: Path) -> str:

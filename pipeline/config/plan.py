@@ -43,10 +43,10 @@ class Unrest(Model):
 class Pass(Model):
     """One pass along the wall."""
 
-    distance_m: Annotated[float, Field(ge=0.5, le=100)]  # of the INS from the wall
+    distance_m: Annotated[float, Field(ge=0.5, le=100)]  # distance of the INS from the wall
     speed_m_s: Annotated[float, Field(ge=0.01, le=10)] = 0.4
     heading_swing_deg: Annotated[float, Field(ge=0, le=45)] = 1.5  # amplitude
-    half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the blocks
+    half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the target
 
     def seconds(self, half_length_m: float) -> float:
         """Return the time of the pass in seconds; ``half_length_m`` is used if the pass has none of its own."""
@@ -63,7 +63,7 @@ class Budget(Model):
 class Plan(Model):
     """PLAN.yaml: the passes to be sailed, and the rates of the instruments."""
 
-    ins_height_m: Lever = 1.3  # of the INS above the water
+    ins_height_m: Lever = 1.3  # height of the INS above the water
     ins_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
     laser: LaserFigures = LaserFigures()
     mbes: MbesFigures = MbesFigures()

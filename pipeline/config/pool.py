@@ -54,7 +54,7 @@ class Segment(Model):
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
     search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # the same of the laser's, if it is calibrated
-    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # of the wall that a pose half a period off must lose
+    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # loss of wall by a shift of half a period: less is ambiguous
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
         0.02  # the mount is ambiguous if a rival's score is smaller by less than this share
     )
@@ -97,10 +97,10 @@ Freeable = Literal["mbes_latency", "laser_latency", "sound_speed"]
 class Adjust(Model):
     """Additional unknowns of the adjustment, its weights, and its tests."""
 
-    free: tuple[Freeable, ...] = ()  # estimated besides the mount and the surfaces
+    free: tuple[Freeable, ...] = ()  # unknowns beside the mount, the surfaces and the INS's drift
     max_iterations: Annotated[int, Field(ge=1, le=100)] = 20
     robust_k0: Annotated[float, Field(ge=0.5, le=1000)] = 3.0  # IGG III: full weight below, in sigmas
-    robust_k1: Annotated[float, Field(ge=0.5, le=1000)] = 6.0  # no weight above
+    robust_k1: Annotated[float, Field(ge=0.5, le=1000)] = 6.0  # IGG III: no weight above, in sigmas
     moment_s: Annotated[float, Field(ge=0.001, le=1000)] = 0.1  # observations within it share the INS's noise
     test_level: Annotated[float, Field(gt=0, lt=0.5)] = 0.001
     test_tolerance_m: SigmaM = 0.003  # smaller mean residuals, steps and differences of passes do not matter

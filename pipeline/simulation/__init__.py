@@ -1,7 +1,7 @@
 """Pool sessions with known truth, written as real instrument files.
 
 The forward model is independent. It is written from the conventions (frames, signs, units) only, and does not import
-``pipeline.maths`` or ``pipeline.readers``. A wrong sign in those packages therefore cannot cancel itself in the session.
+``pipeline.maths`` or ``pipeline.readers``. Therefore a wrong sign in these packages cannot cancel itself.
 
 scenario        the settings of a session (YAML, strict)
 site            target frame <-> WGS 84, by pyproj

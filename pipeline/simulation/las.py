@@ -1,4 +1,4 @@
-"""LAS 1.4, point format 6 (and LAZ): points in the scanner's frame with GPS time."""
+"""LAS 1.4, point format 6 (and LAZ): points with GPS time, in the scanner's frame or in ECEF."""
 
 from datetime import date
 from pathlib import Path

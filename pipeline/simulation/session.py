@@ -144,7 +144,7 @@ def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> d
     begin = time.perf_counter()
     folder = Path(os.path.abspath(folder))
     scenario = load_scenario(scenario_path)
-    _refuse_existing(folder)  # before the work, not after it
+    _refuse_existing(folder)  # checked before the simulation, which takes long
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
