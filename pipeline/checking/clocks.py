@@ -92,9 +92,7 @@ def clock_findings(
     files: Sequence[SurveyedFile],
     weeks: Mapping[str, int | None] = NO_WEEKS,
 ) -> Iterator[Finding]:
-    """Yield a finding for each sensor that ran at times when the INS did not.
-
-    If both sensors' clocks are off by the same amount, there is one finding, about the INS's clock.
+    """Yield a finding for each sensor that ran without the INS; if both are off equally, one for the INS's clock.
 
     Parameters
     ----------

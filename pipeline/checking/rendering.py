@@ -66,7 +66,7 @@ def _quality_lines(found: InsQuality) -> list[str]:
 
 
 def _by_face(examined: SessionCheck) -> list[dict[str, Any]]:
-    """Return a record for each wet face, with the soundings expected and found; none if they were not counted."""
+    """Return a mapping for each wet face, with the soundings expected and found; none if they were not counted."""
     if examined.model is None or examined.soundings is None:
         return []
     both = zip(examined.model.faces, examined.soundings.expected, examined.soundings.found, strict=True)

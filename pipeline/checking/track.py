@@ -166,8 +166,8 @@ def askew_deg(track: InsTrack) -> float | None:
 def _ran(start: int, end: int, files: Sequence[SurveyedFile]) -> float:
     """Return the share of the time from ``start`` to ``end`` in which a sensor ran.
 
-    The time is divided into bins of one second, or of the files' coarseness if they were read in pieces. A sensor runs
-    in a bin with a record.
+    The time is divided into bins of one second, or of the files' coarseness if they were read in pieces. The sensor ran
+    in a bin if the bin has a record.
     """
     known = [file for file in files if len(file.epochs_ns)]
     width = max([BIN_NS, *(round(file.coarseness_ns) for file in known)])

@@ -20,7 +20,7 @@ from pipeline.maths.survey.frame_adjustment import closed_form
 from pipeline.maths.survey.frames import MarkSurvey, RigidFrame
 
 UNITS = {"mm": 1000.0, "cm": 100.0, "inches": 1 / 0.0254, "feet": 1 / 0.3048}  # number of units in a metre
-NEAR_UNIT, NEAR_ONE = 0.05, 0.4  # of ln(drawn size / surveyed): nearest to another unit's, farthest from 0
+NEAR_UNIT, NEAR_ONE = 0.05, 0.4  # limits of |ln(drawn size / surveyed)| about another unit's value, about 0
 STEEPEST_DEG = 60.0  # of an axis through two marks: the vertical must determine the turn about it
 LIKELY = 3  # pairs of names that are tried with a full adjustment
 

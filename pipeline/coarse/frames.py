@@ -33,7 +33,7 @@ class MarkFrames:
 
 
 def frames_of_marks(marks: Marks) -> MarkFrames:
-    """Return the frames with the marks in use: marks that a frame names, without those to be left out."""
+    """Return the frames with the marks in use: marks that a frame names, without the marks in ``leave_out``."""
     wanted = {name for names in marks.named.values() for name in names} - set(marks.leave_out)
     names = tuple(name for name in marks.survey.marks if name in wanted)
     surveyed = [marks.survey.marks[name] for name in names]

@@ -93,7 +93,7 @@ def nearest_flip(frames: MarkFrames, name: str, R_present: Mapping[str, Array]) 
 
 
 def axis_hint(flip: AxisFlip | None) -> str:
-    """Return a hint in brackets about the axis of a mirror-imaged drawing that is reversed."""
+    """Return a hint, in brackets, that names the reversed axis of a drawing if the session's mount shows it."""
     if flip is None or not flip.explains:
         return " (any one of them turned makes it right-handed)"
     return f" (with the sign of {flip.axis} changed the mount is {flip.reversed_deg:.1f}° from session.yaml's)"

@@ -21,7 +21,7 @@ class AsBuilt(Model):
 
 
 class TargetPlace(Model):
-    """Settings of the target that the readers need. Another letter must not make them read the files again."""
+    """Settings of the target that the readers need. A change of its shape does not make them read the files again."""
 
     origin: Origin
     azimuth_deg: float | None
@@ -53,8 +53,8 @@ class Segment(Model):
     search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
-    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # the same of the laser's, if it is calibrated
-    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # loss of wall by a shift of half a period: less is ambiguous
+    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # how wrong the laser's angles may be, if calibrated
+    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # least loss of wall half a period off, not ambiguous
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
         0.02  # the mount is ambiguous if a rival's score is smaller by less than this share
     )
@@ -122,7 +122,7 @@ class LaserFit(Model):
     azimuth_sigma_deg: SigmaDeg | None = None  # of target.azimuth_deg; null: not surveyed
     coarse_sigma_deg: SigmaDeg = 0.5  # of each coarse angle, without laser.mount_covariance
     coarse_sigma_m: SigmaM = 0.05
-    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # least certain estimate, in coarse sigmas; else fixed
+    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # of its coarse sigma; a less certain one is fixed
 
 
 class Verdict(Model):

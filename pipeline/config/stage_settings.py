@@ -1,4 +1,4 @@
-"""The settings that each stage gets: only those that it uses, so that a change of others does not run it again.
+"""The settings of each stage: only settings that it uses, so that a change of another one does not run it again.
 
 A stage names in its Config the blocks that it needs (``laser``, ``mbes``, ``segment``, ...). If it annotates a block
 with a narrower model than the block's own, it gets that model, filled with the block's fields of the same names. Keys

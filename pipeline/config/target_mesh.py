@@ -123,7 +123,7 @@ def _array(values: Any) -> Array:
 
 
 def _outline(vertices: Array, polygons: Sequence[Polygon], where: str) -> Array:
-    """Return the corners (k, 3) of the single outline of polygons: the edges of one polygon only."""
+    """Return the corners (k, 3) of the polygons' single outline: the edges that belong to one polygon only."""
     pairs = cKDTree(vertices).query_pairs(SAME_M, output_type="ndarray")
     count = len(vertices)
     _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count)))

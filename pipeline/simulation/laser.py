@@ -17,7 +17,7 @@ BELOW_WATER_M = 0.3
 
 
 def scan_directions(zenith_rad: Floats, azimuth_rad: Floats) -> Floats:
-    """Return unit vectors (n, 3) in the scanner's frame: (sin t cos p, sin t sin p, cos t); t: zenith, p: azimuth."""
+    """Return unit vectors (n, 3), laser frame: (sin t cos p, sin t sin p, cos t); t from zenith, p from starboard."""
     return np.stack(
         [np.sin(zenith_rad) * np.cos(azimuth_rad), np.sin(zenith_rad) * np.sin(azimuth_rad), np.cos(zenith_rad)], axis=1
     )
@@ -86,7 +86,7 @@ class _LaserPass:
         return t_ns[kept] + round(scenario.latency_s * NS), points
 
     def _true_ranges(self, t_ns: Times, direction_laser: Floats) -> Floats:
-        """Return ranges (n,) to surfaces above the water, or for some rays to just below the water's; inf: none."""
+        """Return ranges (n,) to surfaces above the water, for some rays to just below the water surface; inf: none."""
         pose = self.movement.pose(self.k, t_ns)
         direction_body = self.R_body_from_laser.apply(direction_laser)
         directions = np.einsum("nij,nj->ni", pose.R_target_from_body, direction_body)

@@ -122,7 +122,7 @@ class _SonarPass:
 
         With dc/d(depth) = g, a ray curves upward by g/c per metre, times the part of the vector "up" that is normal to
         the ray. After a path r, its chord is turned upward by r g / 2c times this part. The part is split into the two
-        directions in which ψ and τ of the ray grow. On the way down the mean sound speed is g · depth / 2 higher.
+        directions in which ψ and τ of the ray grow. The mean sound speed down to a depth is g · depth / 2 higher.
         """
         gradient, speed = self.scenario.sound_speed_gradient_1_s, self.scenario.sound_speed_true_m_s
         paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)

@@ -59,7 +59,7 @@ def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = 
 
 
 def target_polygons(target: Target) -> list[FacePolygon]:
-    """Return the listed faces; or, with letters, the blocks and the wall (a box as deep as the pool's wall)."""
+    """Return the listed faces; or, with letters, the blocks and the wall (a box back to the pool's wall)."""
     if isinstance(target, Faces):
         return [FacePolygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
     a, half, c, e = target.a, target.b / 2, target.c, target.e

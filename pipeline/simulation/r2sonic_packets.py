@@ -102,7 +102,7 @@ def _fill_head(head: np.ndarray, pings: Columns, scenario: MbesScenario) -> None
 
 
 def _quality(angles_rad: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Return flags, a nibble per beam, beam 0 topmost: amplitude detection near the middle of the fan, phase outside."""
+    """Return flags, a nibble per beam, beam 0 topmost: amplitude detection in the middle of the fan, phase outside."""
     nibbles = np.where(np.abs(angles_rad) < MAGNITUDE_BELOW_RAD, MAGNITUDE_DETECT, PHASE_DETECT).astype(np.uint32)
     nibbles = np.pad(nibbles, (0, -len(nibbles) % 8)).reshape(-1, 8)
     flags: NDArray[np.uint32] = np.bitwise_or.reduce(nibbles << np.arange(28, -1, -4, dtype=np.uint32), axis=1)

@@ -1,4 +1,4 @@
-"""Random numbers: one generator for each purpose, so that switching off one noise source leaves all others unchanged."""
+"""Random numbers: one generator for each purpose, so that without one noise source all others are unchanged."""
 
 import numpy as np
 
