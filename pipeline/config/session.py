@@ -147,10 +147,6 @@ class Mbes(Model):
         return self
 
 
-
-
-
-
 class SessionConfig(Model):
     """The session's config: SESSION/session.yaml."""
 
