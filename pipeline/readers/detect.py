@@ -31,7 +31,7 @@ from pipeline.readers.file_kind import (
 from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.inertial_explorer_layout import header_line_number
 from pipeline.readers.kongsberg_all_datagrams import is_datagram_header
-from pipeline.readers.r2sonic_packets import BTH0, OTHER_PACKETS, packet_size
+from pipeline.readers.r2sonic_framing import BTH0, OTHER_PACKETS, packet_size
 from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.table_columns import csv_header
 

@@ -12,7 +12,7 @@ letters), u16 size (all of it), padded to 4 bytes; unknown ones are skipped by t
 
 Angles [rad] are from the array's normal, starboard +, not roll corrected; roll stabilisation only moves the sector.
 Pitch stabilisation (2020, 2026) steers the transmit fan by up to 10°. No document says which sign forward has, and no
-file at hand has such steering: such pings are refused. :mod:`pipeline.readers.r2sonic_packets` finds the packets.
+file at hand has such steering: such pings are refused. :mod:`pipeline.readers.r2sonic_framing` finds the packets.
 """
 
 import math
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, gps_ns_from_unix_utc
-from pipeline.readers.r2sonic_packets import Sections, bare_packets, xtf_packets
+from pipeline.readers.r2sonic_framing import Sections, bare_packets, xtf_packets
 from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import RepeatedPings
 from pipeline.readers.row_filter import RowFilter
