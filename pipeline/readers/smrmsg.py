@@ -1,7 +1,8 @@
-"""SMRMSG, the accuracy file that POSPac and others write beside an SBET: 10 little-endian doubles a record, no header.
+"""SMRMSG, the accuracy file that POSPac and others write beside an SBET: records of 10 little-endian doubles, no header.
 
-Time (GPS seconds of week), RMS of position north, east, down [m], of velocity north, east, down [m/s], of roll, pitch,
-heading [arc-minutes]. The file holds no week: the one nearest to the SBET's is taken.
+A record has time (GPS seconds of week), and the RMS of position north, east, down [m], of velocity north, east, down
+[m/s], and of roll, pitch, heading [arc-minutes]. The file does not hold the week. It gets the week that brings its
+beginning nearest to that of the SBET.
 """
 
 from collections import Counter
