@@ -109,8 +109,8 @@ def _refuse_misread(transform: FrameTransform, x: Array, y: Array, name: str) ->
 def _refuse_float32(x: Array, y: Array, unit_m: float, name: str) -> None:
     """Refuse coordinates that were stored as float32.
 
-    All x and y then lie within 0.6 mm (degrees: 6 mm) of float32 numbers. Other coordinates do so by chance, unless
-    float32 numbers of their size are more than ten times that distance apart.
+    All x and y then lie within 0.6 mm (degrees: 6 mm) of float32 numbers. Other coordinates may do so by chance. The
+    test therefore needs 100 points, and float32 numbers that are more than ten times that distance apart.
     """
     rounding = (0.006 if unit_m == DEGREE_M else 0.0006) / unit_m
     for values in (x, y):

@@ -14,13 +14,10 @@ CLEARLY_ELSEWHERE_M = 1000.0
 def refuse_other_crs(frame: LaserFrame, declared: str, points: tuple[Array, Array, Array], name: str) -> None:
     """Refuse a file whose declared CRS contradicts that of session.yaml.
 
-    The two CRSs contradict each other if they place the points' median more than 1 km apart, or if only one of them can
-    place it. They also do if the declared ellipsoid is none of WGS 84, GRS 80 and CGCS2000, if the declared heights are
-    above a geoid, or if the declared CRS has heights in another unit.
-
-    Two datums on the same ellipsoid (NAD83 and WGS 84, for example) give the same ECEF coordinates in this program, so
-    that it cannot notice a wrong one. The user must know the points' datum, and it must be the INS's. A declaration
-    that PROJ does not understand is ignored.
+    They contradict each other if the points' median lies more than 1 km apart in the two, or only one can place it; if
+    the declared ellipsoid is none of WGS 84, GRS 80 and CGCS2000; or if the declared heights are above a geoid, or in
+    another unit. Two datums on the same ellipsoid (NAD83 and WGS 84, for example) give the same ECEF coordinates in
+    this program. Therefore the user must know that the points' datum is the INS's. A CRS unknown to PROJ is ignored.
 
     Parameters
     ----------

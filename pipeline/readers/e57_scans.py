@@ -31,7 +31,7 @@ class E57Scan:
     axes: str  # cartesian or spherical; empty: no coordinates
     single: bool  # coordinates in single precision
     start_s: float  # acquisitionStart, seconds since the GPS epoch
-    atomic: bool  # its clock was set by GPS
+    atomic: bool  # the scanner's clock was set by GPS
     rotation: list[float]  # quaternion w, x, y, z of the scan's pose
     translation: list[float]  # m
 

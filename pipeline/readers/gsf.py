@@ -11,8 +11,8 @@ positive to port, the side of the first beam; the specification does not define 
 starboard +.
 
 GSF does not record how the fan was sent. Therefore the fan must be fixed to the boat. A file is refused if its records
-show stabilisation of pitch or yaw, tilted sectors, or several receivers or swaths. (Only records of Kongsberg's newer
-sonars contain this.) A file is also refused if its along-track distances show that the fan is not fixed
+show stabilisation of pitch or yaw, tilted sectors, or several receivers or swaths. (Records of Kongsberg's newer sonars
+contain this.) A file is also refused if its along-track distances show that the fan is not fixed
 (:mod:`pipeline.readers.gsf_fans`). A file without along-track distances cannot be tested.
 
 Most files store angles and times as 16-bit numbers. Some programs let them overflow: an angle then jumps by 65536

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.maths.sonar.crossed_arrays import tilt_in_mbes
 
 Array = NDArray[np.float64]
-MIN_PATH_RATIO = 3.0  # least path by |t| + |q| of ``in_mbes``; a shorter path counts as impossible
+MIN_PATH_RATIO = 3.0  # least ratio of the path to |t| + |q| of ``in_mbes``; a smaller ratio counts as impossible
 _ITERATIONS = 4  # each reduces the error by the factor (distance of the arrays / range)²
 
 

@@ -20,7 +20,7 @@ _KEYS = {True: "adjusted_standard", False: "seconds_of_week"}
 
 
 def refuse_unusable_times(seconds: NDArray[np.float64], name: str, adjusted: bool, declared: LasTime) -> None:
-    """Refuse times that are all 0, are of the other type, or have lost their digits.
+    """Refuse times that are all 0, are not of the type that is assumed, or were stored as float32.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def refuse_unusable_times(seconds: NDArray[np.float64], name: str, adjusted: boo
 
 
 def refuse_wrong_time_type(seconds: NDArray[np.float64], name: str, adjusted: bool, declared: LasTime) -> None:
-    """Refuse times that are impossible as the type as which they are read.
+    """Refuse times that are impossible for the type that is assumed.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline.gps_time import NS
 
-ONE_PING_NS = 4_000_000  # sectors of one ping are sent within milliseconds, and have times of their own
+ONE_PING_NS = 4_000_000  # the sectors of one ping are sent within this time, and each has a time of its own
 
 
 def rate_hz(sensor: str, epochs_ns: NDArray[np.int64], records: int) -> float:

@@ -1,4 +1,4 @@
-"""Rows of all readers: canonical columns, a filter that counts the rows it leaves out, and one for the order of times."""
+"""Rows of all readers: canonical columns, a filter that counts the rows left out, a filter for the order of times."""
 
 from collections import Counter
 from collections.abc import Mapping

@@ -14,7 +14,7 @@ DAY_NS = 86_400 * NS
 
 @dataclass(frozen=True)
 class WholeDays:
-    """A sensor's difference from the INS's clock in whole days."""
+    """The difference of a sensor's clock from the INS's clock, in whole days."""
 
     amount: str  # such as "3 days"
     ahead: bool  # the sensor's clock is ahead of the INS's
