@@ -30,7 +30,7 @@ MAX_LISTED = 10  # casts that a message lists
 
 
 def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return session.yaml's content with the cast's rows in place of its file's name, and with their record svp_from.
+    """Return session.yaml's content with the cast's rows in place of its file's name, and their record ``svp_from``.
 
     Raises
     ------

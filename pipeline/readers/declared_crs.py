@@ -14,7 +14,7 @@ CLEARLY_ELSEWHERE_M = 1000.0
 def refuse_other_crs(frame: LaserFrame, declared: str, points: tuple[Array, Array, Array], name: str) -> None:
     """Refuse a file whose declared CRS contradicts that of session.yaml.
 
-    They contradict each other if the points' median lies more than 1 km apart in the two, or only one can place it; if
+    The two contradict each other if they place the points' median more than 1 km apart, or only one can place it; if
     the declared ellipsoid is none of WGS 84, GRS 80 and CGCS2000; or if the declared heights are above a geoid, or in
     another unit. Two datums on the same ellipsoid (NAD83 and WGS 84, for example) give the same ECEF coordinates in
     this program. Therefore the user must know that the points' datum is the INS's. A CRS unknown to PROJ is ignored.

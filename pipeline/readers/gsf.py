@@ -18,7 +18,7 @@ contain this.) A file is also refused if its along-track distances show that the
 Most files store angles and times as 16-bit numbers. Some programs let them overflow: an angle then jumps by 65536
 steps. A ping is left out if two neighbouring beams lie more than 20 degrees apart, and more than ten times the median
 spacing of the ping. Pings and beams with the flag "not usable" are left out too. The sound speed is the one that the
-sensor recorded with the ping. Without it, it is the speed at the top of the last profile, or else session.yaml's.
+sensor recorded with the ping. Otherwise the speed at the top of the last profile is used, or else session.yaml's.
 """
 
 from collections import Counter

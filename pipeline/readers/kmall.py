@@ -1,7 +1,7 @@
 """Kongsberg .kmall: the soundings of #MRZ datagrams ("KMALL datagram description", 410224; little-endian).
 
 The library pykmall decodes the parts of a datagram before its soundings. It cannot read a whole file: its functions
-print, hold the index of the whole file, stop with any exception at the first damaged datagram, and may never return. It
+print, hold the index of the whole file, raise various errors at the first damaged datagram, and may never return. It
 also makes a dictionary of each sounding, and ignores the size of a sounding that the datagram states. Therefore
 :mod:`pipeline.readers.kmall_datagrams` finds the datagrams, and numpy reads all soundings of a datagram at once.
 

@@ -2,8 +2,8 @@
 
 A record has time (GPS seconds of week), latitude, longitude [rad], ellipsoidal height [m], velocity x, y, z (wander
 frame) [m/s], roll, pitch, platform heading, wander angle [rad], acceleration x, y, z [m/s2], angular rate x, y, z
-[rad/s]. The body axes are forward, right, down. True heading = platform heading - wander angle (the angle of the wander
-frame from north). The file does not hold the week; ``ins.gps_week`` does.
+[rad/s]. The body axes are forward, right, down. True heading = platform heading - wander angle. The file does not hold
+the week; ``ins.gps_week`` does.
 
 If fewer than 8 bytes follow the last whole record of 136 bytes, the file is used: they are less than one number, such
 as a line end that a program added. If more bytes follow, the last record was cut off and the copy is not complete. The

@@ -5,13 +5,13 @@ whole: the length leads to the end mark, to a correct checksum, or to the next r
 ``head``, the beginning of a file, and ``size``, the file's size in bytes. The layouts are (little-endian):
 
     .s7k                   u16 version, u16 offset 60, u32 0x0000FFFF, u32 size, ..., at byte 32 u32 type of record
-    EdgeTech .jsf          u16 0x1601, u8 version, u8 session, u16 type, 4 u8, u16, u32 bytes that follow
-    Applanix POS           $GRP or $MSG, u16 number, u16 bytes that follow, the last two $#
+    EdgeTech .jsf          u16 0x1601, u8 version, u8 session, u16 type, 4 u8, u16, u32 count of bytes that follow
+    Applanix POS           $GRP or $MSG, u16 number, u16 count of bytes that follow, the last two $#
     SBG                    FF 5A, u8 message, u8 class, u16 length, data, u16 checksum, 33
     Septentrio SBF         $@, u16 checksum, u16 number, u16 length of all, a multiple of 4
     u-blox UBX             B5 62, u8 class, u8 number, u16 length, data, two sums of the bytes from the class on
     Trimble GSOF           STX, u8 status, 40, u8 length, data, sum of the bytes from the status on, ETX
-    RIEGL .pof             27 bytes, u16 x 2 version, u32 place of the data, u16 x 3 date, i64 records, f64 x 6 limits
+    RIEGL .pof             27 bytes, u16 x 2 version, u32 first byte of the data, u16 x 3 date, i64 records, f64 x 6 limits
     RIEGL .poq             35 bytes, u16 x 2 version, f64 x 3 mean, greatest and scatter of the steps in time
 """
 
