@@ -11,7 +11,7 @@ whole: the length leads to the end mark, to a correct checksum, or to the next r
     Septentrio SBF         $@, u16 checksum, u16 number, u16 length of all, a multiple of 4
     u-blox UBX             B5 62, u8 class, u8 number, u16 length, data, two sums of the bytes from the class on
     Trimble GSOF           STX, u8 status, 40, u8 length, data, sum of the bytes from the status on, ETX
-    RIEGL .pof             27 bytes, u16 x 2 version, u32 first byte of the data, u16 x 3 date, i64 records, f64 x 6 limits
+    RIEGL .pof             27 bytes, u16 x 2 version, u32 place of the data, u16 x 3 date, i64 records, f64 x 6 limits
     RIEGL .poq             35 bytes, u16 x 2 version, f64 x 3 mean, greatest and scatter of the steps in time
 """
 
