@@ -8,16 +8,16 @@ Severity = Literal["fault", "look"]  # look: may be intended, and does not chang
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding: the fault, its place, the value, and the remedy.
+    """One fault or doubt: the file or sensor, the value, and the remedy.
 
     Attributes
     ----------
     question : str
-        The check that found it: a word for programs.
+        Code of the question that led to the finding, for programs.
     words : str
         The line for people.
     severity : {"fault", "look"}
-        ``fault``: must be mended; ``look``: may be intended.
+        ``fault``: must be corrected; ``look``: may be intended.
     """
 
     question: str

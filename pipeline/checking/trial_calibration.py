@@ -1,4 +1,4 @@
-"""What calibrating a sample of the session gives, as far as it gets."""
+"""The result of calibrating a sample of the session, as far as the calibration goes."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by se
 
 @dataclass(frozen=True)
 class TrialCalibration:
-    """Tables of a trial calibration; None after the stage at which it stopped.
+    """Tables of a trial calibration; None for tables that it did not reach.
 
     Attributes
     ----------
     soundings : Stream
-        Soundings, each with the face that it is on.
+        Soundings with their faces.
     target_pose, provisional_mount, freed : pd.DataFrame or None
-        The pose of the target, the mount for labelling, and the adjustment's single-parameter tests.
+        The target's pose, the provisional mount, and the adjustment's single-parameter tests.
     """
 
     soundings: Stream = EMPTY_STREAM
