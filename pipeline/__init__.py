@@ -1,8 +1,8 @@
-"""poolcal's library: everything that does not know what a stage is.
+"""The library of poolcal. No module in it imports a stage.
 
-BLAS is pinned to one thread before numpy is first imported: ``eigh``, ``solve`` and ``matmul`` differ in their last
-bits between thread counts, and the same input must give the same Parquet bytes on any machine. The work is spread
-over parts of a stream instead (:mod:`pipeline.run.workers`).
+This module limits BLAS to one thread before numpy is first imported. The last bits of ``eigh``, ``solve`` and
+``matmul`` depend on the number of threads, and the same input must give the same Parquet bytes on any machine. Parallel
+work is done on the parts of a stream instead (:mod:`pipeline.run.workers`).
 """
 
 import os

@@ -1,7 +1,7 @@
-"""Files of a run folder: written whole or not at all, hashed once, removed safely.
+"""Files of a run folder: they are written whole or not at all, read, hashed, and removed safely.
 
-The user must correct what the disk refuses (full, read-only, not permitted, something in the way): such errors, and no
-others, become an :class:`~pipeline.errors.ArtefactError`.
+The disk may be full or read-only, a permission may be missing, or another file may be in the way. The user must correct
+these errors, so they become an :class:`~pipeline.errors.ArtefactError`. No other error does.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ _REMEDIES = {
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn errors of the operating system inside into an ArtefactError that names ``path`` and the remedy."""
+    """Turn an error of the operating system in the block into an ArtefactError with the path and the remedy."""
     try:
         yield
     except OSError as error:
@@ -44,7 +44,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def _errno_in(message: str) -> int | None:
-    """Return the number in a message of pyarrow; None without one.
+    """Return the error number that a message of pyarrow contains; None if it has none.
 
     >>> _errno_in("Error writing bytes to file. Detail: [errno 28] No space left on device")
     28
@@ -54,12 +54,16 @@ def _errno_in(message: str) -> int | None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write text as UTF-8, whole or not at all."""
+    """Write a text file as UTF-8, whole or not at all."""
     write_bytes(path, text.encode("utf-8"))
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: beside it, to the disk, then renamed over it. Links are not followed."""
+    """Write a file whole or not at all.
+
+    The content goes to a new file in the same folder, and to the disk. Then the new file is renamed to ``path``. A
+    symbolic link at ``path`` is replaced, not followed.
+    """
     beside = path.with_name(path.name + ".new")
     with writing(path):
         try:
@@ -81,7 +85,7 @@ def remove(path: Path) -> None:
         if path.is_dir() and not path.is_symlink():
             try:
                 shutil.rmtree(path)
-            except OSError as error:  # it holds only the last name of what cannot be removed
+            except OSError as error:  # its filename is only the last part of the path
                 last = Path(error.filename).name if isinstance(error.filename, str) else path.name
                 named = path if last == path.name else f"{path} (its {last})"
                 raise OSError(error.errno, error.strerror, str(named)) from error
@@ -99,9 +103,9 @@ def flush_to_disk(folder: Path) -> None:
 
 
 def flush_names(folder: Path) -> None:
-    """Write the names in a folder to the disk, as after a rename.
+    """Write a folder's list of names to the disk, which is necessary after a rename.
 
-    Some network disks refuse this; their server does it.
+    Some network disks refuse this, because their server does it.
     """
     with contextlib.suppress(OSError):
         _sync(folder)
@@ -116,12 +120,14 @@ def _sync(path: str | Path) -> None:
 
 
 def read_regular(path: Path, most: int) -> bytes:
-    """Return a file's content, at most ``most`` + 1 bytes: the caller refuses a longer one.
+    """Return the content of a regular file, cut off after ``most`` + 1 bytes.
+
+    The caller refuses a file with more than ``most`` bytes.
 
     Raises
     ------
     OSError
-        The file cannot be read, or is no regular file: reading a FIFO may never return, a device may have no end.
+        The file cannot be read, or it is no regular file. (Reading a FIFO may never return; a device may have no end.)
     """
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(handle, "rb") as file:
@@ -136,9 +142,9 @@ def read_json(path: Path) -> object:
     Raises
     ------
     OSError
-        As :func:`read_regular`.
+        As in :func:`read_regular`.
     ValueError
-        The content is no JSON, too long, or nested too deeply.
+        The content is no JSON, is too long, or is nested too deeply.
     """
     content = read_regular(path, MOST_JSON_BYTES)
     if len(content) > MOST_JSON_BYTES:
@@ -151,7 +157,7 @@ def read_json(path: Path) -> object:
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Make a temporary folder, which is removed at the end."""
+    """Make a temporary folder, yield its path, and remove the folder at the end."""
     try:
         temporary = tempfile.TemporaryDirectory(prefix="poolcal-")
     except OSError as error:
@@ -164,7 +170,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def sha256(path: Path) -> str:
-    """Return the SHA-256 of a file's content; a file that cannot be read is an ArtefactError."""
+    """Return the SHA-256 digest (hex) of a file's content. A file that cannot be read raises ArtefactError."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

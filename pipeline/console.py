@@ -1,4 +1,4 @@
-"""Lines for people: printed safely, with signs and plurals as they should be."""
+"""Text for people: safe printing, numbers with their sign, and plurals."""
 
 import sys
 from typing import TextIO
@@ -7,7 +7,7 @@ from pipeline.errors import ArtefactError
 
 
 def printable(text: str) -> str:
-    r"""Escape control characters: names in files are other people's, and a terminal obeys control characters.
+    r"""Return the text with control characters escaped: names in files may contain them, and a terminal obeys them.
 
     >>> printable("a\x1b[2Jb")
     'a\\x1b[2Jb'
@@ -16,15 +16,15 @@ def printable(text: str) -> str:
 
 
 def say(text: str, stream: TextIO) -> None:
-    """Print lines.
+    """Print lines of text to a stream.
 
-    A reader that has gone away is no reason to stop, nor is a log that cannot be written: a complaint about that would
-    go to the same place.
+    The program goes on if the reader of a pipe has ended. It also goes on if standard error cannot be written, because
+    an error message would go to the same place.
 
     Raises
     ------
     ArtefactError
-        The answer, which goes to standard output, cannot be written.
+        Standard output, which takes the program's answer, cannot be written.
     """
     lines = "\n".join(printable(line) for line in text.split("\n"))
     try:
@@ -39,7 +39,7 @@ def say(text: str, stream: TextIO) -> None:
 
 
 def signed(value: float, digits: int) -> str:
-    """Return a number with its sign, and no minus before zero.
+    """Return a number as text with its sign. A value that is rounded to zero has a plus.
 
     >>> signed(-0.0004, 3), signed(-0.0006, 3)
     ('+0.000', '-0.001')
@@ -48,7 +48,7 @@ def signed(value: float, digits: int) -> str:
 
 
 def plural(number: int, noun: str) -> str:
-    """Return a count and what is counted, in whole words.
+    """Return a count and its noun as text, the noun in singular or plural.
 
     >>> plural(1, "file"), plural(2, "pass"), plural(3, "study"), plural(0, "day")
     ('1 file', '2 passes', '3 studies', '0 days')

@@ -1,26 +1,26 @@
-"""The tree of errors that a user can cause, and correct.
+"""The tree of errors that a user can cause and correct.
 
-PoolcalError                    every one ends as one line on standard error and status 2
-├── ConfigError                 a YAML file or an option: names file, key, value and remedy
-├── RawDataError                an instrument's file: names file, place, value and remedy
-├── ArtefactError               a run folder's table: missing, damaged, locked, not writable
-├── DegenerateGeometryError     data from which the asked-for quantity does not follow
-└── NotConvergedError           an iteration without which nothing can follow did not end
+PoolcalError                    each ends the program with one line on standard error and status 2
+├── ConfigError                 a YAML file or an option: the message names file, key, value and remedy
+├── RawDataError                an instrument's file: the message names file, place, value and remedy
+├── ArtefactError               a run folder or its table: missing, damaged, locked, not writable
+├── DegenerateGeometryError     data that do not determine the wanted quantity
+└── NotConvergedError           an iteration that did not converge, and whose result is necessary
 
-Anything else that is raised is a bug: it keeps its traceback and ends with status 3. Weak geometry and iterations
-that merely give a poor calibration are results (a rejected verdict, status 1), never errors.
+Every other exception is a bug: it keeps its traceback, and the program ends with status 3. Weak geometry, and an
+iteration that only makes the calibration poor, are results (a rejected verdict, status 1), never errors.
 """
 
 
 class PoolcalError(Exception):
-    """A mistake outside the program. The message is one line: what, where, the value, what to do."""
+    """A mistake outside the program. Its message is one line: the mistake, its place, the value, and the remedy."""
 
     def __init__(self, message: str) -> None:
         super().__init__(" ".join(message.split()))
 
 
 class ConfigError(PoolcalError):
-    """A configuration that cannot be meant."""
+    """A configuration that is not valid."""
 
 
 class RawDataError(PoolcalError):
@@ -32,8 +32,8 @@ class ArtefactError(PoolcalError):
 
 
 class DegenerateGeometryError(PoolcalError):
-    """Too few points, or points in a constellation from which the quantity does not follow."""
+    """Too few points, or points whose arrangement does not determine the wanted quantity."""
 
 
 class NotConvergedError(PoolcalError):
-    """An iteration on which everything later depends did not end."""
+    """An iteration that did not converge, although all later steps need its result."""

@@ -1,4 +1,4 @@
-"""Time: everything inside is int64 nanoseconds since the GPS epoch (1980-01-06 00:00:00, no leap seconds)."""
+"""Time scales. Inside the program a time is int64 nanoseconds since the GPS epoch, 1980-01-06, without leap seconds."""
 
 from datetime import UTC, datetime
 
@@ -11,7 +11,7 @@ WEEK_S = WEEK_NS / NS
 GPS_EPOCH_UNIX_S = 315_964_800  # 1980-01-06 00:00:00 UTC as a Unix time
 ADJUSTED_STANDARD_OFFSET_S = 1_000_000_000  # LAS: "adjusted standard GPS time" is GPS seconds - 1e9
 
-# Unix time from which on GPS - UTC has the value beside it (IERS Bulletin C; last: 2017-01-01).
+# Pairs: a Unix time, and GPS - UTC in seconds from that time on (IERS Bulletin C; last: 2017-01-01).
 LEAP_SECONDS: tuple[tuple[int, int], ...] = (
     (315_964_800, 0),  # 1980-01-06
     (362_793_600, 1),  # 1981-07-01

@@ -7,16 +7,17 @@ from collections.abc import Iterable, Sequence
 def text_table(layout: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     r"""Return a table's lines, the header first.
 
-    A column grows where a cell does not fit, so that a blank is left between two columns at least.
+    A column becomes wider where a cell does not fit. At least one blank is left between two columns, except between a
+    flush-right column and a flush-left one for which the layout has no blank.
 
     Parameters
     ----------
     layout
-        By column ``<`` (flush left) or ``>`` (flush right) and its least width; blanks are printed as they stand.
+        For each column ``<`` (flush left) or ``>`` (flush right), and its smallest width. Blanks before it are printed.
     header
         The columns' heads.
     rows
-        Cells by row; those missing at a row's end are empty.
+        The cells of each row. Cells that are missing at the end of a row are empty.
 
     >>> print("\n".join(text_table("  <6>8 <1", ["", "sigma"], [["roll", "0.012", "deg"], ["x", "0.0000003", "m"]])))
                  sigma

@@ -1,1 +1,1 @@
-"""Stage adjust: from labelled points through the observation model and its iteration to tables."""
+"""The computations of stage adjust: observations of labelled points, the iteration, and the tables of results."""

@@ -1,4 +1,4 @@
-"""One pass over the labelled points: sums by interval at the current values, and the next weights."""
+"""One reading of all labelled points: sums by interval at the current values, and new variance factors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,15 +22,15 @@ from pipeline.maths.adjustment.weighting import (
 )
 
 Array = NDArray[np.float64]
-LEAST_DOF = 30  # degrees of freedom for a variance factor
+LEAST_DOF = 30  # smallest number of degrees of freedom for a variance factor
 
 
 @dataclass(frozen=True)
 class GroupStatistics:
     """Statistics of a group of observations.
 
-    count: their number; weights: Σ of robust weights; cut, reduced: how many have no weight, or less than full weight;
-    histogram: of the normalised |v|.
+    count: number of observations; weights: sum of their robust weights; cut: number of observations with the robust
+    weight zero; reduced: number with a robust weight between zero and one; histogram: counts of the normalised |v|.
     """
 
     count: int
@@ -47,7 +47,7 @@ class GroupStatistics:
 
 @dataclass(frozen=True)
 class Accumulation:
-    """All points of one pass over the data: interval sums by sensor, statistics by group."""
+    """Result of one reading of all points: interval sums by sensor, and statistics by group of observations."""
 
     sums: Mapping[str, IntervalSums]
     groups: Mapping[str, GroupStatistics]
@@ -91,14 +91,14 @@ def _accumulate_batch(
 
 
 def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: CurrentValues) -> Accumulation:
-    """Return the sums over all points.
+    """Return the sums and the statistics over all points.
 
     Parameters
     ----------
     streams : mapping of Stream
         Labelled points by sensor.
     model : ObservationModel
-        Turns points into observations.
+        Model that turns points into observations.
     values : CurrentValues
         Parameters, drift and weights at which to linearise.
     """
@@ -114,18 +114,19 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
 
 
 def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -> tuple[Accumulation, Weighting]:
-    """Return the sums with the variance factors that their own scatter shows, and the weighting with these factors.
+    """Return the sums rescaled by new variance factors, and the weighting with these factors.
 
-    A group too small for a factor of its own takes that of the sensor's second group.
+    The scatter within the intervals changes the factor of each group. A group with too few degrees of freedom takes the
+    change of the sensor's other group; if both have too few, their factors stay.
 
     Parameters
     ----------
     accumulation : Accumulation
         Sums with the weights of ``weighting``.
     state : State
-        The surfaces, of which the horizontal ones are a group.
+        State with the surfaces. The sonar's observations of horizontal surfaces are a group.
     weighting : Weighting
-        The weights of the sums.
+        Weights with which the sums were made.
     """
     factors, sums = dict(weighting.factors), {}
     for sensor, intervals in accumulation.sums.items():

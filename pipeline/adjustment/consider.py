@@ -1,4 +1,8 @@
-"""A-priori errors of the fixed parameters: systematic errors, which enter the total covariance."""
+"""A-priori errors of the fixed parameters: systematic errors, which enter the total covariance.
+
+This module provides only the errors. pipeline/maths/adjustment/solution.py computes the total covariance C + S Q Sᵀ:
+``ConsiderErrors.covariance`` returns Q, and ``Solution.total_covariance`` the sum.
+"""
 
 from collections.abc import Sequence
 
@@ -13,26 +17,27 @@ from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
-LEAST_SPAN_M = 0.1  # a cast over less depth covers nothing
+LEAST_SPAN_M = 0.1  # smallest depth and smallest span that count
 LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
 
 
 def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
     """Return the sigma of the change of the sound speed with depth, (m/s)/m.
 
-    With a cast: its speeds at both ends of the span s that it covers have errors of ``svp_sigma_m_s`` σ of their own
-    (the error that all share is sound_speed_sigma_m_s), so that the slope between them has √(σ² + σ²) / s = √2 σ / s.
-    In the share of the depth without a cast the speed is fixed at the last one's, wrong by the gradient that is
-    considered without a cast: both, independent, are added in squares. The default of σ, 0.05 m/s, is of the size that
-    makers state for probes that time a pulse (0.02 to 0.06); those that compute from conductivity and temperature state
-    0.15.
+    Without a cast it is the sigma in session.yaml. A cast covers a span s of the depth. Its speeds at both ends have
+    independent errors with the sigma σ = ``svp_sigma_m_s``, so the slope between them has the sigma √(σ² + σ²) / s =
+    √2 σ / s. (``sound_speed_sigma_m_s`` is the error common to all speeds.) Outside the span the speed is constant, and
+    that share of the depth has the sigma without a cast. The two parts are independent, so their squares are added.
+
+    The default of σ is 0.05 m/s. Makers state 0.02 to 0.06 m/s for probes that measure the travel time of a pulse, and
+    0.15 m/s for probes that compute the speed from conductivity and temperature.
 
     Parameters
     ----------
     mbes : Mbes
         The session's sonar.
     depth_m : float or None
-        Depth of the target's lower end below the water; None: as deep as the cast.
+        Depth of the target's lower end below the water; None: the depth of the cast's last speed.
     """
     without_cast = mbes.sound_speed_gradient_sigma_1_s
     if mbes.svp is None:
@@ -44,9 +49,9 @@ def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
 
 
 def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> ConsiderErrors:
-    """Return the errors of the laser and of the wet faces, zero for all other parameters.
+    """Return the a-priori errors of the laser and of the wet faces, and zero for all other parameters.
 
-    The laser's mount has its covariance as one block, where the session states it.
+    If the session states a covariance of the laser's mount, it is one block.
 
     Parameters
     ----------
@@ -55,7 +60,7 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
     laser : Laser
         The session's laser.
     as_built : AsBuilt
-        Sigmas of the wet faces against the dry ones.
+        Sigmas of the wet faces against the dry faces.
     """
     mount, covariance = laser.mount_sigma, laser.mount_covariance
     mount_sigmas = [float(np.radians(mount.angle_deg))] * 3 + [mount.lever_arm_m] * 3
@@ -76,7 +81,7 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
 def sonar_errors(
     names: Sequence[str], laser: Laser, mbes: Mbes, as_built: AsBuilt, depth_m: float | None = None
 ) -> ConsiderErrors:
-    """Return the errors of laser, sonar and wet faces where the sonar is calibrated; zero for mount and surfaces.
+    """Return the a-priori errors for a calibration of the sonar: zero for the sonar's mount and the surfaces.
 
     Parameters
     ----------

@@ -1,4 +1,8 @@
-"""The INS's noise in the adjustment: drift by the sigmas in its files (table ins_sigmas) or by session.yaml."""
+"""Figures of the INS's noise: sigmas of drift and white noise, from its files (table ins_sigmas) or session.yaml.
+
+This module provides only these figures. pipeline/maths/adjustment/eliminate_drift.py eliminates the drift from the
+normal equations.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +15,7 @@ from pipeline.config.session import Drift, Ins
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.geometry.passes import pass_of
 
-AXES = {  # figures of the session's drift: the columns whose root mean square counts
+AXES = {  # a figure of the drift is the root mean square of these columns of ins_sigmas
     "horizontal_m": ["north_m", "east_m"],
     "vertical_m": ["up_m"],
     "roll_pitch_deg": ["roll_deg", "pitch_deg"],
@@ -20,12 +24,14 @@ AXES = {  # figures of the session's drift: the columns whose root mean square c
 
 
 def sigmas_from_files(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:
-    """Return the drift sigmas from the INS files, medians over the passes; empty if session.yaml takes precedence.
+    """Return the drift's sigmas from the INS files; empty if session.yaml takes precedence.
+
+    They are medians over all records of ins_sigmas that lie in a pass.
 
     Parameters
     ----------
     ins : Ins
-        The session's INS; ``drift_from`` tells which figures take precedence.
+        The session's INS; ``drift_from`` decides which figures take precedence.
     ins_sigmas : DataFrame
         Table ins_sigmas.
     passes : DataFrame
@@ -39,14 +45,14 @@ def sigmas_from_files(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) 
 
 
 def median_sigmas(sigmas: Mapping[str, NDArray[Any]]) -> dict[str, float]:
-    """Return the medians of the drift's figures, from the columns of ins_sigmas; those that have any value."""
+    """Return the median of each drift figure, from the columns of ins_sigmas. Figures without values are left out."""
     squares = {name: np.mean([sigmas[axis] ** 2 for axis in columns], axis=0) for name, columns in AXES.items()}
     finite = {name: values[np.isfinite(values)] for name, values in squares.items()}
     return {name: float(np.sqrt(np.median(values))) for name, values in finite.items() if len(values)}
 
 
 def drift_model(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Drift:
-    """Return the drift model: sigmas from the files where available, otherwise from session.yaml.
+    """Return the drift model: sigmas from the files if available, otherwise from session.yaml.
 
     The time constant is always that of session.yaml.
 
@@ -63,7 +69,7 @@ def drift_model(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Dri
 
 
 def pose_noise(ins: Ins) -> PoseNoise:
-    """Return the INS's noise in the target frame (z up: heading turns about it)."""
+    """Return the INS's white noise and drift in the target frame (z is up: a heading error is a turn about z)."""
     drift, white = ins.drift, ins.white
     angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
     return PoseNoise(

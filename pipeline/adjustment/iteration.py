@@ -1,4 +1,4 @@
-"""The adjustment's iteration: read all points, solve, step; until neither values nor weights change any more."""
+"""The iteration of the adjustment: read all points, solve and step, until neither values nor weights change."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,29 +33,29 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class StepLimits:
-    """Bounds below which a step of the mount is small: a share of its sigma, or these values in rad and m."""
+    """Bounds of a small step of a mount parameter: a share of its sigma, or a value in rad or m if that is larger."""
 
     sigmas: float
     rad: float
     m: float
 
 
-CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # no step worth another
-SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step the weights would change too little for another pass
-NEAR_RAD_M = 1e-3  # the soundings have come near enough for everything else
-LEAST_PASSES = 3  # over the points: to see the drift, to see outliers against it, and to know their scale
-CLOSING_STEPS = 3  # at most, with the last weights
-INITIAL_STEPS = 10  # at most, from the coarse mount to near enough
+CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
+SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step another reading would hardly change the weights
+NEAR_RAD_M = 1e-3  # rad and m: a smaller step ends the initial steps
+LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for the scale of the residuals
+CLOSING_STEPS = 3  # largest number of steps after the last reading, with its weights
+INITIAL_STEPS = 10  # largest number of steps to bring the soundings near the surfaces
 
 
 @dataclass(frozen=True)
 class MountAdjustment:
-    """Where the iteration ended.
+    """Result of the iteration.
 
-    accumulation: sums at the final values; epoch_factors: per sensor, the variance factor of the error common to all
-    points of an interval (the laser's factor has already been applied to the INS's white noise); equations: of all
-    parameters, fixed ones included; fixed_mount: mount parameters that the observations could not give, and the sigma
-    with which each would have come out (rad or m).
+    accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
+    points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
+    white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
+    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
     """
 
     state: State
@@ -71,25 +71,31 @@ class MountAdjustment:
 
     @property
     def values(self) -> CurrentValues:
-        """The final values, at which residuals are taken."""
+        """The final values, at which the residuals are computed."""
         return CurrentValues(self.state, self.drift, self.weighting)
 
     @property
     def redundancy(self) -> float:
-        """Observations with their robust weights, less the parameters; pose errors count as observed, by a prior."""
+        """Sum of the robust weights, less the number of estimated parameters.
+
+        Pose errors do not count: each has one pseudo-observation.
+        """
         observations = sum(group.weights for group in self.accumulation.groups.values())
         return observations - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
-        """The sum of squares beyond the scatter within intervals: how well intervals, passes and sensors agree."""
+        """Sum of squares and degrees of freedom beyond the scatter within intervals.
+
+        They show how well intervals, passes and sensors agree.
+        """
         parts = [scatter(sums, np.ones(len(sums), dtype=bool)) for sums in self.accumulation.sums.values()]
         within = sum(part.squares for part in parts), sum(part.dof for part in parts)
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
 
 def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]:
-    """Return the columns of the parameters to estimate: the mount, the surfaces, and those that the config names."""
+    """Return the numbers of the parameters to estimate: mount, surfaces, and the ones named in ``additional``."""
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
     return sorted({*range(N_MOUNT), *surfaces, *(state.names.index(name) for name in additional)})
 
@@ -97,18 +103,18 @@ def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]
 def adjust_mount(
     problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
 ) -> MountAdjustment:
-    """Return the adjustment, from the coarse mount to the solution.
+    """Return the result of the iteration from the coarse mount to the solution.
 
     Parameters
     ----------
     problem : CalibrationProblem
-        What is calibrated, and what is known of it.
+        Model, prior information and consider errors of the calibration.
     streams : mapping of Stream
         Labelled points by sensor.
     settings : Adjust
         Limits of the iteration, robust weights, additional parameters to estimate.
     gap_s : float
-        A longer time without observations ends a pass.
+        A longer time (s) without observations interrupts the knots of the drift.
     """
     noise = problem.prior.noise
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
@@ -116,7 +122,7 @@ def adjust_mount(
     factors: dict[str, EpochVarianceFactor] = {}
     converged = False
     if not weighted.deficient:
-        # take the INS's white noise from the laser, and close with the weights as they are
+        # take the INS's white noise from the laser's points; further steps have the last weights
         surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
         factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
         noise = noise_seen_by_laser(noise, factors["laser"])
@@ -125,7 +131,7 @@ def adjust_mount(
             converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
             if converged:
                 break
-    # solve the equations of all parameters, fixed ones included, for the covariance and the tests
+    # solve with the equations of all parameters: total covariance and tests need the fixed parameters
     equations = last.equations(noise)
     solution = solve(equations.normal, equations.right, estimated.tolist())
     return MountAdjustment(
@@ -144,7 +150,7 @@ def adjust_mount(
 
 @dataclass(frozen=True)
 class _Iterate:
-    """Current values, and the sums taken there."""
+    """Current values, and the interval sums linearised at them."""
 
     linearisation: Linearisation
     drift: DriftEstimate
@@ -165,7 +171,7 @@ class _Iterate:
         )
 
     def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
-        """Return the values after a step of the estimated parameters, and the solution, numbered as in these."""
+        """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
         state = self.linearisation.state
         equations = self.equations(noise, estimated)
         solution = solve(equations.normal, equations.right, range(len(estimated)))
@@ -179,7 +185,7 @@ class _Iterate:
 
 @dataclass(frozen=True)
 class _WeightedIteration:
-    """The iteration after its last pass over the points; ``deficient``: the data leave directions open."""
+    """The iteration after its last reading of the points; ``deficient``: the data leave directions open."""
 
     last: _Iterate
     estimated: Integers
@@ -194,7 +200,7 @@ class _WeightedIteration:
 def _weighted_iteration(
     problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
 ) -> _WeightedIteration:
-    """Read all points, solve and step, until the weights change no more."""
+    """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior
     state = _initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state)
@@ -205,7 +211,7 @@ def _weighted_iteration(
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
         start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
-        # fix the mount parameters that these observations cannot give
+        # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
             normal = start.equations(prior.noise).normal
             fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
@@ -216,7 +222,7 @@ def _weighted_iteration(
         settled = weighting.robust is not None and _is_small(solution, estimated, SETTLED)
         if deficient or (settled and iteration >= LEAST_PASSES):
             break
-        # reduce the weights of outliers from the next pass on, against scales that have seen the drift
+        # from the next reading on reduce the weights of outliers; scales come from residuals without the drift
         scales = {**weighting.scales, **(accumulation.robust_scales() if iteration > 1 else {})}
         weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
@@ -233,7 +239,7 @@ def _weighted_iteration(
 
 
 def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
-    """Return the coarse mount, stepped until the soundings lie near the laser's planes."""
+    """Return the state after steps of the coarse mount alone, which bring the soundings near the surfaces."""
     state = model.coarse
     for _ in range(INITIAL_STEPS):
         sums = accumulate({"mbes": soundings}, model, CurrentValues(state)).sums

@@ -1,4 +1,4 @@
-"""The laser's own calibration: its points lie on the target's planes, which stand as designed, or as surveyed."""
+"""The calibration of the laser: its points lie on the target's planes, as designed and, if known, as surveyed."""
 
 from collections.abc import Mapping
 
@@ -29,28 +29,28 @@ Array = NDArray[np.float64]
 
 
 def laser_problem(session: SessionData, calibration: LaserCalibration) -> CalibrationProblem:
-    """Return the calibration of the laser against the target's design."""
+    """Return the problem of calibrating the laser against the target's design."""
     model = observation_model(
         session, mount_state(session, session.laser, "laser"), {"laser": sensor_sigmas(session.laser)}
     )
     coarse = coarse_covariance(session.laser, calibration)
     design = design_prior(session.target, session.target_pose, calibration)
     prior = PriorInformation(pose_noise(session.ins), design, required_sigmas(coarse, calibration))
-    # a mount parameter that is fixed keeps the error of the coarse mount
+    # a fixed mount parameter has the error of the coarse mount
     errors = laser_errors(model.coarse.names, session.laser, session.as_built)
     sigmas = np.concatenate([np.sqrt(np.diag(coarse)), errors.sigmas[N_MOUNT:]])
     return CalibrationProblem(model, prior, ConsiderErrors(sigmas, [(np.arange(N_MOUNT), coarse)]))
 
 
 def design_prior(target: TargetModel, target_pose: pd.DataFrame, settings: LaserFit) -> DesignPrior:
-    """Return the target as designed, in the frame in which it was measured; where it was surveyed to stand, there.
+    """Return the prior information about the target, in its frame: the design, and the surveyed place if it is known.
 
     Parameters
     ----------
     target : TargetModel
         The design.
     target_pose : DataFrame
-        Table target_pose: where the target was found against its configured place.
+        Table target_pose: the pose of the target, relative to its configured place.
     settings : LaserFit
         Sigmas of the target's faces and of the survey.
     """
@@ -73,10 +73,10 @@ def design_prior(target: TargetModel, target_pose: pd.DataFrame, settings: Laser
 
 
 def coarse_covariance(laser: Laser, settings: LaserFit) -> Array:
-    """Return the covariance (6, 6) of the coarse mount, rad and m: as surveyed, else as the pool's config has it.
+    """Return the covariance (6, 6) of the coarse mount, rad and m: the session's, or by sigmas of the pool's config.
 
-    If the mount comes from an earlier fine calibration, its covariance counts only for the parameters which that
-    calibration held fixed; the others are to be estimated anew.
+    After an earlier calibration of the laser, the session's covariance counts only for the parameters that this
+    calibration fixed. The others are to be estimated anew, so they have the sigmas of the pool's config.
     """
     sigma = np.repeat([np.radians(settings.coarse_sigma_deg), settings.coarse_sigma_m], 3)
     configured = np.diag(sigma**2)
@@ -91,16 +91,16 @@ def coarse_covariance(laser: Laser, settings: LaserFit) -> Array:
 
 
 def required_sigmas(coarse: Array, settings: LaserCalibration) -> Array:
-    """Return the sigmas (6,) with which the mount parameters must come out to be estimated.
+    """Return the largest sigmas (6,), rad and m, with which mount parameters are estimated, not fixed.
 
-    They are within the verdict's limits, and below a share of the sigmas of the coarse mount, covariance (6, 6).
+    They are the verdict's limits, or a share of the sigmas of the coarse mount, covariance (6, 6), if that is less.
     """
     limits = np.repeat([np.radians(settings.max_sigma_deg), settings.max_sigma_m], 3)
     return np.asarray(np.minimum(limits, settings.hold_share * np.sqrt(np.diag(coarse))))
 
 
 def fixed_parameters_table(fixed: Mapping[int, float]) -> pd.DataFrame:
-    """Return the rows of table ``geometry`` that name the fixed mount parameters, with the sigma of each."""
+    """Return table ``geometry``: the fixed mount parameters, each with the sigma that it would have had."""
     rows = [
         ("held", name, float(np.degrees(fixed[place])) if unit == "deg" else fixed[place])
         for name, place, _, unit in PARAMETERS

@@ -40,8 +40,8 @@ class CurrentValues:
 class SurfaceBatch:
     """A sensor's points (n,) on one surface, in the order of time.
 
-    share (n,): each point's place between its two INS records; record (g,): the record before each interval; axes
-    (3, 3): rows t1, t2, n of the surface, target frame.
+    share (n,): place of each point between two INS records, from 0 to 1; record (g,): the INS record at the start of
+    each interval; axes (3, 3): rows t1, t2, n of the surface, target frame.
     """
 
     points: Batch
@@ -60,9 +60,9 @@ class SurfaceBatch:
         points : Batch
             Columns of n points.
         record, share : (n,) arrays
-            INS record before each point, and place between it and the next.
+            INS record before each point, and place of the point between this record and the next, from 0 to 1.
         surface : ObservedSurface
-            Their surface.
+            The surface of the points.
         """
         intervals = Runs.of(record)
         axes = np.vstack([surface.tangents, surface.normal])
@@ -78,7 +78,7 @@ class SurfaceBatch:
 
 @dataclass(frozen=True)
 class LinearisedBatch:
-    """Points on one surface: vectors r (3, n) from the body, m, surface axes; distances v_m (n,); their design."""
+    """Points on one surface: vectors r (3, n) from the body, m, surface axes; distances v_m (n,); the design."""
 
     r: Array
     v_m: Array
@@ -89,9 +89,10 @@ class LinearisedBatch:
 class Observations:
     """Observations of one batch (n,), ordered by surface and time, so that the points of an interval lie together.
 
-    points: their columns; record: INS record before each; share: place between that record and the next; surface,
-    group: numbers; v_m: distance from the surface less mean_m, the mean of its noise; sigma_m; common_m: the INS's
-    white noise common to the interval; features (F, n) and slopes (F - 1, n): see
+    points: columns of the points; record: INS record before each point; share: place of the point between this record
+    and the next, from 0 to 1; surface, group: number of its surface and of its group; v_m: distance from the surface
+    less mean_m, the mean of the noise; sigma_m: sigma of the sensor's noise in v; common_m: sigma of the INS's white
+    noise, common to the interval; features (F, n) and slopes (F - 1, n): see
     :mod:`pipeline.maths.adjustment.design_matrix`.
     """
 
@@ -108,18 +109,19 @@ class Observations:
     slopes: Array
 
     def features_at_adjusted(self, weight: Array) -> Array:
-        """Return the features (F, n) at the adjusted points: uncorrelated with the noise in v."""
+        """Return the features (F, n) at the adjusted points. They are uncorrelated with the sensor's noise in v."""
         noise = sensor_noise(self.v_m, weight, Runs.of(self.record, self.surface), self.common_m)
         return np.concatenate([self.features[:1], self.features[1:] - self.slopes * noise])
 
 
 @dataclass(frozen=True)
 class ObservationModel:
-    """Turns a batch of labelled points into observations.
+    """Model that turns a batch of labelled points into observations.
 
-    body: its motion, target frame; surface_of_face (f,): each face's surface; height_of_face (f,) m: how far it stands
-    off that surface along the normal; coarse: the state from which the adjustment starts; white_m: white noise of the
-    INS's positions, which all points of an interval share; sigmas: by sensor, of those that observe.
+    body: motion of the body, target frame; surface_of_face (f,): number of each face's surface; height_of_face (f,) m:
+    distance of each face from its surface, along the normal; coarse: the state from which the adjustment starts;
+    white_m: sigma of the white noise of the INS's positions, common to all points of an interval; sigmas: standard
+    deviations of each sensor that observes.
     """
 
     body: BodyMotion
@@ -130,7 +132,7 @@ class ObservationModel:
     sigmas: Mapping[str, SensorSigmas]
 
     def linearise(self, sensor: str, batch: Batch, values: CurrentValues) -> Observations:
-        """Return the observations of a batch, v freed of the drift and of the mean of its noise.
+        """Return the observations of a batch. Their v is without the drift and without the mean of the noise.
 
         Parameters
         ----------
@@ -189,14 +191,14 @@ class ObservationModel:
         return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, points_body_m))
 
     def _ordered(self, batch: Batch) -> tuple[Batch, Integers]:
-        """Return the batch by surface and, on each, by time; and the surfaces (n,)."""
+        """Return the batch ordered by surface, and on each surface by time, with the numbers (n,) of the surfaces."""
         t_ns, surface = batch["t_ns"], self.surface_of_face[batch["face"]]
         ascending = bool(np.all(t_ns[1:] >= t_ns[:-1]))
         order = np.argsort(surface.astype(np.int16), kind="stable") if ascending else np.lexsort((t_ns, surface))
         return {name: column[order] for name, column in batch.items()}, surface[order]
 
     def _pose_errors(self, drift: DriftEstimate | None, record: Integers) -> RecordErrors:
-        """Return the drift after each INS record from the batch's first to its last."""
+        """Return the drift in the middle of each interval from the batch's first to its last, zero if it is None."""
         first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
         seconds = self.body.seconds[first : last + 1]
         error = np.zeros((last - first, N_POSE))

@@ -1,4 +1,7 @@
-"""What is calibrated, as a value: observation model, prior information and consider errors; here for the sonar."""
+"""The calibration problem: observation model, prior information and consider errors.
+
+This module makes the sonar's problem; :mod:`pipeline.adjustment.laser_design` makes the laser's.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,15 +28,15 @@ from pipeline.mount import mount_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LEAST_PARALLEL_RAD = 1e-7  # no two families are known to be parallel to better than this
+LEAST_PARALLEL_RAD = 1e-7  # smallest sigma of the angle between parallel families
 
 
 @dataclass(frozen=True)
 class PriorInformation:
-    """What is known beside the observations.
+    """Prior information.
 
-    noise: of the recorded poses; surfaces: pseudo-observations of the surfaces; required_sigmas (6,) rad and m: a mount
-    parameter that the observations cannot give with this sigma is fixed (None: all are estimated).
+    noise: white noise and drift of the recorded poses; surfaces: pseudo-observations of the surfaces; required_sigmas
+    (6,) rad and m: a mount parameter that would have a larger sigma is fixed (None: all are estimated).
     """
 
     noise: PoseNoise
@@ -43,10 +46,10 @@ class PriorInformation:
 
 @dataclass(frozen=True)
 class CalibrationProblem:
-    """What is calibrated, and what is known of it.
+    """A calibration to be solved.
 
-    model: turns points into observations; its coarse state says which sensor is calibrated; prior: what is known beside
-    the observations; consider: errors of the parameters that are fixed.
+    model: turns points into observations, and its coarse state names the calibrated sensor; prior: prior information;
+    consider: a-priori errors of the fixed parameters.
     """
 
     model: ObservationModel
@@ -56,9 +59,9 @@ class CalibrationProblem:
 
 @dataclass(frozen=True)
 class SessionData:
-    """A session as earlier stages left it: the target's design, three tables, and the instruments.
+    """Data of a session: the target's design and survey, three tables of earlier stages, and the instruments.
 
-    ``ins`` has the drift model that the adjustment is to use.
+    ``ins`` has the drift model for the adjustment.
     """
 
     target: TargetModel
@@ -71,7 +74,7 @@ class SessionData:
 
 
 def sonar_problem(session: SessionData, mbes: Mbes) -> CalibrationProblem:
-    """Return the calibration of the sonar against the surfaces that the laser sees from the same body."""
+    """Return the problem of calibrating the sonar against the surfaces that the laser sees from the same body."""
     sigmas = {"laser": sensor_sigmas(session.laser), "mbes": sensor_sigmas(mbes)}
     model = observation_model(session, mount_state(session, mbes, "mbes"), sigmas)
     target, names = session.target, model.coarse.names
@@ -85,7 +88,7 @@ def sonar_problem(session: SessionData, mbes: Mbes) -> CalibrationProblem:
 def mount_state(session: SessionData, sensor: Laser | Mbes, calibrated: Sensor) -> State:
     """Return the state from which the adjustment starts: the sensor's coarse mount, the laser's planes.
 
-    Families that are horizontal, or of several planes, start as designed.
+    A family starts as designed if it is horizontal, lies in several planes, or has no plane of the laser.
 
     Parameters
     ----------
@@ -94,7 +97,7 @@ def mount_state(session: SessionData, sensor: Laser | Mbes, calibrated: Sensor) 
     sensor : Laser or Mbes
         Settings of the sensor that is calibrated.
     calibrated : {"mbes", "laser"}
-        Its name.
+        Name of this sensor.
     """
     planes, surfaces = laser_planes(session.planes), []
     for family in session.target.families:
@@ -113,11 +116,12 @@ def observation_model(session: SessionData, state: State, sigmas: Mapping[str, S
     Parameters
     ----------
     session : SessionData
-        Poses, target and instruments; faces stand off their surface by their height, designed and as built.
+        Poses, target and instruments. A face's height above its surface is the designed height plus the deviation as
+        built.
     state : State
         The state from which the adjustment starts.
     sigmas : mapping of SensorSigmas
-        By sensor, of those that observe.
+        Standard deviations of each sensor that observes.
     """
     number = {surface.family: k for k, surface in enumerate(state.surfaces)}
     faces, as_built = session.target.faces, session.as_built.faces
@@ -138,7 +142,7 @@ def sensor_sigmas(sensor: Laser | Mbes) -> SensorSigmas:
 
 
 def design_surface(target: TargetModel, family: Family) -> ObservedSurface:
-    """Return the family's plane as designed, its centre in the midst of the corners of its faces."""
+    """Return the family's plane as designed. Its centre is the mean of all corners, projected onto the plane."""
     corners_m = np.concatenate([target.faces[number].vertices_m for number in family.faces])
     centre = corners_m.mean(axis=0)
     on_plane = centre - (centre @ family.normal - family.distance_m) * family.normal
@@ -146,7 +150,7 @@ def design_surface(target: TargetModel, family: Family) -> ObservedSurface:
 
 
 def _parallel_families(target: TargetModel, as_built: AsBuilt) -> ParallelPrior | None:
-    """Return the families that are parallel, within the angle by which they may be turned as built."""
+    """Return the prior information that families are parallel, by the sigma of the angle as built; None if none are."""
     if not target.parallel:
         return None
     return ParallelPrior(target.parallel, max(float(np.radians(as_built.angle_sigma_deg)), LEAST_PARALLEL_RAD))

@@ -1,4 +1,4 @@
-"""Final pass over all points: residual statistics by bin, and a thinned sample of the residuals for the report."""
+"""Final reading of all points: statistics of the residuals by bin, and a sample of the residuals for the report."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -33,18 +33,18 @@ from pipeline.maths.sonar.soundings import receive_angle
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # degrees, m, s
-CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may take its modes in turn, from ping to ping
-COMPARED: dict[str, Comparison] = {"pass": "rest", **dict.fromkeys(CYCLES, "rest"), "step": "steps"}  # others by bin
-TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # columns of the drift
+WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # of bins: degrees, m, s
+CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may change its mode from ping to ping
+COMPARED: dict[str, Comparison] = {"pass": "rest", **dict.fromkeys(CYCLES, "rest"), "step": "steps"}  # else: bins
+TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # components of the drift
 KNOWN = 1e9  # degrees of freedom of a sigma that is not estimated
 Row = dict[str, Any]
-PassMeans = Mapping[tuple[str, int, int], BinMean]  # by sensor, surface, pass
+PassMeans = Mapping[tuple[str, int, int], BinMean]  # key: sensor, surface, pass
 
 
 @dataclass(frozen=True)
 class ResidualStatistics:
-    """Means by sensor, surface and pass; the table ``patterns``, means by all bins; the table ``residuals``."""
+    """Mean residuals by sensor, surface and pass; table ``patterns``, means by all bins; table ``residuals``."""
 
     pass_means: PassMeans
     patterns: pd.DataFrame
@@ -61,7 +61,7 @@ class ResidualStatistics:
 
 @dataclass(frozen=True)
 class _Thinning:
-    """Length of a slot of time, and every how many points to take into the sample."""
+    """Length of a slot of time; step of the sample: every ``step``-th point is in it."""
 
     slot_ns: int
     step: int
@@ -79,7 +79,7 @@ def residual_statistics(
     Parameters
     ----------
     problem : CalibrationProblem
-        What is calibrated, and what is known of it.
+        Model, prior information and consider errors of the calibration.
     adjustment : MountAdjustment
         The adjusted values.
     streams : mapping of Stream
@@ -87,7 +87,7 @@ def residual_statistics(
     passes : DataFrame
         Table passes.
     settings : Adjust
-        Slot of time, tolerance.
+        Length of a slot of time, and tolerance of the tests.
     """
     pass_means: dict[tuple[str, int, int], BinMean] = {}
     patterns: list[Row] = []
@@ -119,7 +119,7 @@ def _batch(
     """Return the sums of one batch by variable, and a sample of its residuals."""
     observations, weighting = model.linearise(sensor, batch, values), values.weighting
     robust, _ = weighting.weights(observations)
-    # plain weights: a whole bin that is off must show, not be rejected
+    # weights without robust reduction: a bin with large residuals must show, not lose its weight
     plain = observations.sigma_m * np.sqrt(weighting.factors_of(observations.group))
     normalised = np.where(robust > 0, np.abs(weighting.normalised(observations)), 0.0)
     slot = observations.points["t_ns"] // thinning.slot_ns
@@ -139,7 +139,7 @@ def _batch(
 
 
 def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, Array | Integers]]:
-    """Yield each variable by which residuals are sorted, and its value (n,) of each point."""
+    """Yield each variable by which residuals are binned: its name, and its values (n,) for the points."""
     batch = observations.points
     own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)
@@ -171,9 +171,9 @@ def _row(variable: str, sensor: str, family: str, mean: BinMean) -> Row:
 
 
 def _drift_rows(problem: CalibrationProblem, adjustment: MountAdjustment, passes: pd.DataFrame) -> list[Row]:
-    """Return how the drift in each pass turns the boat against the others, as rows of ``patterns``; rad.
+    """Return rows of ``patterns``: turn of the boat by the drift in each pass, less that in the other passes, rad.
 
-    (How it moves the boat tells of the INS alone: both sensors move alike.)
+    (Shifts by the drift are not tested: they move both sensors alike, so they only show errors of the INS.)
     """
     drift = adjustment.drift
     t_ns = problem.model.body.trajectory.t_ns[drift.knots.record]

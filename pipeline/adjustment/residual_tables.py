@@ -1,4 +1,4 @@
-"""Mean residuals of the sample as tables: along one variable, and by grid cell of each face."""
+"""Tables of the residuals' sample: the sample, its means along one variable, and by grid cell of each face."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,14 +18,14 @@ from pipeline.maths.geometry.face_grid import BinStatistics, bin_statistics, cel
 from pipeline.maths.sonar.soundings import receive_angle
 
 SENSORS = ("laser", "mbes")
-WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # degrees, m, s
+WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # of bins: degrees, m, s
 CELL_M = 0.1
-FEWEST = 10  # points behind a mean that the report shows
-AT_MOST = 100_000  # points of a sensor in the table
+FEWEST = 10  # points: the report shows no mean of fewer
+AT_MOST = 100_000  # about the largest number of points of a sensor in table residuals
 
 
 def bins_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
-    """Return the table ``residual_bins``: by angle and range over all passes together, by time pass by pass."""
+    """Return the table ``residual_bins``: means by angle and range over all passes together, by time in each pass."""
     families = sorted(set(faces["family"]))
     family = _family_number(residuals, faces, families)
     rows: list[pd.DataFrame] = []
@@ -57,7 +57,7 @@ def bins_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
 
 
 def map_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
-    """Return the table ``residual_map``: the mean residual of each grid cell of each face, sensor by sensor."""
+    """Return the table ``residual_map``: the mean residual of each sensor in each grid cell of each face."""
     rows: list[pd.DataFrame] = []
     for sensor in SENSORS:
         of_sensor = residuals[residuals["sensor"] == sensor]
@@ -89,18 +89,18 @@ def _family_number(residuals: pd.DataFrame, faces: pd.DataFrame, families: list[
 
 
 def sampling_step(total: int, at_most: int = AT_MOST) -> int:
-    """Return every how many points to take; odd, so that no pattern of twos in the data is taken for the whole."""
+    """Return n for a sample of every n-th point. An odd n cannot miss one of two alternating kinds of points."""
     step = -(-total // at_most)
     return step if step <= 1 else step | 1
 
 
 def residual_sample(model: ObservationModel, sensor: str, batch: Batch, values: CurrentValues) -> Batch:
-    """Return positions and residuals of points, calibrated and coarse, as columns of the table ``residuals``.
+    """Return columns of table ``residuals``: positions and residuals with the calibrated and with the coarse mount.
 
     Parameters
     ----------
     model : ObservationModel
-        Turns points into observations.
+        Model that turns points into observations.
     sensor : {"laser", "mbes"}
         The sensor that observed the points.
     batch : Batch

@@ -38,12 +38,12 @@ def result_tables(
     passes: pd.DataFrame,
     test_level: float,
 ) -> dict[str, pd.DataFrame]:
-    """Return the tables of the parameters, by name, and of all that goes with them.
+    """Return by name the tables of parameters, covariance, tests, groups, summary, drift, means and surfaces.
 
     Parameters
     ----------
     problem : CalibrationProblem
-        What is calibrated, with the coarse state and the errors of the fixed parameters.
+        The calibration, with the coarse state and the errors of the fixed parameters.
     adjustment : MountAdjustment
         The adjusted values.
     statistics : ResidualStatistics
@@ -70,10 +70,10 @@ def result_tables(
 def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple[pd.DataFrame, Array, Array]:
     """Return the table of mount and estimated parameters, and their random and total covariance.
 
-    They are not numbers where the data leave a direction open.
+    If the data leave a direction open, the mount's values and both covariances are NaN.
     """
     state, solution = adjustment.state, adjustment.solution
-    numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, also where it is fixed
+    numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, even if it is fixed
     random = solution.total_covariance(ConsiderErrors(np.zeros(state.size)), numbers)
     total = solution.total_covariance(problem.consider, numbers)
     values = _values(state, problem.model.coarse)[numbers]
@@ -91,7 +91,7 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
 
 
 def _values(state: State, coarse: State) -> Array:
-    """Return the value (u,) of each parameter: corrections of the mount, shifts of the surfaces, additional ones."""
+    """Return the values (u,) of all parameters: the mount's corrections, the surfaces' shifts, additional values."""
     values = state.additional_values()
     correction = log_so3(state.R_body_from_sensor @ coarse.R_body_from_sensor.T)
     values[:N_MOUNT] = np.concatenate([correction, state.lever_arm_m - coarse.lever_arm_m])
@@ -123,7 +123,7 @@ def _no_result(deficiency: int) -> str:
 
 
 def _weakest(solution: Solution) -> str:
-    """Return the weakest direction of the mount in words; empty where a mount parameter is fixed."""
+    """Return the weakest direction of the mount in words; empty if a mount parameter is fixed."""
     is_whole = np.all(solution.estimated[:N_MOUNT] == np.arange(N_MOUNT))
     return weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]) if is_whole else ""
 
@@ -147,7 +147,7 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
 def _single_parameter_table(
     adjustment: MountAdjustment, consider_sigmas: Array, estimate: pd.DataFrame
 ) -> pd.DataFrame:
-    """Return one row per fixed parameter (its test, and its effect on the mount) and per additional estimated one."""
+    """Return table ``freed``: rows of the fixed parameters (test, effect on the mount) and of the additional ones."""
     state, solution, equations = adjustment.state, adjustment.solution, adjustment.equations
     tests = {test.parameter: test for test in single_parameter_tests(equations.normal, equations.right, solution)}
     sensitivity = solution.sensitivity_of(np.arange(N_MOUNT))
@@ -210,9 +210,10 @@ def _groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
 def _pass_means_table(
     adjustment: MountAdjustment, statistics: ResidualStatistics, t_ns: NDArray[np.int64], passes: pd.DataFrame
 ) -> pd.DataFrame:
-    """Return the mean of each sensor, surface and pass.
+    """Return table ``cells``: the mean residual of each sensor, surface and pass.
 
-    Each row also has the scatter of its intervals about planes of their own, and how far it lies off other passes.
+    A row also has the variance factor of the scatter of its intervals about their own planes, and the normal deviate of
+    the difference from the other passes.
     """
     patterns = statistics.patterns
     normalised = patterns[patterns["by"] == "pass"].set_index(["sensor", "family", "low"])["normalised"].to_dict()
@@ -221,7 +222,7 @@ def _pass_means_table(
     for (sensor, surface, number), mean in sorted(statistics.pass_means.items()):
         sums = adjustment.accumulation.sums[sensor]
         family = adjustment.state.surfaces[surface].family
-        beside = sums.record, np.minimum(sums.record + 1, len(t_ns) - 1)  # one of them may lie outside the pass
+        beside = sums.record, np.minimum(sums.record + 1, len(t_ns) - 1)  # one of the two may lie outside the pass
         pass_of_interval = np.maximum(*(pass_of(t_ns[record], starts, ends) for record in beside))
         within = scatter(sums, (pass_of_interval == number) & (sums.surface == surface))
         rows.append(

@@ -1,4 +1,4 @@
-"""Types, coordinates and other columns that several tables share."""
+"""Types of columns, and the columns that several tables share."""
 
 # fmt: off: the tables are laid out by hand
 import pyarrow as pa
@@ -19,17 +19,17 @@ def coordinate_columns(frame: str, unit: str = "m", stem: str = "", type_: pa.Da
     frame : str
         Frame of the coordinates.
     unit : str
-        Their unit.
+        Unit of the coordinates.
     stem : str
         First part of the columns' names.
     type_ : DataType
-        Their type.
+        Type of the columns.
     """
     return tuple(Column(f"{stem}{axis}_{frame}_{unit}", type_, unit, f"{axis} in frame {frame}") for axis in "xyz")
 
 
 def float32_coordinates(frame: str) -> tuple[Column, ...]:
-    """Return the columns of x, y, z near target or sensor: single precision is exact to 0.5 µm within 16 m."""
+    """Return the columns of x, y, z in single precision. Within 16 m its rounding error is at most 0.5 µm."""
     return coordinate_columns(frame, type_=F32)
 
 
@@ -39,7 +39,7 @@ ROTATION = tuple(
 MOUNT_CORRECTION = (
     *ROTATION, *(Column(f"lever_arm_{axis}_m", F64, "m", f"lever arm correction, body {axis}") for axis in "xyz")
 )
-ALL_PASSES = -1  # number in place of a pass, in rows of all passes together
+ALL_PASSES = -1  # number of the pass in rows for all passes together
 T_NS = Column("t_ns", I64, "ns", "GPS time: nanoseconds since 1980-01-06 00:00:00 GPS, latency removed")
 PASS = Column("pass", I16, "1", "number of the pass, from 0; -1: none (or all of them together)")
 COUNTS = (

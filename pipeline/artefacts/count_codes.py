@@ -1,6 +1,6 @@
-"""Stable codes of the reasons under which the stages over streams count their points.
+"""Stable codes of the reasons in the tables ``counts``, by which stages count points and records.
 
-The words of a reason are for people and may be mended; its code is for programs and stays.
+People read the words of a reason, which may be mended. Programs read its code, which never changes.
 """
 
 import re
@@ -21,7 +21,7 @@ CODES = {
     "not a whole number": "not_whole",
     "missing value": "missing_value",
     "word where a number should be": "not_a_number",
-    # rows of texts
+    # rows of text files
     "row with another number of columns": "wrong_column_count",
     "line without end": "unterminated_line",
     "last line without line end": "unterminated_last_line",
@@ -80,7 +80,7 @@ CODES = {
     "ray too flat": "grazing_ray",
 }
 
-# Reasons with a variable part; each matches several reasons of one code. The exact words above go first.
+# Codes of reasons with a variable part, by a pattern of the reason. CODES has precedence.
 CODES_OF_PATTERNS = {
     r"ins status .+": "ins_status",
     r"quality Q .+": "quality",

@@ -1,4 +1,4 @@
-"""Counts by source and reason, as every stage over a stream keeps them."""
+"""Counts of records or points by source and reason: the table ``counts`` of each stage that reads streams."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -10,17 +10,18 @@ from pipeline.artefacts.count_codes import code_of
 
 
 def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]) -> pd.DataFrame:
-    """Sum the counts of all chunks by source and reason.
+    """Return the table ``counts``: the counts of all chunks, summed by source and reason.
 
     Parameters
     ----------
     partials : mapping
-        By source: pairs of a part's name and the counts of one of its chunks, by reason; 'used' counts what went on.
+        For each source a list of pairs: the name of a part, and the counts of one of its chunks by reason. The reason
+        'used' counts the records that were kept.
 
     Returns
     -------
     DataFrame
-        Columns source, reason, code, count: reasons of a source in alphabetical order.
+        Columns source, reason, code, count. The reasons of a source are in alphabetical order.
     """
     rows = []
     for source, chunk_counts in partials.items():
@@ -36,7 +37,7 @@ def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]
 
 
 def used(counts: pd.DataFrame, source: str) -> float:
-    """Return how many records of a source went on."""
+    """Return the number of a source's records that were kept."""
     return float(counts[(counts["source"] == source) & (counts["reason"] == "used")]["count"].sum())
 
 
@@ -46,7 +47,7 @@ def by_reason(counts: pd.DataFrame, source: str) -> pd.Series:
 
 
 def why_none_used(counts: pd.DataFrame, source: str) -> str | None:
-    """Return the counts of a source by reason, as text, if no record went on; else None."""
+    """Return a source's counts by reason as text if none of its records was kept; otherwise None."""
     of_source = by_reason(counts, source)
     if of_source["used"]:
         return None

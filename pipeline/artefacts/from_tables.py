@@ -1,4 +1,4 @@
-"""Rows of the tables back into vectors, frames, trajectories and planes: their columns are taken apart here alone."""
+"""Conversion of table rows into vectors, frames, trajectories and planes. The counterpart is ``to_tables``."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,7 +19,7 @@ Row = Mapping[Any, Any] | pd.Series
 
 
 def vector_of(row: Row, columns: str) -> Array:
-    """Return three columns of a row as a vector (3,); ``columns`` has ``{}`` where x, y and z stand.
+    """Return three columns of a row as a vector (3,); ``columns`` is their name with ``{}`` in place of x, y or z.
 
     >>> vector_of({"x_m": 1, "y_m": 2, "z_m": 3}, "{}_m")
     array([1., 2., 3.])
@@ -38,7 +38,7 @@ def normals_of(table: pd.DataFrame) -> Array:
 
 
 def is_horizontal(faces: pd.DataFrame) -> NDArray[np.bool_]:
-    """Return which faces (n,) are horizontal."""
+    """Return a mask (n,): true for horizontal faces."""
     return np.asarray(faces["normal_z_target_1"].abs() > HORIZONTAL_COSINE)
 
 
@@ -48,7 +48,7 @@ def rotation_vector_deg(row: Row) -> Array:
 
 
 def target_frame(target_pose: pd.DataFrame) -> TargetFrame:
-    """Return the target frame as it lies in the pool, from the table ``target_pose`` (one row)."""
+    """Return the target frame relative to the pool frame, from the table ``target_pose`` (one row)."""
     row = target_pose.iloc[0]
     R_target_from_pool = np.array(row["R_target_from_pool"], dtype=np.float64).reshape(3, 3)
     return TargetFrame(R_target_from_pool, vector_of(row, "origin_{}_pool_m"))
@@ -69,7 +69,7 @@ def trajectory_in_target(poses: pd.DataFrame, target_pose: pd.DataFrame) -> Traj
 
 
 def family_names(faces: pd.DataFrame) -> list[str]:
-    """Return the names of the families: roles first, horizontal ones last, else in order of the faces."""
+    """Return the names of the families in order: roles, then other families by their faces, then horizontal ones."""
     horizontal = dict(zip(faces["family"], is_horizontal(faces), strict=True))
 
     def place(name: str) -> int:

@@ -1,4 +1,4 @@
-"""Tables and streams as Parquet. The bytes depend on the rows alone: not on batch sizes, jobs or threads."""
+"""Tables and streams as Parquet files. The bytes depend only on the rows, not on batch sizes, workers or threads."""
 
 import contextlib
 from collections.abc import Mapping, Sequence
@@ -20,12 +20,13 @@ PART_ROWS = 4_000_000  # a longer part of a stream is continued in the next file
 
 
 def to_arrow(columns: Mapping[str, Any] | pd.DataFrame, artefact: Artefact) -> pa.Table:
-    """Return columns in the artefact's order and types.
+    """Return columns as an Arrow table, in the artefact's order and types.
 
     Raises
     ------
     TypeError
-        A column is missing, unknown, or does not fit its type without loss: a bug of the stage.
+        A column is missing, is unknown, or does not fit its type. (Floats may be rounded to single precision.) This is
+        a bug of the stage.
     """
     where = f"{artefact.owner}/{artefact.name}"
     expected = {column.name for column in artefact.columns}
@@ -62,7 +63,7 @@ def _to_array(values: Any, field: "pa.Field[Any]", where: str) -> "pa.Array[Any]
 
 
 def _writer(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
-    """Return a writer that stores integers as differences and floats byte by byte, which LZ4 packs well and fast."""
+    """Return a writer that stores integers as differences, floats byte by byte: LZ4 compresses them well and fast."""
     encodings = {}
     for field in schema:
         inner = field.type.value_type if pa.types.is_list(field.type) else field.type
@@ -81,21 +82,21 @@ def write_table(path: Path, table: pa.Table) -> None:
 
 
 def read_table(path: Path, artefact: Artefact, columns: Sequence[str] = ()) -> pd.DataFrame:
-    """Read a table, or some of its columns.
+    """Return a table of a file, or some of its columns.
 
     Parameters
     ----------
     path : Path
         The Parquet file.
     artefact : Artefact
-        The table that it must hold.
+        The table that the file must contain.
     columns : sequence of str
         Columns to read; empty: all.
 
     Raises
     ------
     ArtefactError
-        The file cannot be read, or holds another table.
+        The file cannot be read, or it contains another table.
     """
     try:
         with pq.ParquetFile(path) as file:
@@ -109,12 +110,15 @@ def read_table(path: Path, artefact: Artefact, columns: Sequence[str] = ()) -> p
 
 
 def from_arrow(table: pa.Table) -> pd.DataFrame:
-    """Return a table as pandas, by its columns alone."""
+    """Return an Arrow table as a DataFrame. Metadata that pandas may have stored are ignored."""
     return table.to_pandas(ignore_metadata=True, use_threads=False)
 
 
 class PartWriter:
-    """One part of a stream: row groups of BATCH_ROWS rows, files of at most PART_ROWS rows, whatever comes in."""
+    """Writer of one part of a stream.
+
+    For batches of any size it writes row groups of BATCH_ROWS rows, and files of at most PART_ROWS rows.
+    """
 
     def __init__(self, folder: Path, artefact: Artefact, number: int) -> None:
         self.paths: list[Path] = []
@@ -128,7 +132,7 @@ class PartWriter:
         """Append the rows of a batch."""
         rows = len(next(iter(batch.values()))) if batch else 0
         if not rows:
-            to_arrow(batch, self._artefact)  # checked all the same
+            to_arrow(batch, self._artefact)  # checks the columns
             return
         self._waiting.append({name: np.asarray(values) for name, values in batch.items()})
         self._rows_waiting += rows
@@ -136,7 +140,7 @@ class PartWriter:
             self._flush(self._group_rows())
 
     def close(self) -> None:
-        """Write the rows that wait, and close the file."""
+        """Write the remaining rows, and close the file."""
         if self._rows_waiting:
             self._flush(self._rows_waiting)
         self._close_file()
@@ -176,13 +180,13 @@ class PartWriter:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         if error is None:
             self.close()
-        elif self._file is not None:  # nothing of this part is kept: only the file is released
+        elif self._file is not None:  # the part is not kept: its file is only closed
             with contextlib.suppress(OSError, pa.ArrowException):
                 self._file.close()
 
 
 def write_empty_part(folder: Path, artefact: Artefact) -> Path:
-    """Write a file without rows, so that an empty stream is a readable folder too, and return its path."""
+    """Write a file without rows and return its path. With it the folder of an empty stream can be read."""
     path = folder / "part-00000-000.parquet"
     with writing(path), _writer(path, artefact.schema):
         pass

@@ -1,4 +1,4 @@
-"""Tables of stage fit_planes back into the observations of the patent's steps."""
+"""Conversion of the tables of stage fit_planes into the observations of the patent's steps."""
 
 import numpy as np
 import pandas as pd
@@ -18,19 +18,19 @@ Array = NDArray[np.float64]
 def angle_passes(
     faces: pd.DataFrame, planes: pd.DataFrame, sounding_moments: pd.DataFrame, min_points: int
 ) -> list[PassPlanes]:
-    """Return the passes in which both sensors have all of P1, P2, P3, with the laser's normals of the same pass.
+    """Return the passes in which both sensors see P1, P2 and P3, each with the laser's normals of that pass.
 
     Parameters
     ----------
     faces, planes, sounding_moments
         Tables of stages segment and fit_planes.
     min_points
-        Fewest soundings on a family.
+        Smallest number of soundings on each of these families.
 
     Raises
     ------
     DegenerateGeometryError
-        The target lacks one of these roles.
+        The target has no faces with one of these roles.
     """
     missing = sorted(set(ROLES) - set(faces["family"]))
     if missing:
@@ -68,7 +68,7 @@ def offset_observations(
     faces, planes, sounding_moments
         Tables of stages segment and fit_planes.
     min_points
-        Fewest points on a horizontal face.
+        Smallest number of points on a horizontal face.
     """
     laser = laser_planes(planes)
     of_passes = [PassOffsets(one, laser[(one.number, "P2")], laser[(one.number, "P1")]) for one in passes]

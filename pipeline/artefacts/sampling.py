@@ -1,4 +1,4 @@
-"""Small, reproducible samples of streams for searches: never for a result."""
+"""Small, reproducible samples of streams. They serve searches, never a result."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,7 @@ _Array = NDArray[np.float64]
 KEY_BITS = 20
 
 
-Voxels = tuple[NDArray[np.int64], _Array]  # keys (v,), and per voxel count and sums of x, y, z (v, 4)
+Voxels = tuple[NDArray[np.int64], _Array]  # keys (v,); for each voxel the count and the sums of x, y, z (v, 4)
 
 
 def points_above(batch: Batch, suffix: str, lowest_m: float) -> _Array:
@@ -35,7 +35,7 @@ def points_above(batch: Batch, suffix: str, lowest_m: float) -> _Array:
 
 
 def voxel_sums(points: _Array, voxel_m: float) -> Voxels:
-    """Sum points (n, 3) by voxels of edge ``voxel_m``."""
+    """Return counts and sums of points (n, 3) by voxel, a cube with the edge ``voxel_m``."""
     cells = np.floor(points / voxel_m).astype(np.int64) + (1 << (KEY_BITS - 1))
     keys, inverse = np.unique(
         (cells[:, 0] << (2 * KEY_BITS)) | (cells[:, 1] << KEY_BITS) | cells[:, 2], return_inverse=True
@@ -44,7 +44,10 @@ def voxel_sums(points: _Array, voxel_m: float) -> Voxels:
 
 
 def voxel_means(partials: Iterable[Voxels]) -> _Array:
-    """Return the mean points (n, 3) of voxels with at least 2 points and 2 % of a typical one's: outliers fall away."""
+    """Return the mean points (n, 3) of voxels. Sparse voxels, mostly of outliers, are left out.
+
+    A voxel must have at least 2 points, and at least 2 % of the points of a typical voxel.
+    """
     keys, sums = np.empty(0, np.int64), np.empty((0, 4))
     for batch_keys, batch_sums in partials:
         keys, inverse = np.unique(np.concatenate([keys, batch_keys]), return_inverse=True)
@@ -58,12 +61,12 @@ def voxel_means(partials: Iterable[Voxels]) -> _Array:
 
 
 def _sums(group: NDArray[np.int64], groups: int, rows: _Array) -> _Array:
-    """Return the sums of rows (n, c) by their group (n,), (groups, c)."""
+    """Return the sums (groups, c) of the rows (n, c) of each group; ``group`` (n,) is the group of each row."""
     return np.column_stack([np.bincount(group, weights=column, minlength=groups) for column in rows.T])
 
 
 def sample_rows(batch: Batch, one_in: float) -> Batch:
-    """Return about one in ``one_in`` rows, chosen by a hash of time and beam: the same rows whatever the batches."""
+    """Return about one in ``one_in`` rows. A hash of time and beam chooses them, so the batches do not matter."""
     if one_in <= 1:
         return batch
     mixed = batch["t_ns"].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)

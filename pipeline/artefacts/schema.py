@@ -1,4 +1,4 @@
-"""Descriptions of tables, streams and documents; :mod:`pipeline.artefacts.catalogue` holds them all."""
+"""Types that describe tables, streams and documents. :mod:`pipeline.artefacts.catalogue` has all descriptions."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -15,7 +15,7 @@ Written = Mapping[str, tuple[Part, ...]]
 
 
 class PartSink(Protocol):
-    """Destination of the rows that one input part gives to the output streams."""
+    """Destination of the output rows that a stage makes from one input part."""
 
     def __enter__(self) -> Self: ...
     def __exit__(self, *error: Any) -> None: ...
@@ -37,13 +37,13 @@ class Sink(Protocol):
         ...
 
     def empty(self, stream: str) -> tuple[Part, ...]:
-        """Return the parts of a stream without any row."""
+        """Return the parts of a stream that has no rows."""
         ...
 
 
 @dataclass(frozen=True)
 class FolderSink:
-    """Streams as folders of Parquet parts in ``folder``."""
+    """Destination that writes each stream to a folder of Parquet parts in ``folder``."""
 
     folder: Path
     streams: Mapping[str, Artefact]
@@ -83,7 +83,7 @@ class _FolderPart:
 
 @dataclass(frozen=True)
 class MemorySink:
-    """Streams in memory: simulated campaigns and tests."""
+    """Destination that keeps streams in memory, for series of simulated sessions and for tests."""
 
     streams: Mapping[str, Artefact]
 
@@ -92,7 +92,7 @@ class MemorySink:
         return _MemoryPart(self, number)
 
     def empty(self, stream: str) -> tuple[Part, ...]:
-        """Return no part."""
+        """Return an empty tuple: in memory a stream without rows has no parts."""
         return ()
 
 

@@ -1,8 +1,8 @@
-"""Streams: tables too long for memory, read part by part and batch by batch.
+"""Streams: tables too long for memory, which are read part by part and batch by batch.
 
-A *batch* is a dict of equally long one-dimensional arrays. A *part* is the unit of work that is handed to a worker:
-a Parquet file, a stretch of a raw file, or (in campaigns and tests) a batch already in memory. A *stream* is an
-ordered tuple of parts that can be iterated any number of times.
+A *batch* is a dict of equally long one-dimensional arrays. A *part* is the unit of work of a worker: a Parquet file, a
+stretch of a raw file, or (in series of simulated sessions, and in tests) a batch in memory. A *stream* is an ordered
+tuple of parts that can be read any number of times.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -22,13 +22,13 @@ _T = TypeVar("_T")
 
 
 def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
-    """Return a table's columns as arrays, single precision as double."""
+    """Return a table's columns as arrays; float32 becomes float64."""
     arrays = {name: table[name].to_numpy() for name in table.column_names}
     return {name: a.astype(np.float64) if a.dtype == np.float32 else a for name, a in arrays.items()}
 
 
 def point_array(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarray:
-    """Return points (n, 3) from the columns ``x_<suffix>``, ``y_…`` and ``z_…``; each axis lies together in memory.
+    """Return points (n, 3) from the columns ``x_<suffix>``, ``y_…`` and ``z_…``. In memory they lie axis by axis.
 
     Parameters
     ----------
@@ -44,16 +44,16 @@ def point_array(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarra
 
 @dataclass(frozen=True)
 class Chunk:
-    """A batch of a part's rows, with the counts of rows that were left out, and an INS's own sigmas and states."""
+    """A batch of a part's rows, the counts of rows left out, and, from an INS, its stated sigmas and filter states."""
 
-    columns: Batch  # good rows
+    columns: Batch  # usable rows
     dropped: Mapping[str, int] = field(default_factory=dict)  # rows left out, by reason
-    sigmas: Batch = field(default_factory=dict)  # columns of the table ins_sigmas, at times of their own
-    states: Batch = field(default_factory=dict)  # by good row: the filter's state (readers/novatel.py: STATES)
+    sigmas: Batch = field(default_factory=dict)  # columns of the table ins_sigmas, with their own times
+    states: Batch = field(default_factory=dict)  # of the INS's filter, by usable row (readers/novatel.py: STATES)
 
 
 class Part(Protocol):
-    """The unit of work. Parts are picklable and hold no open file."""
+    """The unit of work of a worker. Parts are picklable and have no open file."""
 
     @property
     def name(self) -> str:
@@ -95,7 +95,7 @@ class ParquetPart:
 
 @dataclass(frozen=True)
 class MemoryPart:
-    """A batch already in memory: simulated campaigns and tests."""
+    """A batch in memory, for series of simulated sessions and for tests."""
 
     name: str
     columns: Batch
@@ -108,10 +108,10 @@ class MemoryPart:
 
 
 class Mapper(Protocol):
-    """The way in which a function is applied to many items; ``run/workers.py`` has the parallel one."""
+    """A callable that applies a function to many items. ``run/workers.py`` has one that works in parallel."""
 
     def __call__(self, function: Callable[..., _T], /, *items: Iterable[object]) -> Iterable[_T]:
-        """Apply a function to each item; results come back in order."""
+        """Return the function's results for all items, in the order of the items."""
         ...
 
 
@@ -122,7 +122,7 @@ def serial(function: Callable[..., _T], *items: Iterable[object]) -> Iterable[_T
 
 @dataclass(frozen=True)
 class Stream:
-    """An ordered, repeatable sequence of parts, and how work on its parts is spread."""
+    """An ordered sequence of parts that can be read repeatedly, and the mapper that spreads the work on them."""
 
     parts: tuple[Part, ...]
     mapper: Mapper = serial
@@ -134,7 +134,7 @@ class Stream:
                 yield chunk.columns
 
     def fold(self, function: Callable[..., _T], *arguments: object) -> Iterator[_T]:
-        """Yield ``function(batch, *arguments)`` of every batch, in order; parts are worked on in parallel.
+        """Yield ``function(batch, *arguments)`` for every batch, in order. The mapper may work on parts in parallel.
 
         Take the results one by one: together they may not fit in memory.
 
@@ -143,7 +143,7 @@ class Stream:
         function : callable
             Function of a batch and ``arguments``.
         *arguments
-            Passed on to the function.
+            Further arguments of the function.
         """
         work = [(part, function, arguments) for part in self.parts]
         for results in self.mapper(_fold_part, work):

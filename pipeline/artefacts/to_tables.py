@@ -1,4 +1,4 @@
-"""Vectors, planes and faces into rows of the tables: the counterpart of ``from_tables``."""
+"""Conversion of vectors, planes and faces into table rows. The counterpart is ``from_tables``."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def xyz_columns(columns: str, vector: Sequence[Any] | Array) -> dict[str, Any]:
-    """Return a vector (3,) as three columns of a row; ``columns`` has ``{}`` where x, y and z stand.
+    """Return a vector (3,) as three columns of a row; ``columns`` is their name with ``{}`` in place of x, y or z.
 
     >>> xyz_columns("{}_m", [1, 2, 3])
     {'x_m': 1, 'y_m': 2, 'z_m': 3}
@@ -74,7 +74,7 @@ def plane_row(sensor: str, number: int, name: str, plane: Plane) -> dict[str, An
 def direction_row(sensor: str, number: int, normal: Array, count: int) -> dict[str, Any]:
     """Return the row of P4 = P1 x P2 in the table ``planes``.
 
-    P4 is a direction alone; no point lies on it, so its distance and its centroid are not numbers.
+    P4 is only a direction. No point lies on it, so its distance, its RMS and its centroid are NaN.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def direction_row(sensor: str, number: int, normal: Array, count: int) -> dict[s
     normal
         The direction (3,), target frame.
     count
-        Points of the smaller of the two planes.
+        The smaller of the point counts of P1 and P2.
     """
     row: dict[str, Any] = {"sensor": sensor, "pass": number, "plane": "P4", "distance_m": np.nan, "rms_m": np.nan}
     row |= normal_columns(normal) | xyz_columns("centroid_{}_target_m", np.full(3, np.nan))
@@ -102,7 +102,7 @@ def moments_table(moments: Mapping[tuple[int, int], Array]) -> pd.DataFrame:
 
 
 def faces_table(model: TargetModel) -> pd.DataFrame:
-    """Return the table ``faces``: one row a face of the target by design."""
+    """Return the table ``faces``: one row for each face of the target by design."""
     one_plane = {family.name: family.one_plane for family in model.families}
     rows = []
     for number, face in enumerate(model.faces):

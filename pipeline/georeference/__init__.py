@@ -1,1 +1,1 @@
-"""Points into the pool frame, as stage georeference places them."""
+"""The computations of stage georeference: points of both sensors in the pool frame."""

@@ -1,4 +1,4 @@
-"""Points of both sensors in the pool frame: mount, pose at their time, refraction."""
+"""Points of both sensors in the pool frame, by mount, pose at the time of the point, and refraction."""
 
 
 import numpy as np
@@ -17,14 +17,14 @@ Array = NDArray[np.float64]
 def laser_in_pool(
     t_ns: NDArray[np.int64], points: Array, context: PoolContext, laser: LaserPlacement
 ) -> tuple[Array, Array]:
-    """Return points (n, 3) m in the scanner's frame and in the pool frame, whichever of the two the files hold.
+    """Return laser points (n, 3) m in the scanner's frame and in the pool frame.
 
     Parameters
     ----------
     t_ns
         Times (n,).
     points
-        Points (n, 3) m of the files: in the scanner's frame or in ECEF, as ``laser.frame`` says.
+        Points (n, 3) m of the files: in the scanner's frame or in ECEF, by ``laser.frame``.
     context
         The trajectory in the pool.
     laser
@@ -43,7 +43,7 @@ def laser_in_pool(
 def soundings_in_pool(
     columns: Batch, context: PoolContext, mbes: SonarPlacement, water_level_m: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return soundings (n, 3) m in the mbes frame and in the pool frame, and which of them (n,) are possible.
+    """Return soundings (n, 3) m in the mbes frame and in the pool frame, and a mask (n,): true for possible ones.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def soundings_in_pool(
     )
     mount = mount_of(mbes.mount)
     if mbes.svp is not None:
-        # The rays are bent by the cast; its depths are below the water's surface.
+        # The cast bends the rays. Its depths count from the surface of the water.
         positions, R_pool_from_body = context.trajectory.poses_at(t_ns)
         head = positions + R_pool_from_body @ mount.lever_arm_body_m
         sensor = refracted_points(

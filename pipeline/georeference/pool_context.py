@@ -1,4 +1,4 @@
-"""The pool frame and the INS's trajectory in it, which all points of a session are placed by."""
+"""The pool frame and the INS's trajectory in it. All points of a session are placed with them."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ class PoolContext:
     def of(
         cls, ins: pd.DataFrame, passes: pd.DataFrame, pool_frame: pd.DataFrame, box_m: tuple[Array, Array]
     ) -> "PoolContext":
-        """Return the context with the INS records turned into poses in the pool frame.
+        """Return the context of a session. It converts the INS records into poses in the pool frame.
 
         Parameters
         ----------

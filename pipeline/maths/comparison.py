@@ -1,18 +1,18 @@
 """Two estimates of one mount, and an estimate against the truth: the difference, tested against its noise.
 
 With R_true = Exp(ε_A) R_A = Exp(ε_B) R_B, and d = Log(R_B R_Aᵀ), to first order d = ε_A - ε_B; likewise the lever arms,
-l_B - l_A = ε_A - ε_B. So where the mount has not moved, the six differences have mean zero and, the two sessions being
-independent, the covariance C = C_A + C_B. Then
+l_B - l_A = ε_A - ε_B. So if the mount has not moved, the six differences have mean zero. Since the two sessions are
+independent, their covariance is C = C_A + C_B. Then
 
     T = dᵀ C⁻¹ d
 
-is chi-square with six degrees of freedom: one test of all six parameters at one level; six separate tests would give
-six times as many false alarms. (Errors that both sessions share, the laser's mount above all, cancel in d.)
+is chi-square with six degrees of freedom. This is one test of all six parameters at one level; six separate tests would
+give six times as many false alarms. (Errors that both sessions share, the laser's mount above all, cancel in d.)
 
-People read a mount as pitch, roll, yaw, so the difference is given in these, with the covariance
-J_A C_A J_Aᵀ + J_B C_B J_Bᵀ, J = ∂(pitch, roll, yaw)/∂ε (:func:`pipeline.maths.geometry.rotations.mount_partials`); each
-z_i = d_i / root(C_ii) is standard normal. For a head near zero yaw these are the rotations about body x, y, z; for one
-turned by 90° pitch and roll are the other way round.
+People read a mount as pitch, roll and yaw. So the difference is expressed in these, with the covariance
+J_A C_A J_Aᵀ + J_B C_B J_Bᵀ, J = ∂(pitch, roll, yaw)/∂ε (:func:`pipeline.maths.geometry.rotations.mount_partials`). Each
+z_i = d_i / root(C_ii) is standard normal. For a mount with a yaw near zero these are the rotations about body x, y, z.
+With a yaw near 90° pitch and roll change places.
 """
 
 from dataclasses import dataclass
@@ -44,11 +44,11 @@ class MountDifference:
     difference
         Pitch, roll, yaw (rad) and lever arm (m) in one vector (6,).
     covariance, sigma
-        Its covariance (6, 6) and sigmas (6,).
+        Covariance (6, 6) of the difference, and its sigmas (6,).
     z
-        Differences in sigmas (6,).
+        Differences divided by their sigmas (6,).
     statistic, probability
-        The joint statistic T, and its probability if nothing has moved.
+        The joint statistic T, and the probability of a T as large if the mount has not moved.
     """
 
     difference: Array
@@ -59,10 +59,10 @@ class MountDifference:
     probability: float
 
     def significant(self, level: float) -> list[int]:
-        """Return which of the six parameters have changed, if the joint test says that any has.
+        """Return the indices of the parameters that have changed; none if the joint test shows no change.
 
-        Those with |z| beyond the limit that six values exceed together with probability ``level`` (Šidák); the largest
-        at least.
+        They are the parameters with |z| above a limit. With probability ``level`` at least one of six independent
+        values exceeds this limit by chance (Šidák). If none exceeds it, the parameter with the largest |z| is returned.
         """
         if self.probability >= level:
             return []
@@ -98,7 +98,7 @@ def compare_estimates(first: MountEstimate, second: MountEstimate) -> MountDiffe
 
 
 def mount_error(R_true: Array, lever_arm_true_m: Array, R_found: Array, lever_arm_found_m: Array) -> Array:
-    """Return the error (6,) of an estimated mount, true minus found: ε of R_true = Exp(ε) R_found, lever arm.
+    """Return the error (6,) of an estimated mount, true minus estimated: ε of R_true = Exp(ε) R_found, lever arm.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def mount_error(R_true: Array, lever_arm_true_m: Array, R_found: Array, lever_ar
 
 
 def _mahalanobis_squared(d: Array, covariance: Array) -> float:
-    """Return dᵀ C⁻¹ d, scaled first: rad and m are of different size."""
+    """Return dᵀ C⁻¹ d. C is scaled to correlations first, because rad and m differ in size."""
     sigma = np.sqrt(np.diag(covariance))
     z = d / sigma
     return float(z @ np.linalg.solve(covariance / np.outer(sigma, sigma), z))

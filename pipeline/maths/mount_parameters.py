@@ -1,10 +1,10 @@
-"""The six mount parameters: their order in every vector and covariance, their names, and their words for people."""
+"""The six mount parameters: their order in every vector and covariance, their names, and the words for them in text."""
 
 MOUNT_NAMES = ("rotation_x", "rotation_y", "rotation_z", "lever_arm_x", "lever_arm_y", "lever_arm_z")  # body axes
 MOUNT_WORDS = ("pitch", "roll", "yaw", "lever arm x", "lever arm y", "lever arm z")  # in the same order
 N_MOUNT = len(MOUNT_NAMES)
 
-PARAMETERS = (  # as people list them: name, place among the six, setting, unit
+PARAMETERS = (  # in the order of reports: name, index in MOUNT_NAMES, key in YAML, unit
     ("roll", 1, "roll_deg", "deg"),
     ("pitch", 0, "pitch_deg", "deg"),
     ("yaw", 2, "yaw_deg", "deg"),

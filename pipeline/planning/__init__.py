@@ -1,1 +1,1 @@
-"""What planned passes will give, and what passes lack."""
+"""Prediction of the accuracy that planned passes will give, and advice on further passes."""

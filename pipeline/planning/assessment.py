@@ -1,4 +1,4 @@
-"""A plan assessed: predicted sigmas, usable points, what is lacking; and the better list of passes within a budget."""
+"""Assessment of a plan: sigmas, points on the target, gaps in the geometry, and a better list of passes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -30,19 +30,19 @@ MOST_PASSES = 100
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How accurate a calibration from a list of passes will be.
+    """Predicted accuracy of a calibration from a list of passes.
 
     Attributes
     ----------
     passes : tuple[Pass, ...]
-        The list.
+        The list of passes.
     predicted : PredictedPasses
-        What they will tell.
+        Predicted normal equations, points and times of the passes.
     random, total : ndarray, shape (6, 6)
-        Covariances of the mount (rad, m): from noise alone, and with the consider parameters; NaN where a direction is
-        left open.
+        Covariances of the mount (rad, m): from noise alone, and with the consider parameters. They are NaN if the
+        passes leave a direction open.
     solution : Solution
-        Of the normal equations.
+        Solution of the normal equations.
     """
 
     passes: tuple[Pass, ...]
@@ -53,30 +53,30 @@ class Accuracy:
 
     @property
     def seconds(self) -> float:
-        """Time of all passes, without turns."""
+        """Time of all passes (s), without the turns between them."""
         return sum(self.predicted.seconds)
 
     def each(self) -> Iterator[tuple[Pass, float, dict[str, Array]]]:
-        """Return the passes with their time (s), and the points of each sensor by face."""
+        """Return an iterator over the passes: each pass, its time (s), and the points (f,) on the faces by sensor."""
         return zip(self.passes, self.predicted.seconds, self.predicted.points, strict=True)
 
 
 @dataclass(frozen=True)
 class PlanAssessment:
-    """What a plan will give.
+    """Result of the assessment of a plan.
 
     Attributes
     ----------
     setting : PredictionSetting
         Target and instruments.
     given : Accuracy
-        Of the passes as the plan lists them.
+        Accuracy of the passes in the plan.
     gaps : list[str]
-        What these passes lack, in words.
+        Gaps in the geometry of these passes, in words.
     remedy : str
-        What to sail besides, in words.
+        Further passes that would help, in words.
     better : Accuracy or None
-        Of the better list, where the plan has candidates and a budget.
+        Accuracy of the better list, if the plan has candidates and a budget.
     """
 
     setting: PredictionSetting
@@ -87,16 +87,16 @@ class PlanAssessment:
 
     @property
     def weakest(self) -> str:
-        """Which mount parameters are hardest to tell apart, in words; empty where there is no result."""
+        """The mount parameters that are hardest to separate, in words; empty if a direction is open."""
         return "" if self.given.solution.deficiency else weakest_direction(self.given.random)
 
 
 @dataclass(frozen=True)
 class _Adjustment:
-    """What the adjustment of predicted passes takes besides their normal equations.
+    """Inputs of an adjustment of predicted passes, apart from the passes.
 
-    ``turn_s``: time of a turn; ``considered``: errors of the fixed parameters; ``free``: indices
-    of the estimated parameters.
+    ``turn_s``: time of a turn; ``considered``: errors of the fixed parameters; ``free``: numbers of the estimated
+    parameters.
     """
 
     setting: PredictionSetting
@@ -105,7 +105,7 @@ class _Adjustment:
     free: list[int]
 
     def accuracy(self, passes: Sequence[Pass]) -> Accuracy:
-        """Return how accurate a calibration from these passes will be."""
+        """Return the predicted accuracy of a calibration from these passes."""
         predicted = predict(self.setting, passes, self.turn_s)
         normal = predicted.normal
         solution = solve(normal, np.zeros(len(normal)), self.free)
@@ -117,12 +117,12 @@ class _Adjustment:
 
 
 def load_plan(path: Path, session: SessionConfig) -> Plan:
-    """Return a plan that can be sailed; rates that it leaves out are those of the session's instruments.
+    """Return the plan of a YAML file. Rates that it does not set are those of the session's instruments.
 
     Raises
     ------
     ConfigError
-        Where the file is no plan, or the sonar would be above the water.
+        The file is no plan, or the sonar would be above the water.
     """
     plan = parse(Plan, deep_merge(_rates(session), read_yaml(path)), str(path))
     sonar = plan.ins_height_m + session.sonar.mount.z_m
@@ -135,7 +135,7 @@ def load_plan(path: Path, session: SessionConfig) -> Plan:
 
 
 def _rates(session: SessionConfig) -> dict[str, Any]:
-    """Return what the session's instruments can do, as a plan says it."""
+    """Return the rates of the session's instruments, in the keys of a plan."""
     ins, laser, mbes = (
         block.instrument.model_dump(mode="json")["rates"] if block.instrument else {}
         for block in (session.ins, session.laser, session.sonar)
@@ -144,12 +144,12 @@ def _rates(session: SessionConfig) -> dict[str, Any]:
 
 
 def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAssessment:
-    """Assess a plan.
+    """Return the assessment of a plan.
 
     Parameters
     ----------
     plan : Plan
-        The passes, and perhaps candidates and a budget.
+        The passes, and, if set, candidates and a budget.
     pool : PoolConfig
         The pool's settings.
     session : SessionConfig
@@ -178,7 +178,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
 
 
 def _blind_passes(accuracy: Accuracy) -> list[str]:
-    """Return in words the passes from which a sensor does not see the target."""
+    """Return sentences that name the passes in which a sensor does not see the target."""
     sentences = []
     for sensor, name in (("laser", "laser"), ("mbes", "sonar")):
         far = [f"{planned.distance_m:g} m" for planned, _, points in accuracy.each() if not points[sensor].any()]
@@ -198,10 +198,10 @@ def soundings_by_family(setting: PredictionSetting, accuracy: Accuracy) -> dict[
 
 
 def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], seconds: float) -> Accuracy | None:
-    """Take pass after pass the candidate that brings most for its time; None where there is time for none.
+    """Return the accuracy of the list of candidates that helps most; None if there is no time for any.
 
-    A candidate may be taken more than once. What is brought down is the mean square of the six sigmas, angles against
-    lengths as the verdict's usual limits.
+    The list grows by one candidate at a time: the one that reduces the mean square of the six sigmas most for its time.
+    Each sigma is divided by the default limit of the verdict. A candidate may be chosen more than once.
     """
     setting, free, turn_s = adjustment.setting, adjustment.free, adjustment.turn_s
     predicted = [predict(setting, [candidate], phases=1) for candidate in candidates]
@@ -233,16 +233,16 @@ def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], sec
 
 
 def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: VerdictLimits) -> dict[str, float]:
-    """Return each total sigma over the verdict's limit, by parameter; NaN where a direction stays open.
+    """Return each parameter's total sigma, divided by the verdict's limit; NaN if a direction is open.
 
     Parameters
     ----------
     setting : PredictionSetting
         Target and instruments.
     accuracy : Accuracy
-        Of a list of passes.
+        Accuracy of a list of passes.
     limits : VerdictLimits
-        The limits.
+        Limits of the verdict.
     """
     sigma = mount_of(setting.mbes.mount).sigmas(accuracy.total)
     bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
@@ -250,7 +250,7 @@ def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: Ver
 
 
 def is_enough(assessment: PlanAssessment, limits: VerdictLimits) -> bool:
-    """Return whether the list as given will keep the total sigmas below the verdict's limits."""
+    """Return whether the plan's passes will keep all total sigmas within the verdict's limits."""
     if assessment.given.solution.deficiency:
         return False
     return all(share <= 1 for share in shares_of_limits(assessment.setting, assessment.given, limits).values())

@@ -1,4 +1,4 @@
-"""What the passes can tell and what not, in words, and which passes would help."""
+"""Gaps in the geometry of passes, in words, and the further passes that would help most."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from pipeline.planning.prediction import predict
 from pipeline.planning.setting import PredictionSetting
 
 Array = NDArray[np.float64]
-NEAR_M = 1.5  # passes whose distances differ by less are at one distance
-WANTED_DEG, WANTED_M = 0.025, 0.0025  # larger random sigmas are worth another pass
+NEAR_M = 1.5  # distances that differ by less count as one
+WANTED_DEG, WANTED_M = 0.025, 0.0025  # a larger random sigma is worth another pass
 WANTED = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
-TWICE = 2  # passes there
-VAGUE = 1.0  # rad or m, of every parameter
+TWICE = 2  # number of further passes at such a distance
+VAGUE = 1.0  # rad or m: prior sigma of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 HORIZONTAL = (
     "the sonar sees no horizontal face: only the boat's rolling and pitching tell its height, and a still boat tells "
@@ -28,7 +28,7 @@ HORIZONTAL = (
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the passes of a session, or of a plan, cover.
+    """Coverage of the target by the passes of a session or of a plan.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class Coverage:
     soundings : Mapping[str, int]
         Number of soundings by family of faces.
     level : Collection[str]
-        The families that are horizontal.
+        Names of the horizontal families.
     speed_m_s, heading_swing_deg : float
-        Of a usual pass; the swing is an amplitude.
+        Speed of a typical pass, and amplitude of its heading.
     """
 
     distances_m: Sequence[float]
@@ -51,7 +51,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class GeometryAdvice:
-    """What the passes lack, each in words (``gaps``), and what to sail, with what it would bring (``remedy``)."""
+    """Advice in words: ``gaps`` in the geometry, and a ``remedy``, which names further passes and their effect."""
 
     gaps: list[str]
     remedy: str
@@ -60,24 +60,24 @@ class GeometryAdvice:
 def geometry_advice(
     setting: PredictionSetting, coverage: Coverage, normal: Array, solution: Solution
 ) -> GeometryAdvice:
-    """Return what the passes lack, and which passes would help.
+    """Return the gaps in the geometry of the passes, and the further passes that would help.
 
     Parameters
     ----------
     setting : PredictionSetting
         Target and instruments.
     coverage : Coverage
-        What the passes cover.
+        Coverage of the target by the passes.
     normal : ndarray, shape (u, u)
-        Their normal equations (rad, m).
+        Normal matrix of the passes (rad, m).
     solution : Solution
-        Of these equations.
+        Solution of these normal equations.
     """
     determined = _Determined(normal, solution.estimated.tolist())
     gaps, sigma = _gaps(coverage), determined.sigmas()
     pair = None if solution.deficiency else correlated_pair(solution.covariance[:N_MOUNT, :N_MOUNT])
     if not (gaps or np.any(sigma > WANTED)):
-        return GeometryAdvice([], "")  # where all are sure enough, two that move together do no harm
+        return GeometryAdvice([], "")  # with small sigmas a high correlation does no harm
     choice = range(N_MOUNT) if pair is None else pair[:2]
     parameter = max(choice, key=lambda k: sigma[k] / WANTED[k])
     return GeometryAdvice(gaps, _remedy(setting, coverage, determined, parameter))
@@ -85,7 +85,7 @@ def geometry_advice(
 
 @dataclass(frozen=True)
 class _Determined:
-    """What the passes determine: normal equations (u, u), and the indices of the estimated parameters."""
+    """Information from the passes: normal matrix (u, u), and the numbers of the estimated parameters."""
 
     normal: Array
     free: list[int]
@@ -93,8 +93,7 @@ class _Determined:
     def sigmas(self) -> Array:
         """Return the sigmas of the mount parameters (6,), rad and m.
 
-        Of every parameter :data:`VAGUE` is known before any pass, so that they are finite where the data leave all
-        open.
+        Every parameter has the prior sigma :data:`VAGUE`, so the sigmas are finite even if a direction is open.
         """
         prior = np.zeros(len(self.normal))
         prior[self.free] = VAGUE**-2
@@ -102,12 +101,12 @@ class _Determined:
         return np.asarray(np.sqrt(np.diag(known.covariance))[:N_MOUNT])
 
     def with_passes(self, further: Array) -> Solution:
-        """Return the solution with the normal equations of further passes."""
+        """Return the solution with the normal matrix of further passes added."""
         return solve(self.normal + further, np.zeros(len(self.normal)), self.free)
 
 
 def _gaps(coverage: Coverage) -> list[str]:
-    """Return what the passes lack, each in words."""
+    """Return the gaps in the geometry, each in words."""
     there = {family for family, count in coverage.soundings.items() if count}
     upright = [family for family in coverage.soundings if family not in coverage.level]
     if len(there) == 1 and len(upright) > 1 and there <= set(upright):
@@ -129,9 +128,9 @@ def _gaps(coverage: Coverage) -> list[str]:
 
 
 def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determined, parameter: int) -> str:
-    """Return the distance at which two more passes would help most, and by how much.
+    """Return a sentence with the distance at which two more passes would help most.
 
-    It says how the sigma of one mount ``parameter`` falls; empty where no distance halves it.
+    It names the sigma of one mount ``parameter`` without and with them. It is empty if they do not halve this sigma.
     """
     before = float(determined.sigmas()[parameter])
     best: tuple[float, float, float] | None = None

@@ -1,4 +1,4 @@
-"""An assessed plan as plain values, for the YAML file that poolcal plan writes."""
+"""The assessment of a plan as plain values, for the YAML file that ``poolcal plan`` writes."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def plan_document(assessment: PlanAssessment) -> dict[str, Any]:
-    """Return all of a plan's assessment as plain values."""
+    """Return the whole assessment of a plan as plain values."""
     document: dict[str, Any] = {"given": _plain_accuracy(assessment.setting, assessment.given)}
     document |= {"gaps": assessment.gaps, "weakest": assessment.weakest, "remedy": assessment.remedy}
     if assessment.better is not None:
@@ -39,7 +39,7 @@ def _plain_accuracy(setting: PredictionSetting, accuracy: Accuracy) -> dict[str,
 
 
 def _points_by_face(setting: PredictionSetting, points: dict[str, Array]) -> dict[str, dict[str, int]]:
-    """Return points by sensor and name of face, those with any."""
+    """Return the number of points by sensor and name of face. Faces without points are left out."""
     return {
         sensor: {face.name: round(float(n)) for face, n in zip(setting.model.faces, count, strict=True) if n}
         for sensor, count in points.items()

@@ -1,4 +1,4 @@
-"""Rays of both sensors in a planned pass, and where they meet the target."""
+"""Rays of both sensors in a planned pass, and the points in which they meet the target."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-RAYS = 24  # of the laser between two records of the INS: stand for all
+RAYS = 24  # of the laser between two INS records; each stands for several
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Rays:
 
 
 def laser_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]:
-    """Return the scanner's rays in a time, and how many points each stands for."""
+    """Return the laser's rays during ``seconds``, thinned, and the number of points that each ray represents."""
     figures = setting.plan.laser
     each = max(1, int(figures.point_rate_hz / (setting.plan.ins_rate_hz * RAYS)))
     number = np.arange(0, int(seconds * figures.point_rate_hz), each)
@@ -44,7 +44,7 @@ def laser_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]
 
 
 def sonar_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]:
-    """Return the sonar's rays in a time, every beam of every ping, and how many soundings each stands for: one."""
+    """Return the sonar's rays during ``seconds``, and the number of soundings that each represents: one."""
     figures = setting.plan.mbes
     half = np.radians(figures.sector_deg) / 2
     angle = np.linspace(-half, half, figures.beams)
@@ -61,7 +61,7 @@ def sonar_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]
 def label_rays(
     setting: PredictionSetting, caster: ClosestSurface, trajectory: Trajectory, sensor_rays: Rays
 ) -> dict[str, Array]:
-    """Return where rays meet the target, with the labels that stage segment would give.
+    """Return the points in which rays meet the target, with the labels that stage segment would give them.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def label_rays(
     Returns
     -------
     dict[str, Array]
-        Columns as of a labelled stream.
+        Columns like those of a labelled stream.
     """
     sensor, t_ns, rays = sensor_rays.sensor, sensor_rays.t_ns, sensor_rays.directions
     mount = mount_of(setting.laser.mount) if sensor == "laser" else None

@@ -1,8 +1,9 @@
-"""What passes will tell before they are sailed, by the sums and equations of a session, from points without noise.
+"""Prediction of the normal equations of passes before they are sailed, from points without noise.
 
-Passes that are only candidates need not be computed together: their normal equations add up, but for the drift that
-goes on from one pass to the next. Rays are thinned, and weighted with how many they stand for. The records of the INS
-are not thinned, for its white noise is a record's own.
+It forms the same sums and equations as a session does. Candidates for a pass are computed one by one, and their normal
+equations are added. This is exact except for the drift, which goes on from one pass to the next. The laser's rays are
+thinned, and each has the weight of all rays that it represents. The INS records are not thinned, because each record
+has its own white noise.
 """
 
 from collections.abc import Sequence
@@ -27,13 +28,13 @@ from pipeline.planning.setting import PredictionSetting
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-PHASES, APART = 4, 1000  # of the boat's unrest, over which a prediction is averaged; numbers of passes in between
-PAUSE_S = 5.0  # without points, from which on nothing is interpolated
+PHASES, APART = 4, 1000  # number of phases of the boat's unrest in a prediction; step of the pass number between them
+PAUSE_S = 5.0  # a longer time without points interrupts the knots of the drift
 
 
 @dataclass(frozen=True)
 class PassSums:
-    """What both sensors see in one pass: sums by interval, the body's track, points by sensor on each face (f,)."""
+    """Predicted data of one pass: interval sums by sensor, trajectory, points (f,) on the faces by sensor, time (s)."""
 
     sums: dict[str, IntervalSums]
     trajectory: Trajectory
@@ -43,7 +44,7 @@ class PassSums:
 
 @dataclass(frozen=True)
 class PredictedPasses:
-    """What passes give: normal equations of all parameters (u, u); for each pass points by sensor and face, time."""
+    """Prediction for passes: normal matrix (u, u) of all parameters; points by sensor and face, and time, by pass."""
 
     normal: Array
     points: list[dict[str, Array]]
@@ -53,10 +54,10 @@ class PredictedPasses:
 def predict(
     setting: PredictionSetting, passes: Sequence[Pass], turn_s: float = 0.0, phases: int = PHASES
 ) -> PredictedPasses:
-    """Predict what passes will tell, sailed one after the other.
+    """Return the prediction for passes that are sailed one after the other.
 
-    The prediction is the average over several phases of the boat's unrest: how the boat heads while the fan passes a
-    block is chance.
+    It is an average over several phases of the boat's unrest, because the heading at the moment when the fan passes a
+    block is random.
 
     Parameters
     ----------
@@ -65,9 +66,9 @@ def predict(
     passes : Sequence[Pass]
         The passes, in their order.
     turn_s : float
-        Time between two passes.
+        Time between two passes (s).
     phases : int
-        Number of phases.
+        Number of phases of the unrest.
     """
     averaged = []
     for phase in range(phases):
@@ -121,7 +122,7 @@ def _body(setting: PredictionSetting, trajectory: Trajectory) -> BodyMotion:
 
 
 def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: float) -> Array:
-    """Return normal equations (u, u) of passes sailed one after the other: the drift goes on between them."""
+    """Return the normal matrix (u, u) of passes sailed one after the other. The drift goes on between them."""
     starts = np.cumsum([0.0, *(sailed.seconds + turn_s for sailed in passes[:-1])])
     lengths = [len(sailed.trajectory.t_ns) for sailed in passes]
     firsts = np.cumsum([0, *lengths[:-1]])
@@ -145,12 +146,12 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
 
 
 def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Array:
-    """Return where the INS will be, (n, 3) m in the target frame; ``number`` sets the phases of the boat's unrest."""
+    """Return the INS's positions (n, 3) m in the target frame; ``number`` sets the phases of the boat's unrest."""
     return _trajectory(setting, planned, planned.seconds(setting.half_length_m), number).positions_m
 
 
 def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, number: int) -> Trajectory:
-    """Return poses along +y past the target, x = -distance, with waves of golden-ratio phases on every coordinate."""
+    """Return poses along +y past the target at x = -distance, with waves of golden-ratio phases on all except y."""
     plan, unrest = setting.plan, setting.plan.unrest
     t = np.arange(0.0, seconds + 1 / plan.ins_rate_hz, 1 / plan.ins_rate_hz)
     half = planned.half_length_m or setting.half_length_m

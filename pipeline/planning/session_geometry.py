@@ -1,4 +1,4 @@
-"""The geometry of a session's passes: what they lack, and which further passes would help."""
+"""The geometry of a session's passes: its gaps, and the further passes that would help."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def sailed_plan(files: pd.DataFrame) -> Plan:
-    """Return a plan with the rates of a session's files (table ``files``), by which further passes are predicted."""
+    """Return a plan with the rates of a session's files (table ``files``), for the prediction of further passes."""
     rates = files.groupby("sensor")["rate_hz"].median()
     usual = Plan(passes=(Pass(distance_m=1.0),))
     return usual.model_copy(
@@ -36,14 +36,14 @@ def geometry_table(
     normal: Array,
     solution: Solution,
 ) -> pd.DataFrame:
-    """Return table ``geometry``: what the passes lack, and what would cure it.
+    """Return table ``geometry``: the gaps in the geometry of the passes, and the remedy.
 
     Parameters
     ----------
     setting : PredictionSetting
         Target and instruments.
     passes : DataFrame
-        Rows of table passes, of the passes that have soundings.
+        Rows of table passes, for the passes with soundings.
     soundings : mapping of int
         Number of soundings by family.
     normal : (u, u) array
@@ -57,7 +57,7 @@ def geometry_table(
         soundings=soundings,
         level={family.name for family in setting.model.families if family.level},
         speed_m_s=_measured(passes["speed_m_s"].abs().median(), usual.speed_m_s),
-        # of a wave: its amplitude
+        # the amplitude of a wave is √2 times its standard deviation
         heading_swing_deg=_measured(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg),
     )
     advice = geometry_advice(setting, coverage, normal, solution)
@@ -66,5 +66,5 @@ def geometry_table(
 
 
 def _measured(value: float, usual: float) -> float:
-    """Return the session's value within the limits of a plan's figures, or the usual one where there is none."""
+    """Return the session's value, clipped to 0.05 to 1e7; the usual value if the session's is not finite."""
     return float(np.clip(value, 0.05, 1e7)) if np.isfinite(value) else usual

@@ -1,4 +1,4 @@
-"""What passes are predicted for: target and instruments."""
+"""The setting of a prediction: target and instruments."""
 
 from dataclasses import dataclass
 
@@ -11,12 +11,12 @@ from pipeline.maths.target.model import TargetModel
 from pipeline.mount import mount_of
 from pipeline.target.design import target_of
 
-BEYOND_M = 2.0  # a pass runs on beyond the last block
+BEYOND_M = 2.0  # from the last block to the end of a pass
 
 
 @dataclass(frozen=True)
 class PredictionSetting:
-    """Target and instruments: the same for all passes of a plan."""
+    """Target and instruments, which are the same for all passes of a plan."""
 
     model: TargetModel
     state: State
@@ -28,13 +28,13 @@ class PredictionSetting:
 
     @property
     def half_length_m(self) -> float:
-        """How far a pass runs to either side of the target's centre."""
+        """Length of a pass on either side of the target's centre."""
         low, high = self.model.bounds()
         return float(max(-low[1], high[1])) + BEYOND_M
 
 
 def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PredictionSetting:
-    """Return what a plan is predicted for: target and instruments of these settings."""
+    """Return the setting of a plan's prediction: target and instruments by the settings of pool and session."""
     model, mbes = target_of(pool.target), session.sonar
     return PredictionSetting(
         model=model,
@@ -48,7 +48,7 @@ def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Predicti
 
 
 def state_by_design(model: TargetModel, mbes: Mbes) -> State:
-    """Return the mount as configured, and the surfaces as designed, their centres among the faces' corners."""
+    """Return the state with the configured mount and the designed surfaces."""
     surfaces = [design_surface(model, family) for family in model.families]
     mount = mount_of(mbes.mount)
     return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces)

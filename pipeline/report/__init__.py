@@ -1,1 +1,1 @@
-"""The answer: verdict, warnings, suspected causes, calibration.json."""
+"""The report on a calibration: verdict, warnings, suspected causes, calibration.json."""

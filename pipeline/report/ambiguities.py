@@ -1,4 +1,4 @@
-"""Doubts about where the target stands or how the sensor is mounted: the labels depend on both."""
+"""Doubts about the pose of the target or the mount of the sensor. The labels of all points depend on both."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from pipeline.report.reason_codes import ReasonCode, Statement
 
 @dataclass(frozen=True, kw_only=True)
 class MountSearch:
-    """How the provisional mount was searched, and what a reason about it advises.
+    """The search for the provisional mount, and the advice of a reason about it.
 
     Attributes
     ----------
     sensor : the sensor that is calibrated
-    max_angle_deg, max_lever_arm_m : farther from the coarse mount than this no mount is taken for labelling
-    angles_advice : what to enter where the coarse angles have been checked; said where nothing else is in doubt
+    max_angle_deg, max_lever_arm_m : a mount farther from the coarse one than this is not used for labelling
+    angles_advice : advice to enter other angles; it appears only if nothing except the angles is in doubt
     """
 
     sensor: Calibrated
@@ -27,15 +27,15 @@ class MountSearch:
 
 
 def ambiguities(pose: pd.Series, mount: pd.Series, search: MountSearch, shape: str, sides: str) -> list[Statement]:
-    """Return what makes the labels doubtful; empty if nothing does.
+    """Return the reasons why the labels are in doubt; empty if there is none.
 
     Parameters
     ----------
     pose : row of the table ``target_pose``
     mount : row of the table ``provisional_mount``
     search : limits of the mount's search
-    shape : the settings that give the target's shape, for people
-    sides : the setting that tells the target's left from its right, for people
+    shape : names of the settings of the target's shape, in words
+    sides : name of the setting of the target's left and right, in words
     """
     statements = []
     if pose["ambiguous"]:
@@ -62,7 +62,7 @@ def ambiguities(pose: pd.Series, mount: pd.Series, search: MountSearch, shape: s
 
 
 def _ambiguous_pose(pose: pd.Series, shape: str, sides: str) -> Statement:
-    """Name the rival pose, how well it fits, and which settings to check first."""
+    """Return a reason with the rival pose, its fit, and the settings to check first."""
     rival_is_better = pose["rival_agreement_m2"] > pose["agreement_m2"]
     fit = "better" if rival_is_better else "nearly as well"
     remedy = "check" if rival_is_better else "let the laser see the wall's top edge; check"
@@ -78,7 +78,7 @@ def _ambiguous_pose(pose: pd.Series, shape: str, sides: str) -> Statement:
 
 
 def _no_laser_mount(mount: pd.Series, search: MountSearch, shape: str) -> str:
-    """Say that the laser's mount lies outside of the search, and where."""
+    """Return the sentence that no laser mount within the search limits fits, with the components beyond them."""
     excess = _best_fit(mount, search)
     return (
         f"no mount of the laser within {search.max_angle_deg:g}° of the coarse one brings its points onto the "
@@ -87,7 +87,7 @@ def _no_laser_mount(mount: pd.Series, search: MountSearch, shape: str) -> str:
 
 
 def _no_sonar_mount(mount: pd.Series, search: MountSearch, shape: str, alone: bool) -> str:
-    """Say that the sonar's mount lies outside of the search, and where; ``alone``: nothing else is in doubt."""
+    """Return the same sentence for the sonar's mount; ``alone``: nothing else is in doubt."""
     excess = _best_fit(mount, search)
     angles_alone = "°" in excess and " m" not in excess
     advice = search.angles_advice if angles_alone and alone else ""
@@ -100,7 +100,7 @@ def _no_sonar_mount(mount: pd.Series, search: MountSearch, shape: str, alone: bo
 
 
 def _best_fit(mount: pd.Series, search: MountSearch) -> str:
-    """List the components of the best mount that lie beyond the limits; empty if none does."""
+    """Return as text the components of the best mount that lie beyond the limits; empty if none does."""
     angles = [(float(mount[f"rotation_{axis}_deg"]), "°", search.max_angle_deg) for axis in "xyz"]
     arms = [(float(mount[f"lever_arm_{axis}_m"]), " m", search.max_lever_arm_m) for axis in "xyz"]
     components = zip(MOUNT_WORDS, angles + arms, strict=True)

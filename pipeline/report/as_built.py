@@ -1,15 +1,15 @@
 """The target's shape as the laser measures it, against its design in the pool's config.
 
-In the target frame (x into the wall, z up). With the laser's own planes n · X = d of the upright families over all
-passes (the adjusted ones are the sonar's as well: what is wrong there would turn them):
+All figures are in the target frame (x into the wall, z up). They come from the planes n · X = d that are fitted to the
+laser's points on the upright families, over all passes. (Errors of the sonar would turn the adjusted planes.)
 
-* corner: the angle between the normals of a family and of P2 (or of the first family, where none has that role);
-* lean: asin n_z, positive where a face looks up;
-* b, where there are P1 to P3: P1 and P3 each meet P2 in a line; b is how far apart the two lines are at z = 0;
-* e, where the target repeats: the laser's mean residuals on the horizontal faces, v_k ± s_k at design heights h_k, fall
-  on v = v0 + q h if the target is higher by the share q; weighted least squares give e (1 + q), e half the period.
+* corner: the angle between the normals of a family and of P2 (or of the first family if none has that role);
+* lean: asin n_z, positive if a face looks up;
+* b, if there are P1 to P3: P1 and P3 each meet P2 in a line, and b is the distance of these lines at z = 0;
+* e, if the target repeats: e is half the period. If the target is higher by the share q, the laser's mean residuals on
+  the horizontal faces, v_k ± s_k at design heights h_k, lie on v = v0 + q h. Weighted least squares give e (1 + q).
 
-No plane shows the c of the patent's target: the back wall is not the target's.
+No plane gives the c of the patent's target, because the back wall (x = c) is not part of the target.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -27,16 +27,16 @@ from pipeline.report.reason_codes import ReasonCode, Statement
 Plane = tuple[NDArray[np.float64], float]  # normal, distance
 FLANKS = ("P1", "P3")
 WALL = "P2"
-MAX_DEVIATION = {"b": 0.01, "e": 0.002}  # m; more than drift between faces makes
-MAX_DEVIATION_DEG = 0.2  # of a corner, likewise
-MIN_FACES = 3  # horizontal ones, for e
-MIN_SIGMA_M = 1e-5  # no mean is known better
+MAX_DEVIATION = {"b": 0.01, "e": 0.002}  # m: drift from face to face makes less
+MAX_DEVIATION_DEG = 0.2  # of a corner: drift makes less
+MIN_FACES = 3  # smallest number of horizontal faces for e
+MIN_SIGMA_M = 1e-5  # smallest sigma of a mean
 
 
 def measured_shape(planes: pd.DataFrame, patterns: pd.DataFrame, model: TargetModel) -> dict[str, Any]:
-    """Return the shape as measured: b_m, e_m, corner_deg and lean_deg by family.
+    """Return the shape as measured: b_m, e_m, and by family corner_deg and lean_deg.
 
-    What the laser did not see is None, or left out of the angles.
+    A length that the laser did not see is None. A family that it did not see is left out of the angles.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def measured_shape(planes: pd.DataFrame, patterns: pd.DataFrame, model: TargetMo
 
 
 def design_shape(model: TargetModel) -> dict[str, Any]:
-    """Return the same as ``measured_shape``, by design."""
+    """Return the shape by design, with the keys of ``measured_shape``."""
     planes = _upright(model)
     return {
         "b_m": _width(planes),
@@ -67,7 +67,7 @@ def design_shape(model: TargetModel) -> dict[str, Any]:
 
 
 def _upright(model: TargetModel) -> dict[str, Plane]:
-    """Return the planes of families that lie in one plane and are not level, by design."""
+    """Return the designed planes of the families that lie in one plane and are not horizontal."""
     families = [family for family in model.families if family.one_plane and not family.level]
     return {family.name: (family.normal, family.distance_m) for family in families}
 
@@ -83,7 +83,7 @@ def _width(planes: Mapping[str, Plane]) -> float | None:
 
 
 def _corners(planes: Mapping[str, Plane], reference: str) -> dict[str, float]:
-    """Return the angle between each family and the ``reference``; empty if that was not seen."""
+    """Return the angles (degrees) of all families with the ``reference`` family; empty if it was not seen."""
     if reference not in planes:
         return {}
     return {
@@ -94,23 +94,23 @@ def _corners(planes: Mapping[str, Plane], reference: str) -> dict[str, float]:
 
 
 def _leans(planes: Mapping[str, Plane]) -> dict[str, float]:
-    """Return by family how far its faces lean, positive where they look up."""
+    """Return the lean of each family (degrees), positive if its faces look up."""
     return {family: float(np.degrees(np.arcsin(n[2]))) for family, (n, _) in planes.items()}
 
 
 def reference_family(families: Iterable[str]) -> str:
-    """Return the family from which ``corner_deg`` is counted: the wall, or the first."""
+    """Return the reference family of ``corner_deg``: the wall, or the first family if there is no wall."""
     names = list(families)
     return WALL if WALL in names else next(iter(names), "")
 
 
 def family_title(family: str) -> str:
-    """Return a family's name on the screen and in the report."""
+    """Return a family's name as the screen and the report show it."""
     return "wall" if family == WALL else family
 
 
 def _half_period(patterns: pd.DataFrame, model: TargetModel) -> float | None:
-    """Return e: the design's, stretched by the slope of the laser's residuals over the height."""
+    """Return e: the designed one times (1 + slope of the laser's residuals over the height); None if unknown."""
     level = [family for family in model.families if family.level]
     if model.repeats_m is None or not level:
         return None
@@ -125,9 +125,9 @@ def _half_period(patterns: pd.DataFrame, model: TargetModel) -> float | None:
 
 
 def deviations_from_design(measured: Mapping[str, Any], design: Mapping[str, Any]) -> Iterator[Statement]:
-    """Yield a warning for each length and angle that differs from the design by more than a target is usually built to.
+    """Yield a warning for each length and corner that differs from the design by more than its limit.
 
-    Where the target stands, and how far it is out of plumb, is a warning of its own.
+    The place of the target and its tilt have a separate warning (``target_off_origin``).
     """
     for letter, limit_m in MAX_DEVIATION.items():
         value, designed = measured[f"{letter}_m"], design[f"{letter}_m"]

@@ -1,4 +1,4 @@
-"""Blocks of calibration.json that every calibration has, and its documents."""
+"""Blocks of calibration.json that every calibration has, and the texts of the documents."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ SCHEMA = 1
 
 
 def json_number(value: Any) -> bool | int | float | None:
-    """Return a number or truth value that JSON knows; None for what is not finite."""
+    """Return a value as a number or truth value of JSON; None if it is NaN or infinite."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     number = float(value)
@@ -29,7 +29,7 @@ def json_number(value: Any) -> bool | int | float | None:
 
 
 def statement_lists(kind: Literal["reason", "warning"], statements: Sequence[Statement]) -> dict[str, list[str]]:
-    """Return the words of reasons or warnings, and in the same order their codes."""
+    """Return the words of reasons or warnings, and their codes in the same order."""
     return {
         f"{kind}s": [statement.words for statement in statements],
         f"{kind}_codes": [statement.code.value for statement in statements],
@@ -37,7 +37,7 @@ def statement_lists(kind: Literal["reason", "warning"], statements: Sequence[Sta
 
 
 def instruments_block(sensors: Mapping[str, Ins | Laser | Mbes]) -> dict[str, Any]:
-    """Return the key ``instruments``: the presets that session.yaml names, by sensor; empty if it names none."""
+    """Return the block ``instruments``: the presets in session.yaml by sensor; empty if there are none."""
     presets = {sensor: block.instrument for sensor, block in sensors.items() if block.instrument is not None}
     described = {
         sensor: {"name": preset.name, "title": preset.title, "unverified": list(preset.unverified)}
@@ -47,7 +47,7 @@ def instruments_block(sensors: Mapping[str, Ins | Laser | Mbes]) -> dict[str, An
 
 
 def free_block(freed: pd.DataFrame) -> dict[str, Any]:
-    """Return by name what adjust.free names: value and total sigma in ``unit`` (a share for the sound speed), words."""
+    """Return the parameters of ``adjust.free`` by name: value, total sigma, unit ('1' for sound speed), words."""
     return {
         parameter.unknown: {
             "value": json_number(parameter.value),
@@ -60,7 +60,7 @@ def free_block(freed: pd.DataFrame) -> dict[str, Any]:
 
 
 def target_block(pose: pd.Series) -> dict[str, Any]:
-    """Return where the target stands against the pool's config, from a row of the table ``target_pose``."""
+    """Return the target's pose relative to the pool's config, from a row of the table ``target_pose``."""
     return {
         "offset_m": vector_of(pose, "origin_{}_pool_m").tolist(),
         "azimuth_correction_deg": float(pose["azimuth_correction_deg"]),
@@ -70,12 +70,12 @@ def target_block(pose: pd.Series) -> dict[str, Any]:
 
 
 def geometry_block(evidence: Evidence, advice: str, test_level: float) -> dict[str, Any]:
-    """Return how well the geometry determines the mount, and the tests of the residuals.
+    """Return the block ``geometry``: how well the geometry determines the mount, and the tests of the residuals.
 
     Parameters
     ----------
     evidence : tables of the run
-    advice : what would make the geometry better, for people
+    advice : weaknesses of the geometry and their remedy, in words
     test_level : level of the tests
     """
     summary = evidence.summary.iloc[0]
@@ -95,7 +95,7 @@ def correlation_matrix(covariance: pd.DataFrame) -> list[list[float]] | None:
 
 
 def pass_rows(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return each pass of the table ``passes`` with its distance, time, and observations on the target (``cells``)."""
+    """Return a row for each pass: start, distance, duration, and the observations on the target by table ``cells``."""
     rows = []
     for row in passes.to_dict("records"):
         means = cells[cells["pass"] == row["pass"]]
@@ -114,7 +114,7 @@ def pass_rows(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]
 
 
 class _PlainDumper(yaml.SafeDumper):
-    """Writes what is repeated in full: anchors and aliases are not for people."""
+    """YAML dumper without anchors and aliases, which are hard to read: it writes repeated values in full."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True

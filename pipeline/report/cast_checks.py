@@ -1,4 +1,4 @@
-"""A cast of sound speed: how its file was used, and whether it belongs to this session's time, place and water."""
+"""Checks of a cast of sound speed: the use of its file, and whether its time, place and speeds fit the session."""
 
 from collections.abc import Iterator, Mapping
 from datetime import datetime
@@ -12,15 +12,15 @@ from pipeline.config.session import Mbes
 from pipeline.gps_time import NS, unix_ns_from_gps, utc_text
 from pipeline.report.reason_codes import ReasonCode, Statement
 
-MAX_APART_H = 36.0  # between the cast and the soundings, whatever time zone its file has
+MAX_APART_H = 36.0  # between the cast and the soundings; more than any error of the time zone
 MAX_APART_KM = 5.0  # between the cast and the session
-MAX_SPEED_GAP_M_S = 3.0  # a head's sound speed so far beyond the cast's is of other water
-MAX_MOUNT_ERROR_DEG = 2.0  # with a coarse mount farther off than this, rays are to be traced again
+MAX_SPEED_GAP_M_S = 3.0  # between the head's sound speed and those of the cast: more means other water
+MAX_MOUNT_ERROR_DEG = 2.0  # of the coarse mount: with a larger one the rays must be traced again
 EARTH_KM = 6371.0
 
 
 def describe_cast(used: CastUsed) -> str:
-    """Describe which cast of which file was used, and how it was thinned."""
+    """Return in words the file and the number of the cast, and how its rows were reduced."""
     which = f", cast {used.number} of {used.casts}" if used.casts > 1 else ""
     taken = f"taken {used.taken}" if used.taken else "without a time"
     left_out = "".join(f", left out {count} {reason}" for reason, count in used.left_out.items())
@@ -34,11 +34,11 @@ def describe_cast(used: CastUsed) -> str:
 def cast_origin_warnings(
     used: CastUsed | None, span_ns: tuple[int, int] | None, place_deg: tuple[float, float] | None
 ) -> Iterator[Statement]:
-    """Yield a warning if the cast is of another time or another place than the session.
+    """Yield a warning if the cast was taken at another time or place than the session.
 
     Parameters
     ----------
-    used : the cast, with its time and place where the file gives them; None if there is none
+    used : the cast, with time and place if its file has them; None without a cast
     span_ns : GPS times of the first and the last sounding; None if not known
     place_deg : latitude and longitude of the session; None if not known
     """
@@ -67,14 +67,14 @@ def cast_origin_warnings(
 def cast_warnings(mbes: Mbes, files: pd.DataFrame, correction: Mapping[str, Any]) -> Iterator[Statement]:
     """Yield a warning if the cast disagrees with the head's sound speed, or if rays were traced with a wrong mount.
 
-    A ray at θ from straight down bends by g t sin θ. Where the coarse mount makes θ wrong by δ, a share of δ / tan θ
-    of that is wrong (a sixtieth for a degree at 45°).
+    A ray at the angle θ from the vertical bends by g t sin θ (g: gradient of the sound speed, t: travel time). If the
+    coarse mount makes θ wrong by δ, the bend is wrong by its share δ / tan θ (one sixtieth for 1° at 45°).
 
     Parameters
     ----------
     mbes : settings of the sonar; without a cast there is no warning
     files : the table, with the sound speeds that the head recorded
-    correction : of the adjustment, block of calibration.json
+    correction : the adjustment's block ``correction`` of calibration.json
     """
     if mbes.svp is None:
         return
@@ -104,7 +104,7 @@ def _span_ns(files: pd.DataFrame) -> tuple[int, int]:
 
 
 def _apart_km(first_deg: tuple[float, float], second_deg: tuple[float, float]) -> float:
-    """Return the great circle between two places (latitude, longitude) on a sphere, by haversines.
+    """Return the great-circle distance (km) of two places (latitude, longitude; degrees), by haversines.
 
     >>> round(_apart_km((0.0, 179.5), (0.0, -179.5)), 1), round(_apart_km((90.0, 0.0), (0.0, 77.0))), EARTH_KM
     (111.2, 10008, 6371.0)

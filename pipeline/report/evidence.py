@@ -1,4 +1,4 @@
-"""The tables that a report is made from."""
+"""The tables from which a report is made."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -23,7 +23,7 @@ from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Tables of the earlier stages; a calibration of the laser has no ``corrections``."""
+    """Tables of the earlier stages. A calibration of the laser has no ``corrections``."""
 
     files: Annotated[pd.DataFrame, FILES]
     passes: Annotated[pd.DataFrame, PASSES]
@@ -46,6 +46,6 @@ class Evidence:
 
     @property
     def fixed(self) -> dict[str, float]:
-        """Mount parameters that the adjustment fixed, with the sigma that each would have had (degrees or m)."""
+        """Mount parameters that the adjustment fixed, each with the sigma that it would have had (degrees or m)."""
         rows = self.geometry[self.geometry["kind"] == "held"]
         return dict(zip(rows["words"].tolist(), rows["sigma"].tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""What the report says of a calibration of the laser by itself."""
+"""The parts of the report that only a calibration of the laser has."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,7 @@ def laser_report(laser: Laser, evidence: Evidence, segment: Segment) -> SensorRe
 
     Parameters
     ----------
-    laser : its settings
+    laser : settings of the laser
     evidence : tables of the run
     segment : limits of the search for the provisional mount
     """
@@ -41,7 +41,7 @@ def laser_report(laser: Laser, evidence: Evidence, segment: Segment) -> SensorRe
 
 
 def _advice(fixed: Mapping[str, float]) -> str:
-    """Say which mount parameters keep their coarse values, and what would help; empty if none does."""
+    """Return in words the mount parameters that keep their coarse values, and what would help; empty if none does."""
     if not fixed:
         return ""
     verb, pronoun, values = ("is", "it", "value") if len(fixed) == 1 else ("are", "them", "values")

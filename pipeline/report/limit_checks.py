@@ -1,4 +1,4 @@
-"""Reasons to reject from the limits of the total sigmas: the adjustment's own, and what a patent's form may differ."""
+"""Reasons to reject by the limits of the total sigmas, for the adjustment and for a form of the patent."""
 
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
@@ -16,7 +16,7 @@ def sigmas_above_limit(
     Parameters
     ----------
     sigmas : total sigmas by setting, degrees and m; None if the adjustment has none
-    limits : their limits
+    limits : limits of the total sigmas
     fixed : names of the parameters that were fixed
     """
     if sigmas is None:
@@ -38,12 +38,13 @@ def patent_reasons(
 ) -> Iterator[Statement]:
     """Yield each reason why a form of the patent cannot be the result.
 
-    It has no sigma: it must have converged, and agree with the adjustment within the limits of the sigmas.
+    A form of the patent has no sigma. Instead it must have converged, and its correction must agree with that of the
+    adjustment within the limits of the total sigmas.
 
     Parameters
     ----------
-    method : the patent's form
-    row : its row of the table ``corrections``
+    method : name of the form, patent_sequential or patent_alternating
+    row : row of this form in the table ``corrections``
     methods : blocks of calibration.json by method
     limits : limits of the total sigmas
     """

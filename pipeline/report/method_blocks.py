@@ -1,4 +1,4 @@
-"""Each method's mount, corrections and covariances, as blocks of calibration.json, and the table of them all."""
+"""Mount, correction and covariances of each method, as blocks of calibration.json and as table ``calibration``."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ Block = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class MethodResult:
-    """What a method gives; not finite where it gives nothing.
+    """Result of a method. Its corrections are NaN if the method has no result.
 
     Attributes
     ----------
     rotation_vector_rad : correction of the rotation about body x, y, z, (3,)
     lever_arm_m : correction of the lever arm, body axes, (3,)
-    outcome : converged, iterations, and the reason where there is no result
-    covariance : of the noise, (6, 6), rad and m
-    covariance_total : of noise and fixed parameters, (6, 6), rad and m
+    outcome : converged, iterations, and the reason if there is no result
+    covariance : covariance from noise, (6, 6), rad and m
+    covariance_total : covariance from noise and consider parameters, (6, 6), rad and m
     """
 
     rotation_vector_rad: Array
@@ -38,7 +38,7 @@ class MethodResult:
     covariance_total: Array | None = None
 
     def mounted(self, coarse: Mounted) -> Mounted | None:
-        """Return the total mount; None where there is no result."""
+        """Return the total mount; None if there is no result."""
         if not (np.all(np.isfinite(self.rotation_vector_rad)) and np.all(np.isfinite(self.lever_arm_m))):
             return None
         R_body_from_sensor = exp_so3(self.rotation_vector_rad) @ coarse.R_body_from_sensor
@@ -46,12 +46,12 @@ class MethodResult:
 
 
 def method_block(result: MethodResult, coarse: Mounted, sensor: Calibrated = "mbes") -> Block:
-    """Return a method's block of calibration.json, null where it has no result.
+    """Return a method's block of calibration.json. Its values are null if the method has no result.
 
     Parameters
     ----------
     result : corrections and covariances
-    coarse : the mount that they correct
+    coarse : the coarse mount
     sensor : the sensor that is calibrated
     """
     mount = result.mounted(coarse)
@@ -97,7 +97,7 @@ def adjustment_block(
     Parameters
     ----------
     estimate, covariance, summary : tables of the adjustment
-    coarse : the mount that it corrects
+    coarse : the coarse mount
     sensor : the sensor that is calibrated
     """
     values = estimate.set_index("unknown").loc[list(MOUNT_NAMES), "value"].to_numpy()

@@ -1,4 +1,4 @@
-"""Misclosure of the sonar's and the laser's planes: with the coarse mount, and with each method's."""
+"""Plane agreement: angles and distances between the two sensors' planes, with the coarse and calibrated mounts."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 def plane_agreement_table(
     planes: pd.DataFrame, moments: Mapping[str, Array], coarse: Mounted, mounts: Mapping[str, Mounted]
 ) -> pd.DataFrame:
-    """Return the table ``closing``: one row per mount and family in one plane that both sensors see.
+    """Return the table ``closing``: one row for each mount and each family with one plane that both sensors see.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def plane_agreement_table(
 
 
 def lifted_moments_by_family(faces: pd.DataFrame, sounding_moments: pd.DataFrame) -> dict[str, Array]:
-    """Return the lifted moments of each family over all passes, from the tables of these names."""
+    """Return the lifted moments of each family over all passes, from tables ``faces`` and ``sounding_moments``."""
     family_of_face = dict(zip(faces["face"].tolist(), faces["family"].tolist(), strict=True))
     totals: dict[str, Array] = {}
     for (_, family), moments in sorted(by_family(family_of_face, moments_by_face(sounding_moments)).items()):

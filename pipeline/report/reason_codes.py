@@ -1,6 +1,6 @@
-"""Stable codes of everything that a verdict says: why a calibration is rejected, and what it warns of.
+"""Stable codes of all reasons and warnings of a verdict.
 
-The words beside a code are for people and may be mended; a code is for programs and stays.
+People read the words beside a code, which may be mended. Programs read the code, which never changes.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from typing import Self
 
 
 class ReasonCode(StrEnum):
-    """A code of calibration.json with its meaning."""
+    """Code of a reason or a warning in calibration.json, with its meaning."""
 
     meaning: str
 
@@ -19,7 +19,7 @@ class ReasonCode(StrEnum):
         member._value_, member.meaning = code, meaning
         return member
 
-    # The target or the mount is not found for certain: these reject, and nothing else is judged.
+    # Doubts about the pose of the target or the mount: these reject, and nothing else is judged.
     AMBIGUOUS_TARGET_POSE = "ambiguous_target_pose", "another pose of the target fits the laser points as well"
     TARGET_BEYOND_SEARCH = "target_beyond_search", "no pose of the target within the search limits fits"
     MOUNT_BEYOND_SEARCH = "mount_beyond_search", "no mount within the search limits brings the points onto the target"
@@ -50,7 +50,7 @@ class ReasonCode(StrEnum):
     PATENT_NOT_CONVERGED = "patent_not_converged", "the patent's form did not converge"
     PATENT_OFF_ADJUSTMENT = "patent_off_adjustment", "the patent's form differs from the adjustment beyond the limits"
 
-    # Drift of the INS: beside other reasons they reject, otherwise they warn.
+    # Drift of the INS: beside deviating residuals or a suspected cause these reject. Otherwise the second one warns.
     INS_DRIFT_NOT_GIVEN = "ins_drift_not_given", "ins.drift allows the INS no drift at all"
     INS_DRIFT_ABOVE_SETTINGS = "ins_drift_above_settings", "the INS drifts farther than its figures say"
 

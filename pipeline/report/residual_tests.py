@@ -1,9 +1,10 @@
-"""Mean residuals that deviate by more than noise and a tolerance: which, by how much, and what the cause may be.
+"""Reasons from mean residuals that deviate by more than their noise and a tolerance.
 
-Every row of the table ``patterns`` is one mean, or the difference of two, with its normal_deviates excess over the
-tolerance (``maths/adjustment/mean_tests.py``). All rows together have one limit: where nothing is beyond the tolerance,
-the chance that any row exceeds it is at most the test's level. The rows that exceed it deviate. The farthest of each
-variable is named, and the farthest of all comes first.
+Every row of the table ``patterns`` is a mean or the difference of two means. Its column ``normalised`` is the normal
+deviate of the excess over the tolerance (``maths/adjustment/mean_tests.py``). All rows have one limit. If no true mean
+exceeds the tolerance, the chance that any row exceeds the limit is at most the test's level. A row beyond the limit
+deviates. There is at most one reason for the passes, and one for all other variables. Each describes the row that
+deviates most, and names the other variables.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from pipeline.adjustment.pattern_tests import OF_PASSES, limit_for
 from pipeline.report.reason_codes import Statement
 from pipeline.report.residual_words import ExceededTests, ResidualTests, Row, describe_pass, describe_pattern
 
-LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # variables by which a part of the points may deviate
+LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # a deviation by these concerns a part of the points
 
 
 @dataclass(frozen=True)
@@ -24,9 +25,8 @@ class Deviation:
     Attributes
     ----------
     statement : code and words
-    excess : sigmas beyond the tolerance
-    is_local : whether only a part of the points deviates (a face, a step): a parameter of all points does not explain
-        that
+    excess : excess over the tolerance, in sigmas
+    is_local : whether only a part of the points deviates (a face, a step), which no parameter of all points explains
     """
 
     statement: Statement
@@ -35,7 +35,7 @@ class Deviation:
 
 
 def deviations(tests: ResidualTests, level: float) -> list[Deviation]:
-    """Return what deviates at a test's ``level``, the farthest first: one of the passes, one of everything else."""
+    """Return at most two deviations, the larger first: one of the passes, one of all else; ``level``: of the test."""
     limit = limit_for(tests.patterns, level)
     exceeded = ExceededTests(tests, tests.patterns[tests.patterns["normalised"].abs() > limit], limit)
     is_of_passes = exceeded.rows["by"].isin(OF_PASSES)
@@ -48,7 +48,7 @@ def deviations(tests: ResidualTests, level: float) -> list[Deviation]:
 
 
 def _farthest_of_each(rows: pd.DataFrame) -> list[Row]:
-    """Return the row of each variable that deviates most; the farthest of all first."""
+    """Return for each variable the row that deviates most, ordered from the largest deviation to the smallest."""
     farthest: list[Row] = [
         group.iloc[int(group["normalised"].abs().argmax())].to_dict() for _, group in rows.groupby("by", sort=True)
     ]
@@ -56,7 +56,7 @@ def _farthest_of_each(rows: pd.DataFrame) -> list[Row]:
 
 
 def _deviation(farthest: list[Row], statement: Statement) -> Deviation:
-    """Return the deviation of the first row, with its ``statement``, and name the variables of the other rows."""
+    """Return the deviation of the first row. The words of its ``statement`` get the variables of the other rows."""
     first, others = farthest[0], [str(row["by"]) for row in farthest[1:]]
     more = f"; residuals by {' and '.join(others)} lie beyond it too" if others else ""
     return Deviation(

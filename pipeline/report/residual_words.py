@@ -1,4 +1,4 @@
-"""What deviating residuals look like, and what their cause may be, in words."""
+"""Descriptions of deviating residuals and their likely causes, in words."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ import pandas as pd
 
 from pipeline.report.reason_codes import ReasonCode, Statement
 
-CYCLE = "ping_"  # and the length of the cycle in pings
+CYCLE = "ping_"  # before the length of the cycle in pings
 SENSORS = {"laser": "the laser", "mbes": "the sonar"}
-MAX_DRIFT_M = 0.05  # a mean residual beyond this is no drift: the model is wrong
-SAME_STEP_DEG = 3.0  # steps nearer to each other than this are one
-TURNS = {"turn_x": "pitch", "turn_y": "roll", "turn_z": "heading"}  # y of the target is the track
-Row = Mapping[Any, Any]  # of the table patterns
+MAX_DRIFT_M = 0.05  # a larger mean residual is no effect of drift: the model is wrong
+SAME_STEP_DEG = 3.0  # steps at angles that differ by less are one step
+TURNS = {"turn_x": "pitch", "turn_y": "roll", "turn_z": "heading"}  # the track runs along y of the target
+Row = Mapping[Any, Any]  # a row of the table patterns
 
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualTests:
-    """Tested means, and what their description needs.
+    """Tested means, and the further data of their description.
 
     Attributes
     ----------
     patterns : the table
     face_names : names of the faces by number
-    shape : the settings that give the target's shape, for people
+    shape : names of the settings of the target's shape, in words
     tolerance_m : the tolerance of the tests
     """
 
@@ -37,14 +37,14 @@ class ResidualTests:
 
 @dataclass(frozen=True)
 class ExceededTests:
-    """Rows that exceed the ``limit``, with what they were tested against."""
+    """Rows that exceed the ``limit``, with all tests."""
 
     tests: ResidualTests
     rows: pd.DataFrame
     limit: float
 
     def outcome(self, row: Row) -> str:
-        """Describe the outcome of a row's test."""
+        """Return in words how far a row exceeds the tolerance, and the limit."""
         excess = abs(float(row["normalised"]))
         beyond = f"{excess:.1f} sigma beyond {1000 * self.tests.tolerance_m:g} mm"
         if row["by"] == "drift":
@@ -54,7 +54,7 @@ class ExceededTests:
 
 # --- passes ------------------------------------------------------------------------------------------------------
 def describe_pass(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe the pass that deviates most, and whether the other sensor deviates there as well."""
+    """Return a reason that describes a pass that deviates, and whether the other sensor deviates there, too."""
     if row["by"] == "drift":
         return _drift(row, exceeded)
     patterns = exceeded.tests.patterns
@@ -80,7 +80,7 @@ def describe_pass(row: Row, exceeded: ExceededTests) -> Statement:
 
 
 def _drift(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe a pass in which the INS would have to drift too far."""
+    """Return a reason that describes a pass in which the INS would have to drift too far."""
     turn = f"{abs(np.degrees(row['mean_m'])):.3f}° in {TURNS[str(row['family'])]}"
     return Statement(
         ReasonCode.INS_DRIFT_BETWEEN_PASSES,
@@ -92,7 +92,7 @@ def _drift(row: Row, exceeded: ExceededTests) -> Statement:
 
 # --- everything else ---------------------------------------------------------------------------------------------
 def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe a deviation by face, angle, ping, distance or time."""
+    """Return a reason that describes a deviation by face, angle, ping, distance or time."""
     variable, low, high = row["by"], row["low"], row["low"] + row["width"]
     if variable == "step":
         return _step(row, exceeded)
@@ -117,9 +117,10 @@ def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
 
 
 def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe pings that deviate in turn.
+    """Return a reason that describes pings that deviate in a cycle.
 
-    Modes that a sonar takes in turn, whose fans are tilted differently, displace whole pings along the track.
+    If a sonar changes its mode from ping to ping, and the fans of the modes have different tilts, whole pings are
+    displaced along the track.
     """
     pings = int(row["by"].removeprefix(CYCLE))
     which = f"one ping of {pings} (those whose number divided by {pings} leaves {row['low']:.0f})"
@@ -133,10 +134,10 @@ def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
 
 
 def _step(row: Row, exceeded: ExceededTests) -> Statement:
-    """Describe a step of the sonar's distances at one receive angle.
+    """Return a reason that describes a step of the sonar's distances at one receive angle.
 
-    If the steps of two families have different signs at one angle, soundings are displaced along the track: a face
-    turned to one side then lies too near, and one turned to the other side too far.
+    If the steps of two families at one angle have opposite signs, soundings are displaced along the track: a face that
+    looks to one side then seems too near, and a face that looks to the other side too far.
     """
     rows = exceeded.rows
     steps = rows[(rows["by"] == "step") & ((rows["low"] - row["low"]).abs() <= SAME_STEP_DEG)]

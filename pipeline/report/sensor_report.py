@@ -16,21 +16,21 @@ from pipeline.report.reason_codes import Statement
 
 @dataclass(frozen=True, kw_only=True)
 class SensorReport:
-    """What a report says of the calibrated sensor alone.
+    """Parts of a report that differ between a calibration of the sonar and one of the laser.
 
     Attributes
     ----------
-    coarse : its mount as configured
+    coarse : coarse mount of the calibrated sensor
     methods : blocks of calibration.json by method; the adjustment is always among them
     method : the method that is the result
-    search : how its provisional mount was searched
-    sides : the setting that tells the target's left from its right, for people
-    advice : what would make the geometry better, for people
+    search : the search for its provisional mount
+    sides : name of the setting of the target's left and right, in words
+    advice : weaknesses of the geometry and their remedy, in words
     result_keys : keys of calibration.json that follow ``result``
     data_keys : keys of calibration.json that follow ``passes``
-    instruments : settings of its own whose preset is named, by sensor
-    pass_warnings, cast_warnings : warnings that the other sensor's calibration does not have
-    closing : table of the planes' agreement, where there are two sensors
+    instruments : settings of the sonar, by sensor, for the block ``instruments``; empty for the laser
+    pass_warnings, cast_warnings : warnings of a calibration of the sonar; empty for the laser
+    closing : table of the plane agreement; None for the laser
     """
 
     coarse: Mounted

@@ -1,4 +1,4 @@
-"""What the report says of a calibration of the sonar against the laser."""
+"""The parts of the report that only a calibration of the sonar has."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ class SonarSettings:
 
     Attributes
     ----------
-    mbes : the sonar
+    mbes : settings of the sonar
     segment : limits of the search for its provisional mount
     method : the method that is to be the result
-    sides : the setting that tells the target's left from its right, for people
+    sides : name of the setting of the target's left and right, in words
     """
 
     mbes: Mbes
@@ -43,9 +43,9 @@ def sonar_report(settings: SonarSettings, evidence: Evidence, passes: Sequence[M
 
     Parameters
     ----------
-    settings : of the sonar and its search
+    settings : settings of the sonar and of its search
     evidence : tables of the run
-    passes : rows of calibration.json
+    passes : rows of the key ``passes`` of calibration.json
     """
     mbes, method = settings.mbes, settings.method
     coarse = mount_of(mbes.mount)
@@ -74,14 +74,14 @@ def sonar_report(settings: SonarSettings, evidence: Evidence, passes: Sequence[M
 
 
 def _angles_advice(coarse: Mount, provisional: pd.Series) -> str:
-    """Say which angles to enter, where the coarse ones have been checked and the soundings still ask for others."""
+    """Return the advice to enter the angles of the provisional mount, if the signs have been checked."""
     settings = corrected_mount(coarse, rotation_vector_deg(provisional)).settings()
     values = ", ".join(f"{key} {settings[key]:.1f}" for key in ("roll_deg", "pitch_deg", "yaw_deg"))
     return f"; if you have checked the signs, enter {values} as mbes.mount and run again"
 
 
 def _range_note(mbes: Mbes) -> str:
-    """Say how ranges were reduced, and whether rays were traced."""
+    """Return in words how ranges were reduced, and whether rays were traced."""
     note = "sonar ranges taken as recorded: half the two-way path"
     if mbes.projector_offset_m is not None:
         note = f"sonar ranges reduced for a transmitter at {list(mbes.projector_offset_m)} m in the mbes frame"
@@ -92,7 +92,7 @@ def _range_note(mbes: Mbes) -> str:
 
 
 def _cast_block(mbes: Mbes) -> dict[str, Any]:
-    """Return the key ``cast`` of calibration.json; empty without a cast."""
+    """Return the block ``cast`` of calibration.json; empty without a cast."""
     if mbes.svp is None:
         return {}
     source = {} if mbes.svp_from is None else mbes.svp_from.model_dump(mode="json")
@@ -100,7 +100,7 @@ def _cast_block(mbes: Mbes) -> dict[str, Any]:
 
 
 def _closing(evidence: Evidence, coarse: Mounted, methods: Mapping[str, Block]) -> pd.DataFrame:
-    """Return the agreement of the planes with the coarse mount and with that of every method that has a result."""
+    """Return table ``closing``: the plane agreement with the coarse mount and with each method that has a result."""
     mounts = {"coarse": coarse} | {name: mounted_of(block) for name, block in methods.items() if block["mount"]}
     moments = lifted_moments_by_family(evidence.faces, evidence.sounding_moments)
     return plane_agreement_table(evidence.planes, moments, coarse, mounts)

@@ -1,8 +1,8 @@
-"""Fixed parameters that the residuals suggest are wrong, and additionally estimated ones, described for the report.
+"""Suspected causes (fixed parameters that the residuals contradict), and the parameters that adjust.free names.
 
-Each fixed parameter has been estimated by itself (table ``freed``). One whose estimate is farther from zero than noise
-and its own a-priori sigma explain is a suspected cause. One error often moves several of them; the cause named is the
-one that explains most (largest value over sigma).
+Table ``freed`` has the single-parameter test of each fixed parameter. A parameter is a suspected cause if its estimate
+is farther from zero than noise and its a-priori sigma explain. One error often moves the estimates of several
+parameters. The report names the cause that explains most, with the largest value over sigma.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-SIGNIFICANT = 4.0  # sigmas: one in 16 000, of some forty parameters one in 400 sessions
+SIGNIFICANT = 4.0  # sigmas: by chance one of 16 000 parameters, so one of 400 sessions with forty parameters each
 UNITS = {"mbes_latency": "s", "laser_latency": "s", "sound_speed": "1"}
 AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
 FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
@@ -20,7 +20,7 @@ FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y
 
 @dataclass(frozen=True)
 class SuspectedCause:
-    """A fixed parameter that would explain the residuals: words, and its value over the sigma from noise."""
+    """A fixed parameter that would explain the residuals: its words, and its value over the sigma from noise."""
 
     words: str
     normalised: float
@@ -32,10 +32,10 @@ class EstimatedParameter:
 
     Attributes
     ----------
-    unknown : its name
+    unknown : name of the parameter
     value, sigma_total : estimate and total sigma in ``unit``
-    words : the estimate, and what to look at
-    is_significant : whether the value is farther from zero than its sigma and the settings explain
+    words : the estimate, and the setting or device to check
+    is_significant : whether the value is farther from zero than its sigma and its a-priori sigma explain
     """
 
     unknown: str
@@ -47,7 +47,7 @@ class EstimatedParameter:
 
 
 def suspected_causes(freed: pd.DataFrame) -> list[SuspectedCause]:
-    """Return the fixed parameters (table ``freed``) that differ significantly from zero, the most telling first."""
+    """Return the suspected causes from table ``freed``, the one with the largest value over sigma first."""
     causes = [
         SuspectedCause(_words(row), abs(row["value"]) / row["sigma"])
         for row in freed[~freed["estimated"]].to_dict("records")
@@ -57,7 +57,7 @@ def suspected_causes(freed: pd.DataFrame) -> list[SuspectedCause]:
 
 
 def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:
-    """Return what is estimated beside mount and surfaces (table ``freed``); empty if the data leave no result."""
+    """Return the parameters of ``adjust.free`` with their estimates (table ``freed``); empty without a result."""
     return [
         EstimatedParameter(
             unknown=row["unknown"],
@@ -76,7 +76,7 @@ def _is_significant(row: Mapping[Any, Any]) -> bool:
 
 
 def _words(row: Mapping[Any, Any]) -> str:
-    """Describe the estimate of one parameter, and what to look at."""
+    """Return in words the estimate of one parameter, and the setting or device to check."""
     name, value, sigma = str(row["unknown"]), float(row["value"]), float(row["sigma"])
     sensor = "laser" if name.startswith("laser") else "mbes"
     owner = {"laser": "the laser's", "mbes": "the sonar's"}[sensor]
@@ -101,7 +101,7 @@ def _words(row: Mapping[Any, Any]) -> str:
 
 
 def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
-    """Describe a turn (rad) or shift (m) of a family's wet faces against its dry ones."""
+    """Return in words a turn (rad) or shift (m) of a family's wet faces against its dry ones."""
     family, _, kind = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
     faces = FACES_OF_FAMILY.get(family, f"of {family}")
     if kind.startswith("turn"):
@@ -113,7 +113,7 @@ def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
 
 
 def _size(value: float, sigma: float, unit: str) -> str:
-    """Format a value with its sigma, to the sigma's first digit."""
+    """Return a value and its sigma as text, with as many decimals as the first digit of the sigma has."""
     digits = max(0, -int(np.floor(np.log10(max(sigma, 1e-9)))))
     gap = "" if unit == "°" else " "
     return f"{value:+.{digits}f} ± {sigma:.{digits}f}{gap}{unit}"

@@ -1,4 +1,28 @@
-"""Accepted or rejected: every reason to reject, with its evidence. What does not reject is in ``warnings.py``."""
+"""The verdict: all reasons for which a calibration is rejected. Without a reason it is accepted.
+
+The limits are defined at these places (paths from ``pipeline/``):
+
+* pose of the target and provisional mount, judged by stage segment: class ``Segment`` of config/pool.py
+  (``search_...``, ``farthest_mount``, ``ambiguity_share``, ``ambiguity_margin``), ``_best_start`` of
+  target/pose_search.py (largest distance of a pose), ``LARGEST_TURN`` of target/laser_search.py;
+* no result: ``RANK_TOLERANCE`` of maths/adjustment/solution.py;
+* convergence: ``max_iterations`` of class ``Adjust`` of config/pool.py, ``SETTLED``, ``CONVERGED`` and
+  ``CLOSING_STEPS`` of adjustment/iteration.py;
+* number of soundings on a family: ``MIN_SOUNDINGS`` of this module;
+* mean residuals: ``test_level`` and ``test_tolerance_m`` of class ``Adjust`` of config/pool.py; ``FEWEST``,
+  ``FEWEST_SLOTS`` and ``FEWEST_DOF`` of maths/adjustment/residual_means.py decide which means are tested;
+* drift of the INS, beside deviating residuals or a suspected cause: ``MAX_DRIFT_RATIO`` of drift_check.py;
+* suspected causes, and estimates off their settings: ``SIGNIFICANT`` of suspected_causes.py;
+* total sigmas, and difference of a patent's form from the adjustment: ``max_sigma_deg`` and ``max_sigma_m`` of class
+  ``VerdictLimits`` of config/pool.py;
+* all six mount parameters of the laser fixed: ``hold_share`` of class ``LaserFit`` of config/pool.py, and the limits of
+  the total sigmas;
+* result and convergence of a patent's form: classes ``FitPlanes``, ``AngleIterate`` and ``Offsets`` of config/pool.py.
+
+Warnings do not reject. Their limits are the ``MAX_...`` constants of warnings.py, as_built.py and cast_checks.py,
+``MAX_DRIFT_RATIO`` of drift_check.py, and, for gaps in the geometry, ``NEAR_M`` of planning/observability.py.
+``MAX_DRIFT_M`` and ``SAME_STEP_DEG`` of residual_words.py only change the words of a reason.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,22 +41,22 @@ from pipeline.report.residual_tests import deviations
 from pipeline.report.residual_words import ResidualTests
 from pipeline.report.suspected_causes import estimated_parameters, suspected_causes
 
-MIN_SOUNDINGS = 30  # on a family of faces; with fewer its labels cannot be trusted
+MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
 
 
 @dataclass(frozen=True, kw_only=True)
 class Criteria:
-    """What a calibration is judged by.
+    """Limits of the verdict, and words for its reasons.
 
     Attributes
     ----------
     limits : limits of the total sigmas
     test_level : level of the tests of mean residuals
-    tolerance_m : mean residuals that the tests tolerate
+    tolerance_m : size of a mean residual that the tests tolerate
     method : the method that is the result
-    search : how the provisional mount was searched
-    shape : the settings that give the target's shape, for people
-    sides : the setting that tells the target's left from its right, for people
+    search : the search for the provisional mount
+    shape : names of the settings of the target's shape, in words
+    sides : name of the setting of the target's left and right, in words
     """
 
     limits: VerdictLimits
@@ -50,16 +74,16 @@ def rejections(
     criteria: Criteria,
     drift_check: Statement | None = None,
 ) -> list[Statement]:
-    """Return why the calibration is rejected; empty if it is accepted.
+    """Return the reasons for which the calibration is rejected; empty if it is accepted.
 
-    Where labels are in doubt, or the adjustment has no result, nothing else is judged.
+    If the labels are in doubt, or the adjustment has no result, nothing else is judged.
 
     Parameters
     ----------
     evidence : tables of the run
     methods : blocks of calibration.json by method
     criteria : limits, levels and tolerances
-    drift_check : what speaks against the figures of the INS's drift; said where residuals deviate
+    drift_check : doubt about the figures of the INS's drift; a reason only if residuals deviate or a cause is suspected
     """
     doubts = ambiguities(
         evidence.target_pose.iloc[0],
@@ -92,7 +116,7 @@ def rejections(
 
 
 def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: Statement | None) -> list[Statement]:
-    """Say which mean residuals deviate, whether the INS's drift is in doubt, and what would explain them."""
+    """Return the reasons from deviating mean residuals, from the INS's drift, and from a suspected cause."""
     tests = ResidualTests(
         patterns=evidence.patterns,
         face_names=evidence.faces["name"].tolist(),
@@ -108,7 +132,7 @@ def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: State
 
 
 def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
-    """Name families with so few soundings that their labels cannot be trusted; those with none are not used."""
+    """Return a reason for each family with too few soundings for reliable labels. A family without any is not used."""
     count = cells[cells["sensor"] == "mbes"].groupby("family")["count"].sum()
     return [
         Statement(
@@ -122,9 +146,9 @@ def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
 
 
 def _suspected_cause(freed: pd.DataFrame, local: bool) -> list[Statement]:
-    """Name the fixed parameter that explains the residuals best, and count the others.
+    """Return a reason with the fixed parameter that explains the residuals best, and the number of the others.
 
-    ``local``: a face, step, pass or ping has been named as well, and may itself be the cause.
+    ``local``: another reason names a face, step, pass or ping, which may be the cause instead.
     """
     causes = suspected_causes(freed)
     if not causes:
@@ -137,9 +161,9 @@ def _suspected_cause(freed: pd.DataFrame, local: bool) -> list[Statement]:
 
 
 def _estimates_off_settings(freed: pd.DataFrame) -> list[Statement]:
-    """Name what adjust.free estimates as significantly not what the session says.
+    """Return a reason for each parameter of ``adjust.free`` that differs significantly from its setting.
 
-    The mount is right only together with that estimate, and the same error is in the survey.
+    The mount is right only together with this estimate, and the survey has the same error.
     """
     return [
         Statement(

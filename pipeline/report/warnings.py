@@ -1,4 +1,4 @@
-"""What does not reject a calibration, and still is to be looked at before anyone leaves."""
+"""Warnings: they do not reject a calibration, but should be checked before the boat leaves the pool."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -10,8 +10,8 @@ from pipeline.console import plural
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
-MAX_VARIANCE_FACTOR = 2.0  # of a group of observations: above this, or below its inverse, its sigmas are wrong
-MAX_COMMON_VARIANCE_FACTOR = 4.0  # of what an epoch's points share; a small one is a good INS
+MAX_VARIANCE_FACTOR = 2.0  # of a group of observations: above this, or below its inverse, the sigmas are wrong
+MAX_COMMON_VARIANCE_FACTOR = 4.0  # of noise common to an epoch's points; a small one is no warning: the INS is good
 MAX_OUTLIER_SHARE = 0.01  # of a group of observations
 MAX_TARGET_OFFSET_M = 0.1  # from target.origin, along each axis
 MAX_TARGET_TILT_DEG = 0.1  # out of plumb
@@ -21,7 +21,7 @@ GROUP_WORDS = {
     "mbes_vertical": "soundings on vertical faces",
     "mbes_horizontal": "soundings on horizontal faces",
 }
-COMMON_NOISE = {  # groups of what an epoch's points share: code, and words for the root of the variance factor
+COMMON_NOISE = {  # groups of noise common to an epoch's points: code, and words with the root of the factor
     "ins_white": (
         ReasonCode.INS_NOISE_ABOVE_SETTINGS,
         "the INS's poses scatter from record to record {:.1f} times as much as ins.white says: its filter, or the "
@@ -35,9 +35,9 @@ COMMON_NOISE = {  # groups of what an epoch's points share: code, and words for 
 
 
 def geometry_gaps(geometry: pd.DataFrame, sigmas: Mapping[str, float] | None) -> list[Statement]:
-    """Return a warning for each gap in the geometry, with the largest total sigmas that come of it.
+    """Return a warning for each gap in the geometry, with the largest total sigmas.
 
-    ``geometry``: the table; ``sigmas``: total sigmas of the mount by setting, degrees and m, where there are any.
+    ``geometry``: the table; ``sigmas``: total sigmas of the mount by setting, degrees and m, or None.
     """
     suffix = "" if sigmas is None else _sigma_suffix(sigmas)
     gaps = geometry.loc[geometry["kind"] == "gap", "words"]
@@ -45,7 +45,7 @@ def geometry_gaps(geometry: pd.DataFrame, sigmas: Mapping[str, float] | None) ->
 
 
 def _sigma_suffix(sigmas: Mapping[str, float]) -> str:
-    """Name the largest sigma of the angles and of the lever arm."""
+    """Return in words the largest sigma of the angles, and that of the lever arm."""
     angle, arm = (
         max((sigmas[key], MOUNT_WORDS[place]) for _, place, key, unit in PARAMETERS if unit == kind)
         for kind in ("deg", "m")
@@ -77,7 +77,7 @@ def unexpected_noise(groups: pd.DataFrame) -> Iterator[Statement]:
 
 
 def target_off_origin(target: Mapping[str, Any]) -> list[Statement]:
-    """Return a warning if the target (block of calibration.json) stands far from where it was surveyed, or leans."""
+    """Return a warning if the target (block of calibration.json) is far from its configured origin, or out of plumb."""
     x, y, z = target["offset_m"]
     tilts = target["tilt_deg"]
     if not (max(abs(x), abs(y), abs(z)) > MAX_TARGET_OFFSET_M or max(map(abs, tilts)) > MAX_TARGET_TILT_DEG):
@@ -90,7 +90,10 @@ def target_off_origin(target: Mapping[str, Any]) -> list[Statement]:
 
 
 def passes_with_one_sensor(passes: Sequence[Mapping[str, Any]]) -> Iterator[Statement]:
-    """Yield a warning for each sensor that missed the target where the other saw it; ``passes``: as reported."""
+    """Yield a warning for each sensor that did not see the target in passes in which the other one did.
+
+    ``passes``: rows of the key ``passes`` of calibration.json.
+    """
     laser_alone = "the laser saw the target, and there are no soundings on it"
     sonar_alone = "the sonar saw the target, and there are no laser points on it"
     for present, missing, code, words in (

@@ -1,1 +1,1 @@
-"""Where the target is in the points: its pose, the sensors' provisional mounts, its surface."""
+"""The search for the target's pose and the provisional mounts, and the labelling of points by the target's faces."""

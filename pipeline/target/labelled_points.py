@@ -25,14 +25,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LabellingContext:
-    """All that labelling needs beside the points.
+    """Inputs of labelling that are the same for all points.
 
     Parameters
     ----------
     model, surface
-        The target by design.
+        The target by design, and the search for points on its surface.
     target
-        Its pose.
+        The pose of the target.
     mount
         Provisional mount of the sensor that is calibrated.
     trajectory
@@ -49,7 +49,7 @@ class LabellingContext:
     settings: Segment
 
     def label_settings(self, sensor: str, gate_m: float) -> LabelSettings:
-        """Return which points of a sensor ("laser" or "mbes") a face takes."""
+        """Return the conditions for labelling a point of a sensor ("laser" or "mbes") with a face."""
         dry = sensor == "laser"
         level_m, margin_m = self.model.water_level_m, self.settings.water_margin_m
         return LabelSettings(
@@ -63,7 +63,7 @@ class LabellingContext:
 
 
 def label_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
-    """Label laser points that stage georeference has placed.
+    """Label laser points that stage georeference placed in the pool frame.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mb
 def _counts(
     other_side: str, own_side: NDArray[np.bool_], edge: str, near: NDArray[np.int64], labels: Labels
 ) -> dict[str, int]:
-    """Return why points got no label, and how many have one."""
+    """Return the number of points by reason why they have no label, and the labelled ones as ``used``."""
     return {
         other_side: int((~own_side).sum()),
         "off every face": int(own_side.sum()) - len(near) + int(labels.off_surface.sum()),

@@ -1,6 +1,6 @@
-"""The laser's provisional mount and the pose of the target, both from the laser's points.
+"""The laser's provisional mount and the pose of the target, both estimated from the laser's points.
 
-Used where the laser itself is calibrated.
+A calibration of the laser uses this module.
 """
 
 from dataclasses import replace
@@ -19,15 +19,16 @@ from pipeline.target.samples import LaserPoses
 from pipeline.target.search_results import LocatedTarget, ProvisionalMount
 
 Array = NDArray[np.float64]
-LARGEST_TURN = 3.0  # sigmas of what is searched, within which a laser's mount is taken
+LARGEST_TURN = 3.0  # largest turn of the laser about each axis, as a multiple of segment.search_laser_deg
 
 
 def refine_target_and_laser(
     sample: LaserPoses, target: LocatedTarget, model: TargetModel, coarse: Mounted, settings: Segment
 ) -> tuple[LocatedTarget, ProvisionalMount]:
-    """Return the pose of the target and the laser's rotation, from the pose with the coarse mount.
+    """Return the pose of the target and the laser's provisional mount, starting from the pose with the coarse mount.
 
-    The lever arm stays: a laser mounted 3 cm too far starboard and a target 3 cm nearer look alike.
+    The mount's rotation is estimated. Its lever arm stays, because a laser 3 cm farther to starboard and a target 3 cm
+    nearer would give the same points.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def refine_target_and_laser(
         frame=TargetFrame(rotation_z(pose.parameters[0]), pose.parameters[1:]),
         azimuth_correction_rad=float(pose.parameters[0]),
         pose=pose,
-        tilt=replace(target.tilt, parameters=np.zeros(6)),  # it was the laser's
+        tilt=replace(target.tilt, parameters=np.zeros(6)),  # the tilt was that of the laser's coarse mount
         gate_m=gate_of(refined, settings),
     )
     turn_rad = refined.parameters[4:]

@@ -1,4 +1,4 @@
-"""Parts that the three searches share: the planes of the faces, labels while a pose is refined, and the final gate."""
+"""Functions that the three searches share: planes of the faces, labels during a refinement, and the final gate."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,9 @@ from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.registration import FacePlanes, Labeller, Refinement
 
 Array = NDArray[np.float64]
-SCORE_REACH_M = 0.06  # reach of the final score
+SCORE_REACH_M = 0.06  # m: points farther from the surface count nothing in the final score
 REFINEMENT_GATE_M = 0.08  # gate while the pose or the mount is still being refined
-GATE_SCALES = 5  # the final gate, in robust scales of what was labelled
+GATE_SCALES = 5  # the final gate, in robust scales of the labelled points' distances
 
 
 def planes_of_faces(model: TargetModel) -> FacePlanes:
@@ -22,7 +22,7 @@ def planes_of_faces(model: TargetModel) -> FacePlanes:
 
 
 def dry_labeller(model: TargetModel, settings: Segment) -> Labeller:
-    """Return the function that labels the laser's points above the water, while their rays are unknown."""
+    """Return a function that labels the laser's points above the water without knowing their rays."""
     limits = LabelSettings(REFINEMENT_GATE_M, settings.margin_m, min_grazing_rad=0.0, seen="dry")
 
     def label(_: Array, points: Array) -> NDArray[np.int16]:
@@ -34,5 +34,5 @@ def dry_labeller(model: TargetModel, settings: Segment) -> Labeller:
 
 
 def gate_of(refined: Refinement, settings: Segment) -> float:
-    """Return the distance from a face up to which points are labelled: so wide that the noise is not cut into."""
+    """Return the gate (m) for labelling: the configured one, or five robust scales of the noise if that is more."""
     return max(settings.gate_m, GATE_SCALES * refined.scale_m) if np.isfinite(refined.scale_m) else settings.gate_m

@@ -18,7 +18,7 @@ from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-BEHIND_M = 0.15  # farther behind a face than this is no noise
+BEHIND_M = 0.15  # noise does not bring a sounding farther behind a face
 
 
 def search_mount(
@@ -26,11 +26,12 @@ def search_mount(
 ) -> ProvisionalMount:
     """Return the correction of the coarse mount with which the soundings fall onto the wet faces.
 
-    The coarse mount may be wrong by up to the search limits. First comes the front (the patent's wall): roll turns it
-    about the track and x shifts it, and no other parameter moves it. So both follow from a vote over the part of it
-    that is the front wherever the rest still stands; without a front roll is searched as well. Then follows a search
-    over yaw, y and z; blocks repeat every period, so z is sought within the lever arm's limits and a rival there is
-    reported.
+    The coarse mount may be wrong by up to the search limits. First the soundings on the front (the patent's wall) give
+    roll and x: roll turns the front about the track, x shifts it, and no other parameter moves it. A vote decides: the
+    roll and x that bring most soundings into one plane. Only soundings near the front's middle vote, because they are
+    on the front whatever the other parameters are. Without a front the search includes roll. Then follows a search over
+    yaw, y and z. Blocks repeat in height, so another z may fit as well. The search covers all z within the limits of
+    the lever arm, and the best rival is reported.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def search_mount(
 
 
 def _starts(placement: MountCorrection, model: TargetModel, settings: Segment) -> list[list[Array]]:
-    """Return corrections (6,) to start from, in groups of one height."""
+    """Return the corrections (6,) from which the search starts, in groups with the same z."""
     angle, arm = np.radians(settings.search_mount_deg), settings.search_mount_m
     vote = _front_vote(placement, model, settings)
     bases = [np.array([0.0, roll, 0.0, 0.0, 0.0, 0.0]) for roll in np.linspace(-angle, angle, 5)]
@@ -98,7 +99,8 @@ def _criteria(
     def quality(p: Array) -> float:
         """Return the score less the share of soundings behind a face.
 
-        No sounding can lie there: a stack shifted onto the floor or the next block explains as many.
+        No true sounding can lie there. A wrong mount that moves soundings of the floor, or of the next block, onto a
+        face may explain as many soundings, but it puts some behind a face.
         """
         behind = closest.hides(placement.origins(p), placement.points(p), BEHIND_M)
         return surface_score(placement, p, closest, SCORE_REACH_M) - float(np.mean(behind))
@@ -110,7 +112,7 @@ def _criteria(
 def _wet_labeller(
     sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: SonarBeams, settings: Segment
 ) -> Labeller:
-    """Return the function that labels the soundings below the water, with their beams turned by the correction."""
+    """Return a function that labels soundings below the water; the correction also turns their beams."""
     limits = LabelSettings(
         gate_m=REFINEMENT_GATE_M,
         margin_m=settings.margin_m,
@@ -130,11 +132,11 @@ def _wet_labeller(
 def _front_vote(
     placement: MountCorrection, model: TargetModel, settings: Segment
 ) -> tuple[float, Array] | None:
-    """Return the roll correction (rad) and the shift (3,) of the lever arm (m, body) that gather most of the front.
+    """Return the correction of roll (rad) and the shift (3,) of the lever arm (m, body axes) with the most votes.
 
-    They bring most soundings of the front's middle into one plane. None where the target has no front, or the sonar did
-    not see it. A turn ρ about body y moves a sounding by ρ T (e_y × m); only its part along the front's normal matters
-    there.
+    They bring most soundings of the front's middle into the front's plane. The result is None if the target has no
+    front, or if fewer than 20 soundings lie near its middle. A turn ρ about body y moves a sounding by ρ T (e_y × m),
+    with T = R_target_from_body and m the sounding in body axes. Only the component along the front's normal counts.
     """
     front = model.front()
     if front is None:

@@ -23,15 +23,16 @@ from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
 RIVAL_REACHES_M = (0.15, 0.1, 0.07, 0.05)
-TILT_SIGMAS = (0.1, 0.1, 0.1, 1.0, 1.0, 1.0)  # rad and m: so wide that the points alone decide
+TILT_SIGMAS = (0.1, 0.1, 0.1, 1.0, 1.0, 1.0)  # rad and m: so large that only the points count
 
 
 def search_target_pose(dry: LaserSample, model: TargetModel, settings: Segment, azimuth_known: bool) -> LocatedTarget:
-    """Return the pose of the target in dry laser points; rivals are other poses, and the mirrored target.
+    """Return the pose of the target in dry laser points, and how well its best rival fits.
 
-    Where the target repeats, shifting it by one period changes nothing but its ends; and so, on the patent's, does half
-    a period with the sides exchanged. A rival half a period off loses the wall's width times half a period; if it loses
-    less than ``ambiguity_share`` of that, the ends were not seen well enough, and the registration is ambiguous.
+    Rivals are other heights, and the mirrored target. If the target repeats, a shift by one period changes only its
+    ends. On the patent's target a shift by half a period with left and right exchanged does the same. With a rival half
+    a period off, the area that agrees is expected to be smaller by the wall's width times half a period. If it is
+    smaller by less than ``ambiguity_share`` of that, the laser did not see the ends well enough: the pose is ambiguous.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def search_target_pose(dry: LaserSample, model: TargetModel, settings: Segment, 
     settings
         Settings of stage segment.
     azimuth_known
-        The azimuth is configured, not estimated from the track.
+        True: the azimuth is configured; false: it is estimated from the track.
     """
     sigmas = _pose_sigmas(model, settings, azimuth_known)
     placement = TargetPose(dry.voxel_means_m, sigmas)
@@ -71,7 +72,7 @@ def search_target_pose(dry: LaserSample, model: TargetModel, settings: Segment, 
 
 
 def _pose_sigmas(model: TargetModel, settings: Segment, azimuth_known: bool) -> Array:
-    """Return how far off the azimuth (rad) and the origin (m) may be, (4,)."""
+    """Return the a-priori sigmas (4,) of the errors of azimuth (rad) and origin (m): the search limits."""
     azimuth = np.radians(settings.search_azimuth_deg if azimuth_known else max(10.0, settings.search_azimuth_deg))
     reach_xy = settings.search_horizontal_m
     reach_z = reach_xy if model.repeats_m is None else settings.search_vertical_e * model.half_period_m
@@ -81,7 +82,7 @@ def _pose_sigmas(model: TargetModel, settings: Segment, azimuth_known: bool) -> 
 def _best_start(
     placement: TargetPose, surface: TargetSurface, half_period_m: float, azimuth_known: bool
 ) -> SearchResult:
-    """Return the best pose of a search over azimuths, places and heights."""
+    """Return the best pose of a search that starts from a grid of azimuths, horizontal shifts and heights."""
     azimuth, reach_xy, _, reach_z = placement.prior_sigmas
     turns = np.linspace(-azimuth, azimuth, 5 if azimuth_known else 13)
     steps = (-0.8, 0.0, 0.8)
@@ -103,9 +104,9 @@ def _best_start(
 def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, surface: TargetSurface) -> float:
     """Return the area of laser points explained by the model, plus that of its dry upright faces with points, in m².
 
-    Both ways, because a model that reaches beyond the end of the stack explains every point as well.
+    The second area is necessary: a model that is longer than the real stack explains every point, too.
     """
-    from scipy.spatial import cKDTree  # half a second: only where needed
+    from scipy.spatial import cKDTree  # the import takes half a second
 
     points = placement.points(parameters)
     explained = surface_score(placement, parameters, surface.closest, SCORE_REACH_M) * len(points)
@@ -116,7 +117,7 @@ def _agreement(placement: TargetPose, parameters: Array, model: TargetModel, sur
 
 
 def _best_rival(placement: TargetPose, best: Array, model: TargetModel) -> tuple[str, float]:
-    """Return the name of the best rival and its agreement (m²); "none" if the target neither repeats nor has sides."""
+    """Return the best rival's name and agreement (m²); "none" and 0 for a symmetric target that does not repeat."""
     shifts: list[tuple[TargetModel, str, float]] = []
     period_m = model.repeats_m
     if period_m is not None:
@@ -128,7 +129,7 @@ def _best_rival(placement: TargetPose, best: Array, model: TargetModel) -> tuple
             shifts.append((mirrored, "left and right exchanged, half a period higher", period_m / 2))
             shifts.append((mirrored, "left and right exchanged, half a period lower", -period_m / 2))
     rivals = [("none", 0.0)]
-    # No prior here: the rival may converge where it fits best.
+    # Without a prior the rival converges to its best fit.
     free = TargetPose(placement.points_pool_m, np.full(4, 1e3))
     for rival, name, shift_m in shifts:
         surface = TargetSurface(ClosestSurface(rival), planes_of_faces(rival))

@@ -13,7 +13,7 @@ def target_pose_table(target: LocatedTarget) -> pd.DataFrame:
     row = {
         "R_target_from_pool": target.frame.R_target_from_pool.ravel().tolist(),
         "azimuth_correction_deg": np.degrees(target.azimuth_correction_rad),
-        # The correction turns the points onto the model: the target itself is tilted the other way.
+        # The fit turns the points onto the model, so the target itself is tilted the opposite way.
         "tilt_x_deg": -np.degrees(target.tilt.parameters[0]),
         "tilt_y_deg": -np.degrees(target.tilt.parameters[1]),
         "sigma_azimuth_deg": np.degrees(sigma[0]),

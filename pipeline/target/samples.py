@@ -1,4 +1,4 @@
-"""Samples of the points, with which the pose of the target and the mounts are searched."""
+"""Samples of the points for the searches of the target's pose and of the mounts."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ from pipeline.maths.geometry.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 VOXEL_M = 0.1  # laser points are averaged over cubes of this size
-SOUNDING_SAMPLE = 8_000  # soundings to search with
-LASER_SAMPLE = 2_000_000  # laser points, of which voxels are then made
-RAW_SAMPLE = 50_000  # of these taken singly
+SOUNDING_SAMPLE = 8_000  # about this many soundings
+LASER_SAMPLE = 2_000_000  # about this many laser points at most, which are averaged over voxels
+RAW_SAMPLE = 50_000  # about this many of them at most, as single points
 
 
 @dataclass(frozen=True)
 class LaserSample:
-    """Dry laser points in the pool frame: means over voxels (n, 3) m, and a sample of the points themselves (k, 3) m.
+    """Dry laser points in the pool frame: means over voxels (n, 3) m, and a sample of single points (k, 3) m.
 
-    Voxels are evenly dense, which a search wants, but biased where a face runs along their sides: each mean then lies
-    on its own side of the face. The pose itself comes from the points.
+    The search uses the means, because their density is even. They are biased if a face lies along the sides of voxels:
+    the points before and behind the face then have separate means. So the pose is estimated from the points.
     """
 
     voxel_means_m: Array
@@ -31,7 +31,7 @@ class LaserSample:
 
 @dataclass(frozen=True)
 class LaserPoses:
-    """Laser points with their poses in the pool frame: positions (n, 3), R (n, 3, 3); points_laser_m (n, 3)."""
+    """Laser points with poses of the body in the pool frame: positions (n, 3), R (n, 3, 3); points_laser_m (n, 3)."""
 
     positions_m: Array
     R_pool_from_body: Array
@@ -40,7 +40,7 @@ class LaserPoses:
 
 @dataclass(frozen=True)
 class SoundingSample:
-    """Soundings with their poses in the target frame: positions (n, 3), R (n, 3, 3); points_mbes_m (n, 3)."""
+    """Soundings with poses of the body in the target frame: positions (n, 3), R (n, 3, 3); points_mbes_m (n, 3)."""
 
     positions_m: Array
     R_target_from_body: Array
@@ -48,7 +48,7 @@ class SoundingSample:
 
 
 def laser_sample(laser_pool: Stream, count: float, lowest_m: float) -> LaserSample:
-    """Return at most about two million laser points as voxels, and at most about fifty thousand as they are.
+    """Return the voxel means of about two million laser points, and about fifty thousand single points, at most.
 
     Parameters
     ----------
@@ -71,13 +71,13 @@ def laser_sample(laser_pool: Stream, count: float, lowest_m: float) -> LaserSamp
 
 def _voxels_and_points(batch: Batch, count: float, lowest_m: float) -> tuple[Voxels, Array]:
     sample = sample_rows(batch, count / LASER_SAMPLE)
-    singles = sample_rows(sample, count / RAW_SAMPLE)  # the same hash: a part of these
+    singles = sample_rows(sample, count / RAW_SAMPLE)  # chosen by the same hash: a part of the sample
     voxels = voxel_sums(points_above(sample, "pool_m", lowest_m), VOXEL_M)
     return voxels, points_above(singles, "pool_m", lowest_m)
 
 
 def laser_poses(laser_pool: Stream, count: float, lowest_m: float, trajectory: Trajectory) -> LaserPoses:
-    """Return at most about fifty thousand of the points in the scanner's frame, with their poses.
+    """Return about fifty thousand laser points at most, in the scanner's frame, with the poses of the body.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _points_of_scanner(batch: Batch, one_in: float, lowest_m: float) -> tuple[ND
 
 
 def sounding_sample(soundings_pool: Stream, count: float, trajectory: Trajectory) -> SoundingSample:
-    """Return about eight thousand soundings with their poses.
+    """Return about eight thousand soundings at most, in the mbes frame, with the poses of the body.
 
     Parameters
     ----------

@@ -20,23 +20,23 @@ class LocatedTarget:
     Parameters
     ----------
     frame
-        Rotation from the pool frame, and the origin in it.
+        Rotation from the pool frame into the target frame, and the target's origin in the pool frame.
     azimuth_correction_rad
-        Turn from the configured azimuth, clockwise.
+        True azimuth minus the configured one, clockwise.
     pose
         Fit of the azimuth and the origin.
     tilt
-        Fit of a rotation and a shift of the points at that pose.
+        Fit of a small rotation and a shift of the points, starting from that pose.
     agreement_m2, rival_agreement_m2
-        Area explained by this pose, and by the best rival.
+        Area on which points and faces agree, with this pose and with the best rival.
     rival
         Name of the best rival.
     ambiguous
-        The rival explains nearly as much.
+        Whether the rival agrees nearly as well, or better.
     gate_m
         Distance from a face up to which points are labelled.
     within
-        The pose lies within the limits of the search.
+        Whether the pose lies within the limits of the search.
     pose_sigmas
         A-priori sigmas (4,) of the azimuth (rad) and the origin (m).
     """
@@ -67,11 +67,11 @@ class ProvisionalMount:
     gate_m
         Distance from a face up to which points are labelled.
     score, rival_score
-        Quality of this mount, and of the best other one.
+        Quality of this mount, and of the best rival.
     ambiguous
-        The other one is nearly as good.
+        Whether the rival is nearly as good.
     within
-        The correction lies within the limits of the search.
+        Whether the correction lies within the limits of the search.
     """
 
     rotation_vector_rad: Array

@@ -17,9 +17,9 @@ def beams_in_target(
     points_mbes_m: Array,
     mbes: SonarBeams,
 ) -> TargetBeams:
-    """Return the rays and half widths of soundings; beams stray by three sigmas of their angle.
+    """Return the rays and half widths of soundings. Their beams may stray by three sigmas of the angle.
 
-    A beam at its margin that strays over an edge gives the mean of what its parts meet.
+    If a beam strays over an edge, its range is a mean over all surfaces that it meets.
 
     Parameters
     ----------

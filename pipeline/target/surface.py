@@ -1,4 +1,7 @@
-"""Nearest points on a surface, and what it hides: the only importer of open3d beside the simulator's ray caster."""
+"""Nearest points on a target's surface, and the rays that meet it.
+
+Only this module and the simulator's ray caster import open3d.
+"""
 
 from typing import Any
 
@@ -8,17 +11,17 @@ from numpy.typing import NDArray
 from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
-THREADS = 2  # each point is looked up by itself: the answer does not depend on it
+THREADS = 2  # points are independent of each other, so the number does not change the result
 
 
 class ClosestSurface:
-    """Nearest point of a target model's faces; calls return points (n, 3) m and face numbers (n,).
+    """Finder of the nearest points on a target model's faces. A call returns points (n, 3) m and face numbers (n,).
 
-    Single precision (micrometres within tens of metres): for searching and labelling, never for a result.
+    It works in single precision (micrometres within tens of metres). It serves searches and labels, never a result.
     """
 
     def __init__(self, model: TargetModel) -> None:
-        import open3d  # half a second: only where needed
+        import open3d  # the import takes half a second
 
         o3d: Any = open3d
         vertices, triangles = model.triangles()
@@ -29,11 +32,11 @@ class ClosestSurface:
         self._model = model
 
     def __reduce__(self) -> tuple[type, tuple[TargetModel]]:
-        """Return how workers make it: the scene is built anew there."""
+        """Return the constructor and its argument for pickle: a worker builds the scene anew."""
         return ClosestSurface, (self._model,)
 
     def around(self, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
-        """Return which points (n, 3) m can be within reach of the surface at all: those in its box, so much larger."""
+        """Return a mask (n,): true for points (n, 3) m in the surface's box, enlarged by ``reach_m`` on each side."""
         low, high = self._model.bounds()
         return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=1))
 
@@ -44,28 +47,28 @@ class ClosestSurface:
         return answer["points"].numpy().astype(np.float64), self._face_of_triangle[triangles]
 
     def ranges(self, origins_m: Array, directions: Array) -> Array:
-        """Return how far along unit rays (n, 3) the surface is, (n,) m; infinite where they miss it."""
+        """Return the distances (n,) m to the surface along unit rays (n, 3); infinite for rays that miss it."""
         rays = np.hstack([origins_m, directions]).astype(np.float32)
         return np.asarray(self._cast(rays)["t_hit"].numpy(), dtype=np.float64)
 
     def first_met(self, origins_m: Array, directions: Array) -> NDArray[np.int64]:
-        """Return the number of the face that each ray (n, 3) meets first; -1 where it meets none."""
+        """Return the number (n,) of the face that each ray (n, 3) meets first; -1 for rays that meet none."""
         rays = np.hstack([origins_m, directions]).astype(np.float32)
         triangle = self._cast(rays)["primitive_ids"].numpy().astype(np.int64)
         missed = triangle >= len(self._face_of_triangle)
         return np.where(missed, -1, self._face_of_triangle[np.where(missed, 0, triangle)])
 
     def hides(self, origins_m: Array, points_m: Array, spare_m: float) -> NDArray[np.bool_]:
-        """Return which points (n,) lie behind the surface.
+        """Return a mask (n,): true for points behind the surface.
 
         Parameters
         ----------
         origins_m
-            Where each point is seen from (n, 3), target frame.
+            Positions (n, 3) m of the sensor, target frame.
         points_m
-            Points (n, 3), target frame.
+            Points (n, 3) m, target frame.
         spare_m
-            A point counts that lies farther than this behind the surface, along its ray.
+            A point is behind the surface if it lies farther than this (m) behind it, along its ray.
         """
         away = points_m - origins_m
         rays = np.hstack([origins_m, away]).astype(np.float32)

@@ -1,1 +1,1 @@
-"""Every table that a stage writes, two stages a module: owner, name, columns, units."""
+"""Descriptions of all tables and streams: owner, name, columns, units. Each module has the tables of two stages."""

@@ -1,4 +1,4 @@
-"""Tables of stages ingest and georeference: what was recorded, and where it lies in the pool."""
+"""Tables of stages ingest and georeference: the recorded data, and the points in the pool frame."""
 
 # fmt: off: the tables are laid out by hand
 from pipeline.artefacts.columns import (

@@ -1,4 +1,4 @@
-"""Tables of stages adjust and report: the rigorous solution and the answer."""
+"""Tables of stages adjust and report: the adjustment, and the calibration with its documents."""
 
 # fmt: off: the tables are laid out by hand
 from pipeline.artefacts.columns import (

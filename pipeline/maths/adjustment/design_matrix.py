@@ -1,7 +1,9 @@
-"""The design matrix: from points to observations v, and how these depend on each parameter.
+"""The design matrix: from points to observations v, and the derivatives of v by each parameter.
 
-A row of the design matrix is made in two parts. What belongs to the point (its sigma, its *features* q) is taken point
-by point; what belongs to the interval between two INS records (C, K) is taken once for all its points.
+A row of the design matrix, the derivatives of one v by all parameters, is the product q · C. The *features*
+q = (1, α, β, …) (F,) belong to the point: a constant, its coordinates along the surface, and further numbers. The
+*interval design* C (F, m) belongs to the interval between two INS records and is computed once for all its points, as
+is K, the design of pose errors.
 
 **A point.** All vectors have components along the surface's own axes t1, t2, n. With the range ρ, the ray's unit vector
 d and, for the sonar, a = ∂d/∂θ across the receive beam (:mod:`pipeline.maths.sonar.soundings`), a point's covariance is
@@ -9,40 +11,40 @@ d and, for the sonar, a = ∂d/∂θ across the receive beam (:mod:`pipeline.mat
     laser:   σ_ρ² d dᵀ + ρ² σ_a² (1 - d dᵀ)
     sonar:   σ_ρ² d dᵀ + ρ² σ_θ² a aᵀ
 
-(along track the sonar does not measure), and the variance of v is σ² = nᵀ Σ n. The footprint enters through the labels
-(no edge within it) and through the variance factor: on one plane the phase detection takes the beam's axis.
+(the sonar does not measure along track), and the variance of v is σ² = nᵀ Σ n. The footprint enters through the labels
+(no edge within it) and through the variance factor: on one plane the phase detection measures the beam's axis.
 
-The design is taken at the adjusted point, not at the measured one. Noise moves the point along the surface as well, so
-v and α, β are correlated, and Σ w α v would be off by σ_ρ² (n · d)(t1 · d) a point (errors in variables): where the
-points of an interval spread over decimetres, that turns the heading by hundredths of a degree. The *slopes* are the
-changes of each feature with e, the sensor's part in v (see :func:`sensor_noise`); feature - slope · e is uncorrelated
-with the sensor's noise in v.
+The design is computed at the adjusted point, not at the measured one. Noise moves the point along the surface as well.
+So v and α, β are correlated, and Σ w α v would be off by σ_ρ² (n · d)(t1 · d) per point (errors in variables). If the
+points of an interval spread over decimetres only, that turns the heading by hundredths of a degree. The *slopes* are
+the changes of each feature with e, the sensor's noise in v (see :func:`sensor_noise`); feature - slope · e is
+uncorrelated with e.
 
 * Laser: range and angles are measured, and the least squares correction of a point is -Σ n e / (nᵀ Σ n)
-  (Gauss-Helmert): the slopes of α and β are t_k · Σ n / (nᵀ Σ n).
-* Sonar: the recorded angle is not measured but intended: a beam is formed at it, and its true axis strays (the second
-  model of errors in variables, Berkson's). A beam is expected where its *recorded* ray meets the surface; so all of e
-  is taken back along the ray, d e / (n · d). The labels choose points in the same way; with the laser's correction
-  points chosen so turn a grazed face by 0.2°. (And without any correction 20 000 soundings at one distance find the
-  sound speed wrong by 0.1 %, at five sigmas.)
+  (Gauss-Helmert). So the slopes of α and β are t_k · Σ n / (nᵀ Σ n).
+* Sonar: the recorded angle is not measured. It is the angle at which the beam is formed, and the beam's true axis
+  strays from it (Berkson's model of errors in variables). The expected point is the intersection of the *recorded* ray
+  with the surface. So all of e is corrected along the ray, d e / (n · d). The labels choose points in the same way;
+  with the laser's correction these points would turn a grazed face by 0.2°. (Without any correction 20 000 soundings at
+  one distance give a sound speed that is wrong by 0.1 %, five sigmas.)
 
-Two effects of the sonar's angle are of second order, and yet a fifth of the sigma of roll, for no number of soundings
-averages them away. (1) A stray axis meets the surface further away on average: with t = (n · a) / (n · d) the range of
-an axis off by δ is ρ (1 - t δ + (1/2 + t²) δ²), so that the *mean* is E v = (n · d) ρ σ_θ² (1/2 + t²). This holds for
-∂²d/∂θ² = -d; for a tilted fan, p = sin τ, it is -d + k, k = (0, p, p² (1 - p²) / c³), and E v is less by
-ρ σ_θ² (n · k) / 2. (2) ρ in σ must not be the measured range: a range too long would get the smaller weight. It is the
-range of the recorded ray to the surface, ρ - v / (n · d).
+Two effects of the sonar's angle are of second order. They still reach a fifth of the sigma of roll, because more
+soundings do not average them out. (1) A stray axis meets the surface further away on average. With
+t = (n · a) / (n · d) the range of an axis off by δ is ρ (1 - t δ + (1/2 + t²) δ²), so that the *mean* is
+E v = (n · d) ρ σ_θ² (1/2 + t²). This holds for ∂²d/∂θ² = -d. For a tilted fan, p = sin τ, that derivative is -d + k,
+k = (0, p, p² (1 - p²) / c³), and E v is less by ρ σ_θ² (n · k) / 2. (2) ρ in σ must not be the measured range, because
+a range too long would get a smaller weight. It is the range of the recorded ray to the surface, ρ - v / (n · d).
 
-Further features. A range b added to every range: n · d. For the sonar, sound speed higher by the share k: ranges grow
-by k, and so do sin θ and sin τ, for the beams of flat arrays are steered with the recorded speed; with (x, y, z) =
-ρ (s, p, -c) and c² = 1 - s² - p² the point moves by k (2 x, 2 y, z - (x² + y²) / z). For the gradient
-g = dc/d(depth), c the speed measured at the head: with D = -d_z s the depth below the head, ds/dt = c + g D makes the
-path longer by -g d_z ρ² / 2c, and the ray bends away from the faster water, d(d)/ds = (g / c)(e_z - d_z d), so that the
-point moves by (g ρ² / 2c)(e_z - 2 d_z d), first order in g.
+Further features. A range b added to every range has the feature n · d. For the sonar, a sound speed higher by the share
+k makes the ranges longer by k, and likewise sin θ and sin τ, because flat arrays steer their beams with the recorded
+speed. With (x, y, z) = ρ (s, p, -c) and c² = 1 - s² - p² the point moves by k (2 x, 2 y, z - (x² + y²) / z). For the
+gradient g = dc/d(depth), c is the speed measured at the head. With D = -d_z s the depth below the head, ds/dt = c + g D
+makes the path longer by -g d_z ρ² / 2c. The ray bends away from the faster water, d(d)/ds = (g / c)(e_z - d_z d), so
+that the point moves by (g ρ² / 2c)(e_z - 2 d_z d), first order in g.
 
-**An interval.** With q = (1, α, β, …), α = t1 · r, β = t2 · r, every derivative of v = n · (X - c) - shift is q · (a
-column of C or K), and the column is the same for the whole interval (:mod:`pipeline.maths.adjustment.interval_sums`).
-With the body at p, T = R_target_from_body, its velocity (ṗ, ω) in the target frame and the sensor's lever arm l:
+**An interval.** With q = (1, α, β, …), α = t1 · r, β = t2 · r, every derivative of v = n · (X - c) - shift is q times a
+column of C or K. The column is the same for the whole interval (:mod:`pipeline.maths.adjustment.interval_sums`). With
+the body at p, T = R_target_from_body, its velocity (ṗ, ω) in the target frame and the sensor's lever arm l:
 
     pose error, target frame:  δ: n · δ                        ω: ω · (r × n) = β (t1 · ω) - α (t2 · ω)
     lever arm λ, body axes:    Tᵀ n
@@ -53,7 +55,7 @@ With the body at p, T = R_target_from_body, its velocity (ṗ, ω) in the target
     its shift:                 -1
     further features:          each is a derivative itself
 
-X - c is not reduced by a horizontal face's height here: the reduction runs along n, and t_k · n = 0.
+The turns need no reduction of X - c by a horizontal face's height: the reduction is along n, and t_k · n = 0.
 """
 
 from collections.abc import Sequence
@@ -71,10 +73,10 @@ from pipeline.maths.sonar.soundings import across_beam
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SPEED_M_S = 1480.0  # of sound, where only the size of a small effect depends on it
-FLATTEST = 0.05  # n · d: 3°, flatter than any ray that is used, once the mount is nearly right
-STEEPEST = 0.02  # c: flatter beams are not steered by their sines
-FLATTEST_FAN = 0.25  # c: 15° from the array's plane
+SPEED_M_S = 1480.0  # sound speed for the gradient's feature: a nominal value, as the effect is small
+FLATTEST = 0.05  # smallest |n · d|, 3°: flatter than any labelled ray, once the mount is nearly right
+STEEPEST = 0.02  # smallest |c| for the feature of the sound speed, which divides by c
+FLATTEST_FAN = 0.25  # smallest |c| for the curvature of a tilted fan: 15° from the array's plane
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class SensorSigmas:
 
 
 class PointDesign(NamedTuple):
-    """Design of n points: mean of v and its sigma (n,) m, features (F, n), slopes (F - 1, n) of all but the first."""
+    """Design of n points: mean and sigma (n,) m of v, features q (F, n), slopes (F - 1, n) of all except the first."""
 
     mean_m: Array
     sigma_m: Array
@@ -96,6 +98,10 @@ class PointDesign(NamedTuple):
 
 def laser_point_design(r: Array, lever_arm: Array, range_m: Array, sigmas: SensorSigmas) -> PointDesign:
     """Return the design of laser points, F = 4.
+
+    A row of the design matrix is q · C: a point's features q times its interval's design C of
+    :func:`parameter_design`. A feature is a number of the point that multiplies a row of C. For the laser the features
+    are q = (1, α, β, n · d): constant, coordinates along the surface (m), and derivative of v by the range.
 
     Parameters
     ----------
@@ -122,9 +128,9 @@ def laser_point_design(r: Array, lever_arm: Array, range_m: Array, sigmas: Senso
 class SoundingsOnSurface:
     """Soundings of one surface.
 
-    points_m (3, n), in the sonar's frame; axes (3, 3, n): the surface's t1, t2, n, (axis k, component i, point n) in
-    the sonar's frame; up (3, n): the target frame's z, in the sonar's frame; r (3, n): from the body to the points, m,
-    surface axes; v_m (n,): distances from the surface.
+    points_m (3, n), in the sonar's frame; axes (3, 3, n): the surface's t1, t2, n (axis k, component i, point n) in the
+    sonar's frame; up (3, n): the target frame's z axis, in the sonar's frame; r (3, n): vectors from the body to the
+    points, m, surface axes; v_m (n,): distances from the surface.
     """
 
     points_m: Array
@@ -135,7 +141,12 @@ class SoundingsOnSurface:
 
 
 def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> PointDesign:
-    """Return the design of soundings, F = 6; see the module's docstring for each formula."""
+    """Return the design of soundings, F = 6; see the module's docstring for each formula.
+
+    A row of the design matrix is q · C: a sounding's features q times its interval's design C of
+    :func:`parameter_design`. A feature is a number of the sounding that multiplies a row of C. The six are
+    q = (1, α, β, n · d, derivative of v by the sound speed's relative change, and by its gradient).
+    """
     points_m, axes, r = soundings.points_m, soundings.axes, soundings.r
     x, y, z = points_m
     range_m = np.sqrt(np.einsum("in,in->n", points_m, points_m))
@@ -163,10 +174,10 @@ def _curvature(normal: Array, p: Array, c: Array) -> Array:
 
 
 def sensor_noise(v_m: Array, weight: Array, intervals: Runs, common_m: Array) -> Array:
-    """Return e (n,), the sensor's own noise in v; the rest of v is common to an interval.
+    """Return e (n,), the sensor's own noise in v; the rest of v is common to the points of an interval.
 
     With v = e + w, w ~ N(0, s²) common to the interval, the best linear estimate of w is λ v̄ with v̄ = Σ p v / Σ p and
-    λ = s² / (s² + 1 / Σ p). Taking all of v for the sensor's would move α with w and turn the heading again, in the
+    λ = s² / (s² + 1 / Σ p). If e were all of v, the correction would move α with w and turn the heading again, in the
     opposite sense: by 0.4 sigma at 2 mm.
 
     Parameters
@@ -178,7 +189,7 @@ def sensor_noise(v_m: Array, weight: Array, intervals: Runs, common_m: Array) ->
     intervals : Runs
         The points of each interval.
     common_m : (n,) array
-        s, from the INS's white noise.
+        Standard deviations s, from the INS's white noise.
     """
     p = intervals.total(weight)
     mean = np.divide(intervals.total(weight * v_m), p, out=np.zeros_like(p), where=p > 0)
@@ -202,7 +213,7 @@ class BodyPoses:
 class SensorOnSurface:
     """One sensor's observations of one surface.
 
-    lever_arm_m (3,), body axes; surface: its number; features: their number F.
+    lever_arm_m (3,), body axes; surface: number of the surface; features: number F of features.
     """
 
     sensor: str
@@ -212,7 +223,7 @@ class SensorOnSurface:
 
 
 def pose_design(surfaces: Sequence[ObservedSurface], surface: Integers) -> Array:
-    """Return the design K (g, 3, 6) of pose errors (δ, ω) by the first three features, for surface numbers (g,)."""
+    """Return the design K (g, 3, 6) of pose errors (δ, ω), a row for each of 1, α, β, by surface number (g,)."""
     blocks = np.zeros((len(surfaces), N_MOVED, N_POSE))
     for block, plane in zip(blocks, surfaces, strict=True):
         first, second = plane.tangents
@@ -221,7 +232,10 @@ def pose_design(surfaces: Sequence[ObservedSurface], surface: Integers) -> Array
 
 
 def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) -> Array:
-    """Return the design C (g, F, m) of the parameters :meth:`State.columns`.
+    """Return the interval design C (g, F, m) of the parameters :meth:`State.columns`.
+
+    A row of the design matrix is q · C, the point's features q times this design. A feature is a number of the point
+    (1, α, β, n · d, …) that multiplies a row of C.
 
     Parameters
     ----------
@@ -246,7 +260,7 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     design[:, 0, turn] = -np.einsum("gij,gi->gj", T, np.cross(T @ observed.lever_arm_m, plane.normal))
     design[:, 1, turn], design[:, 2, turn] = -(second @ T), first @ T
     design[:, 0, arm] = plane.normal @ T
-    # latency, and what has a feature of its own
+    # latency, and parameters with a feature of their own
     latency = N_SURFACE + N_MOUNT
     design[:, :N_MOVED, latency] = -poses.rates @ pose_design([plane], np.zeros(1, dtype=np.int64))[0].T
     for further in range(observed.features - N_MOVED):

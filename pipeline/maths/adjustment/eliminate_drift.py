@@ -1,8 +1,8 @@
-"""Drift of the INS, eliminated knot by knot: what is left are the normal equations of the parameters alone.
+"""Drift of the INS, eliminated knot by knot; the normal equations of the parameters alone remain.
 
-With the records' white noise eliminated, the normal equations are an arrow: knots banded, the parameters x its border.
-Banded Cholesky (LAPACK pbtrf) eliminates the knots; the Schur complement on x is its inverse covariance with all pose
-errors unknown, and the knots follow from x. See :mod:`pipeline.maths.adjustment.pose_errors` for the prior.
+With the records' white noise eliminated, the normal matrix has arrow form: the knots are a band, the parameters x its
+border. Banded Cholesky (LAPACK pbtrf) eliminates the knots. The Schur complement of x is the inverse covariance of x
+with all pose errors unknown; the knots follow from x. Prior: :mod:`pipeline.maths.adjustment.pose_errors`.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class NormalEquations:
     """Normal equations N x + b = 0 of the parameters, all pose errors eliminated.
 
-    normal N (u, u), right b (u,); squares = Σ p v² left of the observations and of the drift's prior at x = 0;
+    normal N (u, u), right b (u,); squares: remaining Σ p v² of the observations and of the drift's prior at x = 0;
     log_determinant of all eliminated blocks. The knots' step follows from x: knots_at_zero - knots_by_parameter · x,
     (k, 6) and (k, 6, u).
     """
@@ -41,8 +41,8 @@ class NormalEquations:
 def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEstimate) -> NormalEquations:
     """Return the normal equations with the knots eliminated under their prior.
 
-    In units of σ the prior is Σ_j |ξ_{j+1} - φ ξ_j|² / (1 - φ²) + |ξ_0|². Components without drift (σ = 0) stay as they
-    are.
+    In units of σ the prior is Σ_j |ξ_{j+1} - φ ξ_j|² / (1 - φ²) + |ξ_0|². Components without drift (σ = 0) get no
+    step.
 
     Parameters
     ----------
@@ -58,30 +58,31 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
     scale = noise.drift
     before, after = slice(u, u + N_POSE), slice(u + N_POSE, u + 2 * N_POSE)
     sides = [*range(u), u + 2 * N_POSE]  # x and v
-    own, ahead = np.zeros((count, N_POSE, N_POSE)), reduced.normal[:, before, after] * scale[:, None] * scale
+    # blocks of the normal matrix: each knot with itself (diagonal), with the next (coupling), with x and v (border)
+    diagonal, coupling = np.zeros((count, N_POSE, N_POSE)), reduced.normal[:, before, after] * scale[:, None] * scale
     border = np.zeros((count, N_POSE, u + 1))
     for place, of in ((slice(0, -1), before), (slice(1, None), after)):
-        own[place] += reduced.normal[:, of, of]
+        diagonal[place] += reduced.normal[:, of, of]
         border[place] += reduced.normal[:, of][:, :, sides]
-    own, border = own * scale[:, None] * scale, border * scale[:, None]
+    diagonal, border = diagonal * scale[:, None] * scale, border * scale[:, None]
     phi = np.exp(-np.diff(knots.seconds) / noise.time_constant_s)
     variance = 1 - phi**2
     unit = np.eye(N_POSE)
-    own[0] += unit
-    own[:-1] += (phi**2 / variance)[:, None, None] * unit
-    own[1:] += (1 / variance)[:, None, None] * unit
-    ahead -= (phi / variance)[:, None, None] * unit
-    value = np.divide(current, scale, out=np.zeros_like(current), where=scale > 0)
-    change = value[1:] - phi[:, None] * value[:-1]
-    shock = change / variance[:, None]
-    border[0, :, u] += value[0]
-    border[1:, :, u] += shock
-    border[:-1, :, u] -= phi[:, None] * shock
-    factor = cholesky_banded(_banded(own, ahead), lower=True)
+    diagonal[0] += unit
+    diagonal[:-1] += (phi**2 / variance)[:, None, None] * unit
+    diagonal[1:] += (1 / variance)[:, None, None] * unit
+    coupling -= (phi / variance)[:, None, None] * unit
+    xi = np.divide(current, scale, out=np.zeros_like(current), where=scale > 0)  # the drift in units of σ
+    innovation = xi[1:] - phi[:, None] * xi[:-1]  # part of the drift that does not follow from the knot before
+    weighted = innovation / variance[:, None]  # innovation times its weight
+    border[0, :, u] += xi[0]
+    border[1:, :, u] += weighted
+    border[:-1, :, u] -= phi[:, None] * weighted
+    factor = cholesky_banded(_banded(diagonal, coupling), lower=True)
     flat = border.reshape(-1, u + 1)
     solved = cho_solve_banded((factor, True), flat)
     total = reduced.normal[:, sides][:, :, sides].sum(axis=0)
-    total[u, u] += float(np.sum(value[0] ** 2) + np.sum(change * shock))
+    total[u, u] += float(np.sum(xi[0] ** 2) + np.sum(innovation * weighted))
     total -= flat.T @ solved
     log_determinant = 2 * float(np.sum(np.log(factor[0]))) + N_POSE * float(np.sum(np.log(variance)))
     back = solved.reshape(count, N_POSE, u + 1) * scale[:, None]
@@ -95,13 +96,13 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
     )
 
 
-def _banded(own: Array, ahead: Array) -> Array:
-    """Return the lower band (12, 6k) of the matrix with these blocks on and right above its diagonal."""
-    count = len(own)
+def _banded(diagonal: Array, coupling: Array) -> Array:
+    """Return the lower band (12, 6k) of the symmetric matrix with these blocks on and next to its diagonal."""
+    count = len(diagonal)
     band = np.zeros((2 * N_POSE, N_POSE * count))
     for row in range(N_POSE):
         for column in range(N_POSE):
             if row >= column:
-                band[row - column, column::N_POSE] = own[:, row, column]
-            band[N_POSE + row - column, column : N_POSE * (count - 1) : N_POSE] = ahead[:, column, row]
+                band[row - column, column::N_POSE] = diagonal[:, row, column]
+            band[N_POSE + row - column, column : N_POSE * (count - 1) : N_POSE] = coupling[:, column, row]
     return band

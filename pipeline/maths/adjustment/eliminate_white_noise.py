@@ -1,12 +1,12 @@
 """White noise of the INS's records, eliminated from the normal equations interval by interval.
 
-Knots lie at records. Within a span between two knots the noise w_k of its records forms a chain: each interval between
-two records touches two neighbours. They are eliminated one after the other (block Thomas), all spans side by side; what
-is left, the Schur complement, touches the parameters x and the span's two knots. The record at a knot counts as two,
-one in each span: one record in a hundred.
+Knots (of the drift) lie at records. Within a span between two knots the noise w_k of the records forms a chain, because
+each interval between two records depends on two neighbours only. The records are eliminated one after the other (block
+Thomas), all spans side by side. The Schur complement, which remains, depends on the parameters x and the span's two
+knots. The record at a knot counts as two, one in each span: one record in a hundred.
 
-The observed value v stands in as a last column: of the normal equations' matrix [A v]ᵀ P [A v] every Schur complement
-carries along the right side and Σ p v², as what is left of it by least squares.
+The observed value v is a last column. So every Schur complement of the matrix [A v]ᵀ P [A v] contains the right side of
+the normal equations too, and the Σ p v² that remains after least squares.
 
     v = A x + B w,  w ~ N(0, I) after scaling:    -2 log L = vᵀ V⁻¹ v + log det V + const,   V = P⁻¹ + B Bᵀ,
     vᵀ V⁻¹ v the last element's Schur complement, log det V = log det P⁻¹ + Σ log det of the eliminated blocks.
@@ -24,14 +24,15 @@ from pipeline.maths.adjustment.pose_errors import N_POSE, Knots
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SIDE_BY_SIDE = 64  # spans between knots
+SIDE_BY_SIDE = 64  # number of spans that are eliminated together
 
 
 @dataclass(frozen=True)
 class LinearisedIntervals:
     """Intervals of one sensor on one surface, with their designs.
 
-    sums of g intervals; design C (g, F, m) of the parameters ``columns`` (m,); pose K (3, 6): design of pose errors.
+    sums: those of g intervals; design C (g, F, m) of the parameters ``columns`` (m,); pose K (3, 6): design of pose
+    errors.
     """
 
     sums: IntervalSums
@@ -45,11 +46,11 @@ class IntervalSource(Protocol):
 
     @property
     def record(self) -> Integers:
-        """Last INS record before each interval's points."""
+        """Return the last INS record (g,) before each interval's points."""
         ...
 
     def linearised(self, rows: slice) -> LinearisedIntervals:
-        """Return some of the intervals; their designs are made late, for all together are many times the sums."""
+        """Return the intervals in these rows; all designs at once would need many times the memory of the sums."""
         ...
 
 
@@ -65,7 +66,7 @@ class TimeAxis:
 class ReducedIntervals:
     """Normal equations of each span between two knots, without the records' noise.
 
-    normal (j, u + 13, u + 13) of x, the knots before and after, and v; log det of the eliminated blocks.
+    normal (j, u + 13, u + 13) of x, the knots before and after, and v; log_determinant of the eliminated blocks.
     """
 
     normal: Array
@@ -108,10 +109,10 @@ def eliminate_white_noise(
 
 @dataclass(frozen=True)
 class _RecordChain:
-    """Spans side by side (j), their records one after another (l); y = (x, knot before, knot after, v).
+    """Normal equations of spans side by side (j) and their records in order (l); y = (x, knot before, knot after, v).
 
-    normal (j, y, y); own (j, l, 6, 6): a record's own block, ahead (j, l, 6, 6): with its successor, border
-    (j, l, 6, y): with y.
+    normal (j, y, y); blocks of a record: own (j, l, 6, 6): with itself, ahead (j, l, 6, 6): with the next record,
+    border (j, l, 6, y): with y.
     """
 
     first: int
@@ -135,13 +136,13 @@ class _RecordChain:
         )
 
     def add(self, intervals: LinearisedIntervals, span: Integers, times: TimeAxis) -> None:
-        """Add intervals of one sensor and surface, so that no record comes twice, each in its span (g,)."""
+        """Add intervals of one sensor on one surface, in which no record comes twice; span (g,): number of the span."""
         sums, K = intervals.sums, intervals.pose
         width = self.normal.shape[1]
         columns = np.concatenate([intervals.columns, np.arange(width - 2 * N_POSE - 1, width)])
         whole = _with_knots(intervals, span, times)
         normal, right = sums.normal, sums.right[:, :, None]
-        by_feature = np.concatenate([normal @ whole, right], axis=2)  # of features and (x, knots, v)
+        by_feature = np.concatenate([normal @ whole, right], axis=2)  # features by (x, knots, v)
         by_unknown = np.swapaxes(whole, 1, 2)
         of_v = np.concatenate([by_unknown @ right, sums.squares[:, None, None]], axis=1)
         square = np.concatenate([by_unknown @ by_feature[:, :, :-1], np.swapaxes(of_v[:, :-1], 1, 2)], axis=1)
@@ -160,19 +161,19 @@ class _RecordChain:
             part.reshape(count * length, N_POSE, -1) for part in (self.own, self.ahead, self.border)
         )
         for offset, border, own in (
-            (0, sooner, normal[:, :N_MOVED, :N_MOVED] - 2 * swept + twice),  # of (1 - s)²
-            (1, later, twice),  # of s²
+            (0, sooner, normal[:, :N_MOVED, :N_MOVED] - 2 * swept + twice),  # sums with 1 - s and (1 - s)²
+            (1, later, twice),  # sums with s and s²
         ):
             own_line[place + offset] += KT @ own @ K
             spread = np.zeros((len(place), N_POSE, width))
             spread[:, :, columns] = KT @ border
             border_line[place + offset] += spread
-        ahead_line[place] += KT @ (swept - twice) @ K  # of (1 - s) s
+        ahead_line[place] += KT @ (swept - twice) @ K  # sums with (1 - s) s
 
     def eliminate(self, white: Array) -> float:
-        """Take the records out of ``normal``, and return log det of their blocks.
+        """Eliminate the records from ``normal``, and return log det of their blocks.
 
-        With w = √W u, u ~ N(0, 1), the prior is the unit matrix, and W = 0 no exception.
+        With w = √W u, u ~ N(0, 1), the prior is the unit matrix, and W = 0 needs no exception.
         """
         both, log_determinant = white[:, None] * white, 0.0
         carried_own: Array | None = None

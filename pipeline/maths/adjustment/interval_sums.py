@@ -1,4 +1,4 @@
-"""Sums over what one sensor sees of one surface between two INS records (an *interval*): all that a solution needs.
+"""Sums over one sensor's points on one surface between two INS records (an *interval*): a solution needs no more.
 
 Between two records the body moves along one straight step, and all points of an interval (a ping's beams on the wall,
 some hundred laser points on a block) are seen from one pose p, T = R_target_from_body. With r = X - p the vector from
@@ -9,16 +9,16 @@ changes
     with the mount (ε, λ), body axes:                ε · Tᵀ((r - T l) × n) + λ · Tᵀ n
     with the surface's turns and shift:              (α + t1 · (p - c), β + t2 · (p - c), -1)
 
-all linear in q = (1, α, β) with coefficients that are the same for the whole interval (t1 × t2 = n; a part of r along n
-does not count). What does not follow from these (an error of the ranges, of the sound speed) brings a feature of its
-own: q = (1, α, β, …), F in all. So Σ w q qᵀ (F, F), Σ w q v (F,) and Σ w v² hold the normal equations of every
-parameter, whatever the number of points: a stream is read once for each linearisation.
+All are linear in q = (1, α, β), with coefficients that are the same for the whole interval (t1 × t2 = n; the part of r
+along n cancels). Other effects (an error of the ranges, of the sound speed) have features of their own:
+q = (1, α, β, …), F in all. So Σ w q qᵀ (F, F), Σ w q v (F,) and Σ w v² contain the normal equations of every parameter,
+whatever the number of points, and a stream is read once for each linearisation.
 
-Within the step the error of the pose goes from that of one record to that of the next, (1 - s) e_k + s e_{k+1}. A
-scanner's line meets a wall from top to bottom in that time, so that s goes with β, and 2 mm of white noise between two
-records turn the wall by 0.02° in this interval: sums with s and s² are needed as well, for the three features that a
-pose error moves. (With the mean of s in their stead the mean normalised squared error of the mount parameters rose from
-6-7 to 8.3.)
+Within the interval the error of the pose goes from one record's to the next's, (1 - s) e_k + s e_{k+1}. In that time a
+scanner's line crosses a wall from top to bottom, so that s grows with β, and 2 mm of white noise between two records
+turn the wall by 0.02° in this interval. So sums with s and s² are needed as well, for the three features on which a
+pose error acts. (With the mean of s instead, the mean normalised squared error of the mount parameters rose from 6-7 to
+8.3.)
 """
 
 from collections.abc import Iterable
@@ -29,15 +29,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-N_MOVED = 3  # 1, α, β: the features that a pose error moves
+N_MOVED = 3  # number of the features on which a pose error acts: 1, α, β
 
 
 @dataclass(frozen=True)
 class IntervalSums:
     """Intervals of one sensor, ascending by record and surface.
 
-    record (g,): the last INS record before the interval's points; surface (g,). With q₃ the first three features and s
-    the place of a point between the two records:
+    record (g,): the last INS record before the interval's points; surface (g,): number of the surface. With q₃ the
+    first three features and s the time of a point between the two records, 0 to 1:
 
     normal (g, F, F) = Σ w q qᵀ, swept (g, 3, F) = Σ w s q₃ qᵀ, swept_twice (g, 3, 3) = Σ w s² q₃ q₃ᵀ,
     right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,): points with a weight.
@@ -58,18 +58,18 @@ class IntervalSums:
 
     @property
     def share(self) -> Array:
-        """Weighted mean of s of each interval (g,)."""
+        """Return the weighted mean of s in each interval (g,)."""
         return np.asarray(self.swept[:, 0, 0] / self.normal[:, 0, 0])
 
     def selected(self, rows: Integers) -> "IntervalSums":
-        """Return the intervals of these rows."""
+        """Return the intervals in these rows."""
         return IntervalSums(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
 
     def shifted(self, change: Array) -> "IntervalSums":
         """Return the sums of the same observations after v has changed by q · ``change`` (g, F).
 
-        The points need not be read again. This is exact but for the turn of q itself, which is of second order: 1e-3
-        rad of 10 m are 5 µm.
+        The points need not be read again. This is exact except for the turn of q itself, which is of second order: 1e-3
+        rad at 10 m are 5 µm.
         """
         shift = np.einsum("gij,gj->gi", self.normal, change)
         return replace(
@@ -82,9 +82,9 @@ class IntervalSums:
 
 @dataclass(frozen=True)
 class Runs:
-    """Points that follow one another and belong together: place of the first of each run (g,), and their number (g,).
+    """Runs of consecutive points that belong together: index of the first point, and number of points, (g,) each.
 
-    Sums over neighbours cost a quarter of sums by number (bincount), and what a run shares is spread, not looked up.
+    Sums over neighbours cost a quarter of sums by number (bincount). A run's value is repeated, not looked up.
     """
 
     starts: Integers
@@ -92,7 +92,7 @@ class Runs:
 
     @classmethod
     def of(cls, *keys: Integers) -> "Runs":
-        """Return the runs of equal keys, (n,) each."""
+        """Return the runs of points with equal keys, (n,) each."""
         n = len(keys[0])
         new = np.ones(n, dtype=bool)
         if n:
@@ -105,7 +105,7 @@ class Runs:
         return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
 
     def spread(self, values: Array) -> Array:
-        """Return for each point (…, n) the value (…, g) of its run."""
+        """Return the values (…, g) of the runs, repeated for each of their points (…, n)."""
         return np.asarray(np.repeat(values, self.lengths, axis=-1))
 
 
@@ -113,8 +113,8 @@ class Runs:
 class LinearisedPoints:
     """Points of one batch for :func:`interval_sums`.
 
-    record, surface (n,): the INS record before each point, and its surface; share (n,): its place s between that record
-    and the next; features (F, n): q; weight (n,): w; v_m (n,): distance from the surface.
+    record, surface (n,): the last INS record before each point, and its surface; share (n,): its time s between that
+    record and the next, 0 to 1; features (F, n): q; weight (n,): w; v_m (n,): distance from the surface.
     """
 
     record: Integers
@@ -126,7 +126,7 @@ class LinearisedPoints:
 
 
 def interval_sums(points: LinearisedPoints) -> IntervalSums:
-    """Return the sums of one batch; this is quickest where the points of an interval lie together."""
+    """Return the sums of one batch; this is quickest if the points of an interval are consecutive."""
     q, weight, v_m = points.features, points.weight, points.v_m
     runs = Runs.of(points.record, points.surface)
     features, intervals, total = len(q), len(runs.starts), runs.total

@@ -1,26 +1,27 @@
-"""Tests whether means of residuals exceed a tolerance, at a level that holds for all of them together.
+"""Tests whether means of residuals exceed a tolerance, at one level for all means together.
 
-No residual is free of systematic errors: of a target as it was built, of detection, of angles. With a million points
-they are significant long before they matter, so that a mean is compared with what is *tolerated*, τ. The hypothesis for
-a bin is |μ| ≤ τ of its true mean μ. With the mean M, its sigma s and ν degrees of freedom
+All residuals contain systematic errors: of the target as built, of detection, of angles. With a million points these
+errors are significant long before they matter. So a mean is compared with a *tolerance* τ. The hypothesis for a bin is
+|μ| ≤ τ, μ being its true mean. With the mean M, its sigma s and ν degrees of freedom
 
     t = max(0, |M| - τ) / s
 
-exceeds Student's quantile most often where |μ| = τ; there (|M| - τ) / s is Student's t with ν degrees of freedom, and
-the chance is half of the two-sided one (both halves where τ = 0). Inside it is less. So t is compared as if τ were
-zero.
+exceeds Student's quantile most often where |μ| = τ. There (|M| - τ) / s is Student's t with ν degrees of freedom, and
+the probability is half of the two-sided one (both halves where τ = 0). Where |μ| < τ it is less. So t is compared as if
+τ were zero.
 
-Bins have different ν. Each t becomes the normal deviate u that is exceeded as rarely (Wallace 1959, "Bounds on normal
-approximations to Student's and the chi-square distributions"; from ν = 8 on to 1 %, and never too large):
+Bins have different ν. Each t becomes the normal deviate u with the same probability of being exceeded (Wallace 1959,
+"Bounds on normal approximations to Student's and the chi-square distributions"; from ν = 8 on to 1 %, and never too
+large):
 
     u = (8 ν + 1) / (8 ν + 3) · root(ν ln(1 + t² / ν))
 
-so that bins can be ranked, and one limit serves them all. With m bins in all, tested one by one, each must have the
+so that bins can be ranked, and one limit serves all bins. With m bins in all, tested one by one, each must have the
 level p with 1 - (1 - p)^m = α (Šidák 1967, "Rectangular confidence regions for the means of multivariate normal
-distributions"): exact if they are independent, and an upper bound of the chance of a false alarm if they are not. They
-are not: the same points are sorted by face, by angle, by distance.
+distributions"). Then α is the probability of a false alarm if the bins are independent, and an upper bound if they are
+not. They are not, because the same points are sorted by face, by angle, by distance.
 
-The residuals are those of adjusted surfaces and mounts, and so drawn towards zero: this, too, lowers the chance.
+The residuals are those of adjusted surfaces and mounts, and so drawn towards zero. This also lowers the probability.
 """
 
 import numpy as np
@@ -31,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 def normal_deviates(mean: Array, sigma: Array, dof: Array, tolerated: Array | float) -> Array:
-    """Return the normal deviate u (n,) of a mean's excess over the tolerance, with the mean's sign; zero within it.
+    """Return the normal deviates u (n,) of the means' excess over the tolerance, with the means' signs; zero within.
 
     Parameters
     ----------
@@ -48,7 +49,9 @@ def normal_deviates(mean: Array, sigma: Array, dof: Array, tolerated: Array | fl
 
 
 def joint_limit(number: int, level: float) -> float:
-    """Return the |u| that one of so many means exceeds with a chance of ``level``, if all are within their tolerance.
+    """Return the limit of |u| for ``number`` means.
+
+    If no true mean exceeds its tolerance, at least one |u| exceeds the limit with a probability of at most ``level``.
 
     >>> round(joint_limit(1, 0.05), 2), round(joint_limit(500, 0.001), 2)
     (1.96, 4.75)

@@ -5,14 +5,16 @@ Observation: a point lies on its surface,
     v = n · (X - c) - shift,       X = p + T (Exp(ε) R x + l),
 
 with p, T the body's pose in the target frame, n the family's normal and c a fixed point near the surface. Horizontal
-faces are one family H: X is reduced by the design height of its face along their normal (X - h n), so that all are one
-plane: they are parallel and their distances known. (On a target out of plumb X_z - h would be wrong by h (1 - n_z).)
+faces are one family H, because they are parallel and their distances are known. X is reduced by the design height of
+its face along their normal (X - h n), so that all lie in one plane. (On a target out of plumb X_z - h would be wrong by
+h (1 - n_z).)
 
-The pose is known but for white noise of each record and drift (:mod:`pipeline.maths.adjustment.pose_errors`), which
-both sensors share: what the laser sees of the same planes at the same instant tells them. An adjustment that takes the
-trajectory, or the laser's planes, as true throws that away: under ordinary drift its yaw is wrong by 0.1°.
+The pose is known except for white noise of each record and drift (:mod:`pipeline.maths.adjustment.pose_errors`). Both
+sensors share these errors, so the laser's points on the same planes at the same instant determine them. An adjustment
+that takes the trajectory, or the laser's planes, as true loses this information: under ordinary drift its yaw is wrong
+by 0.1°.
 
-The way: points -> sums by interval (:mod:`~pipeline.maths.adjustment.interval_sums`) -> white noise eliminated
+Order: points -> sums by interval (:mod:`~pipeline.maths.adjustment.interval_sums`) -> white noise eliminated
 (:mod:`~pipeline.maths.adjustment.eliminate_white_noise`) -> drift eliminated
 (:mod:`~pipeline.maths.adjustment.eliminate_drift`) -> normal equations of the parameters
 (:mod:`~pipeline.maths.adjustment.parameters`) -> solution (:mod:`~pipeline.maths.adjustment.solution`).
@@ -36,8 +38,8 @@ from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-REACH_S = 0.2  # rates are taken over this time on either side: between two records noise of 2 mm is 0.5 m/s
-BLOCK = 50_000  # intervals whose designs are made at a time
+REACH_S = 0.2  # rates are means over this time on either side: between two records noise of 2 mm gives 0.5 m/s
+BLOCK = 50_000  # number of intervals whose designs are computed at a time
 
 
 @dataclass(frozen=True)
@@ -60,17 +62,17 @@ class BodyMotion:
         return cls(trajectory, seconds, trajectory.rates(REACH_S), laser_lever_arm_m)
 
     def times(self, record: Integers, share: Array) -> Array:
-        """Return the times (g,) s at these shares of the step from each record to the next."""
+        """Return the times (g,) s at these shares of the interval from each record to the next."""
         seconds = self.seconds
         return np.asarray(seconds[record] + share * (seconds[record + 1] - seconds[record]))
 
     def poses(self, record: Integers, share: Array, drift: DriftEstimate | None) -> BodyPoses:
-        """Return the poses at the same times, corrected by the drift, since the design belongs where the body is.
+        """Return the poses at these shares of the intervals, corrected by the drift: the best known for the design.
 
         Parameters
         ----------
         record, share : (g,) arrays
-            Record before each instant, and the share of the step to the next.
+            Record before each instant, and the share of the interval to the next.
         drift : DriftEstimate or None
             The drift estimated so far.
         """
@@ -81,7 +83,7 @@ class BodyMotion:
         return BodyPoses(positions, T, self.rates[record])
 
     def lever_arm(self, sensor: str, state: State) -> Array:
-        """Return the sensor's lever arm (3,) m, body axes: as estimated, or as configured."""
+        """Return the sensor's lever arm (3,) m, body axes: the estimate if it is calibrated, else as configured."""
         return state.lever_arm_m if sensor == state.calibrated else self.laser_lever_arm_m
 
 
@@ -111,7 +113,10 @@ class Linearisation:
 
 @dataclass(frozen=True)
 class SurfaceIntervals:
-    """The intervals ``rows`` of a sensor's sums: those on one surface; ``record``: the last INS record before each."""
+    """One sensor's intervals on one surface: their rows in its sums, and the last INS record before each.
+
+    ``selected``: the parameters (ascending) of the design; None: all.
+    """
 
     linearisation: Linearisation
     sensor: str
@@ -121,7 +126,7 @@ class SurfaceIntervals:
     selected: Integers | None
 
     def linearised(self, rows: slice) -> LinearisedIntervals:
-        """Return some of the intervals with their designs."""
+        """Return the intervals in these rows, with their designs."""
         state, body = self.linearisation.state, self.linearisation.body
         sums = self.linearisation.sums[self.sensor].selected(self.rows[rows])
         poses = body.poses(sums.record, sums.share, self.linearisation.drift)
@@ -182,9 +187,10 @@ def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEst
 
 
 def mount_step(linearisation: Linearisation) -> Array:
-    """Return the step (u,) of the mount that brings the soundings onto the surfaces as they are, poses taken as true.
+    """Return the step (u,) of the mount that brings its sensor's points onto the current surfaces, poses being true.
 
-    It serves to come near enough from a coarse mount: first order in errors of degrees needs a few such steps.
+    It leads from a coarse mount to one near enough for the adjustment. The step is of first order, so that errors of
+    degrees need a few steps.
     """
     normal, right = np.zeros((N_MOUNT, N_MOUNT)), np.zeros(N_MOUNT)
     for source in linearisation.by_surface():
@@ -200,25 +206,25 @@ def mount_step(linearisation: Linearisation) -> Array:
 
 @dataclass(frozen=True)
 class RecordErrors:
-    """Consecutive INS records (r,), and the pose error (r, 6), m and rad, in the middle of the step after each."""
+    """Consecutive INS records (r,), and the pose error (r, 6), m and rad, in the middle of the interval after each."""
 
     record: Integers
     error: Array
 
 
 def residual_shift(state: State, sensor: str, body: BodyMotion, errors: RecordErrors, features: int) -> Array:
-    """Return the change of v (r, s, F) by drift and additional parameters, by an interval's features on each surface.
+    """Return the change of v by drift and additional parameters: its factors (r, s, F) of q, by record and surface.
 
     Parameters
     ----------
     state : State
-        Current values; those in ``state.additional`` move v.
+        Current values; the additional ones change v.
     sensor : str
         The sensor that observes.
     body : BodyMotion
         The motion of the body.
     errors : RecordErrors
-        Records and the drift after each.
+        Records, and the drift after each.
     features : int
         Number F of the sensor's features.
     """

@@ -1,17 +1,16 @@
 """The parameters of the adjustment, in one order: mount, instruments, surfaces, and the surfaces' parts under water.
 
 * the sonar's: rotation ε and lever arm λ (the six mount parameters, body axes), latency τ (s, added to the recorded
-  one), range (m, added to every range), sound speed (the share by which it is higher), and its gradient ((m/s)/m,
-  downward);
+  latency), range (m, added to every range), sound speed (relative increase), and its gradient ((m/s)/m, downward);
 * the laser's: ε, λ, latency and range, with the same meaning;
 * each surface's: two turns of the normal (rad) and a shift (m), shared by both sensors;
-* each surface's part under water: a further two turns and a shift, by which the wet faces stand off the dry ones as
-  built.
+* each surface's part under water: two further turns and a shift, by which the wet faces as built differ from the dry
+  ones.
 
 A run that calibrates the laser has no sonar: the mount parameters are the laser's, and no face is wet.
 
-The mount parameters and the surfaces are estimated. The others are fixed at zero, or estimated where the config names
-them. All fixed parameters are *consider* parameters: an error of theirs within its sigma enters the total covariance.
+The mount parameters and the surfaces are estimated. The others are fixed at zero, or estimated if the config names
+them. All fixed parameters are *consider* parameters: their sigmas enter the total covariance.
 """
 
 from collections.abc import Sequence
@@ -41,8 +40,8 @@ N_SURFACE = len(SURFACE_PARAMETERS)
 class ObservedSurface:
     """The plane of one family of faces: normal · (X - centre) = shift, target frame.
 
-    The tangents (2, 3) satisfy t1 × t2 = normal. They are carried along as the surface turns, because sums are kept in
-    them and a fresh choice may be another one.
+    The tangents (2, 3) satisfy t1 × t2 = normal. They turn with the surface. A new choice after each step could differ,
+    but the interval sums refer to these tangents.
     """
 
     family: str
@@ -53,7 +52,7 @@ class ObservedSurface:
 
     @classmethod
     def at(cls, family: str, normal: Array, centre_m: Array, shift_m: float = 0.0) -> "ObservedSurface":
-        """Return the surface with tangents of its own choice.
+        """Return the surface with tangents chosen from its normal.
 
         Parameters
         ----------
@@ -70,12 +69,12 @@ class ObservedSurface:
 
     @property
     def level(self) -> bool:
-        """Whether the surface is horizontal."""
+        """Return whether the surface is horizontal."""
         return bool(abs(self.normal[2]) > HORIZONTAL_COSINE)
 
     @property
     def distance_m(self) -> float:
-        """Value of normal · X on the surface."""
+        """Return the value of normal · X on the surface."""
         return float(self.normal @ self.centre_m + self.shift_m)
 
     def updated(self, turn_1: float, turn_2: float, shift_m: float) -> "ObservedSurface":
@@ -166,7 +165,7 @@ class State:
         return np.asarray(self.surface_slice.start + N_SURFACE * surface + np.arange(N_SURFACE))
 
     def columns(self, sensor: str, surface: int) -> Integers:
-        """Return the parameters that a sensor's observations of one surface depend on, in the order of the design."""
+        """Return the places (m,) of the parameters of a sensor's observations of one surface, in the design's order."""
         own, both = self._n_sensor_parameters
         on_surface = self.surface_columns(surface)
         if sensor != self.calibrated:
@@ -175,7 +174,7 @@ class State:
         return np.concatenate([on_surface, np.arange(own), wet])
 
     def additional_values(self) -> Array:
-        """Return ``additional`` in the places of all parameters (u,), zero for the mount and the surfaces."""
+        """Return the additional values in a vector of all parameters (u,), zero for the mount and the surfaces."""
         values = np.zeros(self.size)
         split = self.surface_slice.start - N_MOUNT
         values[N_MOUNT : self.surface_slice.start] = self.additional[:split]

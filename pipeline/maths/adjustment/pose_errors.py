@@ -1,27 +1,28 @@
-"""Errors of the recorded poses: white noise of each record, and drift, given at knots; a test of the drift by passes.
+"""Errors of the recorded poses: white noise of each record, and drift with values at knots; a test of it by passes.
 
-Both sensors hang on one body, so that at one instant they share the error e = (δ, ω) of its pose (target frame;
-X -> X + δ + ω × r). Between records the error is interpolated as the poses are. It has two parts:
+Both sensors are fixed to one body, so that at one instant they share the error e = (δ, ω) of its pose (target frame;
+X -> X + δ + ω × r). Between records the error is interpolated like the poses. It has two parts:
 
     e(t) = ξ(t) + (1 - s) w_k + s w_{k+1},        t = t_k + s (t_{k+1} - t_k)
 
 * w_k: white noise of record k, w ~ N(0, W), W diagonal (position, attitude);
 * ξ: drift, a first-order Gauss-Markov process of standard deviations σ (6,) and time constant τ, through all passes and
-  the time between them (Gelb 1974, 3.8), given at *knots* and linear between them. For two knots d apart,
-  ξ_{j+1} = φ ξ_j + N(0, (1 - φ²) σ²), φ = exp(-d / τ). Linear interpolation leaves out what the process does between
-  knots, up to σ √(d / 2τ): at 15 mm and 200 s this is 0.5 mm for d = 0.5 s, and 1.7 mm for 5 s, which is too much.
+  the time between them (Gelb 1974, 3.8). It has values at *knots* and is linear between them. For two knots d apart,
+  ξ_{j+1} = φ ξ_j + N(0, (1 - φ²) σ²), φ = exp(-d / τ). Linear interpolation omits the process between knots, up to
+  σ √(d / 2τ): at 15 mm and 200 s this is 0.5 mm for d = 0.5 s, and 1.7 mm for 5 s, which is too much.
 
-**Test of the drift**: by how much its mean in one pass differs from that in the others, against the INS's sigmas. An
-error of one sensor in one pass (a bracket that moves, a clock that jumps) need not stay in the residuals: where the
-INS is allowed a drift, the adjustment turns the boat in that pass until both sensors fit. The price is a drift larger
-than allowed, and that shows. (5 mm more range in one of four passes leaves 1 mm in the residuals, and turns the boat by
-0.15° in heading.) With weights c, Σ c ξ = (mean of the pass's knots) - (mean of all others), and ξ the Gauss-Markov
-process,
+**Test of the drift**: the difference between its mean in one pass and its mean in the others is compared with the INS's
+sigmas. An error of one sensor in one pass (a bracket that moves, a clock that jumps) does not always stay in the
+residuals. If the INS may drift, the adjustment turns the boat in that pass until both sensors fit. This needs a drift
+larger than the INS's sigmas allow, and the test shows it. (5 mm more range in one of four passes leaves 1 mm in the
+residuals, and turns the boat by 0.15° in heading.) With weights c, Σ c ξ = (mean of the pass's knots) - (mean of all
+others), and ξ the Gauss-Markov process,
 
     Var(Σ c ξ) = c' K c,    K_ij = σ² exp(-|t_i - t_j| / τ)
 
 for each of the six components. The estimate of ξ has at most that variance (the estimate is the conditional mean:
-Var ξ = Var of the estimate + what remains unknown), so that a test against its root rejects too rarely, if at all.
+Var ξ = variance of the estimate + variance of its error). So a test against the root of that variance may reject too
+rarely, never too often.
 """
 
 from dataclasses import dataclass
@@ -32,14 +33,14 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_POSE = 6  # components of a pose error: position x, y, z, turn x, y, z
-SPACING = 1 / 400  # of knots, as a share of the time constant
+SPACING = 1 / 400  # largest distance of two knots, as a share of the time constant
 
 
 @dataclass(frozen=True)
 class PoseNoise:
     """Standard deviations of the pose errors, position (m) and turn (rad).
 
-    white (6,): of each record's noise; drift (6,): of the drift, with its time constant; zero: none.
+    white (6,): of each record's noise; drift (6,): of the drift, with its time constant. Zero: no such error.
     """
 
     white: Array
@@ -48,7 +49,7 @@ class PoseNoise:
 
     @property
     def spacing_s(self) -> float:
-        """Largest distance of two knots."""
+        """Return the largest distance of two knots."""
         return SPACING * self.time_constant_s
 
     def scaled(self, white: float, drift: float) -> "PoseNoise":
@@ -60,8 +61,8 @@ class PoseNoise:
 class Knots:
     """The instants at which the drift is estimated.
 
-    record (k,) ascending: the INS records that are knots; seconds (k,): their times; inner (k - 1,): whether
-    observations may lie between a knot and the next, which is not so between two passes.
+    record (k,) ascending: the INS records that are knots; seconds (k,): their times; inner (k - 1,): mask, true if
+    observations may lie between a knot and the next (false in a gap, such as between two passes).
     """
 
     record: Integers
@@ -69,7 +70,7 @@ class Knots:
     inner: NDArray[np.bool_]
 
     def interval_of(self, record: Integers) -> Integers:
-        """Return the number (n,) of the first knot before the step from each record (n,) to the next."""
+        """Return the number (n,) of the last knot before the interval from each record (n,) to the next."""
         return np.asarray(np.clip(np.searchsorted(self.record, record, side="right") - 1, 0, len(self.record) - 2))
 
 
@@ -83,7 +84,7 @@ def place_knots(record: Integers, seconds: Array, spacing_s: float, gap_s: float
     seconds : (n,) array
         Times of all INS records.
     spacing_s : float
-        Largest distance of two knots, where the records allow it.
+        Largest distance of two knots, if the records allow it.
     gap_s : float
         A longer time without observations ends a run.
     """
@@ -125,8 +126,8 @@ class DriftEstimate:
 class PassDrift:
     """Differences of the drift between passes.
 
-    passes (p,): their numbers; difference (p, 6), m and rad: mean of the drift in each less that in all other passes;
-    sigma (p, 6): standard deviation that the drift process gives this difference.
+    passes (p,): numbers of the passes; difference (p, 6), m and rad: mean of the drift in each pass minus its mean in
+    all others; sigma (p, 6): standard deviation of this difference by the drift process.
     """
 
     passes: Integers
@@ -135,7 +136,7 @@ class PassDrift:
 
 
 def drift_between_passes(drift: DriftEstimate, noise: PoseNoise, pass_of_knot: Integers) -> PassDrift:
-    """Return how the drift in each pass differs from that in the others; for a single pass, its mean itself.
+    """Return the mean of the drift in each pass minus its mean in the others; for a single pass, its mean itself.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ def drift_between_passes(drift: DriftEstimate, noise: PoseNoise, pass_of_knot: I
     noise : PoseNoise
         Standard deviations and time constant of the drift.
     pass_of_knot : (k,) array
-        Number of each knot's pass; negative: none.
+        Number of each knot's pass; negative: no pass.
     """
     passes = np.unique(pass_of_knot[pass_of_knot >= 0])
     inside = pass_of_knot[:, None] == passes

@@ -1,9 +1,9 @@
 """Prior information about the surfaces, as pseudo-observations: the target as designed, or families that are parallel.
 
-**The target as designed.** It calibrates a laser that nothing else has calibrated. The design is a rigid body that
-stands where it was set up, but for a displacement g = (d, ω) (m and rad, target frame; X -> X + d + ω × X). The survey
-knows each component of g with some sigma, or not at all. Each family of faces stands off that body by errors of its
-own: its direction by σ_turn about either axis in it, its place by σ_shift. With n, c, s the surface as it is now
+**The target as designed.** It is the reference for a laser that is itself calibrated. The design is a rigid body. It
+stands where it was set up, except for a displacement g = (d, ω) (m and rad, target frame; X -> X + d + ω × X). The
+survey gives each component of g with a sigma, or not at all. Each family of faces has errors of its own against that
+body: its direction has σ_turn about either axis in its plane, its place has σ_shift. With n, c, s the current surface
 (n · (X - c) = s), t1, t2 its tangents, n0 the design's normal and q a point of the design's plane amid its faces,
 
     turn k:   t_k · (n - n0) - ω · (n0 × t_k)                                   = 0 ± σ_turn
@@ -11,16 +11,16 @@ own: its direction by σ_turn about either axis in it, its place by σ_shift. Wi
     set-up:   g - g0                                                            = 0 ± σ_g
 
 (the design's plane goes through q + d + ω × q with normal n0 + ω × n0). The step of a surface's parameters (turns a_k,
-shift b) changes the first by a_k, the second by a_k t_k · (q - c) - b. g is eliminated: where σ_g is infinite its
-component comes from the faces alone, and a component that no face determines drops out.
+shift b) changes the first by a_k, the second by a_k t_k · (q - c) - b. g is eliminated. A component of g with an
+infinite σ_g comes from the faces alone; a component that no face determines has no effect.
 
-**Parallel families**, at distances that nobody knows. For two such families with normals n, m (m turned over where it
-points the opposite way) and the first's tangents t1, t2
+**Parallel families** at unknown distances. For two of them with normals n, m (m reversed if it points the opposite way)
+and tangents t_k of the first, t'_j of the second
 
     t_k · (n - m) = 0 ± σ,      k = 1, 2,
 
-and a step of their turns changes it by a_k - Σ_j t_k · t'_j b_j. So a wall above the water, which the laser sees, tells
-the direction of the wall's foot, which the sonar alone sees.
+and a step of their turns, a_k and b_j, changes it by a_k - Σ_j t_k · t'_j b_j. So a wall above the water, which the
+laser sees, determines the direction of the wall's foot, which the sonar alone sees.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,7 +53,7 @@ class SurfacePrior(Protocol):
     """Prior information about the surfaces."""
 
     def pseudo_observations(self, state: State) -> PseudoObservations:
-        """Return its pseudo-observations, linearised at the surfaces as they are."""
+        """Return the pseudo-observations of this prior information, linearised at the current surfaces."""
         ...
 
 
@@ -62,8 +62,8 @@ class DesignPrior:
     """The target as designed, target frame.
 
     planes: for each family the normal n0 (3,) and a point q (3,) of its plane; turn_rad, shift_m: sigmas of a family
-    against the body; set_up (6,): g0, where the body was set up (m, rad); set_up_sigma (6,): its sigmas, infinite where
-    nobody surveyed.
+    against the body; set_up (6,): g0, the surveyed displacement of the body (m, rad); set_up_sigma (6,): its sigmas,
+    infinite for components without a survey.
     """
 
     planes: Mapping[str, tuple[Array, Array]]
@@ -73,11 +73,11 @@ class DesignPrior:
     set_up_sigma: Array
 
     def pseudo_observations(self, state: State) -> PseudoObservations:
-        """Return the design's pseudo-observations, linearised at the surfaces as they are."""
+        """Return the design's pseudo-observations, linearised at the current surfaces."""
         size = state.size
         N, b = np.zeros((size, size)), np.zeros(size)
         information = np.where(np.isfinite(self.set_up_sigma), self.set_up_sigma, np.inf) ** -2.0
-        # normal equations of g, and what ties it to the surfaces
+        # normal equations of g, and its coupling to the surfaces
         N_g, N_xg, b_g = np.diag(information), np.zeros((size, N_DISPLACEMENT)), -information * self.set_up
         squares = float(np.sum(information * self.set_up**2))
         weight = np.array([self.turn_rad, self.turn_rad, self.shift_m]) ** -2.0
@@ -104,7 +104,7 @@ class ParallelPrior:
     sigma_rad: float
 
     def pseudo_observations(self, state: State) -> PseudoObservations:
-        """Return the pairs' pseudo-observations, linearised at the surfaces as they are."""
+        """Return the pairs' pseudo-observations, linearised at the current surfaces."""
         number = {surface.family: k for k, surface in enumerate(state.surfaces)}
         N, b, squares = np.zeros((state.size, state.size)), np.zeros(state.size), 0.0
         for pair in self.pairs:
@@ -120,7 +120,7 @@ class ParallelPrior:
 
 
 def _misclosures(surface: ObservedSurface, n0: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Return misclosures (3,), their design by the surface's parameters (3, 3), and by g (3, 6)."""
+    """Return the misclosures (3,), their derivatives by the surface's parameters (3, 3), and by g (3, 6)."""
     n, from_centre = surface.normal, q - surface.centre_m
     r = np.r_[surface.tangents @ (n - n0), n @ from_centre - surface.shift_m]
     J = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [*(surface.tangents @ from_centre), -1.0]])
@@ -131,7 +131,7 @@ def _misclosures(surface: ObservedSurface, n0: Array, q: Array) -> tuple[Array, 
 
 
 def _inverse(matrix: Array) -> Array:
-    """Return the inverse of a positive semidefinite matrix, within what it determines."""
+    """Return the inverse of a positive semidefinite matrix; directions that it leaves open (OPEN) get zero."""
     scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     kept = values > OPEN * max(float(values[-1]), 1e-300)

@@ -1,17 +1,18 @@
-"""Means of residuals by any bin, differences of such means, and the standard deviation of each.
+"""Means of residuals by bin, differences of two means, and the standard deviation of each.
 
-Observations close in time share the INS's white noise and the timing, so that a mean's sigma comes from the scatter of
-slots of time, not of points. A mean is M = Σ S_m / P over slots m with P_m = Σ p, S_m = Σ p v, P = Σ P_m, and
+Observations close in time share the INS's white noise and the timing. So a mean's sigma comes from the scatter of
+*slots*, short equal stretches of time, not of points. A mean is M = Σ S_m / P over slots m with P_m = Σ p, S_m = Σ p v,
+P = Σ P_m, and
 
     sigma² = max( Σ (S_m - P_m M)² / P² · n / (n - 1),  1 / P ),   n = P² / Σ P_m²
 
-n is the number of equally heavy slots that would tell as much (Kish 1965, "Survey sampling"), n - 1 the degrees of
-freedom. 1 / P is what the observations' own noise leaves where slots share nothing: a few slots that lie close together
-by chance are no better than that.
+n is the number of equally heavy slots with the same information (Kish 1965, "Survey sampling"), n - 1 the degrees of
+freedom. 1 / P is the variance from the observations' own noise alone, without errors that a slot shares. A few slots
+that agree by chance are no better than that.
 
-Where n - 1 < 8, Student's quantile at the levels of interest is so large that nothing would be rejected; there the
-scatter is taken together with that of the surface's slots everywhere, as if that were 8 slots' own (Smyth 2004, "Linear
-models and empirical Bayes methods for assessing differential expression"):
+Where n - 1 < 8, Student's quantile at the levels of interest is so large that nothing would be rejected. There the
+bin's scatter is combined with the scatter of all slots of the surface, which has the weight of 8 degrees of freedom
+(Smyth 2004, "Linear models and empirical Bayes methods for assessing differential expression"):
 
     sigma² = (8 u² + (n - 1) sigma_own²) / (8 + n - 1),   u² = 1 / P + c² / n,
     c² = max(0, Σ ((S_m - P_m M)² - P_m) / Σ P_m²) over all bins of the surface, with 8 + n - 1 degrees of freedom.
@@ -26,11 +27,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SPARSE = 10  # bins and slots, as a multiple of the points, above which they are not counted out one by one
+SPARSE = 10  # cells (bins times slots) per point above which only cells with points get a number
 FEW = 8.0  # degrees of freedom below which the surface's other slots are used as well
-ALONE = 1.001  # equal slots, at most, of a mean without scatter
-FEWEST, FEWEST_SLOTS, FEWEST_DOF = 30, 5, 8.0  # points, slots and degrees of freedom of a mean that is tested
-REACH = 4  # bins on either side of a step
+ALONE = 1.001  # largest effective number of slots of a mean without scatter
+FEWEST, FEWEST_SLOTS, FEWEST_DOF = 30, 5, 8.0  # least points, slots and degrees of freedom of a mean that is tested
+REACH = 4  # number of bins on either side of a step
 Comparison = Literal["bins", "rest", "steps"]
 
 
@@ -38,8 +39,8 @@ Comparison = Literal["bins", "rest", "steps"]
 class BinnedResiduals:
     """Residuals of one batch, (n,) each.
 
-    first, second: the two numbers of the bin; slot: number of the slot of time; weight: plain weight p = 1 / σ²; v_m:
-    residual; normalised: |v| / σ, zero where the robust weight is zero.
+    first, second: the two numbers of the bin; slot: number of the slot of time; weight: weight p = 1 / σ²; v_m:
+    residual; normalised: |v| / σ, zero if the robust weight is zero.
     """
 
     first: Integers
@@ -101,8 +102,8 @@ def merged_residual_sums(pieces: Iterable[ResidualSums]) -> ResidualSums:
 class BinMean:
     """Mean residual of one sensor in one bin, or the difference of two means.
 
-    key: the bin; count, slots: number of points and of slots of time (for a difference, the smaller of both); dof:
-    degrees of freedom of sigma_mean_m; largest: largest |v| / σ.
+    key: the two numbers of the bin; count, slots: number of points and of slots of time (for a difference, the smaller
+    numbers of the two means); dof: degrees of freedom of sigma_mean_m; largest: largest |v| / σ.
     """
 
     key: tuple[int, int]
@@ -117,7 +118,7 @@ class BinMean:
 
 @dataclass(frozen=True)
 class _SlotSums:
-    """Slots of one bin, or of several: numbers ascending (k,), Σ p and Σ p v of each (k,); mean; number of points."""
+    """Slots of one bin or several: their numbers, ascending, with Σ p and Σ p v, (k,) each; mean; number of points."""
 
     slots: Integers
     weight: Array
@@ -136,24 +137,24 @@ class _SlotSums:
 
     @property
     def effective(self) -> float:
-        """Number of equally heavy slots that tell as much."""
+        """Return the effective number of slots: of equally heavy slots with the same information."""
         return float(self.weight.sum() ** 2 / (self.weight @ self.weight))
 
     @property
     def parts(self) -> Array:
-        """Each slot's contribution (k,) to the error of the mean, freed of what the mean took from the scatter."""
+        """Return each slot's contribution (k,) to the error of the mean, corrected for the mean's degree of freedom."""
         n = self.effective
         unbiased = np.sqrt(n / (n - 1)) if n > ALONE else 1.0
         return np.asarray((self.weighted - self.weight * self.mean) / self.weight.sum()) * unbiased
 
     @property
     def least_variance(self) -> float:
-        """Variance of the mean, were the noise of the points all there is."""
+        """Return the variance of the mean from the noise of the points alone."""
         return float(1 / self.weight.sum())
 
 
 def bin_means(sums: ResidualSums) -> list[BinMean]:
-    """Return each bin's mean."""
+    """Return the mean of each bin."""
     bins = [(key, rows, _SlotSums.of(_slots(sums, rows))) for key, rows in _bins(sums)]
     of_surface: dict[int, list[_SlotSums]] = {}
     for key, _, slots in bins:
@@ -182,9 +183,9 @@ def bin_means(sums: ResidualSums) -> list[BinMean]:
 
 
 def tested_means(sums: ResidualSums, compared: Comparison) -> list[BinMean]:
-    """Return the means to test: each bin's own, or its difference from the rest, or the steps between bins.
+    """Return the means to test: each bin's mean, or its difference from the rest, or the steps between bins.
 
-    Those of too few points, slots or degrees of freedom are left out.
+    Means of too few points, slots or degrees of freedom are left out.
     """
     if compared == "rest":
         means = differences_from_rest(sums)
@@ -194,13 +195,13 @@ def tested_means(sums: ResidualSums, compared: Comparison) -> list[BinMean]:
 
 
 def _common_variance(bins: list[_SlotSums]) -> float:
-    """Return the variance c² that points of a slot share, from the scatter of all slots about their bins' means."""
+    """Return the variance c² of the error that a slot's points share, from the slots' scatter about the bins' means."""
     scatter = sum(float(np.sum((slots.weighted - slots.weight * slots.mean) ** 2 - slots.weight)) for slots in bins)
     return max(0.0, scatter / sum(float(slots.weight @ slots.weight) for slots in bins))
 
 
 def differences_from_rest(sums: ResidualSums) -> list[BinMean]:
-    """Return how much each bin's mean differs from that of all others with the same first number, if there are any."""
+    """Return each bin's mean minus the mean of all other bins with the same first number, if there are others."""
     differences = []
     for key, rows in list(_bins(sums)):
         rest = sums.key[:, 0] == key[0]
@@ -211,7 +212,7 @@ def differences_from_rest(sums: ResidualSums) -> list[BinMean]:
 
 
 def step_differences(sums: ResidualSums, reach: int) -> list[BinMean]:
-    """Return how much the mean of the ``reach`` bins from each border on differs from that of as many before it.
+    """Return for each border between bins the mean of the ``reach`` bins after it minus that of the bins before it.
 
     The key's second number is the bin that begins at the border.
     """
@@ -240,9 +241,9 @@ def _slots(sums: ResidualSums, rows: slice) -> tuple[Integers, Array]:
 
 
 def _difference(key: tuple[int, int], rows: tuple[Integers, Array], reference: tuple[Integers, Array]) -> BinMean:
-    """Return the mean of some rows less that of the reference.
+    """Return the mean of ``rows`` minus the mean of ``reference``.
 
-    Slots that both have share their noise: its parts are taken from each other before they are squared. Degrees of
+    A slot in both shares its noise, so its two contributions are subtracted before they are squared. Degrees of
     freedom: Welch 1947, "The generalization of Student's problem".
     """
     first, second = _SlotSums.of(rows), _SlotSums.of(reference)

@@ -1,12 +1,12 @@
-"""Solving the normal equations N x + b = 0: step, rank, covariance; effects of fixed parameters, and tests of them.
+"""Solution of the normal equations N x + b = 0: step, rank, covariance; effects of fixed parameters, and their tests.
 
 Some parameters are *estimated* (f), the others *fixed* (h) at their values. With S = -N_ff⁻¹ N_fh,
 
     x_f = -N_ff⁻¹ b_f,     C = N_ff⁻¹,     dx_f = S x_h for an error x_h of the fixed ones,
     C_total = C + S Q Sᵀ,  Q the covariance of the consider parameters (Gelb 1974, 7.5 "consider" filter).
 
-Were a fixed parameter estimated, alone with f, its value would be -(b_h + Sᵀ b_f) / M with M = N_hh + N_hf S, and its
-sigma M^(-1/2).
+If one fixed parameter were estimated together with f, its value would be -(b_h + Sᵀ b_f) / M with M = N_hh + N_hf S,
+and its sigma M^(-1/2).
 """
 
 from collections.abc import Sequence
@@ -20,16 +20,16 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
-VAGUE = 10.0  # rad or m: prior sigma of a parameter of which nothing is known before any point
+VAGUE = 10.0  # rad or m: prior sigma that stands for no prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
 
 @dataclass(frozen=True)
 class ConsiderErrors:
-    """A-priori errors of the parameters, used for those that are fixed.
+    """A-priori errors of the parameters; only those of the fixed parameters are used.
 
-    sigmas (u,): standard deviations, independent of each other; blocks: of parameters that are not independent, their
-    places (k,) among all and their covariance (k, k), which takes the place of the sigmas.
+    sigmas (u,): standard deviations of independent parameters; blocks: places (k,) of parameters that are not
+    independent, and their covariance (k, k), which replaces their sigmas.
     """
 
     sigmas: Array
@@ -50,7 +50,7 @@ class Solution:
     """Solution for the parameters ``estimated`` (f,), the others ``fixed`` (h,).
 
     step (u,), zero for the fixed ones; covariance C (f, f); sensitivity S (f, h); condition number of the scaled normal
-    matrix; deficiency: number of directions that the data leave open.
+    matrix; deficiency: number of directions that the data do not determine.
     """
 
     estimated: Integers
@@ -70,7 +70,7 @@ class Solution:
             Errors of the fixed parameters.
         numbers : (k,) array, optional
             Parameters, estimated or fixed; all estimated ones by default. A fixed parameter has its consider error
-            alone, through which the estimated ones depend on it.
+            alone; this error correlates the estimated parameters with it.
         """
         chosen = self.estimated if numbers is None else np.asarray(numbers)
         Q = consider.covariance(self.fixed)
@@ -84,7 +84,7 @@ class Solution:
     def sensitivity_of(self, numbers: Integers) -> Array:
         """Return the sensitivity (k, h) of parameters (k,) to errors of the fixed ones.
 
-        The row of an estimated parameter is that of S; the row of a fixed one is a row of the unit matrix.
+        The row of an estimated parameter is its row of S; the row of a fixed one is its row of the unit matrix.
         """
         rows = np.zeros((len(numbers), len(self.fixed)))
         for row, number in enumerate(np.asarray(numbers).tolist()):
@@ -120,7 +120,7 @@ def solve(normal: Array, right: Array, estimated: Sequence[int]) -> Solution:
     inverted = np.where(is_open, 0.0, 1 / np.where(is_open, 1.0, values))
     half = vectors * np.sqrt(inverted) * scale[:, None]
     covariance = half @ half.T
-    covariance = (covariance + covariance.T) / 2  # to the last bit
+    covariance = (covariance + covariance.T) / 2  # symmetric to the last bit
     step = np.zeros(len(right))
     step[chosen] = -covariance @ b
     return Solution(
@@ -136,7 +136,7 @@ def solve(normal: Array, right: Array, estimated: Sequence[int]) -> Solution:
 
 @dataclass(frozen=True)
 class ParameterTest:
-    """A fixed parameter's estimate and sigma, were it estimated as well."""
+    """Value and sigma that a fixed parameter would have if it were estimated as well."""
 
     parameter: int
     value: float
@@ -144,7 +144,9 @@ class ParameterTest:
 
 
 def single_parameter_tests(normal: Array, right: Array, solution: Solution) -> list[ParameterTest]:
-    """Return the test of each fixed parameter by itself; those that the observations do not depend on are left out.
+    """Return the single-parameter test of each fixed parameter.
+
+    Parameters that the observations cannot determine beside the estimated ones are left out.
 
     Parameters
     ----------
@@ -166,9 +168,10 @@ def single_parameter_tests(normal: Array, right: Array, solution: Solution) -> l
 
 
 def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) -> dict[int, float]:
-    """Return the mount parameters to fix, and the sigma with which each would have come out.
+    """Return the mount parameters to fix, and the sigma that each would have had if it were estimated.
 
-    Fix the worst parameter and solve again: fixing one of a correlated pair usually makes the second estimable.
+    The worst parameter is fixed, and the rest is solved again: without one of a correlated pair the second can usually
+    be estimated.
 
     Parameters
     ----------
@@ -197,8 +200,9 @@ def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) 
 def correlated_pair(covariance: Array) -> tuple[int, int, float] | None:
     """Return the two mount parameters in (6, 6) that are hardest to tell apart, and their correlation ρ, or None.
 
-    Were one of them known, the sigma of the second would be √(1 - ρ²) of what it is: half of it at ρ = √3/2 = 0.866.
-    From there on two are said to move together. A weaker correlation costs less than another pass.
+    If one of them were known, the sigma of the second would be smaller by the factor √(1 - ρ²): half at
+    ρ = √3/2 = 0.866. From this limit on, two parameters are said to move together. A weaker correlation costs less than
+    another pass.
     """
     sigma = np.sqrt(np.diag(covariance))
     above = np.triu(covariance / np.outer(sigma, sigma), 1)
@@ -208,7 +212,7 @@ def correlated_pair(covariance: Array) -> tuple[int, int, float] | None:
 
 
 def weakest_direction(covariance: Array) -> str:
-    """Return, in words, the two mount parameters in (6, 6) that are hardest to tell apart."""
+    """Return a text that names the two mount parameters in (6, 6) that are hardest to tell apart."""
     sigma, pair = np.sqrt(np.diag(covariance)), correlated_pair(covariance)
     if pair is None:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))

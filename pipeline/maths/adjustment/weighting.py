@@ -1,20 +1,20 @@
-"""The stochastic model: variance factors, of the sensors' noise and of what an interval's points share; robust weights.
+"""The stochastic model: variance factors of the sensors' noise and of errors that intervals share; robust weights.
 
-**Sensors**, from the scatter of each interval's points about a plane of its own. With v fitted by (1, α, β) within an
-interval, neither pose nor mount nor surface matters: what is left is the sensor's noise alone (pure error, Draper &
-Smith 1998, 2.1). Its expectation is f times n - rank, the rank being 3 where the points spread over the surface and 2
-where they lie on a line, as those of one ping do. (Noise moves the points of a line aside, and a fit to that direction
-would take the noise away: f came out a third too small.)
+**Sensors.** Their variance factor f follows from the scatter of each interval's points about a plane of their own. When
+v is fitted by (1, α, β) within an interval, pose, mount and surface have no effect. Only the sensor's noise remains
+(pure error, Draper & Smith 1998, 2.1). The expectation of the remaining Σ w v² is f times n - rank. The rank is 3 if
+the points spread over the surface and 2 if they lie on a line, like those of one ping. (Noise moves the points of a
+line aside, and a fit to that direction would remove the noise: f came out a third too small.)
 
-**In common**, from the intervals' means m = Σ w v / Σ w. For an interval with q̄ = Σ w q / Σ w, K its design of pose
-errors and W the white noise of a record,
+**In common.** The variance factor of the error that an interval's points share follows from the intervals' means
+m = Σ w v / Σ w. For an interval with q̄ = Σ w q / Σ w, K its design of pose errors and W the white noise of a record,
 
     E m² = 1 / Σ w + f c,     c = ((1 - s)² + s²) q̄ᵀ K W Kᵀ q̄,
 
-so that f follows by regression with weights c / (1 / Σ w + f c)², which are those of maximum likelihood (twice: the
-first with f = 1). The laser's f is the white noise of the INS against what the session says. The sonar's f contains,
-besides, the errors that only a ping has in common: an unsteady clock, or beams stabilised by another attitude than the
-INS's.
+so that f follows by regression with the weights of maximum likelihood, c / (1 / Σ w + f c)². The regression is done
+twice, first with f = 1. The laser's f is the ratio of the INS's white noise to its value in the session. The sonar's f
+also contains the errors that all beams of a ping share: an unsteady clock, or beams stabilised by another attitude than
+the INS's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,10 +35,10 @@ Integers = NDArray[np.int64]
 BINS = np.linspace(0.0, 50.0, 2001)  # |residual| / sigma; larger ones count into the last bin
 NORMAL_MEDIAN = 0.6744897501960817  # median of |standard normal|
 LEAST_SCALE = 0.01  # no sensor's noise is a hundred times smaller than its stated sigma: less is rounding
-FEWEST = 6  # points of an interval
-FLAT = 1e-5  # an eigenvalue of the scaled sums below this is none: 3 mm aside of a line seen from a metre
-GROUPS = ("laser", "mbes_vertical", "mbes_horizontal")  # of observations: one variance factor each
-SURE, UNLIKELY = 0.1, 100.0  # the white noise's factor is applied if its sigma is below, within these bounds
+FEWEST = 6  # smallest number of points of an interval that is used
+FLAT = 1e-5  # an eigenvalue of the scaled sums below this counts as zero: 3 mm aside of a line, seen from a metre
+GROUPS = ("laser", "mbes_vertical", "mbes_horizontal")  # groups of observations: one variance factor each
+SURE, UNLIKELY = 0.1, 100.0  # sigma below which the white noise's factor is applied; largest factor, and its inverse
 
 
 def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
@@ -51,7 +51,7 @@ def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
     normalised : (n,) array
         Residuals in units of their sigma.
     k0, k1 : float
-        Bounds of full weight and of any weight.
+        Largest residual with full weight, and with any weight.
 
     Examples
     --------
@@ -64,14 +64,14 @@ def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
 
 
 def histogram(normalised: Array) -> Array:
-    """Return the counts of |v| in :data:`BINS`; they add up over chunks, and their median gives the scale."""
+    """Return the counts of |v| in :data:`BINS`; counts of several batches add up, and their median gives the scale."""
     last = len(BINS) - 2
     width = BINS[-1] / (last + 1)
     return np.bincount(np.minimum(np.abs(normalised) / width, last).astype(np.int64), minlength=last + 1).astype(float)
 
 
 def robust_scale(counts: Array) -> float:
-    """Return the median of |v|, from the histogram, divided by that of the standard normal; 1 without data.
+    """Return the median of |v|, from the histogram, divided by NORMAL_MEDIAN; 1 without data.
 
     >>> round(robust_scale(histogram(np.random.default_rng(0).normal(scale=2.0, size=100_000))), 1)
     2.0
@@ -85,19 +85,19 @@ def robust_scale(counts: Array) -> float:
 
 @dataclass(frozen=True)
 class Scatter:
-    """Σ w v² about the intervals' own planes, in the sums' weights, and its degrees of freedom."""
+    """Σ w v² about the intervals' own planes, with the weights of the sums, and its degrees of freedom."""
 
     squares: float
     dof: float
 
     @property
     def factor(self) -> float:
-        """Variance factor; 1 without degrees of freedom."""
+        """Return the variance factor; 1 without degrees of freedom."""
         return self.squares / self.dof if self.dof > 0 else 1.0
 
 
 def scatter(sums: IntervalSums, rows: NDArray[np.bool_]) -> Scatter:
-    """Return the scatter of the chosen intervals (g,) together; those of few points are left out."""
+    """Return the scatter of the intervals in the mask (g,) together. Intervals of few points are left out."""
     use = np.flatnonzero(rows & (sums.count >= FEWEST))
     normal, right = sums.normal[use][:, :N_MOVED, :N_MOVED], sums.right[use][:, :N_MOVED]
     scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", normal), 1e-300))
@@ -109,7 +109,7 @@ def scatter(sums: IntervalSums, rows: NDArray[np.bool_]) -> Scatter:
 
 
 def rescaled(sums: IntervalSums, factor_by_surface: Mapping[int, float]) -> IntervalSums:
-    """Return the sums with weights divided by a factor of each surface."""
+    """Return the sums with the weights divided by the factor of their surface."""
     share = 1 / np.array([factor_by_surface[k] for k in range(len(factor_by_surface))])[sums.surface]
     names = ("normal", "swept", "swept_twice", "right", "right_swept", "squares")
     parts = {name: getattr(sums, name) for name in names}
@@ -118,7 +118,7 @@ def rescaled(sums: IntervalSums, factor_by_surface: Mapping[int, float]) -> Inte
 
 @dataclass(frozen=True)
 class EpochVarianceFactor:
-    """Variance factor of the error that an interval's points have in common, and its sigma (infinite: unknown)."""
+    """Variance factor of the error that an interval's points share, and its sigma (infinite: unknown)."""
 
     factor: float
     sigma: float
@@ -161,7 +161,7 @@ def epoch_variance_factors(
     sums_by_sensor : mapping of IntervalSums
         Intervals of each sensor.
     surfaces : sequence of ObservedSurface
-        The surfaces that the sums number.
+        The surfaces, in the order of their numbers in the sums.
     white : (6,) array
         Standard deviations of a record's white noise, m and rad.
     """
@@ -170,14 +170,14 @@ def epoch_variance_factors(
 
 
 def noise_seen_by_laser(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
-    """Return the noise with its white part as the laser shows it, where the laser shows it well."""
+    """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE)."""
     if laser.sigma < SURE:
         return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY), 1.0)
     return noise
 
 
 def group_of(sensor: str, level: bool) -> int:
-    """Return the number among GROUPS of a sensor's observations of a surface that is horizontal or not."""
+    """Return the number among GROUPS of a sensor's observations of a surface, which is horizontal if ``level``."""
     return 0 if sensor == "laser" else 2 if level else 1
 
 
@@ -196,7 +196,7 @@ class Residuals(Protocol):
 
     @property
     def common_m(self) -> Array:
-        """Standard deviations (n,) m of what the points of an interval share."""
+        """Standard deviations (n,) m of the error that the points of an interval share."""
         ...
 
     @property
@@ -210,8 +210,8 @@ class Weighting:
     """Variance factors f and robust scales by group, and the bounds of IGG III (None: no weight is reduced).
 
     Residuals are normalised by sqrt(f σ² + c²), c being the INS's white noise common to the points of an interval.
-    Without c, points at grazing incidence (σ = 1 mm) would be rejected for the INS's 2 mm; they were, and the sigmas of
-    the result came out 3 % too small.
+    Without c, points at grazing incidence (σ = 1 mm) would be rejected because of the INS's 2 mm. In a trial they were
+    rejected, and the sigmas of the result came out 3 % too small.
     """
 
     factors: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 1.0))

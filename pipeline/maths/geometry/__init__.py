@@ -1,1 +1,1 @@
-"""Rotations, poses, planes, geodesy: what every part of the mathematics stands on."""
+"""Rotations, poses, planes and geodesy, which all other parts of the mathematics use."""

@@ -1,7 +1,7 @@
-"""Residuals along one variable, and over each face: means by bin, and the grid of a face.
+"""Means of residuals by bin, along one variable or over the cells of a face; the grid of cells on a face.
 
-All means are weighted with the robust weights w of the adjustment, mean = Σ w v / Σ w and rms = root(Σ w v² / Σ w), so
-that what the adjustment cut does not hide what is systematic. A bin in which every weight is zero has NaN for both.
+All means are weighted with the robust weights w of the adjustment, mean = Σ w v / Σ w and rms = root(Σ w v² / Σ w). So
+residuals that the adjustment rejected do not hide systematic ones. A bin with no weight above zero has NaN for both.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class BinStatistics:
-    """Statistics of residuals by bin: keys (b, k), one row a bin, ascending; count, mean and RMS (b,) each."""
+    """Statistics of residuals by bin: keys (b, k), one row per bin, ascending; count, mean and RMS (b,) each."""
 
     keys: Integers
     count: Integers
@@ -29,7 +29,7 @@ def bin_statistics(keys: Integers, residual_m: Array, weight: Array) -> BinStati
     Parameters
     ----------
     keys
-        Whole-number keys (n, k) of the bin of each residual, such as (family, pass, number of the bin).
+        Integer keys (n, k) of the bin of each residual, for example (family, pass, number of the bin).
     residual_m, weight
         Residuals and their weights (n,).
 
@@ -51,7 +51,9 @@ def bin_statistics(keys: Integers, residual_m: Array, weight: Array) -> BinStati
 
 
 def face_axes(normal: Array) -> Array:
-    """Return two unit vectors (2, 3) in a face, the horizontal one first; in a horizontal face the frame's x and y.
+    """Return two unit vectors (2, 3) in a face, the horizontal one first.
+
+    For a face that slopes by less than 45°, they are the frame's x and y axes.
 
     >>> face_axes(np.array([-1.0, 0.0, 0.0]))
     array([[ 0., -1.,  0.],
@@ -65,7 +67,7 @@ def face_axes(normal: Array) -> Array:
 
 
 def cells_on_face(points_m: Array, normal: Array, size_m: float) -> Integers:
-    """Return the square cells (n, 2) of points on a face, counted from the frame's origin along :func:`face_axes`.
+    """Return the numbers (n, 2) of the square cells of points on a face, from the origin along :func:`face_axes`.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ def cell_centres(cells: Integers, normal: Array, distance_m: float, size_m: floa
     Parameters
     ----------
     cells
-        Cells (n, 2) of :func:`cells_on_face`.
+        Numbers (n, 2) from :func:`cells_on_face`.
     normal, distance_m
         Unit normal (3,) and distance of the face.
     size_m

@@ -1,4 +1,4 @@
-"""Geodetic, earth-centred and pool coordinates, over the ellipsoid of WGS 84 (GRS 80, CGCS2000: 0.12 mm from it)."""
+"""Geodetic, earth-centred and pool coordinates, on the ellipsoid of WGS 84 (GRS 80 and CGCS2000: within 0.12 mm)."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ def ecef_from_geodetic(latitude_rad: Array, longitude_rad: Array, height_m: Arra
     """Return earth-centred, earth-fixed coordinates (n, 3) m.
 
     X = (N + h) cos φ cos λ, Y = (N + h) cos φ sin λ, Z = (N (1 - e²) + h) sin φ, N = a / √(1 - e² sin² φ)
-    (e.g. Torge, Geodesy, 4.1.3). Rounding at the earth's radius: 1e-9 m.
+    (e.g. Torge, Geodesy, 4.1.3). Rounding at the earth's radius is 1e-9 m.
 
     Parameters
     ----------
@@ -56,9 +56,10 @@ def rotation_ecef_from_level(latitude_rad: Array, longitude_rad: Array) -> Array
 
 @dataclass(frozen=True)
 class PoolFrame:
-    """The ``pool`` frame: origin as configured, z up there, y in direction ``azimuth_rad`` (clockwise from north).
+    """The ``pool`` frame: the configured origin, z up at the origin, y at an azimuth (clockwise from true north).
 
-    Coordinates are differences in ECEF turned into the frame: millimetres of curvature within the pool are kept exact.
+    Coordinates are differences in ECEF, rotated into the frame. So the earth's curvature within the pool, millimetres,
+    is exact.
     """
 
     origin_ecef_m: Array
@@ -66,14 +67,14 @@ class PoolFrame:
 
     @classmethod
     def at(cls, latitude_rad: float, longitude_rad: float, height_m: float, azimuth_rad: float) -> "PoolFrame":
-        """Return the frame at an origin.
+        """Return the pool frame with this origin and azimuth.
 
         Parameters
         ----------
         latitude_rad, longitude_rad
             Geodetic latitude and longitude of the origin.
         height_m
-            Its ellipsoidal height.
+            Ellipsoidal height of the origin.
         azimuth_rad
             Direction of the y axis, clockwise from true north.
         """
@@ -86,5 +87,5 @@ class PoolFrame:
         )
 
     def points_from_ecef(self, points_ecef_m: Array) -> Array:
-        """Return points (n, 3) m of ECEF in the pool frame."""
+        """Return the pool coordinates (n, 3) m of points (n, 3) m in ECEF."""
         return (points_ecef_m - self.origin_ecef_m) @ self.R_pool_from_ecef.T

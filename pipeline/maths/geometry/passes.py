@@ -1,4 +1,4 @@
-"""Passes: maximal intervals without gap or along-track reversal, and the direction of the track."""
+"""Passes, which are maximal intervals without a gap and without along-track reversal; the direction of the track."""
 
 from itertools import pairwise
 
@@ -24,7 +24,9 @@ def split_at_gaps(t_ns: Times, max_gap_ns: int) -> list[Interval]:
 
 
 def reversals(t_ns: Times, along_m: Array, hysteresis_m: float) -> list[int]:
-    """Return the times of turning: extremes of the along-track coordinate that are left by more than the hysteresis.
+    """Return the times at which the boat turns back along the track.
+
+    A turn is an extreme of the along-track coordinate from which the boat moves back by more than the hysteresis.
 
     Parameters
     ----------
@@ -33,7 +35,7 @@ def reversals(t_ns: Times, along_m: Array, hysteresis_m: float) -> list[int]:
     along_m
         Along-track coordinate (n,).
     hysteresis_m
-        Smallest way back from an extreme that makes it a turn.
+        Smallest distance back from an extreme that makes the extreme a turn.
 
     >>> reversals(np.arange(7) * 1_000_000_000, np.array([0.0, 1, 2, 3, 2, 1, 0]), 1.5)
     [3000000000]
@@ -85,9 +87,9 @@ def find_passes(
     ping_t_ns
         Times of the pings, ascending.
     max_gap_ns
-        Longest gap in either.
+        Longest gap allowed between INS records, and between pings.
     reversal_m
-        Smallest way back that ends a pass.
+        Smallest distance back along the track that ends a pass.
     shortest_ns
         Shortest pass.
 
@@ -126,7 +128,9 @@ def pass_of(t_ns: Times, starts_ns: Times, ends_ns: Times) -> NDArray[np.int16]:
 
 
 def abeam(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> NDArray[np.bool_]:
-    """Return where (n,) an INS has the target abeam to starboard, and near.
+    """Return a mask (n,): true where the target lies to starboard, within 45° of abeam, and near.
+
+    Near means: less than ``within_m`` away across the heading.
 
     Parameters
     ----------
@@ -135,7 +139,7 @@ def abeam(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 2
     azimuth_rad
         Heading (n,), clockwise from true north.
     within_m
-        Largest distance.
+        Largest distance across the heading.
     """
     starboard = -(east_m * np.cos(azimuth_rad) - north_m * np.sin(azimuth_rad))
     ahead = -(east_m * np.sin(azimuth_rad) + north_m * np.cos(azimuth_rad))
@@ -143,7 +147,7 @@ def abeam(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 2
 
 
 def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> float | None:
-    """Return the direction (rad) of the track past the origin: mean heading while the origin is near, to starboard.
+    """Return the direction (rad) of the track past the target: the mean heading while the target is :func:`abeam`.
 
     Parameters
     ----------
@@ -152,11 +156,11 @@ def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m
     azimuth_rad
         Heading (n,), clockwise from true north.
     within_m
-        Largest distance.
+        Largest distance of the target across the heading.
 
     Returns
     -------
-    The direction, clockwise from true north; None if the boat never had the target to starboard.
+    The direction, clockwise from true north; None if the target was never abeam to starboard.
     """
     near = abeam(east_m, north_m, azimuth_rad, within_m)
     if not near.any():

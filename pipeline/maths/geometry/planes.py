@@ -1,4 +1,4 @@
-"""Planes from second moments, with errors in all three coordinates [0051-0088]."""
+"""Planes from second moments, with errors in all three coordinates (patent CN 105425246 B, [0051-0088])."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from pipeline.errors import DegenerateGeometryError
 
 Array = NDArray[np.float64]
-ACROSS = 1e-3  # smallest variance of points across their rays, in any direction, as a share of that along them
+ACROSS = 1e-3  # variance added to the points' errors in every direction, as a share of the errors' total variance
 
 
 @dataclass(frozen=True)
 class PlaneMoments:
-    """Sums over points from which a plane follows; they add, so points are never kept.
+    """Sums over points from which a plane follows. Sums of several batches add up, so no points are kept.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class PlaneMoments:
         Σ x xᵀ (3, 3), in a frame whose origin is near the points (pool or target: with coordinates of metres the
         smallest eigenvalue keeps an absolute precision of 1e-14 m²).
     noise
-        Σ cov(x) (3, 3) up to a factor: how the points' errors lie in space.
+        Σ cov(x) (3, 3) up to a factor: the directions of the points' errors.
     """
 
     count: int
@@ -35,7 +35,7 @@ class PlaneMoments:
 
     @classmethod
     def of(cls, points_m: Array) -> "PlaneMoments":
-        """Return the moments of points (n, 3) m whose errors are alike in all directions."""
+        """Return the moments of points (n, 3) m with equal errors in all directions."""
         return cls(len(points_m), points_m.sum(axis=0), points_m.T @ points_m, len(points_m) * np.eye(3))
 
     @classmethod
@@ -56,8 +56,9 @@ class PlaneMoments:
 class Plane:
     """The plane ``normal · x = distance_m``, fitted to points.
 
-    The covariance (3, 3) is that of (turn of the normal along t1, along t2, distance at the centroid) in rad and m, for
-    independent points with the RMS of their residuals.
+    The tangents (2, 3) are t1, the direction of the widest spread, and t2. The eigenvalues (3,) are the variances of
+    the points along the normal, t2 and t1. The covariance (3, 3) is that of (turn of the normal along t1, along t2,
+    distance at the centroid) in rad and m, for independent points with the RMS of their residuals.
     """
 
     normal: Array
@@ -71,18 +72,19 @@ class Plane:
 
 
 def fit_plane(moments: PlaneMoments, toward: Array) -> Plane:
-    """Fit the plane that minimises nᵀ S n / nᵀ N n: mean square of n · x - d over its expectation [0061-0088].
+    """Fit the plane that minimises nᵀ S n / nᵀ N n: mean square of n · x - d, relative to expectation [0061-0088].
 
     S is the centred scatter matrix of the points and d = n · mean. A point x = x0 + e of the plane n · x0 = d with an
     error of covariance s C gives E[S] = S0 + s N, where N is the mean of C and S0 n = 0: the eigenvector n of
-    S n = λ N n with the smallest λ is the plane's normal in expectation, and λ = s. With errors alike in all
-    directions, N = 1, this is the patent's total least squares. Where they lie along oblique rays that is biased: it
-    turns the normal by -s n · N t / λ_t towards each t in the face (hundredths of a degree, of a pass's slanted faces).
-    N is made definite by ACROSS of its trace.
+    S n = λ N n with the smallest λ is the plane's normal in expectation, and λ = s. With equal errors in all
+    directions, N = 1, this is the patent's total least squares. With errors along oblique rays, that is biased: it
+    turns the normal by -s n · N t / λ_t towards each t in the face (hundredths of a degree for slanted faces in a
+    pass). ACROSS times the trace of N is added to the diagonal of N, so that N is definite.
 
-    The normal is turned so that n · toward > 0; the tangents are the eigenvectors of S across it, eigenvalues λ_k.
-    First-order covariance (e.g. Kanatani 1996, ch. 10): turning n along t_k changes the residuals by t_k · (x - mean),
-    so var = σ² / (count λ_k), and var of the distance at the centroid σ² / count, with σ² = count nᵀ S n / (count - 3).
+    The normal points so that n · toward >= 0. The tangents t_k are the eigenvectors of S within the face, with the
+    eigenvalues λ_k. First-order covariance (e.g. Kanatani 1996, ch. 10): a turn of n along t_k changes the residuals by
+    t_k · (x - mean), so the turn has the variance σ² / (count λ_k), and the distance at the centroid has σ² / count,
+    with σ² = count nᵀ S n / (count - 3).
 
     Parameters
     ----------
@@ -94,7 +96,7 @@ def fit_plane(moments: PlaneMoments, toward: Array) -> Plane:
     Raises
     ------
     DegenerateGeometryError
-        Fewer than four points, or points on a line (λ1 not greater than λ0 by rounding).
+        Fewer than four points, or points near a line: the smaller λ_k is below 1e-12 m² or below 2 nᵀ S n.
     """
     n = moments.count
     if n < 4:
@@ -126,7 +128,7 @@ def fit_plane(moments: PlaneMoments, toward: Array) -> Plane:
 
 
 def angle_between(first: Array, second: Array) -> float:
-    """Return the angle (rad) between two unit vectors (3,), by the chord: exact where it is small.
+    """Return the angle (rad) between two unit vectors (3,), from their chord, which is exact for small angles.
 
     >>> round(angle_between(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])), 12) == round(np.pi / 2, 12)
     True
@@ -135,7 +137,7 @@ def angle_between(first: Array, second: Array) -> float:
 
 
 def _signed(rows: Array) -> Array:
-    """Give eigenvectors (k, 3) a sign: make the largest component positive, so that tables are reproducible."""
+    """Return eigenvectors (k, 3), each with its largest component positive, so that tables are reproducible."""
     largest = np.take_along_axis(rows, np.argmax(np.abs(rows), axis=1)[:, None], axis=1)
     return np.where(largest < 0, -rows, rows)
 

@@ -40,7 +40,7 @@ def skew(vector: Array) -> Array:
 
 
 def exp_coefficients(squared_angle: Array) -> tuple[Array, Array]:
-    """Return sin(t)/t and (1 - cos t)/t² of t² (series below t = 1e-3, where they are exact to 1e-17)."""
+    """Return sin(t)/t and (1 - cos t)/t² for squared angles t²; below t = 1e-3 from series, exact to 1e-17."""
     small = squared_angle < 1e-6
     first = 1 - squared_angle / 6 + squared_angle**2 / 120
     second = 0.5 - squared_angle / 24 + squared_angle**2 / 720
@@ -55,7 +55,7 @@ def exp_so3(rotation_vector: Array) -> Array:
 
     R = I + sin t / t · K + (1 - cos t) / t² · K², K = skew(vector), t its length.
 
-    The patent writes I + K [0032]; that is no rotation and at 1° wrong by 1.5e-4 of the range.
+    The patent (CN 105425246 B) writes I + K [0032]. That is not a rotation; at 1° it is wrong by 1.5e-4 of the range.
     (..., 3) -> (..., 3, 3).
     """
     vector = np.asarray(rotation_vector, dtype=np.float64)
@@ -69,7 +69,7 @@ def log_so3(R: Array) -> Array:
 
     (..., 3, 3) -> (..., 3).
 
-    It goes through the quaternion with the largest component first, so it is exact near 0 and near pi.
+    The vector follows from the quaternion, which is computed from its largest component: exact near 0 and near pi.
 
     >>> log_so3(exp_so3(np.array([0.1, -0.2, 0.3]))).round(12)
     array([ 0.1, -0.2,  0.3])
@@ -86,7 +86,7 @@ def log_so3(R: Array) -> Array:
 def quaternion_from_rotation(R: Array) -> Array:
     """Return the unit quaternion (w, x, y, z), w >= 0, of a rotation (..., 3, 3).
 
-    Shepperd's method: the largest component is the root.
+    Shepperd's method: the largest component comes from a square root, the others from products with it.
     """
     m = np.asarray(R, dtype=np.float64)
     trace = np.trace(m, axis1=-2, axis2=-1)
@@ -136,7 +136,7 @@ def rotation_from_mount(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Ar
 def mount_from_rotation(R_body_from_sensor: Array) -> tuple[float, float, float]:
     """Return (roll, pitch, yaw) in radians: inverse of :func:`rotation_from_mount`, pitch in [-pi/2, pi/2].
 
-    From the product Rz(y)·Rx(p)·Ry(r): third row (-cos p sin r, sin p, cos p cos r), second column
+    The product Rz(y)·Rx(p)·Ry(r) has the third row (-cos p sin r, sin p, cos p cos r) and the second column
     (-sin y cos p, cos y cos p, sin p).
     """
     m = R_body_from_sensor
@@ -148,8 +148,9 @@ def mount_partials(R_body_from_sensor: Array) -> Array:
     """Return ∂(pitch, roll, yaw)/∂ε (3, 3) of R = Exp(ε) · Rz(yaw)·Rx(pitch)·Ry(roll), ε about body x, y, z.
 
     Each angle turns about its own axis in the body: pitch about Rz(yaw) e_x, roll about Rz(yaw) Rx(pitch) e_y, yaw
-    about e_z; so ε = A (dpitch, droll, dyaw) with these as columns, and the partials are A⁻¹ (none at pitch = ±90°,
-    where roll and yaw are one). Near a mount of zero it is the identity; with yaw 90° pitch and roll change places.
+    about e_z. With these axes as the columns of A, ε = A (dpitch, droll, dyaw), and the partials are A⁻¹. At pitch =
+    ±90° A has no inverse, because roll and yaw turn about one axis. For a mount near zero A⁻¹ is the identity; with yaw
+    90° pitch and roll change places.
     """
     _, pitch, yaw = mount_from_rotation(R_body_from_sensor)
     turned = rotation_z(yaw)
@@ -186,5 +187,5 @@ def rotation_from_attitude(roll_rad: Array, pitch_rad: Array, azimuth_rad: Array
 
 
 def rotation_error(R_true: Array, R_found: Array) -> Array:
-    """Return the error ε (3,) rad of a rotation (3, 3), true minus found: R_true = Exp(ε) R_found."""
+    """Return the error ε (3,) rad of an estimated rotation (3, 3), true minus estimated: R_true = Exp(ε) R_found."""
     return log_so3(R_true @ R_found.T)

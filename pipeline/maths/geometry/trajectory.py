@@ -1,4 +1,4 @@
-"""Poses of the body between the INS's records: position linear, attitude on the rotation group."""
+"""Poses of the body between the INS's records: positions are linear, attitudes move on the rotation group."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from pipeline.maths.geometry.rotations import (
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
 NS_PER_S = 1e9
-BLOCK = 16_384  # points turned at a time: fits the cache
+BLOCK = 16_384  # points that are rotated at a time: their arrays fit the cache
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Trajectory:
 
     @classmethod
     def build(cls, t_ns: Times, positions_m: Array, R_frame_from_body: Array) -> "Trajectory":
-        """Return the trajectory of records.
+        """Return the trajectory through these records.
 
         Parameters
         ----------
@@ -64,7 +64,7 @@ class Trajectory:
     def transformed(self, R_new_from_frame: Array, shift_m: Array) -> "Trajectory":
         """Return the same poses in another frame: x_new = R_new_from_frame · x + shift.
 
-        The steps are body vectors and stay.
+        The steps are vectors in body axes and do not change.
         """
         return Trajectory(
             self.t_ns,
@@ -74,13 +74,13 @@ class Trajectory:
         )
 
     def interval_of(self, t_ns: Times) -> tuple[NDArray[np.int64], Array]:
-        """Return the last record before each time, and the share of the interval to the next, 0 to 1; (n,) each."""
+        """Return the last record (n,) before each time, and the share (n,) of its interval that has passed, 0 to 1."""
         index = np.clip(np.searchsorted(self.t_ns, t_ns, side="right") - 1, 0, len(self.t_ns) - 2)
         start = self.t_ns[index]
         return index, (t_ns - start) / (self.t_ns[index + 1] - start)
 
     def covers(self, t_ns: Times, max_interval_ns: int) -> NDArray[np.bool_]:
-        """Return which times (n,) lie between two records not further apart than ``max_interval_ns``."""
+        """Return a mask (n,): true for times between two records at most ``max_interval_ns`` apart."""
         if len(self.t_ns) < 2:
             return np.zeros(len(t_ns), dtype=bool)
         covered = (t_ns >= self.t_ns[0]) & (t_ns <= self.t_ns[-1])
@@ -103,8 +103,8 @@ class Trajectory:
     def rates(self, reach_s: float) -> Array:
         """Return velocity and rate of rotation at each record in this frame, (n, 6) m/s and rad/s.
 
-        Each is the mean from ``reach_s`` before the record to ``reach_s`` after it, or as far as records go without an
-        interval longer than that.
+        Each is the mean from ``reach_s`` before the record to ``reach_s`` after it. The mean stops earlier at the ends
+        of the records, and at an interval between records longer than ``reach_s``.
         """
         reach = round(reach_s * NS_PER_S)
         holes = np.r_[-1, np.flatnonzero(np.diff(self.t_ns) > reach), len(self.t_ns) - 1]
@@ -118,10 +118,10 @@ class Trajectory:
         return np.asarray(np.concatenate([way, turning], axis=1) / seconds)
 
     def points_from_body(self, t_ns: Times, points_body_m: Array) -> Array:
-        """Return points (n, 3) m of the body's frame in this frame at their times (n,): p(t) + R(t) x.
+        """Return the coordinates (n, 3) m in this frame of points in the body frame at times (n,): p(t) + R(t) x.
 
         R(t) x = R_k Exp(v) x with v = s φ_k is evaluated without forming the matrices (Rodrigues on the vector),
-        block by block so that the work stays in the cache.
+        block by block so that the arrays stay in the cache.
         """
         placed = np.empty((3, len(points_body_m)))
         for start in range(0, len(t_ns), BLOCK):
@@ -144,8 +144,8 @@ class Trajectory:
     def track_of_point(self, t_ns: Times, point_body_m: Array) -> Array:
         """Return the positions (n, 3) m of a point (3,) m fixed to the body at times (n,), linear between records.
 
-        For directions of rays: off by |φ|² |x| / 8, which at 1e-3 rad between records and 2 m is a quarter of a
-        micrometre.
+        This is off by |φ|² |x| / 8, a quarter of a micrometre at 1e-3 rad between records and 2 m: enough for the
+        directions of rays.
         """
         at_records = self.positions_m + self.R_frame_from_body @ point_body_m
         since, records = ((t - self.t_ns[0]).astype(np.float64) for t in (t_ns, self.t_ns))
@@ -170,14 +170,14 @@ class GeodeticPoses:
 
 
 def poses_in_pool(frame: PoolFrame, ins: GeodeticPoses) -> tuple[Array, Array]:
-    """Return positions (n, 3) m and R_pool_from_body (n, 3, 3) of INS records [0034].
+    """Return positions (n, 3) m and R_pool_from_body (n, 3, 3) of INS records (patent CN 105425246 B, [0034]).
 
-    R_pool_from_body = R_pool_from_ecef · R_ecef_from_level(INS) · R_level_from_body: the level frame is the one at the
+    R_pool_from_body = R_pool_from_ecef · R_ecef_from_level(INS) · R_level_from_body. The level frame is the one at the
     INS, not at the pool's origin (10 m apart they differ by 1.6e-6 rad).
     """
     positions = frame.points_from_ecef(ecef_from_geodetic(ins.latitude_rad, ins.longitude_rad, ins.height_m))
     R_ecef_from_body = rotation_ecef_from_level(ins.latitude_rad, ins.longitude_rad) @ rotation_from_attitude(
         ins.roll_rad, ins.pitch_rad, ins.azimuth_rad
     )
-    # Through the quaternion: exactly orthonormal, and what is stored in Parquet is what is used.
+    # Through the quaternion: R is exactly orthonormal, and equal to the attitude that is stored in Parquet.
     return positions, rotation_from_quaternion(quaternion_from_rotation(frame.R_pool_from_ecef @ R_ecef_from_body))

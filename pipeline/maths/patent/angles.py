@@ -1,16 +1,18 @@
 """The patent's angles [0101-0123]: how the MBES's planes deviate from the laser's, and the iteration over them.
 
+Numbers in brackets are paragraphs of patent CN 105425246 B; P1 to P4 are explained in CONVENTIONS.md, "The target".
+
 Signs. With outward normals n1, n2, n3 (toward the vessel) and n4 = n1 x n2 (pointing down), to first order in a small
-right-handed turn (α about x, β about y, γ about z) of the cloud in the target frame:
+right-handed turn (α about x, β about y, γ about z) of the MBES's points in the target frame:
 
 * the wall's normal (-1, 0, 0) gets the z component +β: roll deviation = change of its elevation;
 * P3's normal turns about z by γ: yaw deviation = change of its azimuth, counter-clockwise +;
 * n4 = (0, 0, -1) gets the y component +α: pitch deviation = its turn about x.
 
-These are signed components, not the full angles between normals (which contain the other two axes and stop converging
-at 0.01°), and no published sign rule is looked up: [0025] and [0113] contradict each other. The patent's cosines are
-recorded beside them. The correction is minus the deviation, turned into the body frame by the mean attitude, and
-composed (not added) onto the rotation so far.
+These are signed components, not the full angles between normals. (The full angles contain the other two axes; with them
+the iteration stops converging at 0.01°.) No published sign rule is used, because [0025] and [0113] contradict each
+other. The patent's cosines are recorded beside the deviations. The correction is minus the deviation. It is turned into
+the body frame by the mean attitude and composed with (not added to) the rotation so far.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +37,20 @@ def fourth_normal(first: Array, second: Array) -> Array:
 
 
 def angle_deviations(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> Array:
-    """Return (pitch, roll, yaw) (3,) rad of the MBES's normals P1-P4 relative to the laser's, signed as above."""
+    """Return the deviations (pitch, roll, yaw) (3,) rad of the MBES's normals P1-P4 from the laser's.
+
+    The patent's three steps [0101-0123], each the MBES's angle minus the laser's, with the signs of the module's
+    docstring. :func:`patent_cosines` returns the cosines by which the patent measures them [0112-0117].
+
+    * roll step: elevation of the normal of P2, the wall;
+    * yaw step: azimuth of the normal of P3, counter-clockwise;
+    * pitch step: turn of the normal P4 = P1 x P2 about x.
+
+    Parameters
+    ----------
+    mbes, laser
+        Unit normals (3,) of P2, P3 and P4 in the target frame, by name.
+    """
     pitch = _angle(mbes["P4"][1], -mbes["P4"][2]) - _angle(laser["P4"][1], -laser["P4"][2])
     roll = np.arcsin(mbes["P2"][2]) - np.arcsin(laser["P2"][2])
     yaw = _angle(mbes["P3"][1], mbes["P3"][0]) - _angle(laser["P3"][1], laser["P3"][0])
@@ -51,9 +66,10 @@ def _wrap(angle_rad: float) -> float:
 
 
 def patent_cosines(mbes: Mapping[str, Array], laser: Mapping[str, Array]) -> dict[str, float]:
-    """Return the cosines of [0112-0117].
+    """Return the cosines of [0112-0117], for each step and sensor.
 
-    The wall against (0, 0, 1); P3 against the laser's P2; P4 against the laser's P1.
+    They are the cosines between the normals of the wall and (0, 0, 1) (roll), of P3 and the laser's P2 (yaw), of P4 and
+    the laser's P1 (pitch).
     """
     against = {"roll": ("P2", np.array([0.0, 0.0, 1.0])), "yaw": ("P3", laser["P2"]), "pitch": ("P4", laser["P1"])}
     return {
@@ -78,7 +94,7 @@ class PassPlanes:
 
 
 def pass_normals(pass_planes: PassPlanes, rotation: Array, lever_arm_m: Array) -> tuple[dict[str, Array], float]:
-    """Return the MBES's normals P1-P4 of a pass, and its weight: inverse variance of the normals for unit noise.
+    """Return the MBES's normals P1-P4 of a pass, and the pass's weight: inverse variance of normals for unit noise.
 
     Parameters
     ----------
@@ -102,7 +118,7 @@ def _spread(plane: Plane) -> float:
 
 
 def mean_attitude(lifted: Mapping[str, Array]) -> Array:
-    """Return the mean R_body_from_target (3, 3) over the soundings whose moments by family are ``lifted``."""
+    """Return the mean R_body_from_target (3, 3) over the soundings in the lifted moments of all families."""
     total = sum((attitude_sum(moments) for moments in lifted.values()), np.zeros((3, 3)))
     count = sum(moments[-1, -1] for moments in lifted.values())
     return np.asarray(total.T / count)
@@ -110,7 +126,7 @@ def mean_attitude(lifted: Mapping[str, Array]) -> Array:
 
 @dataclass(frozen=True)
 class AngleStep:
-    """One comparison of all passes: the rotation (body) that would undo the deviations, and the rows to record."""
+    """Comparison of all passes: the rotation vector (3,) (body axes) that undoes the deviations; rows to record."""
 
     correction_rad: Array
     combined: dict[str, float]
@@ -120,8 +136,8 @@ class AngleStep:
 def angle_step(passes: Sequence[PassPlanes], rotation: Array, lever_arm_m: Array) -> AngleStep:
     """Compare the planes pass by pass with this mount, and combine the deviations by weight.
 
-    Pass by pass, because one straight pass turns with a yaw error by a known sign (0 < gain <= 1), passes pooled need
-    not.
+    Each pass is compared alone. In one straight pass a yaw error turns the planes in a known direction, by the error
+    times a factor, the *gain*: 0 < gain <= 1. For all passes together the direction is not certain.
 
     Parameters
     ----------
@@ -161,7 +177,7 @@ def angle_step(passes: Sequence[PassPlanes], rotation: Array, lever_arm_m: Array
 
 @dataclass(frozen=True)
 class AngleTolerances:
-    """When the iteration ends: most iterations, largest last step, largest last change of the normals' angles."""
+    """Limits that end the iteration: number of iterations, last step, last change of the angles between the normals."""
 
     max_iterations: int
     step_rad: float
@@ -180,19 +196,20 @@ class AngleResult:
 
 
 def iterate_angles(passes: Sequence[PassPlanes], lever_arm_m: Array, tolerances: AngleTolerances) -> AngleResult:
-    """Correct, place again, compare again [0036], until the step and the angles between the normals stand still.
+    """Correct the mount, place the soundings, compare the planes [0036], until the step and the angles stay the same.
 
-    A yaw error turns a straight pass's 45° faces by half only, so the iteration closes about half of it per step: no
-    gain is assumed, enough iterations are allowed. With noise the angles end at the noise, not at zero.
+    A yaw error turns the 45° faces of a straight pass by half of the error only (gain 1/2, see :func:`angle_step`). So
+    one step removes about half of the error. No gain is assumed; enough iterations are allowed instead. With noise the
+    angles between the normals end at the noise, not at zero.
 
     Parameters
     ----------
     passes
         Passes in which both sensors have P1, P2 and P3.
     lever_arm_m
-        Lever arm (3,), body axes; it stays.
+        Lever arm (3,), body axes; it is not changed.
     tolerances
-        When the iteration ends.
+        Limits that end the iteration.
     """
     rotation = np.eye(3)
     rows: list[dict[str, float]] = []

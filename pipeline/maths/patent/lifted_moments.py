@@ -1,4 +1,4 @@
-"""Lifted second moments: one sum over the soundings from which the planes of *every* mount follow.
+"""Lifted second moments: one sum over the soundings, from which their planes with *any* mount follow.
 
 A sounding lies in the target frame at
 
@@ -9,8 +9,9 @@ which is linear in θ = (vec E, l, 1) with 9 + 3 + 1 = 13 elements: X_a = f_a ·
 
     f_a = (T_a1 m1, T_a1 m2, T_a1 m3, T_a2 m1, …, T_a3 m3 | T_a1, T_a2, T_a3 | p_a),      vec E row by row.
 
-So Σ X_a X_b = θᵀ (Σ f_a f_bᵀ) θ, and with a constant 1 as fortieth feature also Σ X_a and the count: a 40 x 40 matrix
-per pass and face holds all. Iterating over mounts then costs microseconds, and no sounding is read twice.
+So Σ X_a X_b = θᵀ (Σ f_a f_bᵀ) θ. The f_a of the three axes and a constant 1 are the 40 *features* of a sounding. With
+the constant the sums contain Σ X_a and the count as well. One 40 x 40 matrix per pass and face is enough for all
+mounts. An iteration over mounts then costs microseconds, and no sounding is read twice.
 """
 
 from collections.abc import Mapping
@@ -48,10 +49,10 @@ def lift(R_target_from_body: Array, positions_m: Array, points_body_m: Array) ->
 
 
 def plane_moments(lifted: Array, correction: Array, lever_arm_m: Array) -> PlaneMoments:
-    """Return the moments of the soundings placed with mount Exp(δ) = ``correction`` times coarse, and this lever arm.
+    """Return the moments of the soundings, placed with the mount Exp(δ) · coarse and this lever arm.
 
-    Their noise is Σ r rᵀ of the rays r = T E m: a beam that errs by δ meets a face at incidence i by r δ tan i too
-    early or too late, along the ray it is recorded on, which the range's own noise does as well.
+    Their noise is Σ r rᵀ of the rays r = T E m. A beam that errs by an angle δ meets a face at incidence i too early or
+    too late by r δ tan i. So its point errs along the recorded ray, as with noise of the range.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def plane_moments(lifted: Array, correction: Array, lever_arm_m: Array) -> Plane
 
 
 def attitude_sum(lifted: Array) -> Array:
-    """Return Σ R_target_from_body (3, 3) over the soundings: the features T_a multiplied by the constant."""
+    """Return Σ R_target_from_body (3, 3) over the soundings, from the products of the features T_a and the constant."""
     return np.array([lifted[axis * FEATURES + 9 : axis * FEATURES + 12, -1] for axis in range(3)])
 
 

@@ -1,8 +1,8 @@
-"""The patent's offsets [0126-0128], and angles and offsets in turn until both stand still.
+"""The patent's offsets [0126-0128], and the alternation: angles and offsets in turn until both stay the same.
 
-Corrections are laser minus MBES, displacements in the *target* frame; the lever arm lives in the *body* frame, so they
-are turned by the mean R_body_from_target of the soundings used: a pool that is not aligned with north would give
-nonsense otherwise.
+Numbers in brackets are paragraphs of patent CN 105425246 B. Corrections are laser minus MBES, displacements in the
+*target* frame. The lever arm is in *body* axes. So the corrections are turned by the mean R_body_from_target of the
+soundings; without this, a pool that is not aligned with north would give wrong lever arms.
 """
 
 from collections.abc import Sequence
@@ -59,7 +59,7 @@ class OffsetObservations:
 
 @dataclass(frozen=True)
 class PatentOffsets:
-    """Displacement of the MBES's cloud onto the laser's: (3,) m in the target frame, in the body frame; pairs for Z."""
+    """Displacement (3,) m of the MBES's points onto the laser's, in target frame and body axes; face pairs for Z."""
 
     target_m: Array
     body_m: Array
@@ -74,8 +74,8 @@ def patent_offsets(
     X [0126]: mean X of the laser's wall points minus that of the MBES's, pass by pass, weighted by n_L n_M / (n_L +
     n_M). Z [0127]: (z_dry - z_wet) measured minus (z_dry - z_wet) by design, over every pair of horizontal faces.
     Y [0128]: P1 planes projected onto the floor (their traces at their own mean height), cut with a line parallel to Y
-    through the faces' centroid, laser minus MBES. Moving the MBES's points by ΔX moves their cut by ΔX n_x / n_y, laser
-    minus MBES by the opposite: with ``apply_x_first`` that is added, and Y is what remains after X has been applied.
+    through the centroid of the laser's points, laser minus MBES. A shift of the MBES's points by ΔX moves their cut by
+    ΔX n_x / n_y. With ``apply_x_first`` this is subtracted, and Y is the offset that remains after X has been applied.
 
     Parameters
     ----------
@@ -86,12 +86,12 @@ def patent_offsets(
     lever_arm_m
         Lever arm (3,), body axes.
     apply_x_first
-        Y is what remains after X has been applied.
+        Whether Y is the offset that remains after X has been applied.
 
     Raises
     ------
     DegenerateGeometryError
-        No pass has what the offsets need, or a sensor sees no horizontal face.
+        No pass has points of both sensors on P1 and P2, or a sensor sees no horizontal face.
     """
     passes = observations.passes
     if not passes:
@@ -117,7 +117,7 @@ def patent_offsets(
 
 
 def _pair_weight(first: int, second: int) -> float:
-    """Return the weight of a difference of two means of so many points."""
+    """Return the weight of the difference of two means, from their numbers of points."""
     return first * second / (first + second)
 
 
@@ -126,7 +126,7 @@ def _mean(rows: Sequence[tuple[float, float]]) -> float:
 
 
 def _cut(plane: Plane, x_m: float) -> float:
-    """Return y where the trace of the plane, at the height of its centroid, meets x = x_m."""
+    """Return the y (m) at which the trace of the plane, at the height of its centroid, meets x = x_m."""
     n, c = plane.normal, plane.centroid_m
     return float(c[1] - (x_m - c[0]) * n[0] / n[1])
 
@@ -163,7 +163,7 @@ def _height_pairs(
 
 @dataclass(frozen=True)
 class AlternationTolerances:
-    """When the alternation ends: most iterations, largest last step of the angles and of the offsets."""
+    """Limits that end the alternation: number of iterations, last step of the angles and of the offsets."""
 
     max_iterations: int
     step_rad: float
@@ -187,10 +187,11 @@ def alternate(
     lever_arm_m: Array,
     tolerances: AlternationTolerances,
 ) -> AlternationResult:
-    """Take one step of the angles, then one of the offsets, until both stand still.
+    """Take one step of the angles, then one of the offsets, until both stay the same or a step exceeds 100 m.
 
-    The sequential recipe stops at angles found with a wrong lever arm (method: 0.08° on noise-free data); the fixed
-    point of the alternation has neither a deviation nor a displacement left, which only the truth has.
+    The sequential method ends with angles that were computed with a wrong lever arm (the method's own error is 0.08° on
+    noise-free data). At the end of the alternation neither a deviation nor a displacement is left. Only the true mount
+    has neither.
 
     Parameters
     ----------
@@ -201,7 +202,7 @@ def alternate(
     lever_arm_m
         Coarse lever arm (3,), body axes.
     tolerances
-        When the alternation ends.
+        Limits that end the alternation.
     """
     rotation, correction = np.eye(3), np.zeros(3)
     rows: list[dict[str, float]] = []

@@ -1,1 +1,1 @@
-"""From what a sonar records to points in its frame: beams, refraction, sound-speed casts."""
+"""Points in a sonar's frame from its recorded times and angles: beams, refraction, sound-speed casts."""

@@ -1,4 +1,4 @@
-"""A cast's rows as a profile: one direction of the probe, growing depths, no more points than the rays need."""
+"""A cast's rows as a profile: one direction of the probe, ascending depths, only the points that rays need."""
 
 from dataclasses import dataclass
 
@@ -6,16 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-SAME_DEPTH_M = 1e-3  # depths nearer to each other are one
-MOST = 200  # depths of a profile
-TOLERANCE_M_S = 0.02  # of thinning: what a probe resolves; 0.1 mm in a range of 10 m
-LEAST_HEIGHT_M = 0.05  # over which scattered rows are averaged first
+SAME_DEPTH_M = 1e-3  # depths are rounded to this; rows of the same depth are averaged
+MOST = 200  # largest number of depths in a profile
+TOLERANCE_M_S = 0.02  # largest error of thinning: a probe's resolution; 0.1 mm in a range of 10 m
+LEAST_HEIGHT_M = 0.05  # thickness of the first layers over which scattered rows are averaged
 
 
 def one_way(depth_m: Array) -> NDArray[np.int64]:
-    """Return the rows of the probe's way down, if that and the way up each cover half of the depths; else all rows.
+    """Return the row numbers of the probe's way down, if it and the way up each cover half of the depths; else all.
 
-    In the other case the probe went one way only, however unevenly. ``depth_m`` (n,) is as recorded.
+    In the second case the probe went one way only, however unevenly. ``depth_m`` (n,) is in the order of recording.
     """
     turn = int(np.argmax(depth_m))
     rows = np.arange(len(depth_m))
@@ -25,9 +25,9 @@ def one_way(depth_m: Array) -> NDArray[np.int64]:
 
 
 def largest_difference(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[float, float]:
-    """Return the largest difference (m/s) of two profiles over the depths that both have, and its depth (m).
+    """Return the largest difference (m/s) of two profiles, and its depth (m); zeros if their depths do not overlap.
 
-    A profile is (depths, ascending; speeds).
+    They are compared at the first profile's depths within the second. A profile is (depths, ascending; speeds).
     """
     depths = first[0][(first[0] >= second[0][0]) & (first[0] <= second[0][-1])]
     if not len(depths):
@@ -37,7 +37,7 @@ def largest_difference(first: tuple[Array, Array], second: tuple[Array, Array]) 
 
 
 def ascending(depth_m: Array, speed_m_s: Array) -> tuple[Array, Array]:
-    """Return depths and speeds sorted by depth; rows of the same millimetre become their mean."""
+    """Return depths, rounded to the millimetre and ascending, and the mean speed of the rows at each."""
     millimetre, group = np.unique(np.rint(depth_m / SAME_DEPTH_M), return_inverse=True)
     return millimetre * SAME_DEPTH_M, np.bincount(group, speed_m_s) / np.bincount(group)
 
@@ -46,8 +46,8 @@ def ascending(depth_m: Array, speed_m_s: Array) -> tuple[Array, Array]:
 class Profile:
     """Sound speed by depth, ascending.
 
-    The rows of the cast lie within TOLERANCE_M_S of the straight lines between these points; where ``averaged_m`` is
-    not 0, the means of the rows over that much depth do. ``scatter_m_s`` is the RMS of the rows about those lines.
+    The rows of the cast lie within TOLERANCE_M_S of the straight lines between these points. If ``averaged_m`` is not
+    0, only their means over layers of this thickness do. ``scatter_m_s`` is the RMS of the rows about those lines.
     """
 
     depth_m: Array
@@ -59,9 +59,9 @@ class Profile:
 def thinned_profile(depth_m: Array, speed_m_s: Array) -> Profile:
     """Return a profile of at most MOST points from the rows (n,) of a cast, depths ascending.
 
-    Straight lines are split at the row farthest off them (in speed) until none is farther than the tolerance (Ramer
-    1972; Douglas & Peucker 1973). Where too many rows remain, they scatter: then they are averaged over 5 cm of depth,
-    10 cm and so on first. (A larger tolerance would keep the worst of them.)
+    A straight line is split at the row farthest off it (in speed) until no row is farther than the tolerance (Ramer
+    1972; Douglas & Peucker 1973). If too many rows remain, the rows scatter. Then they are first averaged over layers
+    of 5 cm, 10 cm, 20 cm and so on. (A larger tolerance would keep the worst rows.)
     """
     height, depth, speed = 0.0, depth_m, speed_m_s
     while len(kept := _split(depth, speed, TOLERANCE_M_S)) > MOST:
@@ -73,14 +73,14 @@ def thinned_profile(depth_m: Array, speed_m_s: Array) -> Profile:
 
 
 def _averaged(depth: Array, speed: Array, height: float) -> tuple[Array, Array]:
-    """Return the means of depth and speed over layers of so much height."""
+    """Return the means of depth and speed over layers of this height."""
     _, layer = np.unique(np.floor((depth - depth[0]) / height), return_inverse=True)
     count = np.bincount(layer)
     return np.bincount(layer, depth) / count, np.bincount(layer, speed) / count
 
 
 def _split(depth: Array, speed: Array, tolerance: float) -> NDArray[np.int64]:
-    """Return the rows whose straight lines leave no row farther off than the tolerance."""
+    """Return the numbers of the rows to keep: straight lines between them pass all others within the tolerance."""
     kept = np.zeros(len(depth), dtype=bool)
     kept[[0, -1]] = True
     waiting = [(0, len(depth) - 1)]

@@ -1,18 +1,19 @@
-"""Two arrays that are not exactly at right angles: the transmit tilt as the receiving array's frame has it.
+"""Two arrays that are not exactly at right angles: the transmit tilt, expressed in the receiving array's frame.
 
 Frame ``mbes`` is the receiving array's, in which a ray is u = (s, p, -c) (:mod:`pipeline.maths.sonar.soundings`). A
-transmitter with installation angles of its own lies along the unit vector t, not along y: its fan of tilt τ is the cone
-u · t = sin τ. The ray is where that cone meets the receive beam's, s = sin θ. With w = sin τ, a = w - s t_x and
-n = t_y² + t_z²,
+transmitter with installation angles of its own lies along the unit vector t, not along y. Its fan of tilt τ is the cone
+u · t = sin τ. The ray is the line in which that cone meets the receive beam's cone, s = sin θ. With w = sin τ,
+a = w - s t_x and n = t_y² + t_z²,
 
     p t_y - c t_z = a,   p² + c² = 1 - s²
 
-is a line across a circle: with D = n (1 - s²) - a² the points where they meet are
+are a line and a circle. With D = n (1 - s²) - a² they meet at the points
 
     p = (a t_y ± t_z √D) / n,   c = (± t_y √D - a t_z) / n
 
-and the one on the beam's side of the array, c > 0 below it, has the sign of t_y. Its arcsin p is the tilt of a fan
-round y with the same ray. For t = (0, -1, 0), a transmitter mounted the other way round, it is -τ.
+The ray is the one on the beam's side of the array: below the array, c > 0, the sign ± is the sign of t_y; above the
+array it is the opposite. The tilt of a fan round y with the same ray is arcsin p. For t = (0, -1, 0), a transmitter
+turned round by 180°, this tilt is -τ.
 """
 
 import numpy as np

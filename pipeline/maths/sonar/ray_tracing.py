@@ -1,13 +1,13 @@
 """Rays through water whose sound speed changes with depth: layers of constant gradient, each an exact arc.
 
-In a layer c(D) = c_0 + g (D - D_0), and with θ the ray's angle from straight down Snell's law is sin θ / c = p. From
-dD / dt = c cos θ and cos θ dθ = p g dD follows dθ / dt = g sin θ, so that after a time t
+At depth D in a layer the speed is c(D) = c_0 + g (D - D_0). With θ the ray's angle from straight down, Snell's law is
+sin θ / c = p. From dD / dt = c cos θ and cos θ dθ = p g dD follows dθ / dt = g sin θ, so that after a time t
 
     tan(θ_1 / 2) = tan(θ_0 / 2) exp(g t),     D_1 = D_0 + (c_1 - c_0) / g,  c_1 = c_0 sin θ_1 / sin θ_0,
     x_1 - x_0 = (cos θ_0 - cos θ_1) / (p g)
 
-(Medwin & Clay 1998, 3.3; the half-angle form takes a ray that turns back, θ passing 90°, like any other). Layers are
-crossed one after the other; above the first and below the last point of the cast the speed stays as it is there.
+(Medwin & Clay 1998, 3.3). The half-angle form also holds for a ray that turns back, its θ passing 90°. Layers are
+crossed one after the other. Above the first and below the last point of the cast the speed is constant.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-LEAST_RAD = 1e-7  # rays nearer to the vertical than this are taken to be so far off it
-LEAST_GRADIENT = 1e-6  # 1/s: less bends nothing (10 m: 0.03 µm), and the arc's formula would divide by it
+LEAST_RAD = 1e-7  # smallest angle from the vertical; rays nearer to it get this angle
+LEAST_GRADIENT = 1e-6  # 1/s: a smaller one bends no ray (0.03 µm in 10 m), and the arc's formula would divide by it
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Cast:
 
 
 def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[Array, Array]:
-    """Return where rays are after a time: horizontal distance and depth, (n,) m each.
+    """Return the ends of rays after a travel time: horizontal distance from the start, and depth, (n,) m each.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[
     depth_m
         Depths (n,) at which the rays start.
     angle_rad
-        Their angles (n,) from straight down (π: straight up).
+        Angles (n,) of the rays at the start, from straight down (π: straight up).
     time_s
         Travel times (n,).
     """
@@ -54,8 +54,8 @@ def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[
     gradients = np.concatenate([[0.0], np.diff(cast.speed_m_s) / np.diff(edges), [0.0]])
     bounds = np.concatenate([[-np.inf], edges, [np.inf]])
     going = np.flatnonzero(left > 0)
-    layer = np.searchsorted(edges, depth, side="right")  # number of the layer from its upper edge on
-    layer -= (theta > np.pi / 2) & np.isin(depth, edges)  # from an edge upward: the one above
+    layer = np.searchsorted(edges, depth, side="right")  # an upper edge belongs to its layer
+    layer -= (theta > np.pi / 2) & np.isin(depth, edges)  # a ray upward from an edge starts in the layer above
     while len(going):
         k, t0, c0, d0 = layer[going], theta[going], speed[going], depth[going]
         g = gradients[k]
@@ -64,7 +64,7 @@ def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[
         out, down = _exit(t0, c0, d0, np.where(straight, 0.0, g), (bounds[k], bounds[k + 1]))
         t = np.minimum(out, left[going])
         tangent = np.tan(t0 / 2)
-        # half the turn, and the mean angle: no difference of nearly equal numbers
+        # half the turn and the mean angle: so no nearly equal numbers are subtracted
         half = np.where(straight, 0.0, np.arctan(tangent * np.expm1(g * t) / (1 + tangent**2 * np.exp(g * t))))
         t1, mean = t0 + 2 * half, t0 + half
         bow = np.where(straight, c0 * t / 2, np.sin(half) / g * c0 / np.sin(t0))
@@ -83,7 +83,7 @@ def trace(cast: Cast, depth_m: Array, angle_rad: Array, time_s: Array) -> tuple[
 def _exit(
     theta: Array, speed: Array, depth: Array, gradient: Array, layer: tuple[Array, Array]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the time until a ray leaves its layer, and whether downward; infinite if it never does."""
+    """Return the times (n,) until rays leave their layers, infinite if never, and a mask (n,): true for downward."""
     exit_time, downward = np.full(len(theta), np.inf), np.zeros(len(theta), dtype=bool)
     upper, lower = layer
     for edge, down in ((lower, True), (upper, False)):

@@ -1,7 +1,7 @@
-"""From travel time, receive angle and transmit tilt to a point in the sonar's frame.
+"""Points in the sonar's frame from travel time, receive angle and transmit tilt.
 
-A Mills cross measures two angles of a ray u: the receiving array lies along x and its beam is a cone round x, the
-transmitting array lies along y and its fan is a cone round y. The ray is where the two cones meet,
+A Mills cross measures two angles of a ray u. The receiving array lies along x and its beam is a cone round x; the
+transmitting array lies along y and its fan is a cone round y. The ray is the line in which the two cones meet,
 
     u = (s, p, -c),   s = sin θ,  p = sin τ,  c = √(1 - s² - p²)
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.maths.sonar.ray_tracing import Cast, trace
 
 Array = NDArray[np.float64]
-STEEPEST = 4.0  # bound of cos θ / c
+STEEPEST = 4.0  # upper bound of cos θ / c in :func:`across_beam`
 
 
 def points_in_mbes(
@@ -28,15 +28,15 @@ def points_in_mbes(
     true_sound_speed_m_s: float | None = None,
     projector_offset_m: Array | None = None,
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return points r u, (n, 3) m in frame mbes, and which of them (n,) are possible.
+    """Return points r u, (n, 3) m in frame mbes, and a mask (n,): true where the direction u exists.
 
-    Sound speed is not only a scale of ranges. Both arrays are flat: they set the slope of the wave front along
-    themselves, sin θ / c and sin τ / c. With the speed c the head worked with and the true speed c', k = c' / c:
+    Sound speed does not only scale the ranges. Both arrays are flat: they set the slope of the wave front along
+    themselves, sin θ / c and sin τ / c. With the speed c that the head used, the true speed c', and k = c' / c:
     r' = k r, sin θ' = k sin θ and sin τ' = k sin τ (R2Sonic manual on sound speed at the head; Snell's law at the
-    array's face). Where s² + p² then exceeds 1 no such direction exists.
+    array's face). Where these sines give s² + p² > 1, no direction exists.
 
-    Where the transmitter stands off the receiver by o, the path c t = |x - o| + |x| with x = r u gives
-    r = (L² - |o|²) / (2 (L - o · u)), L = c t; else r = c t / 2.
+    With the transmitter at o from the receiver, the path c t = |x - o| + |x| with x = r u gives
+    r = (L² - |o|²) / (2 (L - o · u)), L = c t. Without an offset r = c t / 2.
 
     Parameters
     ----------
@@ -47,11 +47,11 @@ def points_in_mbes(
     transmit_tilt_rad
         Tilts τ (n,) of the transmit fans, forward positive.
     sound_speed_m_s
-        Sound speeds c (n,) that the head worked with.
+        Sound speeds c (n,) that the head used.
     true_sound_speed_m_s
-        Sound speed c'; None: that of the head.
+        Sound speed c'; None: c' = c.
     projector_offset_m
-        Transmitter o (3,) in the mbes frame, if ranges are to be counted from it.
+        Position o (3,) of the transmitter, frame mbes; None: no offset from the receiver.
     """
     speed = sound_speed_m_s if true_sound_speed_m_s is None else np.full_like(sound_speed_m_s, true_sound_speed_m_s)
     slopes = np.column_stack([np.sin(angle_rad), np.sin(transmit_tilt_rad)]) * (speed / sound_speed_m_s)[:, None]
@@ -65,9 +65,10 @@ def points_in_mbes(
 
 
 def _intersection(slopes: Array, side: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return where the cones of ``slopes`` (n, 2), s and p, meet on the ``side`` (n,) of ±z.
+    """Return unit vectors (n, 3) in which the cones of ``slopes`` (n, 2), s and p, meet, and a mask (n,).
 
-    Unit vectors (n, 3), and whether the cones meet (n,); where they do not, a vector in the array's plane.
+    The sign of ``side`` (n,) is that of the vectors' z. The mask is true where the cones meet. Where they do not, the
+    vector lies in the array's plane.
     """
     square = np.einsum("nk,nk->n", slopes, slopes)
     flat = slopes / np.sqrt(np.maximum(square, 1.0))[:, None]
@@ -87,20 +88,20 @@ def receive_angle(points_mbes_m: Array) -> Array:
 def refracted_points(
     points_mbes_m: Array, speed_m_s: Array, R_up_from_mbes: Array, depth_m: Array, cast: Cast
 ) -> Array:
-    """Return the points (n, 3) m in the mbes frame where the rays really end, traced through a cast.
+    """Return the ends (n, 3) m of the rays, traced through a cast, in frame mbes.
 
-    The flat arrays set sin θ / c and sin τ / c along themselves, so that in the water that the cast says
-    to be at the head's depth both sines are larger by k = c_cast / c: whether c is wrong, or right for a thin layer of
-    other water at the arrays' faces. (A layer that lies level would refract otherwise; but the fan of a tilted head
-    looks along it, where any difference of the two speeds would turn rays by degrees.) From there the ray is traced for
-    the recorded time.
+    The flat arrays set sin θ / c and sin τ / c along themselves. So at the head's depth, where the cast has the speed
+    c_cast, both sines are larger by k = c_cast / c. This holds if c is wrong, and also if c is right for a thin layer
+    of other water at the arrays' faces. (A level layer would refract differently. But the fan of a tilted head looks
+    along it, and any difference of the two speeds would turn rays by degrees.) From the head the ray is traced for the
+    recorded time.
 
     Parameters
     ----------
     points_mbes_m
         Points (n, 3) of :func:`points_in_mbes`.
     speed_m_s
-        Sound speeds (n,) with which they were made.
+        Sound speeds (n,) with which these points were computed.
     R_up_from_mbes
         Rotations (n, 3, 3) into a frame with z up.
     depth_m
@@ -120,10 +121,11 @@ def refracted_points(
 
 
 def across_beam(x: Array, y: Array, z: Array) -> Array:
-    """Return r ∂u/∂θ (3, n): how points move with the angle of their receive beam, with the tilt fixed.
+    """Return r ∂u/∂θ (3, n): the change of points with the angle of their receive beam, the tilt being fixed.
 
-    From c² = 1 - s² - p²: ∂u/∂θ = (q, 0, s q / c) with q = cos θ = ±√(p² + c²). Without tilt it is the unit vector
-    (c, 0, s) across the fan. At the ends of a tilted fan, where the cones touch, c is 0 and q / c is bounded.
+    From c² = 1 - s² - p² follows ∂u/∂θ = (q, 0, s q / c) with q = cos θ = ±√(p² + c²). Without tilt this is the unit
+    vector (c, 0, s) across the fan. At the ends of a tilted fan, where the cones touch, c is 0; q / c is limited to
+    STEEPEST.
 
     Parameters
     ----------
@@ -138,8 +140,8 @@ def across_beam(x: Array, y: Array, z: Array) -> Array:
 def beam_half_widths(points_mbes_m: Array, across_rad: float, along_rad: float) -> tuple[Array, Array]:
     """Return the half axes of the beams at the points, (n, 3) m each in frame mbes: across track, and along track.
 
-    Across it is :func:`across_beam`; along, with θ fixed, r ∂u/∂τ = r cos τ (0, 1, p / c). Both are multiplied by the
-    tangent of half the width.
+    The axis across is r ∂u/∂θ (:func:`across_beam`). The axis along is r ∂u/∂τ = r cos τ (0, 1, p / c), θ being fixed.
+    Both are multiplied by the tangent of half the width.
 
     Parameters
     ----------

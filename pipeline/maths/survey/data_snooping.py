@@ -1,15 +1,16 @@
-"""Data snooping: tests of an adjustment's residuals, mark by mark, and again without the worst.
+"""Data snooping: tests of an adjustment's residuals mark by mark, repeated without the worst mark.
 
-The alternative hypothesis is that the residuals contain a shift G ∇ as well (G: the rows that the mark's error moves,
-along three axes, survey or drawing). With W = Σ⁻¹ and Q_v the residuals' cofactors, the likelihood ratio is
+The alternative hypothesis is that an error ∇ (3,) of one mark shifts the residuals by G ∇. G (n, 3) has the derivatives
+of the residuals by the mark's coordinates, in one frame (error of the drawing) or in all (error of the survey). With
+W = Σ⁻¹ and Q_v the residuals' cofactors, the likelihood ratio is
 
     T = rᵀ W G (Gᵀ W Q_v W G)⁺ Gᵀ W r ~ chi²(rank),        W Q_v W = W - W J C Jᵀ W,
 
-and T is the decrease of Ω when that coordinate is not known. For a mark of one frame this is vᵀ (Q_vv)⁺ v of its v
-(Baarda 1968, "A testing procedure for use in geodetic networks"; in this form Teunissen 2006, "Testing Theory", 4.3).
-T is measured by its critical value: with different ranks the largest quotient is the worst mark (de Jong and Teunissen
-2000, Earth Planets Space 52). The sigmas are taken as configured, without the estimated variance factor (Pope 1976),
-which the wrong mark itself would raise.
+and T is the decrease of Ω if the mark's coordinates were unknown. For a mark of one frame this is vᵀ (Q_vv)⁺ v of its
+residuals v (Baarda 1968, "A testing procedure for use in geodetic networks"; in this form Teunissen 2006, "Testing
+Theory", 4.3). T is divided by its critical value, because ranks differ; the mark with the largest quotient is the worst
+(de Jong and Teunissen 2000, Earth Planets Space 52). The sigmas are the configured ones. The estimated variance factor
+(Pope 1976) is not used, because the wrong mark itself would raise it.
 """
 
 from collections.abc import Sequence
@@ -24,16 +25,16 @@ from pipeline.maths.survey.frame_adjustment import FrameAdjustment, adjust_frame
 from pipeline.maths.survey.frames import MarkSurvey, RigidFrame
 
 Array = NDArray[np.float64]
-SNOOPING_LEVEL = 0.001  # level of the global test; and of all the marks' tests together
-LEAST_SHARE = 1e-6  # share of an error that reaches the residuals, below which they do not show it
-LINE_RAD = float(np.radians(5.0))  # a turn less certain than this is not determined
-UNEXPLAINED_RATIO = 3.0  # critical values: if a frame's worst is beyond that, what went from it did not explain it
-SURVEY = -1  # in place of a frame: the mark's survey, which all its frames share
+SNOOPING_LEVEL = 0.001  # level of the global test, and of all the marks' tests together
+LEAST_SHARE = 1e-6  # smallest share of an error that must reach the residuals, for the residuals to show the error
+LINE_RAD = float(np.radians(5.0))  # largest sigma of a turn that counts as determined
+UNEXPLAINED_RATIO = 3.0  # critical values: a frame whose worst test is larger is not explained by the marks left out
+SURVEY = -1  # in place of a frame's number: the error is in the mark's survey, which all its frames share
 
 
 @dataclass(frozen=True)
 class MarkTest:
-    """Test of a mark (its number in the survey) of a frame, or of all its frames (SURVEY): T, rank, critical value."""
+    """Test of a mark (number in the survey) in one frame, or in all its frames (SURVEY): T, rank, critical value."""
 
     frame: int
     mark: int
@@ -43,13 +44,13 @@ class MarkTest:
 
     @property
     def ratio(self) -> float:
-        """Return T in critical values."""
+        """Return T divided by its critical value."""
         return self.statistic / self.limit
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """A mark that was left out, and the rivals that would explain the misfit as well: their tests, worst first."""
+    """Test of a mark that was left out, and tests of the rivals, marks that would explain the misfit as well."""
 
     test: MarkTest
     rivals: tuple[MarkTest, ...]
@@ -66,9 +67,9 @@ class SnoopingResult:
     suspects
         Marks left out.
     last, last_tests
-        Adjustment without them, and its tests.
+        Adjustment without the suspects, and its tests.
     agrees
-        The marks that are left agree.
+        Whether the remaining marks agree.
     """
 
     first: FrameAdjustment
@@ -80,12 +81,12 @@ class SnoopingResult:
 
 
 def global_limit(redundancy: int) -> float:
-    """Return the limit of the global test: Ω lies above it with probability SNOOPING_LEVEL."""
+    """Return the limit of the global test, which Ω exceeds with probability SNOOPING_LEVEL."""
     return float(chdtri(max(redundancy, 1), SNOOPING_LEVEL))
 
 
 def mark_tests(adjusted: FrameAdjustment, frames: Sequence[RigidFrame]) -> tuple[MarkTest, ...]:
-    """Return the test of every mark whose error would show, the worst first.
+    """Return the tests of all marks whose errors would show in the residuals, the worst first.
 
     All limits together have the level SNOOPING_LEVEL (Bonferroni).
     """
@@ -115,7 +116,7 @@ def mark_tests(adjusted: FrameAdjustment, frames: Sequence[RigidFrame]) -> tuple
 def _statistic(G: Array, W: Array, P: Array, weighted: Array) -> tuple[float, int]:
     """Return T and its rank; ``weighted`` is W r.
 
-    The eigenvalues of Gᵀ P G against Gᵀ W G are the shares of an error that the residuals show.
+    The eigenvalues of Gᵀ P G relative to Gᵀ W G are the shares of an error that the residuals show.
     """
     moved = np.flatnonzero(G.any(axis=1))
     G, weighted = G[moved], weighted[moved]
@@ -130,10 +131,10 @@ def _statistic(G: Array, W: Array, P: Array, weighted: Array) -> tuple[float, in
 
 
 def snoop(survey: MarkSurvey, frames: Sequence[RigidFrame]) -> SnoopingResult:
-    """Adjust; while a test fails, leave out the worst mark and adjust again.
+    """Adjust all frames. While a test fails, leave out the worst mark and adjust again.
 
-    At most (k - 2) // 2 of the k marks of a frame go, so that most of them agree on what is left: with three none does.
-    If a frame is at odds all the same, the marks that went from it explained nothing and come back.
+    At most (k - 2) // 2 of the k marks of a frame are left out, so that most marks remain; of three marks none is left
+    out. If a frame still fails clearly (UNEXPLAINED_RATIO), its missing marks explained nothing and are used again.
     """
     left = tuple(frames)
     first = now = adjust_frames(survey, left)
@@ -163,7 +164,7 @@ def snoop(survey: MarkSurvey, frames: Sequence[RigidFrame]) -> SnoopingResult:
 
 
 def _without(frames: tuple[RigidFrame, ...], test: MarkTest) -> tuple[RigidFrame, ...]:
-    """Return the frames without the mark of a test, left out of the frame of the test or of all."""
+    """Return the frames, the mark of a test left out of the test's frame, or of all for SURVEY (axes keep theirs)."""
     fewer = []
     for number, frame in enumerate(frames):
         places = np.flatnonzero(frame.marks == test.mark)
@@ -173,7 +174,7 @@ def _without(frames: tuple[RigidFrame, ...], test: MarkTest) -> tuple[RigidFrame
 
 
 def _may_go(survey: MarkSurvey, frames: Sequence[RigidFrame], fewer: Sequence[RigidFrame]) -> bool:
-    """Return whether each frame keeps enough marks, and not all of them on a line."""
+    """Return whether each frame keeps enough marks, not all of which lie on a line."""
     for before, after in zip(frames, fewer, strict=True):
         if after.axes is None and len(before.marks) - len(after.marks) > (len(before.marks) - 2) // 2:
             return False
@@ -185,8 +186,8 @@ def _may_go(survey: MarkSurvey, frames: Sequence[RigidFrame], fewer: Sequence[Ri
 def sigma_about_line(survey: MarkSurvey, frame: RigidFrame) -> float:
     """Return the sigma (rad) of a frame's turn about the line nearest to its marks; infinite if they lie on a line.
 
-    By the drawing. With each mark's mean variance, the information of the turn is Σ |x|² / σ² about the weighted
-    middle, without the part along the line: the smallest eigenvalue of Σ (|x|² 1 - x xᵀ) / σ².
+    The marks stand at their places x in the drawing, from their weighted mean, with mean variances σ². The information
+    of the turn is Σ |x|² / σ² without the part along the line: the smallest eigenvalue of Σ (|x|² 1 - x xᵀ) / σ².
     """
     variance = np.trace(survey.covariance[frame.marks] + frame.covariance, axis1=1, axis2=2) / 3
     x = frame.drawing_m - (1 / variance) @ frame.drawing_m / np.sum(1 / variance)
@@ -197,7 +198,7 @@ def sigma_about_line(survey: MarkSurvey, frame: RigidFrame) -> float:
 
 
 def fit_of_frame(survey: MarkSurvey, frame: RigidFrame) -> tuple[float, int]:
-    """Return Ω and redundancy of one frame by itself; infinite if it fits so badly that nothing converges."""
+    """Return Ω and redundancy of one frame by itself; Ω is infinite if the adjustment does not converge."""
     try:
         adjusted = adjust_frames(survey, [frame])
     except NotConvergedError:

@@ -1,21 +1,24 @@
 """Adjustment of frames in one survey of marks by rigid transformations: least squares with the full covariance.
 
-A mark i stands at s_i in the survey and, by the drawing of frame f, at x_i in that frame; with R_f = R_survey_from_f
+A mark i stands at s_i in the survey and, by the drawing of frame f, at x_i in that frame. With R_f = R_survey_from_f
 and t_f the frame's origin in the survey,
 
     r_fi = s_i - R_f x_i - t_f = e_i - R_f d_fi,
 
-e_i the survey's error (covariance S_i), d_fi the drawing's (D_fi, in the frame's own axes). A mark of two frames has
-its e_i in the residuals of both: all frames are one adjustment, with the covariance of the stacked residuals
+where e_i is the survey's error (covariance S_i) and d_fi the drawing's (D_fi, in the frame's own axes). A mark of two
+frames has its e_i in the residuals of both. So all frames are adjusted together, with the covariance of the stacked
+residuals
 
     Σ = B diag(S) Bᵀ + Σ_f B_f diag(R_f D_f R_fᵀ) B_fᵀ,      B = ∂r/∂s, B_f its rows of frame f.
 
-A frame may instead be given by *axes*: its origin is a mark (a point with x = 0), one of its axes runs through two
-marks (with d the vector between them, the two other components of R_fᵀ d are zero), and a level gives the turn about
-that axis (roll or pitch of R_level_from_body, CONVENTIONS.md, minus the reading): six conditions for six unknowns.
+A frame may instead be defined by *axes*. Its origin is a mark (a point with x = 0). One of its axes runs through two
+marks (with d the vector between them, the two other components of R_fᵀ d are zero). The INS reads the turn about that
+axis (roll or pitch of R_level_from_body, CONVENTIONS.md; its difference from the reading is zero). These are six
+conditions for six unknowns.
 
-Start: the closed form of Kabsch (1976) and Umeyama (IEEE PAMI 13, 1991), det = +1 enforced. Then Gauss-Newton (the
-Gauss-Helmert model, e.g. Förstner and Wrobel 2016, 4.8) over u = (η_f, δt_f), R_f <- Exp(η_f) R_f, in survey axes:
+The iteration starts from the closed form of Kabsch (1976) and Umeyama (IEEE PAMI 13, 1991), with det = +1 enforced.
+Gauss-Newton follows (the Gauss-Helmert model, e.g. Förstner and Wrobel 2016, 4.8) over u = (η_f, δt_f), with
+R_f <- Exp(η_f) R_f, in survey axes:
 
     ∂r/∂η = skew(R x),   ∂r/∂t = -1;   ∂(Rᵀ d)/∂η = Rᵀ skew(d);   C = (Jᵀ Σ⁻¹ J)⁻¹,   Ω = rᵀ Σ⁻¹ r ~ chi²(n - u).
 """
@@ -46,13 +49,13 @@ class FrameAdjustment:
     poses
         Poses of the frames.
     covariance
-        Covariance (6 f, 6 f) of their (η, δt), rad and m in survey axes.
+        Covariance (6 f, 6 f) of the poses' (η, δt), rad and m in survey axes.
     residuals, rows
         Residuals r (n,), and the rows of each frame.
     weight
         W = Σ⁻¹ (n, n).
     by_survey
-        B (n, m, 3): derivatives of the residuals by the marks of the survey.
+        B (n, m, 3): derivatives of the residuals by the coordinates of the m marks of the survey.
     design
         J (n, 6 f).
     """
@@ -72,7 +75,7 @@ class FrameAdjustment:
 
     @property
     def redundancy(self) -> int:
-        """Return the number of residuals minus that of unknowns."""
+        """Return the number of residuals minus the number of unknowns."""
         return int(np.subtract(*self.design.shape))
 
     def residuals_of(self, frame: int, points: int) -> Array:
@@ -93,7 +96,7 @@ def closed_form(drawing_m: Array, survey_m: Array, weight: Array, mirrored: bool
     weight
         Weights w (n,).
     mirrored
-        det R = -1 instead.
+        True: det R = -1 instead.
 
     >>> R, t = closed_form(np.eye(3), np.eye(3) @ rotation_x(0.3).T + [1, 2, 3], np.ones(3))
     >>> bool(np.allclose(R, rotation_x(0.3))), t.round(9)
@@ -108,7 +111,7 @@ def closed_form(drawing_m: Array, survey_m: Array, weight: Array, mirrored: bool
 
 
 def adjust_frames(survey: MarkSurvey, frames: Sequence[RigidFrame]) -> FrameAdjustment:
-    """Adjust all frames at once, to the end of the iteration.
+    """Adjust all frames together, by iteration to convergence.
 
     Raises
     ------
@@ -205,7 +208,7 @@ def _through(by_mark: Array, covariance: Array) -> Array:
 
 
 def _rows_of(survey: MarkSurvey, frame: RigidFrame, pose: FramePose) -> tuple[Array, Array, Array, Array]:
-    """Return r (n,), J (n, 6), B (n, k, 3) by its own marks, and variances (n,) that are no mark's, of one frame."""
+    """Return r (n,), J (n, 6), B (n, k, 3) of one frame and its k marks, and the variances (n,) of its INS reading."""
     R, k = pose.R_survey_from_frame, frame.points
     at = survey.at_m[frame.marks]
     turned = frame.drawing_m[:k] @ R.T
@@ -231,8 +234,8 @@ def _rows_of(survey: MarkSurvey, frame: RigidFrame, pose: FramePose) -> tuple[Ar
 def _level(R: Array, along: int) -> tuple[float, Array]:
     """Return roll (along FORWARD) or pitch of R_survey_from_body, and its derivative (3,) by η in survey axes.
 
-    The third row of Rz(-azimuth) Rx(pitch) Ry(roll) is ρ = (-cos p sin r, sin p, cos p cos r); turned by η, ρ_k changes
-    by η · (R e_k x e_z).
+    The third row of Rz(-azimuth) Rx(pitch) Ry(roll) is ρ = (-cos p sin r, sin p, cos p cos r). A turn η changes ρ_k by
+    η · (R e_k x e_z).
     """
     rho = R[2]
     by_turn = np.cross(R.T, [0.0, 0.0, 1.0])  # (k, 3)
@@ -243,7 +246,11 @@ def _level(R: Array, along: int) -> tuple[float, Array]:
 
 
 def _start(survey: MarkSurvey, frame: RigidFrame) -> FramePose:
-    """Return the closed form, weighted by the mean variance of each mark; with axes, the vertical made orthogonal."""
+    """Return the pose from which the iteration starts.
+
+    It is the closed form, weighted by the mean variance of each mark. A frame with axes starts from its axis and the
+    vertical, made orthogonal to the axis, turned by the INS's reading.
+    """
     at, axes = survey.at_m[frame.marks], frame.axes
     if axes is None:
         variance = np.trace(survey.covariance[frame.marks] + frame.covariance, axis1=1, axis2=2)

@@ -9,7 +9,7 @@ from pipeline.maths.geometry.rotations import exp_so3
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-STARBOARD, FORWARD = 0, 1  # axes of the body that two marks may give
+STARBOARD, FORWARD = 0, 1  # the axes of the body that may run through two marks
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class MarkSurvey:
 
 @dataclass(frozen=True)
 class FrameAxis:
-    """One axis of a frame through two of its marks, and the attitude about it as the INS read it.
+    """An axis of a frame that runs through two of its marks, and the INS's reading of the attitude about the axis.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class FrameAxis:
     first, second
         Numbers of the marks within the frame; the axis runs from the first to the second.
     angle_rad, sigma_rad
-        The attitude and its sigma: roll for FORWARD, pitch for STARBOARD.
+        The reading and its sigma: roll for FORWARD, pitch for STARBOARD.
     """
 
     along: int
@@ -50,9 +50,9 @@ class RigidFrame:
     marks
         Numbers (k,) of the marks in the survey.
     drawing_m, covariance
-        Their places (k, 3) and covariance (k, 3, 3) m² by the drawing, in the frame's own axes.
+        Places (k, 3) of the marks and their covariance (k, 3, 3) m² by the drawing, in the frame's own axes.
     axes
-        With it only the first mark, the origin, has a place in the drawing: zero.
+        Definition of the frame by axes. With it only the first mark, the origin, has a place in the drawing: zero.
     """
 
     marks: Integers
@@ -62,11 +62,11 @@ class RigidFrame:
 
     @property
     def points(self) -> int:
-        """Return the number of marks with a residual of their own."""
+        """Return the number of marks that have residuals: all, or for a frame with axes only the origin."""
         return len(self.marks) if self.axes is None else 1
 
     def without(self, place: int) -> "RigidFrame":
-        """Return the frame without one of its marks, the one at ``place``."""
+        """Return the frame without its mark number ``place``."""
         kept = np.delete(np.arange(len(self.marks)), place)
         return replace(self, marks=self.marks[kept], drawing_m=self.drawing_m[kept], covariance=self.covariance[kept])
 

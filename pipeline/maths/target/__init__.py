@@ -1,1 +1,1 @@
-"""The target: its faces and planes, where it is in a point cloud, and which point lies on which face."""
+"""The target: its faces and planes, its pose in a point cloud, and the labelling of points by face."""

@@ -20,7 +20,7 @@ class TargetBeams:
     ranges_m
         Measured ranges (n,).
     half_widths
-        For finite beams the half widths' vectors across and along, (n, 3) each, for one metre of range: tan(half
+        Vectors of the half widths of finite beams, across and along, (n, 3) each, for one metre of range: tan(half
         width) · unit vector normal to the ray.
     stray
         The beam may stray by this many times the half width across.
@@ -33,11 +33,11 @@ class TargetBeams:
 
     @classmethod
     def head_on(cls, count: int) -> "TargetBeams":
-        """Return unknown rays (of averaged points): every face is taken to be seen from its front."""
+        """Return beams with unknown rays, for averaged points: every face counts as seen from its front."""
         return cls(np.zeros((count, 3)), np.zeros(count))
 
     def corners(self, rows: NDArray[np.int64]) -> Iterator[Array]:
-        """Yield rays (n, 3) along the four corners of these beams, as far out as the beams may stray."""
+        """Yield rays (n, 3) along each of the four corners of these beams; across, the corners include the stray."""
         across, along = (width[rows] for width in self.half_widths)
         for side, end in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
             yield self.directions[rows] + side * (1 + self.stray) * across + end * along
@@ -45,9 +45,9 @@ class TargetBeams:
     def spreads(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> tuple[Array, ...]:
         """Return the half axes, (n, 3) m each, of the footprints on a plane.
 
-        Tilting a ray u by a small angle towards t moves its intersection with the plane by w = h - u (n · h) / (n · u),
-        h = range · angle · t: h itself plus what is needed along the ray to come back to the plane (n · w = 0). On a
-        face grazed at 10° the axis across the ray is six times longer than the beam is wide.
+        A tilt of a ray u by a small angle towards t moves its intersection with the plane by
+        w = h - u (n · h) / (n · u), h = range · angle · t. This is h plus the part along the ray that leads back to
+        the plane (n · w = 0). On a face grazed at 10° one axis is six times longer than the beam is wide.
 
         Parameters
         ----------

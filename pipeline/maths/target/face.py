@@ -1,4 +1,4 @@
-"""A face of the target: a convex planar polygon, its edges, and where it meets others."""
+"""A face of the target: a convex planar polygon, its edges, and the lines along which it meets other faces."""
 
 from dataclasses import dataclass
 
@@ -25,13 +25,13 @@ class Face:
     vertices_m
         Corners (k, 3), counter-clockwise about the normal.
     sense
-        +1 where its normal is that of its family, -1 where it is the opposite.
+        +1 if its normal is that of its family, -1 if it is the opposite.
     offset_m
         Distance from the plane of the family, along the family's normal.
     seen
-        Where a sensor has to see it to use it: "dry" (the laser), "wet" (the sonar) or "both".
+        The sensors that use the face: "dry" (the laser alone), "wet" (the sonar alone) or "both".
     creases_m
-        Lines (2, 3) within it along which another face meets it.
+        Lines (2, 3) within the face along which another face meets it.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Face:
 
     @property
     def width_m(self) -> float:
-        """Return how far the face reaches horizontally, along itself."""
+        """Return the horizontal width of the face, measured along the face; for a horizontal face its width in y."""
         across = np.array([-self.normal[1], self.normal[0]])
         across = across / np.linalg.norm(across) if not self.level else np.array([0.0, 1.0])
         return float(np.ptp(self.vertices_m[:, :2] @ across))
@@ -68,9 +68,9 @@ class Face:
     ) -> Array:
         """Return the smallest distance (n,) of points in the plane from the polygon's edges, + inside.
 
-        A point counts with the whole parallelogram point ± spread_1 ± spread_2, so the margin lies along the direction
-        in which the footprint spreads. From every edge a margin is kept besides, or what the footprint may stray across
-        it where that is more. Creases count as edges, of both sides, along their length.
+        Each point stands for its footprint, the parallelogram point ± spread_1 ± spread_2: its extent counts in the
+        direction across each edge. From every edge the margin is kept besides, or the stray of the footprint across
+        the edge if that is larger. A crease counts along its length as an edge on both sides.
 
         Parameters
         ----------
@@ -81,11 +81,11 @@ class Face:
         margin_m
             Margin from every edge.
         stray_m
-            How far the footprints may stray (n, 3).
+            Vectors (n, 3) by which the footprints may stray.
         """
 
         def reach(axis: Array) -> Array | float:
-            """Return how far the footprint and its margin go along a unit vector (3,)."""
+            """Return the extent of the footprint with its margin along a unit vector (3,)."""
             spread = sum((np.abs(half_axis @ axis) for half_axis in spreads_m), start=np.zeros(1))
             return spread + (margin_m if stray_m is None else np.maximum(np.abs(stray_m @ axis), margin_m))
 
@@ -103,7 +103,7 @@ class Face:
         return smallest
 
     def meets(self, other: "Face") -> Array | None:
-        """Return the line (2, 3) along which another face meets this one within its edges; None where it does not."""
+        """Return the line (2, 3) along which another face meets this one within its edges; None if there is none."""
         away = other.vertices_m @ self.normal - self.distance_m
         ends = list(other.vertices_m[np.abs(away) < TOUCH_M])
         for k, (start, end) in enumerate(zip(away, np.roll(away, -1), strict=True)):
@@ -132,7 +132,7 @@ class Face:
         return np.asarray(points[self.clearance(points) >= 0])
 
     def same_corners(self, other: "Face") -> bool:
-        """Return whether the corners of both faces are the same, wherever they begin."""
+        """Return whether both faces have the same corners, in any order."""
         away = np.linalg.norm(self.vertices_m[:, None] - other.vertices_m[None], axis=2)
         same_count = len(self.vertices_m) == len(other.vertices_m)
         return bool(same_count and np.all(away.min(axis=1) < SAME_CORNER_M))
@@ -141,8 +141,8 @@ class Face:
 def plane_of(vertices_m: Array) -> tuple[Array, float]:
     """Return the unit normal (3,) and the distance of a polygon (k, 3), counter-clockwise about the normal.
 
-    Newell's method: components of Σ v_i × v_{i+1}, twice the area of the polygon's shadow along each axis; right for
-    corners slightly off a plane too. The distance is the mean of normal · v.
+    Newell's method: the components of Σ v_i × v_{i+1} are twice the areas of the polygon's projections along each axis.
+    It also holds for corners slightly off a plane. The distance is the mean of normal · v.
     """
     after = np.roll(vertices_m, -1, axis=0)
     shadows = np.sum((vertices_m - after)[:, [1, 2, 0]] * (vertices_m + after)[:, [2, 0, 1]], axis=0)

@@ -1,4 +1,4 @@
-"""Which face a point lies on: by polygon, with a margin of the footprint's half extent along its own direction."""
+"""Labelling: a point lies on a face if its whole footprint lies within the face's polygon, with a margin."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 NO_FACE = -1
-ROUNDING_M = 1e-6  # of heights of points on a horizontal face
+ROUNDING_M = 1e-6  # rounding of the heights of points on a horizontal face
 
 
 @dataclass(frozen=True)
 class LabelSettings:
-    """Which points a face takes.
+    """Limits within which a point is labelled with a face.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class LabelSettings:
     lowest_m, highest_m
         Heights in the target frame between which points count.
     seen
-        Faces that count: those to be seen "dry", or "wet", or "both".
+        Faces to use: "dry" (those that the laser uses), "wet" (those that the sonar uses), or "both" (all).
     """
 
     gate_m: float
@@ -47,10 +47,10 @@ class LabelSettings:
 
 @dataclass(frozen=True)
 class Labels:
-    """Face number (n,) of each point or -1, the cosine of its incidence, and why points have no face.
+    """Face number (n,) of each point or -1, the cosine of its incidence, and masks (n,) of the points without a face.
 
-    Masks of unlabelled points: off_surface; near_edge (on the plane of a face, but outside its polygon or within the
-    margin of its edges); grazing (ray too flat, or from behind).
+    off_surface: the ray meets no face's polygon within the gate and the heights; grazing: it meets one too flat, or
+    from behind; near_edge: it meets one, and the footprint with its margin does not lie within the polygon.
     """
 
     face: NDArray[np.int16]
@@ -63,10 +63,10 @@ class Labels:
 def hidden_in_part(
     model: TargetModel, faces: NDArray[np.int16], corners: Iterable[Array], first_met: Callable[[Array], Integers]
 ) -> Flags:
-    """Return the beams (n,) of which a corner ray meets first something else than the plane of their face.
+    """Return a mask (n,): true for beams with a corner ray that does not meet the plane of their face first.
 
-    An edge before it hides part of the footprint, or another face rises out of it, and the echo is the mean of two
-    things.
+    An edge in front hides part of the footprint, or another face stands out of it. Then the echo is the mean of two
+    surfaces.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def hidden_in_part(
     corners
         Rays (n, 3) along one corner of each beam, corner by corner.
     first_met
-        Rays (n, 3) -> the face that each meets first (-1: none).
+        Function from rays (n, 3) to the number (n,) of the face that each ray meets first (-1: none).
     """
     planes = {plane: k for k, plane in enumerate(dict.fromkeys((face.family, face.offset_m) for face in model.faces))}
     plane = np.array([planes[face.family, face.offset_m] for face in model.faces] + [-1])
@@ -131,7 +131,7 @@ class _Candidates:
         self.distance_m[rows] = np.abs(away[better])
 
     def labels(self) -> Labels:
-        """Return the faces, and why the other points have none."""
+        """Return the faces of the points, and for points without a face the reason."""
         free = self.face == NO_FACE
         near_edge = free & self.near_plane & ~self.too_flat
         return Labels(
@@ -152,16 +152,16 @@ def label_points(
 ) -> Labels:
     """Label points by the faces of the target.
 
-    A point belongs to a face if it lies within the gate of the face's plane, its ray meets the front at no less than
-    the smallest grazing angle and its whole footprint, taken where the ray meets the plane, lies within the polygon
-    with the margin to spare (or what the beam may stray, where that is more), and between the heights. Of several faces
-    the nearest plane wins.
+    A point belongs to a face if it lies within the gate of the face's plane, and its ray meets the front of the face at
+    the smallest grazing angle or more, and its whole footprint lies within the polygon and between the heights. The
+    footprint is taken at the point in which the ray meets the plane. From the polygon's edges it keeps the margin, or
+    the beam's stray if that is larger. Of several faces the one with the nearest plane is taken.
 
-    Where the ray meets the plane does not depend on the measured range, nor does the footprint there. If the point
-    itself were taken, a range too long would bring it in at one edge of a grazed face and out at the other, and the
-    points that are left would tilt the face: cov(distance from the plane, place) = σ² sin i cos i. (Along the water
-    line alone that was a fifth of the sigma of roll.) The point must lie within the polygon nevertheless, by half the
-    margin, which noise does not cross: a strong echo of a corner stands on the corner wherever its beam points.
+    The point in which the ray meets the plane does not depend on the measured range; nor does the footprint there. With
+    the measured point instead, a range too long would move it into a grazed face at one edge and out at the other. The
+    remaining points would tilt the face: cov(distance from the plane, place) = σ² sin i cos i. (Along the water line
+    alone that was a fifth of the sigma of roll.) The measured point must still lie within the polygon by half the
+    margin, which noise does not exceed: a strong echo of a corner lies at the corner, wherever its beam points.
 
     Parameters
     ----------
@@ -170,11 +170,11 @@ def label_points(
     points_m
         Points (n, 3) m, target frame.
     beams
-        Their rays.
+        Rays of the points.
     settings
-        Which points a face takes.
+        Limits for the labels.
     planes
-        Planes and their points from ``near_planes``, if known already: then ``points_m`` are its rows alone.
+        Planes and their points from ``near_planes``, for ``points_m`` that are the rows it returned; None: all planes.
     """
     candidates = _Candidates(points_m, beams, settings)
     for plane in planes_with_points(model, points_m, settings.gate_m, seen=settings.seen) if planes is None else planes:

@@ -1,11 +1,11 @@
 """The target: named planar polygons, and the relations between their planes.
 
-Faces that are known to be parallel, at known distances, form a *family*: one plane of unknown place and direction, from
-which each of its faces stands off by a known *offset* along the family's normal (zero for all that lie in one plane).
-A dry face and a wet one of a family lie on the same plane: a calibration rests on that. A family is *level* if its
-plane is horizontal: then its normal points up and offsets are heights.
+Parallel faces at known distances form a *family*. A family has one plane of unknown place and direction. Each of its
+faces stands off this plane by a known *offset* along the family's normal (zero for all faces if they lie in one plane).
+The dry and the wet faces of a family share its plane; the calibration rests on that. A family is *level* if its plane
+is horizontal. Then its normal points up and offsets are heights.
 
-Nothing downstream knows what the target is called or made of: it sees faces with a family, a plane and corners.
+Nothing downstream knows the kind of the target: other modules use only faces with a family, a plane and corners.
 """
 
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ from pipeline.maths.target.face import HORIZONTAL_COSINE, Face
 
 Array = NDArray[np.float64]
 
-ROLES = ("P1", "P2", "P3")  # of the patent's steps
+ROLES = ("P1", "P2", "P3")  # roles of families in the patent's steps
 
 
 @dataclass(frozen=True)
 class Family:
-    """Parallel faces at known distances; on its plane ``normal · x = distance_m`` by design.
+    """Parallel faces at known distances. The family's plane is ``normal · x = distance_m`` by design.
 
-    ``faces`` are their numbers; ``one_plane``: no face stands off the plane.
+    ``faces`` are the faces' numbers; ``one_plane``: no face stands off the plane.
     """
 
     name: str
@@ -50,13 +50,13 @@ class TargetModel:
     faces
         All faces; ``face`` numbers in tables are indices into them.
     families
-        All families: roles first, level ones last.
+        All families: those with a role first, level ones last.
     parallel
         Pairs of families that are parallel at an unknown distance.
     water_level_m
         Height of the water, target frame.
     repeats_m
-        Height after which the shape repeats; None where it does not.
+        Height after which the shape repeats; None if it does not.
     """
 
     faces: tuple[Face, ...]
@@ -67,24 +67,24 @@ class TargetModel:
 
     @property
     def depth_m(self) -> float:
-        """Return how far the lower end lies below the water."""
+        """Return the depth of the target's lower end below the water."""
         return self.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in self.faces)
 
     @property
     def half_period_m(self) -> float:
-        """Return half of the height after which the shape repeats; 0.5 m if it does not: poses differ on that scale."""
+        """Return half of the height after which the shape repeats, or 0.5 m: the scale on which poses differ."""
         return 0.5 if self.repeats_m is None else self.repeats_m / 2
 
     @property
     def width_m(self) -> float:
-        """Return the width of the front; without one, of the widest upright face."""
+        """Return the width of the front; without a front, of the widest upright face."""
         front = self.front()
         if front is not None:
             return front.width_m
         return max((face.width_m for face in self.faces if not face.level), default=1.0)
 
     def front(self) -> Face | None:
-        """Return the widest wet face that looks at the passing boat; None if every face looks aside, up or down."""
+        """Return the face toward the passing boat with the largest width times depth under water; None without one."""
         wet = [face for face in self.faces if face.seen != "dry" and face.vertices_m[:, 2].min() < self.water_level_m]
         ahead = [face for face in wet if not face.level and face.normal[0] < -0.9]
         return max(ahead, key=lambda face: face.width_m * self._depth(face), default=None)
@@ -114,7 +114,7 @@ class TargetModel:
         return all(any(face.same_corners(other) for other in self.faces) for face in self.mirrored().faces)
 
     def triangles(self) -> tuple[Array, Array]:
-        """Return vertices (v, 3) and corner numbers (t, 3) of the faces' triangles, fanned from each first corner."""
+        """Return vertices (v, 3) and corner numbers (t, 3) of triangles; those of a face share its first corner."""
         vertices: list[Array] = []
         triangles: list[tuple[int, int, int]] = []
         for face in self.faces:
@@ -129,7 +129,7 @@ class TargetModel:
 
 
 def names_in_order(families: Sequence[Family]) -> tuple[Family, ...]:
-    """Return the families in order: roles first, level ones last, else as they are."""
+    """Return the families with a role first, then the others in their order, level ones last."""
 
     def place(family: Family) -> int:
         return ROLES.index(family.name) if family.name in ROLES else len(ROLES) + family.level
@@ -150,9 +150,9 @@ class TargetFrame:
         return -self.R_target_from_pool @ self.origin_pool_m
 
     def points_from_pool(self, points_pool_m: Array) -> Array:
-        """Return points (n, 3) m of the pool frame in the target frame."""
+        """Return the target coordinates (n, 3) m of points (n, 3) m in the pool frame."""
         return np.asarray((self.R_target_from_pool @ (points_pool_m - self.origin_pool_m).T).T)
 
     def trajectory_from_pool(self, trajectory: Trajectory) -> Trajectory:
-        """Return a trajectory of the pool frame in the target frame."""
+        """Return a trajectory in the target frame, from one in the pool frame."""
         return trajectory.transformed(self.R_target_from_pool, self.shift_m)

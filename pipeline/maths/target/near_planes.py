@@ -16,7 +16,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class NearPlane:
-    """Faces in one plane, and the points near it: rows (m,) and their signed distances along ``axis`` (m,)."""
+    """Numbers of the faces in one plane, rows (m,) of the points near it, and their distances (m,) along ``axis``."""
 
     faces: list[int]
     axis: Array
@@ -24,16 +24,16 @@ class NearPlane:
     distance_m: Array
 
     def intersections(self, points_m: Array, beams: TargetBeams, sine: float) -> tuple[Array, Array]:
-        """Return where the rays of the points meet the plane (m, 3), and at what range (m,).
+        """Return the points (m, 3) in which the rays meet the plane, and their ranges (m,).
 
-        For rays that meet the plane at less than the angle of ``sine`` these are the feet of the points.
+        For rays that meet the plane at less than the angle of ``sine``, they are the feet of the points instead.
 
         Parameters
         ----------
         points_m
             All points (n, 3) m, target frame.
         beams
-            Their rays.
+            Rays of the points.
         sine
             Sine of the smallest angle between ray and plane.
         """
@@ -48,9 +48,10 @@ class NearPlane:
 def planes_with_points(
     model: TargetModel, points_m: Array, reach_m: float, among: Flags | None = None, seen: str = "both"
 ) -> Iterator[NearPlane]:
-    """Yield each plane of the model with the points (of those ``among``) within ``reach_m``, parallel planes together.
+    """Yield each plane of the model that has points within ``reach_m``, with these points.
 
-    Of parallel planes a point goes to the nearest: one projection and one search for all tops and bottoms, not forty.
+    Among parallel planes a point belongs to the nearest. So one projection and one search serve all tops and bottoms,
+    instead of forty.
 
     Parameters
     ----------
@@ -61,9 +62,9 @@ def planes_with_points(
     reach_m
         Largest distance from the plane.
     among
-        Points (n,) that count; None: all.
+        Mask (n,) of the points to use; None: all.
     seen
-        Faces that count: those to be seen "dry", or "wet", or "both".
+        Faces to use: "dry" (those that the laser uses), "wet" (those that the sonar uses), or "both" (all).
     """
     parallel: dict[tuple[float, ...], dict[float, list[int]]] = {}
     for number, face in enumerate(model.faces):
@@ -71,7 +72,7 @@ def planes_with_points(
             continue
         sign = np.sign(face.normal[np.flatnonzero(np.abs(face.normal) > 1e-9)[0]])
         axis = tuple((sign * face.normal + 0.0).tolist())
-        # Tops of one side and bottoms of the other lie at one height, computed by different sums: one plane.
+        # Tops of one side and bottoms of the other lie at one height from different sums: rounding makes one plane.
         parallel.setdefault(axis, {}).setdefault(round(float(sign * face.distance_m), 9), []).append(number)
     for axis, planes in parallel.items():
         direction, offsets = np.array(axis), np.array(sorted(planes))
@@ -92,7 +93,7 @@ def planes_with_points(
 def near_planes(
     model: TargetModel, points_m: Array, reach_m: float, among: Flags, seen: str
 ) -> tuple[NDArray[np.int64], tuple[NearPlane, ...]]:
-    """Return the rows of points near a plane of the target, and the planes, for labelling these alone.
+    """Return the rows of the points near any plane of the target, and these planes, to label only these points.
 
     Parameters
     ----------
@@ -103,13 +104,13 @@ def near_planes(
     reach_m
         Largest distance from the plane.
     among
-        Points (n,) that count.
+        Mask (n,) of the points to use.
     seen
-        Faces that count: those to be seen "dry", or "wet", or "both".
+        Faces to use: "dry" (those that the laser uses), "wet" (those that the sonar uses), or "both" (all).
 
     Returns
     -------
-    Rows, ascending; planes with their points numbered within those rows.
+    Rows, ascending, and the planes. The rows of a plane are numbers within the returned rows.
     """
     planes = tuple(planes_with_points(model, points_m, reach_m, among, seen))
     near = np.zeros(len(points_m), dtype=bool)

@@ -1,7 +1,7 @@
-"""Outlines of faces and relations between them -> the target's model.
+"""The target's model from the outlines of its faces and the relations between them.
 
-Relations: *same_plane*, *distance* (parallel, as far apart as their corners say) and *height* (the same of horizontal
-faces) make one family of the faces they name; *parallel* leaves the distance open and ties two families.
+The relations *same_plane*, *distance* (parallel, as far apart as their corners) and *height* (the same for horizontal
+faces) make one family of the faces that they name. *parallel* leaves the distance open and ties families.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 Kind = Literal["same_plane", "distance", "height", "parallel"]
 FLAT_M = 0.01  # corners farther than this off their own plane make no plane
 SAME_PLANE_M = 0.02  # faces of one plane may stand this far apart by their corners
-PARALLEL_DEG = 0.5  # and be turned by this
-SMALLEST_M = 0.05  # a face narrower than this shows nothing
+PARALLEL_DEG = 0.5  # parallel faces may be turned by this by their corners
+SMALLEST_M = 0.05  # a face smaller than the square of this side is refused
 
 
 @dataclass(frozen=True)
 class Outline:
-    """A face by its corners (k, 3) m, counter-clockwise as seen from where the sensors see it."""
+    """A face with its corners (k, 3) m, counter-clockwise as the sensors see them; ``seen`` as in Face."""
 
     name: str
     corners: Sequence[Sequence[float]]
@@ -35,7 +35,7 @@ class Outline:
 
 @dataclass(frozen=True)
 class Relation:
-    """A relation between faces; ``name`` is that of their family, if it is not to be made of the faces' names."""
+    """A relation between faces; ``name`` is the name of their family (empty: the role, or made from a face's name)."""
 
     kind: Kind
     faces: tuple[str, ...]
@@ -52,11 +52,11 @@ def build_target(
     outlines
         Faces, target frame.
     relations
-        What is known of their planes.
+        Known relations between the planes of the faces.
     water_level_m
         Height of the water, target frame.
     repeats_m
-        Height after which the shape repeats; None where it does not.
+        Height after which the shape repeats; None if it does not.
 
     Raises
     ------
@@ -99,7 +99,10 @@ def build_target(
 
 
 def _with_creases(faces: Sequence[Face]) -> list[Face]:
-    """Return the faces with the lines along which they meet; only faces whose boxes touch can."""
+    """Return the faces with their creases, the lines along which other faces meet them.
+
+    Only faces whose bounding boxes touch are tried.
+    """
     low = np.array([face.vertices_m.min(axis=0) for face in faces]) - TOUCH_M
     high = np.array([face.vertices_m.max(axis=0) for face in faces]) + TOUCH_M
     touch = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=2)
@@ -111,7 +114,7 @@ def _with_creases(faces: Sequence[Face]) -> list[Face]:
 
 
 def _plane(outline: Outline) -> tuple[Array, float]:
-    """Return normal and distance of a face; refuse corners that make no polygon the boat can see."""
+    """Return normal and distance of a face; refuse corners that do not make a convex polygon visible from the boat."""
     vertices = np.array(outline.corners, dtype=np.float64)
     where = f"target.faces.{outline.name}: corners"
     after = np.roll(vertices, -1, axis=0)
@@ -155,7 +158,7 @@ def _check(relation: Relation, planes: Mapping[str, tuple[Array, float]]) -> Non
 
 
 def _groups(names: Sequence[str], relations: Sequence[Relation]) -> list[list[str]]:
-    """Return the names of the faces of each family, in order of the faces."""
+    """Return the names of the faces of each family, in the order of ``names``."""
     group = {name: name for name in names}
     for relation in relations:
         if relation.kind != "parallel":
@@ -172,7 +175,7 @@ def _family(
     roles: Mapping[str, str],
     order: Sequence[str],
 ) -> Family:
-    """Return the family of some faces; its name is the role, or that of a relation, or made of the first face's."""
+    """Return the family of these faces. Its name is their role, else a relation's, else made from the first face's."""
     inside = [relation for relation in relations if relation.kind != "parallel" and relation.faces[0] in members]
     own_roles = sorted({roles[name] for name in members if name in roles})
     if len(own_roles) > 1:

@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.maths.target.outlines import Outline, Relation
 
 Corner = tuple[float, float, float]
-HORIZONTAL_FAMILY = "H"  # all tops and bottoms
+HORIZONTAL_FAMILY = "H"  # name of the family of all tops and bottoms
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,15 @@ class PatentDimensions:
     c
         Legs of a block's right-angled triangle.
     e
-        Height of a block, and the gap to the next above.
+        Height of a block, and the gap to the next block above.
     low_side
-        Side of the lower first base, "south" (-y) or "north".
+        Side whose lowest block stands lower, "south" (-y) or "north" (+y).
     blocks_per_side
-        Default: whole part of a / 2e.
+        Number of blocks on each side, default the whole part of a / 2e.
     first_base_m
-        Height of the low side's first base, default -a/2.
+        Height of the base of the low side's lowest block, default -a/2.
     stagger_m
-        How much higher the other side's first base stands, default e.
+        Height of the other side's lowest base above it, default e.
     """
 
     a: float
@@ -60,7 +60,7 @@ def patent_outlines(dimensions: PatentDimensions) -> tuple[list[Outline], list[R
     A block on side s = ±1 (+1 is north, +y) is the prism of height e over the triangle (0, s b/2), (c, s b/2),
     (c, s (b/2 + c)). Its measured face runs at 45° from the wall's edge back to the pool's wall; its outward normal is
     (-1, s, 0)/√2. P1 are the faces on -y, P3 those on +y, P2 the wall's front. The low side's first base stands at
-    ``first_base_m`` (default -a/2), the other side's ``stagger_m`` (default e) higher; then one block every 2 e.
+    ``first_base_m`` (default -a/2), the other side's ``stagger_m`` (default e) higher. A block follows every 2 e.
     """
     a, b, c, e = dimensions.a, dimensions.b, dimensions.c, dimensions.e
     per_side, first_base_m, stagger_m = dimensions.blocks_per_side, dimensions.first_base_m, dimensions.stagger_m

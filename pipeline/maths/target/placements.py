@@ -1,7 +1,7 @@
 """Points in the target frame as a function of the parameters that a registration estimates.
 
-The laser's points and the soundings are registered by the same steps; only the parameters differ: for the laser the
-pose of the target (azimuth, x, y, z), for the soundings the mount (rotation, lever arm). A ``Placement`` hides which.
+The laser's points and the soundings are registered by the same steps. Only the parameters differ: for the laser the
+pose of the target (azimuth, x, y, z), for the soundings the mount (rotation, lever arm). A ``Placement`` hides this.
 """
 
 from dataclasses import dataclass, replace
@@ -70,7 +70,7 @@ class TargetPose:
 class TiltedTarget:
     """Points already in the target frame, (n, 3) m; parameters: a small rotation vector and a shift of the points.
 
-    d(g · x)/dω = x × g (from g · (ω × x)), d/ds = g: used once, at zero.
+    The derivatives are d(g · x)/dω = x × g (from g · (ω × x)) and d(g · x)/ds = g. They are used once, at zero.
     """
 
     points_target_m: Array
@@ -92,8 +92,8 @@ class MountCorrection:
     x = p + T (Exp(δ) m + l + Δl), where p (n, 3) m and T (n, 3, 3) are poses of the body in the target frame,
     m = R_body_from_mbes(coarse) x_mbes (n, 3) m and l (3,) m is the coarse lever arm.
 
-    Rows [u × g_body, g_body], u = Exp(δ) m, g_body = Tᵀ g: exact for the increment ε of Exp(ε) Exp(δ), and within
-    |δ| / 2 relative for δ itself, enough for an iteration.
+    The rows are [u × g_body, g_body], u = Exp(δ) m, g_body = Tᵀ g. They are exact for the increment ε of
+    Exp(ε) Exp(δ), and right to a share |δ| / 2 for δ itself, which is enough for an iteration.
     """
 
     positions_m: Array
@@ -162,5 +162,5 @@ class LaserMount:
 
 
 def _random_rows(count: int, size: int) -> NDArray[np.int64]:
-    """Return a random subset of rows in their original order: every n-th point of a grid might all lie on one row."""
+    """Return ``size`` random rows, ascending: every n-th point of a grid might lie on one line."""
     return np.sort(np.random.default_rng(0).permutation(count)[:size])

@@ -11,10 +11,10 @@ from pipeline.maths.target.placements import Placement, SubsetPlacement
 Array = NDArray[np.float64]
 Labeller = Callable[[Array, Array], NDArray[np.int16]]  # parameters, points -> face numbers (-1: none)
 Closest = Callable[[Array], tuple[Array, NDArray[np.int64]]]  # points -> nearest points on the model, face numbers
-ROUGH = 2000  # points with which starts are scored and at first converge
-START_REACH_M = 0.25  # with which starts are scored
-COARSE_REACHES_M, FINE_REACHES_M = (0.4, 0.3, 0.2, 0.15), (0.1, 0.07, 0.05)  # while roughly converging, and then
-SAME_POSE_M = 0.03  # poses that put no point farther apart are one: less than the finest reach
+ROUGH = 2000  # number of points for the scores of the starts and for the coarse convergence
+START_REACH_M = 0.25  # reach for the scores of the starts; a point farther than the reach does not count
+COARSE_REACHES_M, FINE_REACHES_M = (0.4, 0.3, 0.2, 0.15), (0.1, 0.07, 0.05)  # for coarse and for final convergence
+SAME_POSE_M = 0.03  # two poses are one if no coordinate of a point differs by more; less than the finest reach
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ def surface_score(placement: Placement, parameters: Array, closest: Closest, rea
     placement, parameters
         The points, and their parameters (k,).
     closest
-        Nearest points on the model.
+        Function that returns the nearest points on the model.
     reach_m
-        Distance at which a point counts nothing.
+        Distance from which on a point adds nothing.
     """
     points = placement.points(parameters)
     nearest, _ = closest(points)
@@ -57,8 +57,8 @@ def converge(
     """Return the parameters (k,) after Gauss-Newton steps onto the nearest surface, within a shrinking reach.
 
     The residual of a point is its distance from the nearest point of the nearest face, along the line between them
-    (along the normal of the face where they coincide). Its weight is (1 - (d / reach)²)², and zero beyond the reach.
-    The prior keeps directions that the points leave open where they were.
+    (along the normal of the face if they coincide). Its weight is (1 - (d / reach)²)², and zero beyond the reach. The
+    prior draws directions that the points do not determine to zero, the parameters' expectation.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def converge(
         Largest number of steps with each reach.
     """
     parameters = start.copy()
-    prior = np.diag(0.05**2 / placement.prior_sigmas**2)  # as if one point with 5 cm said the same
+    prior = np.diag(0.05**2 / placement.prior_sigmas**2)  # relative to points with a sigma of 5 cm
     for reach in reaches_m:
         tolerance = 1e-5 if reach == reaches_m[-1] else reach / 200
         for _ in range(steps):
@@ -99,18 +99,19 @@ def converge(
 
 @dataclass(frozen=True)
 class SearchCriteria:
-    """Which converged poses a search accepts, and how it compares them.
+    """Criteria by which a search accepts converged poses and compares them.
 
     Parameters
     ----------
     same
-        Whether two converged poses (k,) are the same solution.
+        Function that returns whether two converged poses (k,) are the same solution.
     quality
-        How good a converged pose (k,) is; the highest wins.
+        Function that returns the quality of a converged pose (k,); the highest wins.
     limits
-        (k,): a converged pose further from zero than this is no candidate.
+        Largest absolute values (k,) of the parameters of a candidate.
     starts_per_group
-        How many of each group of starts go on. Where blocks repeat, the best of all may lie round one wrong height.
+        Number of starts of each group that converge. Where blocks repeat, the best of all may lie round one wrong
+        height.
     """
 
     same: Callable[[Array, Array], bool]
@@ -121,9 +122,9 @@ class SearchCriteria:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """A pose and its score, with the score of the best rival that is another pose (not the same one again).
+    """The best pose, its score, and the score of the best rival, a pose that is another solution (0: no rival).
 
-    ``within``: it lies within the limits; otherwise no start led to a pose that does.
+    ``within``: whether the pose lies within the limits; if not, no start led to a pose within them.
     """
 
     parameters: Array
@@ -137,8 +138,8 @@ def search(
 ) -> SearchResult:
     """Return the best pose from many starts: all are scored with a wide reach, the best converge and are compared.
 
-    Starts are scored, and converge within the coarse reaches, with ROUGH of the points: more do not tell starts apart
-    any better. Of several that converge to the same pose one goes on.
+    Starts are scored, and converge within the coarse reaches, with ROUGH of the points: more points do not separate
+    starts better. Of several starts that converge to the same pose only the first goes on.
 
     Parameters
     ----------
@@ -149,7 +150,7 @@ def search(
     surface
         The surface of the target.
     criteria
-        What is a candidate, and how good it is.
+        Criteria for candidates and for their quality.
     """
     rough = placement.subset(ROUGH)
 
@@ -178,7 +179,7 @@ def search(
 
 @dataclass(frozen=True)
 class Refinement:
-    """Parameters (k,), covariance (k, k) from the residuals' robust scale, that scale, their RMS and their number."""
+    """Parameters (k,), covariance (k, k) from the residuals' robust scale; scale, RMS and number of the residuals."""
 
     parameters: Array
     covariance: Array
@@ -188,10 +189,11 @@ class Refinement:
 
 
 def refine(placement: Placement, start: Array, label: Labeller, planes: FacePlanes, rounds: int = 6) -> Refinement:
-    """Return the point-to-plane least-squares fit of labelled points alone, relabelled each round: no bias from edges.
+    """Return the point-to-plane least-squares fit of labelled points, which edges do not bias.
 
-    Residual r = n · x - d, Huber weights min(1, k s / |r|) with k = 2 and s = 1.4826 · median |r|; covariance
-    s² (Aᵀ W A + prior)⁻¹. With too few points the start comes back.
+    Points are labelled again in each round. The residual is r = n · x - d, the Huber weights are min(1, k s / |r|) with
+    k = 2 and s = 1.4826 · median |r|, the covariance is s² (Aᵀ W A + prior)⁻¹. With fewer than three labelled points
+    per parameter the rounds end with the parameters so far, at first the start.
 
     Parameters
     ----------
