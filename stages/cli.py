@@ -261,9 +261,9 @@ def _compare(
 
     Status 0 if it was accepted and every error is within four sigma.
     """
-    from stages.commands import truth as comparison
+    from stages.commands import compare
 
-    return comparison.command(run_folder, truth)
+    return compare.command(run_folder, truth)
 
 
 def call(arguments: list[str]) -> int:

@@ -8,8 +8,8 @@ from typing import Any
 
 from pipeline.atomic_files import write_text, writing
 from pipeline.console import say
-from pipeline.results.compare import run_difference
-from pipeline.results.compare_text import comparison_text
+from pipeline.results.diff import run_difference
+from pipeline.results.diff_text import difference_text
 from pipeline.results.finished_run import FinishedRun
 from pipeline.results.mount_difference import Tolerances, is_moved
 from pipeline.run.output_files import refuse_output
@@ -46,18 +46,18 @@ def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutp
     for option, file in (("--html", outputs.html), ("--rrd", outputs.rrd)):
         refuse_output(option, file, first, second)
     if outputs.html is not None:
-        from pipeline.results.pages.comparison import comparison_page
+        from pipeline.results.pages.diff import difference_page
 
-        write_text(outputs.html, comparison_page(difference))
+        write_text(outputs.html, difference_page(difference))
     if outputs.rrd is not None:
         write_two_runs(first, second, difference, outputs.rrd)
-    text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else comparison_text(difference)
+    text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else difference_text(difference)
     say(text, sys.stdout)
     return 1 if is_moved(difference) else 0
 
 
 def compare_runs(first: Path, second: Path, tolerances: Tolerances) -> dict[str, Any]:
-    """Return the difference of two run folders, of :func:`pipeline.results.compare.run_difference`.
+    """Return the difference of two run folders, of :func:`pipeline.results.diff.run_difference`.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from pipeline.artefacts.catalogue.target import SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.artefacts.streams import point_array
 from pipeline.atomic_files import write_bytes
-from pipeline.results.compare_text import comparison_text
+from pipeline.results.diff_text import difference_text
 from pipeline.run.results import Tables, calibration
 from stages.views.blueprint import two_runs_blueprint
 from stages.views.recording import DOT_M, LASER, SONAR, log_stage, recording_content, recording_id, text_document
@@ -46,7 +46,7 @@ def save_two_runs(first: Path, second: Path, difference: dict[str, Any], path: P
     first, second
         The run folders.
     difference
-        Their difference, of :func:`pipeline.results.compare.run_difference`.
+        Their difference, of :func:`pipeline.results.diff.run_difference`.
     path
         The recording's file.
     """
@@ -56,7 +56,7 @@ def save_two_runs(first: Path, second: Path, difference: dict[str, Any], path: P
             for stage in STAGES:
                 log_stage(NestedRecording(recording, name), stage, Tables(run))
         _on_one_target(recording, Tables(first), Tables(second))
-        recording.log("tables/comparison", text_document(comparison_text(difference)), static=True)
+        recording.log("tables/comparison", text_document(difference_text(difference)), static=True)
 
     write_bytes(path, recording_content(recording_id(first, second), two_runs_blueprint(), draw))
 
