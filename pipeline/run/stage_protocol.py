@@ -3,9 +3,9 @@
 A stage is a module with the frozen dataclasses ``Config``, ``Inputs`` and ``Outputs``. Each field of the latter two is
 annotated with its artefact. A stage of tables alone has ``run(inputs, config) -> Outputs``. A stage over streams has
 
-    prepare(inputs, config) -> prepared                     called once
-    run_batch(source, chunk, prepared, config) -> Piece     called for every chunk of the streams in SOURCES (or all)
-    combine(prepared, partials, config) -> Outputs          called once; its fields of streams stay EMPTY_STREAM
+    prepare(inputs, config) -> prepared                         called once
+    run_batch(source, chunk, prepared, config) -> BatchResult   called for each chunk of the streams in SOURCES (or all)
+    combine(prepared, partials, config) -> Outputs              called once; its fields of streams stay EMPTY_STREAM
 
 A table's field with the default None is optional. An optional input is None if no stage of the run writes it. An
 optional output that is None is not written.

@@ -1,4 +1,4 @@
-"""``poolcal check``: what a session's files are, and what is wrong with them, before it is calibrated."""
+"""``poolcal check``: the content and the faults of a session's files, before the session is calibrated."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -22,7 +22,7 @@ WITHOUT_CONFIG = "Target, mounts and soundings were not checked: give the pool's
 
 
 def command(session: Path, config: Path | None, as_json: bool) -> int:
-    """Print the findings; 1 if something is wrong.
+    """Print the findings; return 1 if something is wrong.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     config
         The pool's YAML file; None: target, mounts and soundings are not checked.
     as_json
-        Print JSON, for programs.
+        True: print JSON, for programs.
     """
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)

@@ -1,4 +1,4 @@
-"""``poolcal diff``: two runs compared, on the screen, as JSON, as a page and as a recording."""
+"""``poolcal diff``: the difference of two runs on the screen, as JSON, as a page and as a recording."""
 
 import json
 import sys
@@ -18,9 +18,9 @@ from stages import ORDER
 
 @dataclass(frozen=True)
 class DiffOutputs:
-    """In which forms the comparison is wanted, beside lines on the screen."""
+    """The forms of the output: JSON or text on the screen, a page, a recording; None: no such file."""
 
-    as_json: bool  # in their place
+    as_json: bool  # else text
     html: Path | None
     rrd: Path | None
 
@@ -33,14 +33,14 @@ def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutp
     first, second
         Run folders.
     tolerances
-        A larger difference of the mount is a no, significant or not.
+        A larger difference of the mount gives status 1, even if it is not significant.
     outputs
-        Forms of the comparison.
+        The forms of the output.
 
     Returns
     -------
     int
-        1: the mounts differ, or cannot be compared.
+        0: the mount has not moved; 1: it has moved, or the mounts cannot be compared.
     """
     difference = compare_runs(first, second, tolerances)
     for option, file in (("--html", outputs.html), ("--rrd", outputs.rrd)):
@@ -64,7 +64,7 @@ def compare_runs(first: Path, second: Path, tolerances: Tolerances) -> dict[str,
     first, second
         The run folders.
     tolerances
-        Larger differences of the mount are listed.
+        A mount parameter with a larger difference is listed by name.
     """
     return run_difference(FinishedRun.read(first, ORDER), FinishedRun.read(second, ORDER), tolerances)
 

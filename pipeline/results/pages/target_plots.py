@@ -130,7 +130,7 @@ def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: Cut
 def _across(
     axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: CuttingPlane, drawn: Sequence[Array]
 ) -> None:
-    """Set the panel to the whole height of the tallest face with points, and stretch its thickness to fit the points."""
+    """Set the panel to the whole height of the tallest face with points; its thickness is stretched to fit them."""
     there = [cut_line(corners[number], plane)[0][:, [plane.along, 2]] for number in points["face"].astype(int).unique()]
     ends = max(there, key=lambda cut: float(np.ptp(cut[:, 1])))
     slant = np.ptp(ends[:, 0]) / 2
