@@ -144,7 +144,7 @@ def _plane_rows(
 def _moments_by_name(
     moments: dict[Key, PlaneMoments], faces: pd.DataFrame
 ) -> dict[NamedKey, tuple[PlaneMoments, Array]]:
-    """Return each plane's moments, and the vector to whose side its normal must point, by pass and name."""
+    """Return each plane's moments by pass and name, with the normal by design, which fixes the sign of the plane's."""
     normals = dict(zip(faces["face"].tolist(), normals_of(faces), strict=True))
     rows = {row["face"]: row for row in faces[["face", "name", "family", "one_plane"]].to_dict("records")}
     total: dict[NamedKey, tuple[PlaneMoments, Array]] = {}

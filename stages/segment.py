@@ -1,4 +1,4 @@
-"""Find the target in the laser's points, and label the points of both sensors by its faces."""
+"""Find the target in the laser's points, and label the points of both sensors by face."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -32,7 +32,7 @@ from pipeline.target.result_tables import provisional_mount_table, target_pose_t
 from pipeline.target.samples import laser_poses, laser_sample, sounding_sample
 from pipeline.target.surface import ClosestSurface
 
-FEWEST_VOXELS = 50  # with laser points above the water
+FEWEST_VOXELS = 50  # fewest voxels with laser points above the water
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Largest tolerated differences of an angle (degrees) and of a lever-arm component (mm); None: any difference."""
+    """Largest tolerated differences of an angle (degrees) and of a lever-arm component (mm); None: no limit."""
 
     angle_deg: float | None = None
     lever_arm_mm: float | None = None

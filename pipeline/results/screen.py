@@ -95,7 +95,7 @@ def _pass_lines(passes: Sequence[Mapping[str, Any]], sensor: str) -> list[str]:
 
 
 def _target_line(target: Mapping[str, Any]) -> str:
-    """Return the sentence on the target's pose. An error of the laser's mount or of the origin shows first there."""
+    """Return the sentence on the target's pose. There an error of the laser's mount or of the origin shows first."""
     x, y, z = (signed(value, 3) for value in target["offset_m"])
     azimuth, first, second = (signed(angle, 2) for angle in (target["azimuth_correction_deg"], *target["tilt_deg"]))
     return f"Target found at x {x}, y {y}, z {z} m from target.origin, azimuth {azimuth}°, tilt {first}° {second}°."

@@ -36,7 +36,7 @@ class Manifest:
     key: Key
     outputs: Mapping[str, Mapping[str, Any]]  # sha256 and bytes, by file in the folder
     rows: Mapping[str, int]  # by artefact
-    counts: list[dict[str, Any]]  # of points, by source and reason; the reason "used" among them
+    counts: list[dict[str, Any]]  # numbers of records by source and reason; "used" is one of the reasons
     git_commit: str | None
     wall_s: float
 

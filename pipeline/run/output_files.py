@@ -10,7 +10,7 @@ from pipeline.errors import ArtefactError, ConfigError
 
 @contextlib.contextmanager
 def as_written(run: Path) -> Iterator[None]:
-    """Raise an ArtefactError for an error in the values of calibration.json: somebody must have changed the file."""
+    """Turn an error in reading values of calibration.json into an ArtefactError: somebody has changed the file."""
     try:
         yield
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
@@ -23,7 +23,7 @@ def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b
     Parameters
     ----------
     option
-        The option with the file's path. The file's name must end in its word: after ``--html`` in ``.html``.
+        The option with the path, for example ``--html``. The file must then have the suffix ``.html``.
     file
         The path of the file; None: no file is written.
     runs

@@ -18,7 +18,7 @@ MAX_REASONS = 3
 
 @dataclass
 class Progress:
-    """Print the progress of a run. Several workers may call this at the same time."""
+    """Print the progress of a run. Several workers may use it at the same time."""
 
     stream: TextIO = field(default_factory=lambda: sys.stderr)
     quiet: bool = False

@@ -40,7 +40,7 @@ def library_versions() -> dict[str, str]:
 
 
 def source_digests(stage: ModuleType) -> dict[str, str]:
-    """Return the digests of the program's files that the stage imports, with the readers if it reads raw files."""
+    """Return the digests of the program's files on which the stage depends, with the readers if it reads raw files."""
     raw = any(isinstance(marker, RawFiles) for marker in declared(stage.Inputs).values())
     return dict(_source_digests(ROOT, stage.__name__, Path(str(stage.__file__)), raw))
 

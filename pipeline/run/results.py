@@ -53,7 +53,7 @@ class Tables:
         for batch in stream.batches():
             rows = len(next(iter(batch.values())))
             first = -rows_before % step
-            pieces.append({name: values[first::step].copy() for name, values in batch.items()})  # no views
+            pieces.append({name: values[first::step].copy() for name, values in batch.items()})  # frees the batch
             rows_before += rows
         if not pieces:
             return {name: np.empty(0) for name in columns}, step

@@ -51,11 +51,11 @@ def run(
     run_folder
         The folder for the results.
     workers
-        Process the parts of streams.
+        The threads or the cluster that process the parts of streams.
     progress
-        Prints the progress; None: nothing is printed.
+        The display of the progress; None: nothing is printed.
     finished
-        Called with the name of each stage that was run, when it has ended.
+        Function that is called with the name of each stage that was run, when the stage has ended.
     calibrated
         The sensor that is calibrated.
     overwrite
@@ -106,9 +106,9 @@ def run_stage(
     settings
         New settings; None: the settings in run.yaml.
     workers
-        Process the parts of streams.
+        The threads or the cluster that process the parts of streams.
     progress
-        Prints the progress; None: nothing is printed.
+        The display of the progress; None: nothing is printed.
 
     Returns
     -------

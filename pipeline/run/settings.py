@@ -1,4 +1,4 @@
-"""Settings of a run. They are read from YAML, kept in run.yaml, and refused if they must be a mistake."""
+"""Settings of a run. They are read from YAML, kept in run.yaml, and refused if they cannot be correct."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -24,7 +24,7 @@ def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Wor
     run_folder
         The run folder; it is only read.
     workers
-        Hash the files in parallel.
+        The threads that hash the files.
     """
     settings = read_settings(run_folder)
     with folder.reading(run_folder):

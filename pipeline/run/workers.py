@@ -44,7 +44,10 @@ class Workers:
         return self.map if self.local else serial
 
     def map(self, function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]:
-        """Yield the result of ``function`` for each item, in order. In a worker it runs serially, without waiting."""
+        """Yield the result of ``function`` for each item, in order.
+
+        A worker that calls this runs the function itself, so that no worker waits for another.
+        """
         if self.executor is None or getattr(_inside, "worker", False):
             return map(function, *items)
         return self._ordered(self.executor, function, zip(*items, strict=True))

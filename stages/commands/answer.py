@@ -39,7 +39,7 @@ def say_where(run: Path) -> None:
 
 
 def say_failures(failures: "Sequence[DrawingFailure]", but: str = "") -> None:
-    """Print which drawings failed, and why; ``but``: ends each line. The result of the run stays valid."""
+    """Print which drawings failed, and why; ``but``: text at the end of each line. The result stays valid."""
     for failure in failures:
         if failure.trace:
             say(failure.trace, sys.stderr)

@@ -54,9 +54,9 @@ def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
     limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
     within = error is not None and bool(np.all(np.abs(error) <= limit))
     accepted = result["verdict"] == "accepted"
-    what = "sigma" if sigma is not None else "the largest sigma allowed"
+    bound = "sigma" if sigma is not None else "the largest sigma allowed"
     lines += ["", "error: what is still wrong; of angles the rotation from found to true about the body's axes"]
-    how = f"{'every error is' if within else 'an error is not'} within {LIMIT:g} {what}"
+    how = f"{'every error is' if within else 'an error is not'} within {LIMIT:g} {bound}"
     lines.append(f"{chosen}: {how if accepted else 'the calibration was rejected'}")
     return "\n".join(lines), accepted and within
 

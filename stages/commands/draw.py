@@ -68,7 +68,7 @@ def draw_missing(run: Path, wanted: Drawings, jobs: int = 1) -> list[DrawingFail
 
 
 def missing_drawings(run: Path, wanted: Drawings) -> list[str]:
-    """Return the names of the drawings to make: PAGE, and stages with results that agree with each other."""
+    """Return the names of the drawings to make: PAGE, and stages without a recording; their results must agree."""
     stages = names_in(run)
     page = [PAGE] if wanted.report and is_page_outdated(run, stages) else []
     if not wanted.recordings:

@@ -35,7 +35,7 @@ def _usage(error: typer.TyperException) -> str:
 
 
 def status_of(command: Callable[[], Any], debug: bool) -> int:
-    """Call a command and return its exit status, without an exception; ``debug``: show tracebacks of bad input too."""
+    """Call a command and return its exit status. Exceptions end here. ``debug``: show tracebacks of bad input too."""
     try:
         status = int(command() or 0)
         if status == INTERRUPTED:

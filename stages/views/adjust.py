@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 Shades = dict[str, tuple[int, int, int]]  # by family
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SENSORS = {"laser": LASER, "mbes": SONAR}
-RAYS = 60  # the most in a fan
+RAYS = 60  # most rays in a fan
 FAN_NS = NS // 50  # points of a fan lie within this time of its epoch
 
 

@@ -22,8 +22,8 @@ from pipeline.run.settings import read_settings
 from stages.views.fit_planes import faces_on_plane
 from stages.views.recording import COLOURS, GREY, SONAR, log_curve, text_document
 
-SOUNDINGS = 20_000  # the most in one step, all families together
-STEPS = 60  # the most that are shown
+SOUNDINGS = 20_000  # most soundings in one step, all families together
+STEPS = 60  # most steps that are shown
 FAMILIES = ("P1", "P2", "P3")
 ANGLE_COLOURS = dict(zip((*FAMILIES, "P4"), COLOURS.values(), strict=False))
 

@@ -15,7 +15,7 @@ from pipeline.target.design import target_of
 
 PAPER = (255, 255, 255)
 FROM = (-1.0, -0.55, 0.45)  # the eye is in this direction from the target's middle
-DISTANCE = 2.0  # of the eye from the target's middle, in halves of the target's diagonal
+DISTANCE = 2.0  # from the target's middle to the eye, in halves of the target's diagonal
 TABS = ("Overview", "Before and after", "Iteration", "Residuals", "Quality")
 
 

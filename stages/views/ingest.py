@@ -11,7 +11,7 @@ from pipeline.run.results import Tables
 from pipeline.text_table import text_table
 from stages.views.recording import log_curve, text_document
 
-RECORDS = 20_000  # the most in a curve
+RECORDS = 20_000  # most records in a curve
 HOLE_NS = 2 * NS
 AXES = {"roll": (0, 114, 178), "pitch": (230, 159, 0), "heading": (0, 158, 115)}
 HOW_TO_READ = """\

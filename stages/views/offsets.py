@@ -11,7 +11,7 @@ from stages.views.angle_iterate import iteration_column, log_reasons
 from stages.views.recording import LASER, SONAR, log_curve
 
 CURVES = (("angles", "step_deg", 1.0, SONAR, "angles, °"), ("offsets", "step_m", 1000.0, LASER, "offsets, mm"))
-SMALLEST = 1e-9  # change that is shown; the curve is its logarithm
+SMALLEST = 1e-9  # smallest change that is shown; the curve is its logarithm
 
 
 def log(recording: Any, tables: Tables) -> None:

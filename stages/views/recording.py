@@ -43,7 +43,7 @@ from stages import ORDER, names_in
 
 APPLICATION = "poolcal"
 DRAWN = ORDER  # stages that have a recording
-MOST_POINTS = 300_000  # the most in a cloud: dense enough to see, few enough for any laptop
+MOST_POINTS = 300_000  # most points in a cloud: dense enough to see, few enough for any laptop
 COLOURS = {  # that colour-blind readers can tell apart
     "P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167),
     "other": (122, 92, 0), "more": (60, 60, 60),

@@ -15,7 +15,7 @@ from pipeline.run.results import Tables, calibration
 from stages.views.blueprint import two_runs_blueprint
 from stages.views.recording import DOT_M, LASER, SONAR, log_stage, recording_content, recording_id, text_document
 
-SOUNDINGS = 200_000  # the most of each run under /both
+SOUNDINGS = 200_000  # most soundings of each run under /both
 STAGES = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # with entities in the target frame
 
 

@@ -50,7 +50,7 @@ def slopes_in(faces: pd.DataFrame, plane: CuttingPlane) -> Array:
     """Return the slope of each face, (n,): the change of the coordinate along the plane by the coordinate across it.
 
     With this slope points near the plane are moved along their face into the plane. It is ±1 for a face at 45° to the
-    plane, and set to 0 for horizontal faces and for faces parallel to the plane.
+    plane, and set to 0 for horizontal faces and for faces nearly parallel to the plane.
     """
     across, along = (faces[f"normal_{'xy'[axis]}_target_1"].to_numpy() for axis in (plane.axis, plane.along))
     aslant = np.abs(along) > 0.1

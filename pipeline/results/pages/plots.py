@@ -19,7 +19,7 @@ from pipeline.results.pages.rendering import drawing_style
 from pipeline.run.results import Tables, calibration
 from pipeline.run.settings import read_settings
 
-TRACK_POINTS = 300  # at least, of a long pass in the plan
+TRACK_POINTS = 300  # a long pass has one to two times this number in the plan
 
 
 def draw_picture(run: Path, name: str) -> Markup:

@@ -1,7 +1,7 @@
 """Pages for people: self-contained, printable HTML without scripts. The template engine escapes every text.
 
 Pictures are SVG by matplotlib. Each is a separate image in the page, with all letters drawn as paths. It shows numbers,
-words of this program, and names of families, which consist of plain letters.
+words of this program, and names of families, which have only letters, digits, hyphens, underscores and dots.
 """
 
 import base64

@@ -64,7 +64,7 @@ def residual_charts(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFram
 
 
 def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
-    """Draw mean residuals by family and pass: one mark for each pass, on the left for the laser, else for the sonar."""
+    """Draw the mean residuals by family, with one mark for each pass: the laser on the left, the sonar on the right."""
     for sensor, side, colour in (("laser", -0.18, LASER), ("mbes", 0.18, SONAR)):
         for place, name in enumerate(marks):
             rows = cells[(cells["sensor"] == sensor) & (cells["family"] == name)]
