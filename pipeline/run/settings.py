@@ -23,7 +23,7 @@ RUN_YAML = "run.yaml"
 
 @dataclass(frozen=True)
 class Settings:
-    """The settings of a run: those of the pool and of the session, both checked, and the folder with the raw files."""
+    """The checked settings of a run, of the pool and of the session, and the folder with the raw files."""
 
     session_folder: Path
     pool: PoolConfig

@@ -18,7 +18,7 @@ from stages import ORDER
 
 @dataclass(frozen=True)
 class DiffOutputs:
-    """The forms of the output: JSON or text on the screen, a page, a recording; None: no such file."""
+    """The forms of the output: JSON or text on the screen, a page and a recording in files; None: no file."""
 
     as_json: bool  # else text
     html: Path | None

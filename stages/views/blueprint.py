@@ -37,7 +37,7 @@ def tabs_of(run: Path) -> tuple[str, ...]:
 
 
 def run_blueprint(tabs: Sequence[str], model: TargetModel) -> Any:
-    """Return the layout of a run's recordings. All but the overview have one viewpoint, on the whole target.
+    """Return the layout of a run's recordings. Scenes after the overview share one viewpoint on the whole target.
 
     Parameters
     ----------
