@@ -13,7 +13,7 @@ HEAD = 2000  # bytes at the start of the page that contain its digest
 
 
 def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
-    """Return a digest of the results, settings and raw files on the page; ``manifests``: the manifests of all stages."""
+    """Return a digest of the results, settings and raw files on the page; ``manifests``: one for each stage."""
     shown = [[stage, of_stage.outputs, of_stage.key.raw] for stage, of_stage in manifests.items()]
     settings = read_settings(run).as_json()
     return hashlib.sha256(json.dumps([shown, settings], sort_keys=True).encode()).hexdigest()
