@@ -83,7 +83,7 @@ class Statement:
 
 
 def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
-    """Return the verdict as people read it; ``fixed``: mount parameters that an accepted calibration did not estimate.
+    """Return the verdict in words; ``fixed``: mount parameters that an accepted calibration did not estimate.
 
     >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
     ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')

@@ -125,7 +125,7 @@ def test_of_several_causes_the_most_telling_is_named():
     assert "20 sigma): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason.words
 
 
-def test_an_ins_that_is_conceded_no_drift_is_looked_at_first():
+def test_an_ins_that_is_allowed_no_drift_is_named_first():
     check = check_ins_drift(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0)))
     assert rejections(evidence(), methods(), ADJUSTED, check) == []
     reasons = rejections(evidence(patterns=[OFF], freed={"value": 6e-4}), methods(), ADJUSTED, check)

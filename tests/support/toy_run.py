@@ -43,5 +43,5 @@ class Pool:
         """The stages that were run; what was said about them is kept in ``said``."""
         progress = Progress()
         self.said.clear()
-        progress.note = self.said.append  # type: ignore[assignment,method-assign]
+        progress.note = self.said.append  # type: ignore[assignment,method-assign]  # kept in a list, not printed
         return runner.run(self.stages, self.session, self.config, self.run_folder, workers=workers, progress=progress)

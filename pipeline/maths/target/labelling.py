@@ -155,7 +155,7 @@ def label_points(
     A point belongs to a face if it lies within the gate of the face's plane, and its ray meets the front of the face at
     the smallest grazing angle or more, and its whole footprint lies within the polygon and between the heights. The
     footprint is taken at the point in which the ray meets the plane. From the polygon's edges it keeps the margin, or
-    the beam's stray if that is larger. Of several faces the one with the nearest plane is taken.
+    the beam's stray if that is larger. If several faces qualify, the one with the nearest plane is taken.
 
     The point in which the ray meets the plane does not depend on the measured range; nor does the footprint there. With
     the measured point instead, a range too long would move it into a grazed face at one edge and out at the other. The

@@ -139,7 +139,7 @@ def search(
     """Return the best pose from many starts: all are scored with a wide reach, the best converge and are compared.
 
     Starts are scored, and converge within the coarse reaches, with ROUGH of the points: more points do not separate
-    starts better. Of several starts that converge to the same pose only the first goes on.
+    starts better. If several starts converge to the same pose, only the first goes on.
 
     Parameters
     ----------

@@ -191,7 +191,7 @@ def drifted(rng, noise, seconds):
     return root @ rng.normal(size=(len(seconds), 6)) * noise.drift
 
 
-def test_drift_of_a_pass_against_the_others_has_the_sigma_conceded():
+def test_drift_of_a_pass_against_the_others_has_the_sigma_allowed():
     noise = PoseNoise(np.zeros(6), np.array([0.015, 0.015, 0.02, 1e-4, 2e-4, 5e-4]), 60.0)
     seconds = np.concatenate([start + np.arange(0, 20, 2.0) for start in (0.0, 80.0, 160.0, 240.0)])
     number = np.append(np.repeat(np.arange(4), 10)[:-1], -1)  # the last knot lies behind the last pass

@@ -74,7 +74,7 @@ def test_a_design_displaced_as_a_whole_is_no_misclosure() -> None:
     free = np.array([np.inf] * 3 + [1e-4] * 2 + [np.inf])
     assert DesignPrior(PLANES, 4e-4, 0.002, np.zeros(6), free).pseudo_observations(at).squares < 1e-4
     fixed = np.array([0.01] * 3 + [1e-4] * 2 + [np.inf])
-    expected = np.sum((shift / 0.01) ** 2)  # minus what the faces concede
+    expected = np.sum((shift / 0.01) ** 2)  # minus what the faces absorb
     design = DesignPrior(PLANES, 4e-4, 1e-5, np.zeros(6), fixed)
     assert design.pseudo_observations(at).squares == pytest.approx(expected, rel=0.02)
 
