@@ -1,6 +1,6 @@
-"""The rigorous solution: sensors observe shared surfaces from one moving body; parameters and their covariance.
+"""The rigorous solution: one least-squares adjustment of all points on the target, with the parameters' covariance.
 
-The sonar is calibrated against the surfaces that the laser sees, or the laser against the target's design.
+The sonar is calibrated against the surfaces that the laser measures, or the laser against the target's design.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ from pipeline.target.design import target_of
 
 @dataclass(frozen=True)
 class Config:
-    """Settings; ``mbes`` is None where the laser is calibrated, ``laser_fit`` where the sonar is."""
+    """Settings that the stage uses; ``mbes`` is None if the laser is calibrated, ``laser_fit`` if the sonar is."""
 
     target: Target
     segment: Segment
@@ -58,14 +58,14 @@ class Config:
 
     @property
     def calibration(self) -> Mbes | LaserCalibration:
-        """What is calibrated: the sonar, or the laser in this way."""
+        """The settings of the calibration: ``mbes`` or ``laser_fit``, whichever is not None."""
         (calibration,) = (block for block in (self.mbes, self.laser_fit) if block is not None)
         return calibration
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """Artefacts read; there are no labelled soundings where the laser is calibrated."""
+    """Tables and streams that the stage reads; ``soundings_labelled`` is empty if the laser is calibrated."""
 
     files: Annotated[pd.DataFrame, FILES]
     passes: Annotated[pd.DataFrame, PASSES]
@@ -80,7 +80,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Artefacts written."""
+    """Tables that the stage writes."""
 
     estimate: Annotated[pd.DataFrame, ESTIMATE]
     covariance: Annotated[pd.DataFrame, COVARIANCE]
@@ -99,18 +99,18 @@ class Outputs:
 
 def run(inputs: Inputs, config: Config) -> Outputs:
     """Adjust the mount of the sensor that is calibrated."""
-    # Say what is calibrated, and what is known of it.
+    # Set up the problem of the sensor that is calibrated.
     calibration, session = config.calibration, session_data(inputs, config)
     problem = (
         sonar_problem(session, calibration) if isinstance(calibration, Mbes) else laser_problem(session, calibration)
     )
 
-    # Adjust the mount by all labelled points of the sensors that observe.
+    # Adjust the mount to all labelled points of the sensors that take part.
     labelled = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
     points = {sensor: labelled[sensor] for sensor in problem.model.sigmas}
     adjustment = adjust_mount(problem, points, config.adjust, config.ingest.max_gap_s)
 
-    # Take the residuals of all points at the adjusted values, and make the tables.
+    # Compute the residuals of all points at the adjusted values, and make the tables.
     statistics = residual_statistics(problem, adjustment, points, inputs.passes, config.adjust)
     return Outputs(
         **result_tables(problem, adjustment, statistics, inputs.passes, config.adjust.test_level),
@@ -123,7 +123,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
 
 
 def session_data(inputs: Inputs, config: Config) -> SessionData:
-    """Return the session as earlier stages left it, with the drift model that the adjustment is to use."""
+    """Return the results of earlier stages and the instruments, with the drift model for the adjustment."""
     drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     return SessionData(
         target=target_of(config.target),
@@ -139,12 +139,12 @@ def session_data(inputs: Inputs, config: Config) -> SessionData:
 def weak_geometry(
     inputs: Inputs, config: Config, session: SessionData, adjustment: MountAdjustment, statistics: ResidualStatistics
 ) -> pd.DataFrame:
-    """Return table ``geometry``: the laser's parameters that had to be fixed, or what the sonar's passes lack.
+    """Return table ``geometry``: the laser's parameters that were fixed, or the weaknesses of the sonar's passes.
 
     Parameters
     ----------
     inputs, config : Inputs, Config
-        Those of the stage.
+        The inputs and settings of the stage.
     session : SessionData
         Target and instruments.
     adjustment : MountAdjustment

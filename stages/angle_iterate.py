@@ -45,7 +45,7 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    """Iterate the angles; where the geometry does not allow it, the table says why."""
+    """Iterate the angles. If the geometry does not allow it, they are NaN, and table ``angles`` has the reason."""
     settings = config.angle_iterate
     tolerances = AngleTolerances(
         max_iterations=settings.max_iterations,

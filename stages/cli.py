@@ -1,6 +1,6 @@
-"""The command line: declares the arguments of each command, and hands them to its module in :mod:`stages.commands`.
+"""The command line. It declares each command's arguments, and passes them to its module in :mod:`stages.commands`.
 
-A command's module, and all that it computes with, is imported when the command is called: ``--help`` answers at once.
+A command's module and its imports are loaded only when the command is called. Therefore ``--help`` answers at once.
 """
 
 import sys
@@ -261,20 +261,20 @@ def _compare(
 
     Status 0 if it was accepted and every error is within four sigma.
     """
-    from stages.commands import truth as comparison
+    from stages.commands import compare
 
-    return comparison.command(run_folder, truth)
+    return compare.command(run_folder, truth)
 
 
 def call(arguments: list[str]) -> int:
-    """Return the exit status of a command line; nothing is raised."""
-    debug = "--debug" in arguments  # accepted anywhere on the line
+    """Run a command line and return its exit status; no exception is raised."""
+    debug = "--debug" in arguments  # may stand anywhere in the line
     words = [word for word in arguments if word != "--debug"] or ["--help"]
     return entry.status_of(lambda: app(words, prog_name="poolcal", standalone_mode=False), debug)
 
 
 def main() -> None:
-    """Run the command line of this process: the console script."""
+    """Run the command line of this process, as the console script does."""
     entry.prepare_process()
     entry.end_process(call(sys.argv[1:]))
 

@@ -1,4 +1,4 @@
-"""Planes of both sensors, by pass, face and family; and moments from which any mount's follow."""
+"""Planes of both sensors by pass, face and family, and lifted moments, which give the planes for any mount."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Config:
     """Settings that the stage uses."""
 
     fit_planes: FitPlanes
-    mbes: SensorMount | None  # none: the laser is calibrated
+    mbes: SensorMount | None  # None: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    """Fit the planes of both sensors, and keep the soundings' lifted moments."""
+    """Fit the planes of both sensors, and return them with the lifted moments of the soundings."""
     trajectory = trajectory_in_target(inputs.poses, inputs.target_pose)
     laser = _merge(inputs.laser_labelled.fold(laser_moments))
     lifted: dict[Key, Array] = {}
@@ -82,7 +82,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
 
 
 def _rows_by_key(batch: Batch) -> Iterator[tuple[Key, NDArray[np.int64]]]:
-    """Yield the row numbers of each (pass, face) in the batch."""
+    """Yield each key (pass, face) of the batch with the numbers of its rows, (n,)."""
     code = batch["pass"].astype(np.int64) * 65_536 + batch["face"]
     order = np.argsort(code, kind="stable")
     codes, starts = np.unique(code[order], return_index=True)
@@ -125,14 +125,14 @@ def _merge(partials: Iterator[dict[Key, Any]]) -> dict[Key, Any]:
 def _plane_rows(
     sensor: str, moments: dict[Key, PlaneMoments], faces: pd.DataFrame, min_points: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the rows of one sensor: by face and by family in one plane, in each pass and in all of them together."""
+    """Yield one sensor's rows: by face, by family in one plane, and the direction P4; by pass and for all passes."""
     fitted: dict[NamedKey, Plane] = {}
     for key, (of_plane, toward) in sorted(_moments_by_name(moments, faces).items()):
         if of_plane.count >= min_points:
             try:
                 fitted[key] = fit_plane(of_plane, toward)
             except DegenerateGeometryError:
-                continue  # all on one line: no plane, and no row that could be taken for one
+                continue  # the points lie on one line: no plane, and no row
             yield plane_row(sensor, *key, fitted[key])
     for number in sorted({number for number, _ in fitted}):
         if (number, "P1") in fitted and (number, "P2") in fitted:
@@ -144,7 +144,7 @@ def _plane_rows(
 def _moments_by_name(
     moments: dict[Key, PlaneMoments], faces: pd.DataFrame
 ) -> dict[NamedKey, tuple[PlaneMoments, Array]]:
-    """Return the moments of each plane, and the vector toward which its normal points."""
+    """Return each plane's moments by pass and name, with the normal by design, which fixes the sign of the plane's."""
     normals = dict(zip(faces["face"].tolist(), normals_of(faces), strict=True))
     rows = {row["face"]: row for row in faces[["face", "name", "family", "one_plane"]].to_dict("records")}
     total: dict[NamedKey, tuple[PlaneMoments, Array]] = {}

@@ -1,4 +1,7 @@
-"""Points into the pool frame: attitude on the rotation group, through ECEF; points far off the target are dropped."""
+"""Place the points in the pool frame, and drop the points that are far from the target.
+
+Attitude is interpolated on the rotation group. Positions are converted through ECEF.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -39,7 +42,7 @@ class Config:
     target: Target
     georeference: Georeference
     laser: LaserPlacement
-    mbes: SonarPlacement | None  # none: the laser is calibrated
+    mbes: SonarPlacement | None  # None: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -64,14 +67,14 @@ class Outputs:
 
 
 def prepare(inputs: Inputs, config: Config) -> PoolContext:
-    """Turn the INS records into poses in the pool frame."""
+    """Return the poses of the INS in the pool frame, with the passes and the box round the target."""
     low, high = target_of(config.target).bounds()
     margin = config.georeference.box_margin_m
     return PoolContext.of(inputs.trajectory, inputs.passes, inputs.pool_frame, (low - margin, high + margin))
 
 
 def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) -> BatchResult:
-    """Place the points of one chunk in the pool frame, and keep those within the box round the target."""
+    """Place the points of one chunk in the pool frame, and keep the points within the box round the target."""
     columns = chunk.columns
     t_ns = columns["t_ns"]
     number = pass_of(t_ns, prepared.starts_ns, prepared.ends_ns)
@@ -103,7 +106,7 @@ def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) 
 
 
 def combine(prepared: PoolContext, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
-    """Sum the counts, and write the poses.
+    """Return the poses and the sums of the counts.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Simulated sessions through the stages in memory: for tests and ``make montecarlo``, without any file."""
+"""Run the stages in memory, without any file: for tests, campaigns, and the trial calibration of ``poolcal check``."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -26,18 +26,18 @@ def calibrate_in_memory(
     Parameters
     ----------
     session, pool
-        Settings.
+        The settings of the session and of the pool.
     raw : mapping
-        Canonical columns of ins, laser and mbes.
+        The columns that the readers return, by sensor: ins, laser, mbes.
     until : str
         The last stage to run.
     changed : callable
-        Function of an artefact's key and value: what the following stages get in its place.
+        Function of an artefact's key and value. Its result replaces the value for the following stages.
 
     Returns
     -------
     dict
-        Every artefact of these stages, by "owner/name".
+        All artefacts of these stages, by "owner/name".
     """
     artefacts: dict[str, Any] = {}
 

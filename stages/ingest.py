@@ -1,4 +1,4 @@
-"""Raw instrument files -> canonical streams and tables, with quality control."""
+"""Read raw instrument files into streams and tables with the same columns for all formats; quality control."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -39,7 +39,7 @@ from pipeline.readers.track_tables import passes_table, pool_frame_table
 
 @dataclass(frozen=True)
 class Config:
-    """The settings on which the results depend."""
+    """Settings that the stage uses."""
 
     target_place: TargetPlace
     ingest: Ingest
@@ -57,7 +57,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Tables and streams."""
+    """Tables and streams that the stage writes."""
 
     trajectory: Annotated[pd.DataFrame, TRAJECTORY]
     ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
@@ -76,7 +76,7 @@ def prepare(inputs: Inputs, config: Config) -> None:
 
 
 def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> BatchResult:
-    """Pass laser points and soundings on, and summarise a chunk.
+    """Pass on a chunk of laser points or soundings, and summarise it.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Batc
     Returns
     -------
     BatchResult
-        Its partial result is a ChunkSummary, which for ins holds all rows.
+        Its partial result is a ChunkSummary, which has all rows of an ins chunk.
     """
     t_ns = np.asarray(chunk.columns["t_ns"], dtype=np.int64) if chunk.columns else np.empty(0, np.int64)
     dropped = dict(chunk.dropped)
@@ -130,7 +130,8 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, ChunkSummary]]],
     Raises
     ------
     RawDataError
-        A sensor has no usable record, or none while the INS ran, or the azimuth of the target cannot be estimated.
+        A sensor has no usable record, or no record while the INS recorded, or the azimuth of the target cannot be
+        estimated.
     """
     recorded = {name: summaries for name, summaries in partials.items() if name != "mbes" or config.recordings.mbes}
     refuse_empty_sensors(recorded)
@@ -142,7 +143,7 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, ChunkSummary]]],
         if partials[sensor]
     }
     refuse_disjoint_times((ins_t[0], ins_t[-1]), {sensor: (t_ns[0], t_ns[-1]) for sensor, t_ns in epochs.items()})
-    calibrated = "mbes" if "mbes" in epochs else "laser"  # the sensor whose epochs bound the passes
+    calibrated = "mbes" if "mbes" in epochs else "laser"  # no pass extends beyond the epochs of this sensor
     pool_frame, frame = pool_frame_table(trajectory, config.target_place)
     max_gap_ns = round(config.ingest.max_gap_s * NS)
     sigmas, outside = _sigmas(partials["ins"], int(ins_t[0]), int(ins_t[-1]))
@@ -158,7 +159,7 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, ChunkSummary]]],
 
 
 def _one_a_second(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the first time in each second that has one, and the last of all."""
+    """Return the first time (ns) within each second, and the last of all times."""
     if not len(t_ns):
         return t_ns
     ordered = np.sort(t_ns)
@@ -167,7 +168,7 @@ def _one_a_second(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _trajectory(chunks: list[dict[str, NDArray[Any]]]) -> tuple[pd.DataFrame, int]:
-    """Return all INS records in order of time, the first one of equal times; and how many were left out."""
+    """Return the INS records in order of time, and the number left out: only the first of equal times is kept."""
     chunks = sorted(chunks, key=lambda columns: int(columns["t_ns"][0]))
     table = pd.DataFrame(
         {c.name: np.concatenate([columns[c.name] for columns in chunks]) for c in TRAJECTORY.columns}
@@ -179,7 +180,7 @@ def _trajectory(chunks: list[dict[str, NDArray[Any]]]) -> tuple[pd.DataFrame, in
 
 
 def _sigmas(summaries: Summaries, start: int, end: int) -> tuple[pd.DataFrame, int]:
-    """Return the INS's own sigmas while it ran (``start`` to ``end``, ns), and the number of rows outside."""
+    """Return the sigmas in the INS's files from ``start`` to ``end`` (ns), and the number of rows outside this time."""
     for name in dict.fromkeys(name for name, summary in summaries if summary.accuracy):
         times = np.concatenate([summary.epochs_ns for part, summary in summaries if part == name])
         if not len(times):

@@ -1,4 +1,4 @@
-"""The patent's offsets: once after the angles (as it prints them), and in turn with them until both stand still."""
+"""The patent's offsets: once after the angles, as the patent prints them, and in turn with them to convergence."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -58,7 +58,7 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    """Compute the offsets by both methods; where the geometry does not allow one, the table says why."""
+    """Compute the offsets by both methods. If the geometry does not allow a method, ``corrections`` has the reason."""
     min_points = config.fit_planes.min_points
     try:
         passes = angle_passes(inputs.faces, inputs.planes, inputs.sounding_moments, min_points)
@@ -94,7 +94,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
 def _sequential(
     angles: pd.Series, observations: OffsetObservations, lever_arm_m: np.ndarray, apply_x_first: bool
 ) -> PatentOffsets:
-    """Return the offsets once after the angles."""
+    """Return the offsets, computed once after the angles."""
     if angles["reason"]:
         raise DegenerateGeometryError(str(angles["reason"]))
     rotation = exp_so3(np.radians(rotation_vector_deg(angles)))
@@ -104,7 +104,7 @@ def _sequential(
 def _alternating(
     passes: list[PassPlanes], observations: OffsetObservations, lever_arm_m: np.ndarray, settings: Offsets
 ) -> tuple[AlternationResult, PatentOffsets]:
-    """Return the fixed point of angles and offsets in turn, and the offsets there."""
+    """Return the fixed point of the alternation of angles and offsets, and the offsets at this point."""
     tolerances = AlternationTolerances(
         max_iterations=settings.max_iterations,
         step_rad=np.radians(settings.step_tolerance_deg),

@@ -37,7 +37,7 @@ from pipeline.target.design import target_of
 
 @dataclass(frozen=True)
 class Config:
-    """Settings: ``calibrated`` says whether the report is the sonar's or the laser's."""
+    """Settings that the stage uses; ``calibrated``: the sensor that the report is about."""
 
     name: str
     target: Target
@@ -52,20 +52,20 @@ class Config:
 
     @property
     def sensor(self) -> Mbes | Laser:
-        """Settings of the calibrated sensor."""
+        """The settings of the calibrated sensor."""
         return self.mbes if self.calibrated == "mbes" and self.mbes is not None else self.laser
 
 
 @dataclass(frozen=True, kw_only=True)
 class Inputs(Evidence):
-    """Tables of the earlier stages, and what the run is made from."""
+    """Tables of the earlier stages, and the run's provenance: digests of raw files, versions of software."""
 
     provenance: Annotated[dict[str, Any], Provenance]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
-    """The documents and tables; ``closing`` compares two sensors, so a calibration of the laser has none."""
+    """Documents and tables that the stage writes; ``closing`` compares two sensors: None if the laser is calibrated."""
 
     calibration: Annotated[pd.DataFrame, CALIBRATION]
     calibration_json: Annotated[str, CALIBRATION_JSON]
@@ -74,7 +74,7 @@ class Outputs:
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    """Judge a calibration, and write it down for programs and people."""
+    """Judge a calibration, and return it as documents for programs and for people."""
     passes = pass_rows(inputs.passes, inputs.cells)
     report = _sensor_report(inputs, config, passes)
     model = target_of(config.target)
@@ -126,7 +126,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
 
 
 def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str, Any]]) -> SensorReport:
-    """Return the parts of the report that depend on which sensor is calibrated; ``passes``: of calibration.json."""
+    """Return the parts of the report that depend on the calibrated sensor; ``passes``: as in calibration.json."""
     sensor = config.sensor
     if isinstance(sensor, Laser):
         return laser_report(sensor, evidence, config.segment)
@@ -137,7 +137,7 @@ def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str
 
 
 def _criteria(config: Config, report: SensorReport) -> Criteria:
-    """Return what the calibration is judged by."""
+    """Return the criteria by which the calibration is judged."""
     return Criteria(
         limits=config.verdict,
         test_level=config.adjust.test_level,

@@ -1,4 +1,4 @@
-"""Where the target is, and which points lie on which of its faces."""
+"""Find the target in the laser's points, and label the points of both sensors by face."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -32,7 +32,7 @@ from pipeline.target.result_tables import provisional_mount_table, target_pose_t
 from pipeline.target.samples import laser_poses, laser_sample, sounding_sample
 from pipeline.target.surface import ClosestSurface
 
-FEWEST_VOXELS = 50  # of dry laser points
+FEWEST_VOXELS = 50  # fewest voxels with laser points above the water
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Config:
     target: Target
     segment: Segment
     laser: SensorMount
-    mbes: SonarBeams | None  # none: the laser is calibrated
+    mbes: SonarBeams | None  # None: the laser is calibrated
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def run_batch(source: str, chunk: Chunk, prepared: LabellingContext, config: Con
 def combine(
     prepared: LabellingContext, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config
 ) -> Outputs:
-    """Sum the counts, and write where the target is.
+    """Return the target's faces and pose, the provisional mount, and the sums of the counts.
 
     Raises
     ------

@@ -1,6 +1,7 @@
-"""A session checked before it is calibrated, on samples of its files.
+"""Checks of a session before its calibration, on samples of its files.
 
-``file_survey`` reads heads, tails and pieces of every file. Each question then is one function: it takes what was
-read, and yields findings, each one line that names file or sensor, value and remedy. What would follow from a finding
-is not said again: of a sensor whose clock is a week off nobody asks whether it hits the target.
+``file_survey`` reads the start, the end and pieces of every file. Each question about the session is then one function.
+It takes the surveyed files and yields findings. A finding is one line that names the file or sensor, the value and the
+remedy. A question is left out if an earlier finding decides its answer: if a sensor's clock is a week off, no function
+checks whether its points hit the target.
 """

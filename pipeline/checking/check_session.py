@@ -1,4 +1,4 @@
-"""All questions in their order; what would only follow from an earlier finding is not asked."""
+"""All questions about a session, in their order. A question is left out if an earlier finding decides its answer."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,18 +23,18 @@ from pipeline.maths.target.model import TargetModel
 from pipeline.target.design import target_of
 from pipeline.target.surface import ClosestSurface
 
-ROUGHLY, SAMPLED, FINELY = 4_000, 20_000, 60_000  # rows of a sensor: to hit the target, to calibrate, to count
+ROUGHLY, SAMPLED, FINELY = 4_000, 20_000, 60_000  # sampled rows: target hits, trial calibration, sounding counts
 
 
 @dataclass(frozen=True)
 class SessionCheck:
-    """What the files of a session hold, and what is wrong with it."""
+    """The surveyed files of a session, its passes, and the findings."""
 
     files: tuple[SurveyedFile, ...]
     legs: tuple[Leg, ...]
     findings: tuple[Finding, ...]
-    model: TargetModel | None = None  # with the soundings on its faces, where they were counted
-    soundings: SoundingCounts | None = None
+    model: TargetModel | None = None  # None: the check ended before the passes
+    soundings: SoundingCounts | None = None  # None: the soundings were not counted
     quality: InsQuality = field(default_factory=InsQuality)
 
     @property
@@ -45,7 +45,7 @@ class SessionCheck:
 
 @dataclass(frozen=True)
 class _Session:
-    """A session whose target is known."""
+    """A session, with the pool's settings and the target."""
 
     files: Sequence[SurveyedFile]
     settings: SessionConfig
@@ -57,7 +57,7 @@ class _Session:
 def check_session(
     folder: Path, session: SessionConfig, pool: PoolConfig | None, calibrate: Calibrate
 ) -> SessionCheck:
-    """Check the files of a session, and what they say together.
+    """Check each file of a session by itself, and then all files together.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ def check_session(
     session : SessionConfig
         Its settings.
     pool : PoolConfig or None
-        The pool's settings; without them no question is asked about the target.
+        The pool's settings. With None no question is asked about the target.
     calibrate : Calibrate
-        Calibrates a sample of the session in memory.
+        Function that calibrates a sample of the session in memory.
     """
     checked = _check(folder, session, pool, calibrate)
     quality = assess_ins_quality(checked.files, [leg for leg in checked.legs if leg.good])
@@ -110,7 +110,7 @@ def _file_findings(
 
 
 def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[str]) -> SessionCheck:
-    """Check what the session says of the target; of the sensors in ``unusable`` nothing more is asked."""
+    """Check the track and the points against the target. Points of the sensors in ``unusable`` are not checked."""
     files, pool, model, ins = session.files, session.pool, session.model, joined(session.files)
     away = SessionCheck(tuple(files), (), tuple(track_checks.origin_findings(ins, pool, model)))
     if away.findings:
@@ -139,7 +139,10 @@ def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[
 def _point_findings(
     session: _Session, track: InsTrack, sensors: Sequence[str]
 ) -> tuple[list[Finding], SoundingCounts | None]:
-    """Return where the points fall; of sensors whose points miss the target nothing finer is asked."""
+    """Return the findings about the sensors' points, and the counts of soundings.
+
+    The counts are None if points miss the target, if the trial calibration shows a fault, or without soundings.
+    """
     files, settings, pool, model = session.files, session.settings, session.pool, session.model
     rough = [sample_points(files, settings, sensor, track, ROUGHLY) for sensor in sensors]
     samples = [sample for sample in rough if sample is not None]
@@ -162,7 +165,7 @@ def _point_findings(
 
 
 def _trial_findings(session: _Session, track: InsTrack, trial: TrialCalibration) -> Iterator[Finding]:
-    """Yield what speaks against the target's pose and the sonar's mount in the settings."""
+    """Yield findings if the trial calibration contradicts the target's pose or the sonar's mount in the settings."""
     laser = sample_points(session.files, session.settings, "laser", track, SAMPLED)
     if laser is not None and trial.target_pose is not None:
         yield from pose_findings(track, laser, trial.target_pose, session.model, session.pool)
@@ -172,7 +175,7 @@ def _trial_findings(session: _Session, track: InsTrack, trial: TrialCalibration)
 
 
 def _epochs(files: Sequence[SurveyedFile]) -> dict[str, Times]:
-    """Return the times of each sensor's records, in order, each once; those of sensors that have any."""
+    """Return by sensor the times of its records, ascending, without repeats; sensors without records are left out."""
     epochs: dict[str, Times] = {}
     for sensor in SENSORS:
         pieces = [file.epochs_ns for file in files if file.sensor == sensor and len(file.epochs_ns)]

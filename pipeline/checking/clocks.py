@@ -1,4 +1,7 @@
-"""Clocks compared by when sensors ran: offsets that have a name, such as a week, hours of a time zone, leap seconds."""
+"""Clocks compared by the times at which the sensors ran.
+
+Offsets with a known cause are sought: whole weeks and days, the hours of a time zone, leap seconds.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +17,7 @@ from pipeline.maths.geometry.passes import pass_of, split_at_gaps
 from pipeline.readers.whole_days import whole_days_apart
 
 Times = NDArray[np.int64]
-LEAPS = {  # s
+LEAPS = {  # offset in seconds: its cause
     18: "UTC and GPS time are mixed up",
     37: "TAI and UTC are mixed up",
     19: "TAI and GPS time are mixed up",
@@ -22,12 +25,12 @@ LEAPS = {  # s
 }
 HOUR_NS = 3_600 * NS
 NO_WEEKS: Mapping[str, int | None] = {}
-FARTHEST_H = 14
-ENOUGH, MOST = 0.9, 0.99  # of a sensor's time in which the INS runs: as it is, and with a named offset
+FARTHEST_H = 14  # largest offset of a time zone
+ENOUGH, MOST = 0.9, 0.99  # least share of a sensor's times within the INS's: as recorded, and less a named offset
 
 
 def offset_name(offset_s: float, within_s: float = 0.3) -> str:
-    """Return what an offset of clocks is known as; nothing where it has no name.
+    """Return the known cause of an offset between two clocks; an empty text if there is none.
 
     >>> offset_name(18.1), offset_name(-18.0), offset_name(5.0)
     ('UTC and GPS time are mixed up', 'UTC and GPS time are mixed up', '')
@@ -36,7 +39,7 @@ def offset_name(offset_s: float, within_s: float = 0.3) -> str:
 
 
 def share_within(t_ns: Times, stretches: Sequence[tuple[int, int]]) -> float:
-    """Return the share of the times that lie in a stretch."""
+    """Return the share of the times that lie within one of the stretches (first and last time)."""
     starts, ends = (np.array(column, dtype=np.int64) for column in zip(*stretches, strict=True))
     return float(np.mean(pass_of(t_ns, starts, ends) >= 0))
 
@@ -52,9 +55,9 @@ class Offset:
     ahead : bool
         Whether the sensor's clock is ahead.
     why : str
-        What the offset is known as, and the remedy.
+        The cause of the offset, and the remedy.
     weeks : int
-        The offset in weeks, where it is whole weeks; else 0.
+        The offset in weeks, positive if the sensor's clock is ahead; 0 if it is not whole weeks.
     """
 
     how: str
@@ -63,18 +66,18 @@ class Offset:
     weeks: int = 0
 
     def words(self, to_the_ins: bool, week: int | None, key: str, whose: str = "the INS's") -> str:
-        """Return what to say of a sensor's clock against the INS's.
+        """Return the text that states how far one clock is ahead of or behind another, the cause and the remedy.
 
         Parameters
         ----------
         to_the_ins : bool
-            False: say it of the INS's clock against the sensors'.
+            True: the sensor's clock against the INS's; false: the INS's clock against the sensors'.
         week : int or None
-            The week in the session's settings, from which the right one follows.
+            The GPS week in the session's settings. The right week follows from it. None: the settings have no week.
         key : str
             The setting that holds the week.
         whose : str
-            The clock that it is compared with.
+            Name of the clock that serves as the reference, for the text.
         """
         ahead = self.ahead == to_the_ins
         why = self.why
@@ -89,18 +92,18 @@ def clock_findings(
     files: Sequence[SurveyedFile],
     weeks: Mapping[str, int | None] = NO_WEEKS,
 ) -> Iterator[Finding]:
-    """Yield the sensors that did not run while the INS did; where both are off by the same, it is the INS's clock.
+    """Yield a finding for each sensor that ran without the INS; if both are off equally, one for the INS's clock.
 
     Parameters
     ----------
     epochs : Mapping[str, Times]
-        Times of the records of each sensor, in order; ``ins`` among them.
+        By sensor the times of its records, ascending. The key ``ins`` is required.
     max_gap_ns : int
         A longer time without a record is a pause.
     files : Sequence[SurveyedFile]
         The session's files.
     weeks : Mapping[str, int or None]
-        gps_week in the settings, by sensor.
+        By sensor the setting gps_week.
     """
     ins = epochs["ins"]
     running = split_at_gaps(ins, max_gap_ns)
@@ -140,7 +143,7 @@ def clock_findings(
                 "ins missing",
                 f"{sensor}: ran for {1 - share:.0%} of its time without the INS{which}: {spans}; add the INS's other "
                 "files, or check the clocks",
-                "fault" if outside or between - share > 1 - ENOUGH else "look",  # on before it, or longer than it
+                "fault" if outside or between - share > 1 - ENOUGH else "look",  # look: it began earlier or ended later
             )
 
 
@@ -154,7 +157,7 @@ def _from(epochs: Mapping[str, Times]) -> str:
 
 
 def _amount(offset_ns: int) -> str:
-    """Return an offset in its largest whole unit.
+    """Return the size of an offset as text: in whole weeks or hours if it is a multiple of them, else in seconds.
 
     >>> _amount(18 * NS), _amount(-2 * WEEK_NS)
     ('18 s', '2 weeks')
@@ -165,10 +168,11 @@ def _amount(offset_ns: int) -> str:
 
 
 def _offset(t_ns: Times, running: Sequence[tuple[int, int]], apart: bool, pauses: bool) -> Offset | None:
-    """Return the offset with a name that brings the sensor into the INS's time; None where there is none.
+    """Return the offset of known cause that moves the sensor's times into the INS's; None if there is none.
 
-    Weeks and hours are tried only where the two have no time in common (``apart``). Leap seconds are tried there, and
-    where the sensor paused: a sensor that did not pause, and was switched on before the INS, looks the same.
+    Weeks, days and hours are tried only if less than a tenth of the sensor's times lie within the INS's (``apart``).
+    Leap seconds are tried then too, and if the sensor paused (``pauses``). Without a pause they are not tried, because
+    a sensor that was switched on before the INS shows the same pattern.
     """
     away = int((t_ns[0] + t_ns[-1]) // 2) - (running[0][0] + running[-1][1]) // 2
     weeks = round(away / WEEK_NS)

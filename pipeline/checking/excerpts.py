@@ -1,8 +1,8 @@
-"""Large files read in pieces: parts over evenly spread stretches, or over a short copy made of head, pieces and tail.
+"""Large files read in pieces: stretches of a LAS file, or a short copy made of a file's start, pieces and its end.
 
-LAS is read at any point. The readers of binary logs find their next record after a cut, so that a copy of some pieces
-in order is a log with holes; pieces of SBET are cut between records, of texts between lines. Other files (E57, Parquet)
-are read from their start for as long as allowed: of those the end stays unseen.
+LAS can be read from any point. The readers of binary logs find the next record after a cut, so that a copy of some
+pieces in their order reads as a log with holes. Pieces of SBET are cut between records, pieces of texts between lines.
+Other files (E57, Parquet) are read from their start up to a limit. Their end stays unread.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,20 +19,20 @@ from pipeline.readers.las import LasPart
 from pipeline.readers.raw_file import opened, read_at, size_of
 from pipeline.readers.sbet import SBET_RECORD
 
-POINTS = 4_000_000  # of a laser, over all its files
+POINTS = 4_000_000  # upper limit, about, of the points read of a laser's files together
 STRETCH = 8_192  # points read at one place
-PACKED_STRETCH, PACKED_PLACES = 50_000, 24  # of LAZ each place costs a process
-BYTES = {"ins": 64 << 20, "mbes": 48 << 20}  # of a sensor, over all its files
-PLACES = 128
-LEAST = {"ins": 1 << 16, "mbes": 1 << 19}  # read at one place: some records at least, of which a sonar's are large
-HEAD = 1 << 18  # at least so much of a file's start
+PACKED_STRETCH, PACKED_PLACES = 50_000, 24  # points at one place of LAZ, and places: each place costs a process
+BYTES = {"ins": 64 << 20, "mbes": 48 << 20}  # upper limit, about, of the bytes read of a sensor's files together
+PLACES = 128  # most places in one file
+LEAST = {"ins": 1 << 16, "mbes": 1 << 19}  # least bytes at one place: several records, and a sonar's are large
+HEAD = 1 << 18  # bytes of a file's start
 LOGS = ("novatel", "r2sonic", "gsf", "kmall", "all")
 TEXTS = ("inertial_explorer",)
 
 
 @dataclass(frozen=True)
 class SurveyedSensor:
-    """What the survey of one sensor's files has in common.
+    """A sensor's settings and folders, the same for the survey of each of its files.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class SurveyedSensor:
     folder : Path
         The session folder.
     number : int
-        How many files there are, which share what may be read.
+        Number of the sensor's files. They share the limits of points and bytes.
     copies : Path
         The folder for short copies.
     """
@@ -58,7 +58,7 @@ class SurveyedSensor:
 def stretches(parts: Sequence[LasPart], files: int) -> tuple[list[Part], float]:
     """Return parts over evenly spread stretches of one LAS file, and the share of its points in them.
 
-    ``files`` is the number of the sensor's files, which share what may be read.
+    ``files`` is the number of the sensor's files, which share the limit POINTS.
     """
     total = sum(part.stop - part.start for part in parts)
     packed = any(part.compressed for part in parts)
@@ -77,9 +77,9 @@ def stretches(parts: Sequence[LasPart], files: int) -> tuple[list[Part], float]:
 
 
 def _starts(last: int, places: int) -> list[int]:
-    """Return the first place, the last, and between them one at random in each step.
+    """Return the places: 0, ``last``, and between them even steps, each shifted at random by less than half a step.
 
-    At even steps always the same part of a scan's line might be read.
+    Without the random shifts, all places might show the same part of a scan line.
     """
     steps = np.linspace(0.0, 1.0, places)
     steps[1:-1] += np.random.default_rng(0).uniform(-0.45, 0.45, places - 2) / (places - 1)
@@ -88,7 +88,7 @@ def _starts(last: int, places: int) -> list[int]:
 
 @dataclass(frozen=True)
 class Excerpt:
-    """A short copy of a file, the share of the file in it, and from how many places it comes."""
+    """A short copy of a file, the share of the file that it holds, and the number of places that it was taken from."""
 
     path: Path
     share: float = 1.0
@@ -96,16 +96,16 @@ class Excerpt:
 
 
 def excerpt(path: Path, name: str, sharing: SurveyedSensor) -> Excerpt:
-    """Return a short copy of a file; the file itself where it is short, or cannot be cut.
+    """Write a short copy of a file and return it; return the file itself if it is short or cannot be cut.
 
     Parameters
     ----------
     path : Path
         The file.
     name : str
-        What messages call it.
+        The file's name in messages.
     sharing : SurveyedSensor
-        The sensor's files, and where the copy goes.
+        The sensor's settings, the number of its files, and the folder for the copy.
     """
     sensor, settings = sharing.sensor, sharing.settings
     allowed = BYTES.get(sensor, 0) // sharing.number
@@ -124,14 +124,17 @@ def excerpt(path: Path, name: str, sharing: SurveyedSensor) -> Excerpt:
 
 
 def _pieces(file: BinaryIO, size: int, each: int, places: int, form: str) -> Iterator[bytes]:
-    """Yield pieces of a file that is at least twice as long as they are together, so that they do not overlap."""
+    """Yield the start of a file, and pieces evenly spread up to its end.
+
+    ``excerpt`` calls this only for files so long that the pieces do not overlap.
+    """
     yield from _cut(file, 0, HEAD, form)
     for start in np.linspace(HEAD, size - each, places).astype(int).tolist():
         yield from _cut(file, start, each, form)
 
 
 def _cut(file: BinaryIO, start: int, count: int, form: str) -> Iterator[bytes]:
-    """Yield about so many bytes from a place on: whole records, or whole lines, where the format needs it."""
+    """Yield about ``count`` bytes from byte ``start`` on: whole records of SBET, whole lines of texts."""
     if form == "sbet":
         start, count = -(-start // SBET_RECORD) * SBET_RECORD, count // SBET_RECORD * SBET_RECORD
         data = read_at(file, start, count)

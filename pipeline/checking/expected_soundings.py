@@ -1,8 +1,8 @@
-"""Soundings on the target's wet faces against what these very pings should have given.
+"""Soundings on the target's wet faces, compared with the number expected of the same pings.
 
-The sonar's own beams, with the angles that it recorded, are cast from where the boat truly was at its own pings. A
-sounding is expected where a beam meets a face by the rules of the labels. A sounding that is then missing was not
-detected, or the face does not lie where the target is said to be.
+The sonar's beams, at their recorded angles, are cast as rays from the boat's recorded poses at its pings. A sounding is
+expected if a ray meets a face and stage segment would label the point. A missing sounding was not detected, or the face
+does not lie where the settings place it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,17 +29,17 @@ from pipeline.planning.setting import setting_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-RAN = 0.3  # of a pass; in less of it the sonar was not on
-POOR, NONE, FEWEST = 0.4, 0.15, 200  # of what is expected: worth a look, a fault; too few to tell
+RAN = 0.3  # share of a pass up to which the sonar counts as switched off
+POOR, NONE, FEWEST = 0.4, 0.15, 200  # found / expected below it: a look, a fault; fewest expected to judge
 USUAL = "usual: 60 to 120 %"
-NEAR_M = 0.35  # a sounding with the coarse mount belongs to the face it is nearest to
-PINGS, BEAMS = 400, 100_000  # cast as rays, and rows from which the beams' angles are taken
+NEAR_M = 0.35  # a sounding placed with the coarse mount counts for the nearest face within this distance
+PINGS, BEAMS = 400, 100_000  # pings that are cast as rays, and rows from which the beams' angles are taken
 FARTHEST_M = 100.0
 
 
 @dataclass(frozen=True)
 class SoundingCounts:
-    """How many soundings on each face of a target, in their order: expected of these passes, and about found."""
+    """Numbers of soundings on each face (f,), in the order of the model's faces: expected, and found (estimated)."""
 
     expected: Array
     found: Array
@@ -47,7 +47,7 @@ class SoundingCounts:
 
 @dataclass(frozen=True)
 class PingsOnTarget:
-    """A session's pings, and where boat and target are."""
+    """A session's files and settings, the INS's track, and the target."""
 
     track: InsTrack
     files: Sequence[SurveyedFile]
@@ -59,23 +59,23 @@ class PingsOnTarget:
 def count_soundings(
     pings: PingsOnTarget, sample: PointSample, labelled: Stream, labelled_rows: int
 ) -> SoundingCounts | None:
-    """Count the soundings on each face, and those that these pings should have given.
+    """Count the soundings found on each face, and the soundings expected of the pings in the good passes.
 
     Parameters
     ----------
     pings : PingsOnTarget
         The session's pings.
     sample : PointSample
-        Soundings; each belongs to the face that it is nearest to with the coarse mount. Used where none is labelled.
+        Soundings, used if ``labelled`` is empty. Each counts for the face nearest to it with the coarse mount.
     labelled : Stream
-        Soundings with their faces, of a calibrated sample.
+        Soundings of the calibrated sample, with their faces.
     labelled_rows : int
-        How many rows that sample had.
+        Number of rows in the calibrated sample.
 
     Returns
     -------
     SoundingCounts or None
-        None without a pass in which the sonar ran below the water.
+        None if the sonar ran in no good pass, was above the water, or pinged only at times without a pose of the INS.
     """
     track, files, model = pings.track, pings.files, pings.model
     legs = [leg for leg in track.legs if leg.good and leg.distance_m > 0.5 and leg.ran["mbes"] > RAN]
@@ -103,14 +103,14 @@ def count_soundings(
 
 
 def _beams_that_meet(pings: PingsOnTarget, t_ns: Times) -> Array:
-    """Return how many beams of the pings at these times meet each face so that they would be used, (f,)."""
+    """Return, for each face (f,), the number of beams that would be labelled with the face, of pings at these times."""
     model, session = pings.model, pings.session
     rows = sampled_rows(pings.files, "mbes", BEAMS)
     fan = _fan(rows)
     reach = float(np.quantile(rows["two_way_time_s"], 0.99)) * SPEED_M_S / 2
     plan = Plan(
         mbes=MbesFigures(max_range_m=float(np.clip(reach, MbesFigures().max_range_m, FARTHEST_M))),
-        passes=(Pass(distance_m=1.0),),  # none is sailed: the boat's own track stands in its place
+        passes=(Pass(distance_m=1.0),),  # a plan needs one; the boat's recorded track replaces it
     )
     setting = setting_of(plan, pings.pool, session)
     rays = Rays("mbes", np.repeat(t_ns, len(fan)), np.tile(fan, (len(t_ns), 1)))
@@ -119,7 +119,7 @@ def _beams_that_meet(pings: PingsOnTarget, t_ns: Times) -> Array:
 
 
 def _fan(rows: Columns) -> Array:
-    """Return unit rays (b, 3) of the beams that a sonar has, each in the middle of where it pointed."""
+    """Return unit vectors (b, 3) of a sonar's beams in the mbes frame, each at the median of its recorded angles."""
     order = np.argsort(rows["beam"], kind="stable")
     _, first = np.unique(rows["beam"][order], return_index=True)
     angle, tilt = (
@@ -131,7 +131,7 @@ def _fan(rows: Columns) -> Array:
 
 
 def _nearest_faces(track: InsTrack, sample: PointSample, model: TargetModel) -> NDArray[np.int64]:
-    """Return the nearest face of each sounding that is near one."""
+    """Return the numbers (m,) of the nearest faces, for the soundings within NEAR_M of a face."""
     points = place_points(track, sample.in_good_legs(track))
     points = points[np.isfinite(points[:, 0])]
     on, face = ClosestSurface(model)(points)
@@ -139,7 +139,10 @@ def _nearest_faces(track: InsTrack, sample: PointSample, model: TargetModel) -> 
 
 
 def faces_missed(model: TargetModel, counts: SoundingCounts) -> Iterator[Finding]:
-    """Yield faces of which far too little was found: by the upper and the lower half of the water, else one by one."""
+    """Yield a finding for each half of the water, lower and upper, with far too few soundings on its faces.
+
+    If neither half has too few, yield one finding for all faces with almost no soundings.
+    """
     middle = [(face.vertices_m[:, 2].min() + face.vertices_m[:, 2].max()) / 2 for face in model.faces]
     deep = np.array(middle) < (model.water_level_m + model.bounds()[0][2]) / 2
     remedy = "turn the head, widen its sector, or check its range and gates"

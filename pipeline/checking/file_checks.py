@@ -1,4 +1,4 @@
-"""Questions to the files by themselves: can they be read, do they hold what they should, is one of them a copy."""
+"""Checks of the files and settings without the target: files are readable, complete and no copies, values plausible."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,18 +13,18 @@ from pipeline.gps_time import utc_text
 from pipeline.maths.geometry.geodesy import ecef_from_geodetic
 from pipeline.report.cast_checks import cast_origin_warnings
 
-SLOWEST_HZ = 49.0  # of an INS: 50 Hz, but for its clock
-TWICE = 0.5  # of a file's time in another one: recorded twice
+SLOWEST_HZ = 49.0  # slowest rate of an INS: 50 Hz, less an allowance for its clock
+TWICE = 0.5  # share of a file's times that are in another file too: recorded twice
 CUT = ("truncated", "truncated message", "truncated packet", "truncated record", "truncated datagram")
-FAR_M = 10_000.0  # from a scanner: coordinates of a CRS
+FAR_M = 10_000.0  # points farther from a scanner have coordinates in a CRS
 SPEEDS_M_S = (1400.0, 1560.0)
 DIFFERENT_M_S = 5.0
-FAR_ARM_M = 5.0  # of a bracket that is rigid to millimetres
+FAR_ARM_M = 5.0  # longest lever arm on a bracket that is rigid to millimetres
 GEODETIC = ("latitude_rad", "longitude_rad", "height_m")
 
 
 def unreadable_files(files: Sequence[SurveyedFile], list_faults: Sequence[str]) -> Iterator[Finding]:
-    """Yield files that a reader refuses, that are cut off, or hold nothing of use; and what is wrong with the lists."""
+    """Yield findings for faults in the lists of files, and for files refused, cut off or without usable records."""
     for words in list_faults:
         yield Finding("files", words)
     for file in files:
@@ -32,7 +32,7 @@ def unreadable_files(files: Sequence[SurveyedFile], list_faults: Sequence[str]) 
             yield Finding("file", file.complaint)
             continue
         cut = {reason: file.dropped[reason] for reason in CUT if file.dropped[reason]}
-        if cut and (file.share == 1.0 or "truncated" in cut):  # pieces of a log end within a record
+        if cut and (file.share == 1.0 or "truncated" in cut):  # a piece of a log may end within a record
             lost = ", ".join(f"{number} x {reason}" for reason, number in cut.items())
             words = f"{file.name}: ends in the middle of a record ({lost}); copy it again, unless it was logged so"
             yield Finding("cut off", words, "look" if sum(cut.values()) == 1 and "truncated" not in cut else "fault")
@@ -45,7 +45,7 @@ def unreadable_files(files: Sequence[SurveyedFile], list_faults: Sequence[str]) 
 
 
 def duplicate_files(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
-    """Yield files of one sensor that hold the same time."""
+    """Yield a finding for each pair of files of a sensor with half or more of one file's times in common."""
     for first, second in _overlapping([file for file in files if len(file.epochs_ns) > 1]):
         start_ns = max(first.span_ns[0], second.span_ns[0])
         common = np.count_nonzero(np.isin(first.epochs_ns, second.epochs_ns, assume_unique=True))
@@ -62,7 +62,10 @@ def duplicate_files(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
 
 
 def _overlapping(files: Sequence[SurveyedFile]) -> Iterator[tuple[SurveyedFile, SurveyedFile]]:
-    """Yield pairs of one sensor whose times overlap, each in the order of the list; of many files few do."""
+    """Yield each pair of files of one sensor whose times overlap, the pair in the order of ``files``.
+
+    Each file is compared only with the files that still run when it begins, because few of many files overlap.
+    """
     order = {id(file): k for k, file in enumerate(files)}
     running: list[SurveyedFile] = []
     for later in sorted(files, key=lambda file: (file.sensor, file.span_ns[0])):
@@ -75,7 +78,7 @@ def _overlapping(files: Sequence[SurveyedFile]) -> Iterator[tuple[SurveyedFile, 
 
 
 def slow_ins_logs(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
-    """Yield logs of the INS that are too slow for a boat that rolls."""
+    """Yield a finding for each log of the INS that is too slow for a boat that rolls."""
     for file in files:
         if file.sensor == "ins" and file.rate_hz < SLOWEST_HZ:
             yield Finding(
@@ -86,7 +89,7 @@ def slow_ins_logs(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
 
 
 def unaligned_ins(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
-    """Yield an INS without a solution for most of its log."""
+    """Yield a finding if the INS has no solution in most of its records."""
     of_ins = [file for file in files if file.sensor == "ins" and file.records]
     dropped = sum((file.dropped for file in of_ins), Counter[str]())
     bad = {reason: number for reason, number in dropped.items() if reason.startswith("ins status")}
@@ -101,7 +104,7 @@ def unaligned_ins(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
 
 
 def wrong_frames(files: Sequence[SurveyedFile], session: SessionConfig) -> Iterator[Finding]:
-    """Yield points in a CRS that are declared as the scanner's own, and the reverse."""
+    """Yield a finding for each laser file whose coordinates contradict ``laser.frame``."""
     for file in files:
         if file.sensor != "laser" or not len(file.columns.get("x_m", ())):
             continue
@@ -123,7 +126,7 @@ def wrong_frames(files: Sequence[SurveyedFile], session: SessionConfig) -> Itera
 
 
 def _elsewhere(laser: SurveyedFile, files: Sequence[SurveyedFile], frame: str) -> Iterator[Finding]:
-    """Yield points of a CRS, in ECEF by now, that are far from every place where the boat was: in another zone."""
+    """Yield a finding if georeferenced points, already in ECEF, lie far from the whole track, as in another zone."""
     of_ins = [file.columns for file in files if file.sensor == "ins" and file.records]
     if not of_ins:
         return
@@ -139,7 +142,7 @@ def _elsewhere(laser: SurveyedFile, files: Sequence[SurveyedFile], frame: str) -
 
 
 def long_lever_arms(session: SessionConfig) -> Iterator[Finding]:
-    """Yield lever arms as long as a boat: they may be in another unit."""
+    """Yield a finding for each lever-arm component as long as a boat: it may be in another unit."""
     for sensor in ("laser", "mbes"):
         settings = getattr(session, sensor)
         for key in ("x_m", "y_m", "z_m") if settings is not None else ():
@@ -154,11 +157,11 @@ def long_lever_arms(session: SessionConfig) -> Iterator[Finding]:
 
 
 def doubtful_sound_speeds(files: Sequence[SurveyedFile], mbes: Mbes) -> Iterator[Finding]:
-    """Yield recorded sound speeds that no pool has, that differ from file to file, or that look like a default."""
+    """Yield findings for recorded sound speeds that no pool has, or that differ between files or from a cast."""
     speeds = {file.name: file.columns["sound_speed_m_s"] for file in files if file.sensor == "mbes" and file.columns}
     medians = {name: float(np.median(values)) for name, values in speeds.items() if len(values)}
     low, high = SPEEDS_M_S
-    recorded = mbes.sound_speed_m_s is None and mbes.svp is None  # what is recorded is used
+    recorded = mbes.sound_speed_m_s is None and mbes.svp is None  # the recorded speed is used
     for name, speed in medians.items():
         if not low <= speed <= high and recorded:
             yield Finding(
@@ -182,7 +185,7 @@ def doubtful_sound_speeds(files: Sequence[SurveyedFile], mbes: Mbes) -> Iterator
 
 
 def doubtful_cast(files: Sequence[SurveyedFile], mbes: Mbes) -> Iterator[Finding]:
-    """Yield a cast's file of another day, or of another place."""
+    """Yield findings if the cast's file is of another time or place than the session."""
     if mbes.svp_from is None:
         return
     times = [file.span_ns for file in files if file.sensor == "mbes" and len(file.epochs_ns)]
@@ -198,7 +201,7 @@ def _degrees(angles_rad: NDArray[np.float64]) -> float:
 
 
 def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:
-    """Yield files whose sound speeds differ; ``medians``: by file, m/s."""
+    """Yield a finding if sound speeds differ between files; ``medians``: the median by file, m/s."""
     if medians and max(medians.values()) - min(medians.values()) > DIFFERENT_M_S:
         slow, fast = min(medians, key=lambda name: medians[name]), max(medians, key=lambda name: medians[name])
         yield Finding(
@@ -209,7 +212,7 @@ def _differing(medians: Mapping[str, float]) -> Iterator[Finding]:
 
 
 def sensors_without_records(files: Sequence[SurveyedFile], session: SessionConfig) -> Iterator[Finding]:
-    """Yield sensors of which no file at all can be used."""
+    """Yield a finding for each sensor without a usable file."""
     for sensor in SENSORS:
         if getattr(session, sensor) is not None and not any(file.records for file in files if file.sensor == sensor):
             yield Finding("no records", f"{sensor}: has no file that can be used; correct {sensor}.files or the files")

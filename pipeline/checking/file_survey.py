@@ -1,4 +1,4 @@
-"""A survey of every file of a session: what it is, when it begins and ends, how fast it runs, samples of its rows."""
+"""A survey of every file of a session: its kind, its first and last time, its rate, and samples of its rows."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -28,39 +28,39 @@ from pipeline.readers.smrmsg import SmrmsgPart
 Columns = dict[str, NDArray[Any]]
 Times = NDArray[np.int64]
 SENSORS: tuple[Sensor, ...] = ("ins", "laser", "mbes")
-MOST_ROWS = 12_000_000  # read of the files of a sensor that cannot be cut
-KEPT = 200_000  # rows kept of a file of points or soundings
-TICK_NS = NS // 20  # of the laser's times one in each such interval is kept
+MOST_ROWS = 12_000_000  # most rows read of a sensor's files together; only files that cannot be cut reach it
+KEPT = 200_000  # most rows kept of a file of points or soundings
+TICK_NS = NS // 20  # one of the laser's times is kept per 0.05 s
 
 
 @dataclass(frozen=True)
 class SurveyedFile:
-    """What was read of one file.
+    """A file, and a summary of the rows that were read.
 
     Attributes
     ----------
     sensor, name, size, kind
-        The sensor, the name within the session folder, the bytes, and what the file is, for people.
+        The sensor, the name within the session folder, the size in bytes, and the kind of file in words for people.
     share : float
-        How much of it was read.
+        Share of the file that was read, if it was read at several places; otherwise 1.
     places : int
-        At how many evenly spread places.
+        Number of evenly spread places at which it was read.
     ended : bool
         Whether its end was read.
     records : int
-        Records of an INS, soundings, points; estimated where the file was read in part.
+        Number of INS records, soundings or laser points; estimated if the file was read at several places.
     dropped : Counter[str]
-        Rows that cannot be used, by reason.
+        Number of unusable rows, by reason.
     epochs_ns : ndarray of int64
-        Times of records or pings, in order; of a laser one in each tick.
+        Times of INS records or pings, ascending; laser: one per 0.05 s.
     columns : Columns
-        Sampled rows; of an INS all rows.
+        Sampled rows of points or soundings; all rows of an INS.
     states : Columns
-        What an INS's log says of each of its rows.
+        State of the INS in each of its rows, by kind of state.
     sigmas : Columns
-        What an INS says of its accuracy, thinned.
+        The INS's own sigmas, thinned to about one row per half second.
     complaint : str
-        Why the file could not be read.
+        Why the file could not be read; empty if it could.
     """
 
     sensor: Sensor
@@ -85,19 +85,22 @@ class SurveyedFile:
 
     @property
     def rate_hz(self) -> float:
-        """How many records of the INS, pings or points a second."""
+        """INS records, pings or laser points per second; NaN if there are too few times."""
         return rate_hz(self.sensor, self.epochs_ns, self.records)
 
     @property
     def coarseness_ns(self) -> float:
-        """The time between two places that were read; a longer time without a record is a hole in the file."""
+        """Three times the mean time between two places that were read; 0 if the file was read at one place.
+
+        A longer time without a record is a hole in the file.
+        """
         if self.places < 2 or len(self.epochs_ns) < 2:
             return 0.0
         return 3 * float(self.epochs_ns[-1] - self.epochs_ns[0]) / (self.places - 1)
 
 
 def survey_files(session: SessionConfig, folder: Path) -> tuple[list[SurveyedFile], list[str]]:
-    """Return all files, those that cannot be read with their refusal, and what is wrong with the lists of files."""
+    """Return the survey of every file, and the faults in the lists of files. Unreadable files carry a complaint."""
     files: list[SurveyedFile] = []
     list_faults: list[str] = []
     with temporary_folder() as copies:
@@ -118,7 +121,10 @@ def survey_files(session: SessionConfig, folder: Path) -> tuple[list[SurveyedFil
 def _with_accuracy(
     files: Sequence[SurveyedFile], list_faults: Sequence[str], ins: Ins, folder: Path
 ) -> tuple[list[SurveyedFile], list[str]]:
-    """Give the first good file of the INS what its accuracy files say; refusals of these go to the faults."""
+    """Return the files, and the faults of the lists; the first readable INS file gets the sigmas of the accuracy files.
+
+    If an accuracy file cannot be read, its error is added to the faults.
+    """
     good = next((k for k, file in enumerate(files) if file.sensor == "ins" and not file.complaint), None)
     if good is None:
         return list(files), list(list_faults)
@@ -133,7 +139,7 @@ def _with_accuracy(
 
 
 def _listed(settings: SensorSettings, folder: Path) -> tuple[list[str], list[str]]:
-    """Return the names of the files that the patterns match, and the refusals of patterns that match none."""
+    """Return the names of the files that the patterns match, and the errors for patterns that match none."""
     names: list[str] = []
     faults = []
     for pattern in settings.files:
@@ -152,9 +158,9 @@ def _without_accuracy(settings: SensorSettings) -> dict[str, Any]:
 def _parts(
     sensor: Sensor, settings: SensorSettings, folder: Path, names: Sequence[str]
 ) -> Iterator[tuple[str, Sequence[Part] | RawDataError]]:
-    """Yield by file its parts, or why there are none.
+    """Yield each file's name, with its parts or with the error that its reader raised.
 
-    The files are opened together where that is possible: their weeks follow from the first one.
+    The files are opened together if possible, because the GPS weeks of all follow from the first one.
     """
     without = _without_accuracy(settings)
 
@@ -186,7 +192,7 @@ def _escaped(name: str) -> str:
 
 
 def _survey_file(sharing: SurveyedSensor, name: str, parts: Sequence[Part] | RawDataError) -> SurveyedFile:
-    """Read a file, in pieces where it is long; ``parts``: those of its reader, or its refusal."""
+    """Return the survey of a file, read in pieces if it is long; ``parts``: the parts or the error of its reader."""
     path = sharing.folder / name
     try:
         file = SurveyedFile(sharing.sensor, name, path.stat().st_size)
@@ -220,15 +226,15 @@ def _path_of(part: Part) -> Path | None:
 
 
 def _over(part: Part, path: Path) -> Part:
-    """Return a part that reads another file."""
-    moved: Part = replace(part, path=path)  # type: ignore[type-var]  # every part of a raw file is a dataclass with one
+    """Return a copy of a part that reads another file."""
+    moved: Part = replace(part, path=path)  # type: ignore[type-var]  # each raw file's part is a dataclass with a path
     return moved
 
 
 def _read(file: SurveyedFile, parts: Sequence[Part], files: int) -> SurveyedFile:
-    """Count the rows of parts of a file, and thin them until few enough remain.
+    """Return the file with the counts, times and rows of its parts: of an INS all rows, else about KEPT at most.
 
-    ``files`` is the number of the sensor's files, which share what may be read and kept.
+    ``files`` is the number of the sensor's files, which share the limit MOST_ROWS.
     """
     epochs: list[Times] = []
     kept: list[Columns] = []

@@ -3,21 +3,21 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Severity = Literal["fault", "look"]  # look: may be meant, and does not change the status
+Severity = Literal["fault", "look"]  # look: may be intended, and does not change the exit status
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong, where, with which value, and what to do.
+    """One fault or doubt: the file or sensor, the value, and the remedy.
 
     Attributes
     ----------
     question : str
-        The question that led to it: a word for programs.
+        Code of the question that led to the finding, for programs.
     words : str
         The line for people.
     severity : {"fault", "look"}
-        Whether it has to be mended, or only looked at.
+        ``fault``: must be corrected; ``look``: may be intended.
     """
 
     question: str

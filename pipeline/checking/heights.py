@@ -1,11 +1,12 @@
-"""Heights by which the sensors' points miss the target.
+"""Errors of height with which the sensors' points miss the target.
 
-If both sensors miss it by the same height, target.origin.height_m is wrong. If one of them does, the z of its mount is
-wrong; where others have placed the laser's points, the surface that their heights are above.
+If both sensors miss it by the same height, target.origin.height_m is wrong. If one sensor misses it, the z of its mount
+is wrong, or, for georeferenced laser points, the reference surface of their heights.
 
-The laser sees the target above the water alone, and the sonar below it alone. So points count only on their own side of
-the water: a shift downwards loses the laser's lowest points and the sonar's deepest, one upwards the laser's highest
-and the sonar's shallowest. Where a target repeats, its ends tell one repetition from the next.
+The laser sees the target only above the water, the sonar only below it. Therefore points count only on their sensor's
+side of the water. A shift downwards loses the laser's lowest points and the sonar's deepest ones. A shift upwards loses
+the laser's highest points and the sonar's shallowest ones. If the target repeats with height, these losses at its ends
+distinguish one repetition from the next.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,32 +21,32 @@ from pipeline.checking.track import InsTrack
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-REACH_M = 0.5  # from a face, beyond which a point counts nothing
-FARTHEST_M, STEP_M = 50.0, 0.25
+REACH_M = 0.5  # distance from a face beyond which a point counts 0
+FARTHEST_M, STEP_M = 50.0, 0.25  # largest shift that is tried, and the step between shifts
 SHIFTS_M = np.arange(-FARTHEST_M, FARTHEST_M + STEP_M / 2, STEP_M)
-HERE = len(SHIFTS_M) // 2
-LEAST_M = 0.8  # less may be a wrong target.water_level_m; the calibration finds its share of it by itself
-LIKE = 0.97  # of the best: as good
-TOGETHER = 0.8  # of its own best that each sensor must have at the common shift
-WORSE = 0.8  # of that, the most that the heights as given may have
-FEWEST, FIT = 50, 0.05  # points in passes, and the share of them on the target at the best shift
-SIGN_M = 0.5  # a shift as near to twice a lever arm is its sign
+HERE = len(SHIFTS_M) // 2  # index of the shift 0
+LEAST_M = 0.8  # a smaller shift may be a wrong target.water_level_m; the calibration's search covers part of it
+LIKE = 0.97  # share of the best agreement that counts as equally good
+TOGETHER = 0.8  # least share of its own best agreement that each sensor must have at the common shift
+WORSE = 0.8  # heights are wrong only if the agreement without a shift is a smaller share of the best
+FEWEST, FIT = 50, 0.05  # fewest points in good passes, and least agreement at the best shift
+SIGN_M = 0.5  # a shift this near to minus twice the mount's z is explained by the sign of z
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How well one sensor's points lie on the target, by shift.
+    """Agreement of one sensor's points with the target, by the shift upwards.
 
     Attributes
     ----------
     sensor : str
         ``laser`` or ``mbes``.
     z_m : float
-        Of its mount.
+        z of the sensor's mount.
     sided, free : ndarray, shape (k,)
-        Agreement at each of SHIFTS_M as a share of the best: on the sensor's own side of the water, and anywhere.
+        Agreement at each of SHIFTS_M as a share of the best: of points on the sensor's side of the water, and of all.
     georeferenced : bool
-        Whether others have placed the points, so that the mount moves nothing.
+        Whether another program has placed the points. Their mount then has no effect.
     """
 
     sensor: str
@@ -61,7 +62,7 @@ class Fit:
 
     @property
     def sign(self) -> bool:
-        """Whether the reversed sign of z is the shift."""
+        """Whether a reversed sign of z explains the shift."""
         return not self.georeferenced and bool(abs(self.shift_m + 2 * self.z_m) < SIGN_M)
 
     @property
@@ -71,7 +72,11 @@ class Fit:
 
     @property
     def off(self) -> bool:
-        """Whether the points lie clearly better elsewhere; a wrong water level leaves them on the target."""
+        """Whether the points fit clearly better at another height.
+
+        With only a wrong water level, ``free`` is high without any shift. In this case a better height counts only if a
+        reversed sign of z explains it.
+        """
         far = abs(self.shift_m) >= LEAST_M and self.sided[HERE] < WORSE
         return far and (self.sign or self.free[HERE] < WORSE)
 
@@ -79,12 +84,12 @@ class Fit:
 def height_findings(
     track: InsTrack, samples: Sequence[PointSample], closest: ClosestSurface, water_m: float, height_m: float
 ) -> Iterator[Finding]:
-    """Yield the height that is wrong, where points miss the target by one.
+    """Yield findings for wrong heights, if points miss the target because of them.
 
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        The INS's track.
     samples : Sequence[PointSample]
         Points of each sensor.
     closest : ClosestSurface
@@ -92,7 +97,7 @@ def height_findings(
     water_m : float
         Height of the water in the target frame.
     height_m : float
-        target.origin.height_m as it is configured.
+        The configured target.origin.height_m.
     """
     fits = [fit for fit in (_fit(track, sample, closest, water_m) for sample in samples) if fit is not None]
     common = common_shift(fits)
@@ -138,7 +143,7 @@ def _target_is_off(fits: Sequence[Fit], shift_m: float, height_m: float) -> str:
 
 
 def way(shift_m: float, up: str, down: str) -> str:
-    """Return a shift and its direction.
+    """Return the size of a shift and its direction as text.
 
     >>> way(-4.53, "higher", "lower")
     '4.5 m lower'
@@ -154,7 +159,7 @@ class SideOfWater:
     water_m: float
 
     def visible(self, points: Array) -> NDArray[np.bool_]:
-        """Return which points (n, 3) m in the target frame are on that side."""
+        """Return a mask (n,): true for each of the points (n, 3) m, target frame, on that side."""
         return points[:, 2] > self.water_m if self.sensor == "laser" else points[:, 2] < self.water_m
 
 
@@ -165,22 +170,23 @@ def profile(
     side: SideOfWater | None = None,
     reach_m: float = REACH_M,
 ) -> Array:
-    """Return how well points lie on the target when they are shifted upwards, (k,).
+    """Return the agreement (k,) of points with the target after each shift upwards.
 
-    It is the mean of 1 - (d / reach)², none beyond the reach or on the other sensor's side of the water.
+    The agreement is the mean over all points of 1 - (d / reach)², with the distance d from the target. Points beyond
+    the reach or on the other sensor's side of the water count 0.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        In metres, in the frame of the surface.
+        Points, m, in the frame of the surface.
     closest : ClosestSurface
         The target's surface.
     shifts_m : ndarray, shape (k,)
-        The shifts.
+        Shifts upwards.
     side : SideOfWater or None
-        Where the sensor can see the target; None: anywhere.
+        The side of the water on which points count; None: both sides.
     reach_m : float
-        Distance from a face beyond which a point counts nothing.
+        Distance from a face beyond which a point counts 0.
     """
     scores = []
     for shift in shifts_m:
@@ -195,7 +201,7 @@ def profile(
 
 
 def _fit(track: InsTrack, sample: PointSample, closest: ClosestSurface, water_m: float) -> Fit | None:
-    """Return the fit of a sensor's points; None where they are few, or hit nothing at any height."""
+    """Return the fit of a sensor's points; None if they are too few or hit nothing at any height."""
     points = place_points(track, sample.in_good_legs(track))
     points = points[np.isfinite(points[:, 0])]
     if len(points) < FEWEST:
@@ -208,9 +214,9 @@ def _fit(track: InsTrack, sample: PointSample, closest: ClosestSurface, water_m:
 
 
 def common_shift(fits: Sequence[Fit]) -> float | None:
-    """Return how far up all sensors' points have to go to lie on the target.
+    """Return the shift upwards (m) that brings the points of all sensors onto the target.
 
-    None where they lie there as they are, or where no single shift brings all of them there.
+    Return None if they lie there without a shift, or if no single shift suits all sensors.
     """
     if not fits:
         return None
@@ -221,6 +227,6 @@ def common_shift(fits: Sequence[Fit]) -> float | None:
 
 
 def _middle(fits: Array) -> float:
-    """Return the middle of the shifts that are as good as the best."""
+    """Return the middle (m) of the shifts whose agreement is as good as the best."""
     good = SHIFTS_M[fits >= LIKE * fits.max()]
     return float((good.min() + good.max()) / 2)

@@ -1,4 +1,4 @@
-"""What may be wrong with a sensor's points: the clock, unit or sign with which they would hit the target."""
+"""Errors that may explain why a sensor's points miss the target: of its clock, of a unit, of a sign in its mount."""
 
 from dataclasses import dataclass
 
@@ -11,24 +11,24 @@ from pipeline.checking.track import InsTrack
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-REACH_M = 0.5  # from a face, beyond which a point counts nothing: coarse mount and origin may be wrong by that
-FARTHEST_S, STEP_S, FINE_S = 60.0, 1.0, 0.1
+REACH_M = 0.5  # distance from a face beyond which a point counts 0: coarse mount and origin may be wrong by as much
+FARTHEST_S, STEP_S, FINE_S = 60.0, 1.0, 0.1  # clock offsets that are tried: the largest, coarse and fine steps
 UNITS = {"millimetres": 0.001, "centimetres": 0.01, "feet": 0.3048}
-SIGNS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m")  # of z: heights.py
+SIGNS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m")  # heights.py tries the sign of z
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """What may be wrong with a sensor, and how well its points fall onto the target if it is.
+    """A possible error of a sensor, and the agreement of its points with the target once the error is removed.
 
     Attributes
     ----------
     score : float
-        The mean of 1 - (d / reach)², none beyond the reach.
+        Agreement: the mean of 1 - (d / reach)², with the distance d from the target. Points beyond the reach count 0.
     clock_s : float
-        By how much the sensor's clock would be ahead.
+        How far the sensor's clock would be ahead of the INS's.
     words : str
-        What else would be wrong, for the finding.
+        Another error than of the clock, and its remedy, in the words of the finding.
     """
 
     score: float
@@ -37,7 +37,7 @@ class Hypothesis:
 
 
 def agreement(closest: ClosestSurface, points: Array) -> float:
-    """Return how well points (n, 3) m in the pool frame fall onto the target; those that are NaN do not."""
+    """Return the agreement, 0 to 1, of points (n, 3) m in the pool frame with the target; NaN points count 0."""
     known = np.flatnonzero(np.isfinite(points[:, 0]))
     if not len(known):
         return 0.0
@@ -47,12 +47,14 @@ def agreement(closest: ClosestSurface, points: Array) -> float:
 
 
 def hypotheses(track: InsTrack, sample: PointSample, closest: ClosestSurface) -> list[Hypothesis]:
-    """Return how well a sensor's points fit as they are, first; then with other units, signs and clocks.
+    """Return the hypotheses about a sensor's points: first that there is no error, then other units, signs and clocks.
+
+    For georeferenced points there is only the first.
 
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        The INS's track.
     sample : PointSample
         The sensor's points.
     closest : ClosestSurface

@@ -1,4 +1,4 @@
-"""What the INS says of itself: the state of its filter, the kind of its positions, its own sigmas."""
+"""The quality that the INS's log states: the status of its filter, the type of its positions, its own sigmas."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -15,14 +15,14 @@ from pipeline.maths.geometry.passes import pass_of
 from pipeline.readers.novatel import STATES
 
 Mask = NDArray[np.bool_]
-SHARE = 0.1  # of the records: fewer in a poorer state are a moment
+SHARE = 0.1  # share of the records up to which a poor state does not matter
 GOOD_STATES = {"status": ("INS_SOLUTION_GOOD",), "type": ("INS_RTKFIXED", "PPP", "INS_PPP")}
 REMEDIES = {
     "INS_ALIGNMENT_COMPLETE": "its attitude has not settled: sail figures of eight before the first pass until it says "
     "INS_SOLUTION_GOOD",
     "INS_SOLUTION_FREE": "it ran without GNSS: its position drifts",
 }
-LIMITS = {  # of the INS's own sigmas: from the first on worth a look, from the second on of no use
+LIMITS = {  # of the INS's own sigmas: from the first limit on a look, from the second on a fault
     "horizontal_m": (0.1, 0.5, "position is", "m", "see that it has corrections (RTK), or process it afterwards"),
     "vertical_m": (0.1, 0.5, "height is", "m", "see that it has corrections (RTK), or process it afterwards"),
     "roll_pitch_deg": (0.05, 0.5, "roll and pitch are", "°", "sail figures of eight before the first pass"),
@@ -32,18 +32,18 @@ LIMITS = {  # of the INS's own sigmas: from the first on worth a look, from the 
 
 @dataclass(frozen=True)
 class InsQuality:
-    """What the INS says of itself.
+    """States and sigmas in the INS's log.
 
     Attributes
     ----------
     by_file : dict[str, dict[str, Counter[str]]]
-        By file, and by kind of state, how many records are in which state.
+        By file and by kind of state (``status``, ``type``), the number of records in each state.
     together : dict[str, Counter[str]]
-        The same by kind of state, of the records that count.
+        By kind of state, the number of records in each state over all files, among the records that count.
     sigmas : dict[str, float]
-        The INS's own sigmas, medians; units in the names.
+        Medians of the INS's own sigmas over the records that count; units in the names.
     of_passes : bool
-        Whether the records within the passes count; else those of the whole log.
+        True: the records within the passes count; false: all records count.
     """
 
     by_file: dict[str, dict[str, Counter[str]]] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class InsQuality:
 
 
 def assess_ins_quality(files: Sequence[SurveyedFile], legs: Sequence[Leg]) -> InsQuality:
-    """Return what the INS says of itself: within the passes, where there are any."""
+    """Return the states and sigmas in the INS's log, within the legs if there are any."""
     ins_files = [file for file in files if file.sensor == "ins"]
     together: dict[str, Counter[str]] = {}
     for file in ins_files:
@@ -76,7 +76,7 @@ def assess_ins_quality(files: Sequence[SurveyedFile], legs: Sequence[Leg]) -> In
 
 
 def _inside(t_ns: NDArray[np.int64], legs: Sequence[Leg]) -> Mask:
-    """Return which times are within the legs; all, where there is no leg."""
+    """Return a mask (n,): true for times within a leg. Without legs all are true."""
     if not legs:
         return np.ones(len(t_ns), dtype=bool)
     ordered = sorted(legs, key=lambda leg: leg.start_ns)
@@ -85,17 +85,17 @@ def _inside(t_ns: NDArray[np.int64], legs: Sequence[Leg]) -> Mask:
 
 
 def _counted(kind: str, numbers: NDArray[np.uint8]) -> Counter[str]:
-    """Return how many records are in which state, by its name."""
+    """Return the number of records by the name of their state."""
     values, counts = np.unique(numbers, return_counts=True)
     pairs = zip(values.tolist(), counts.tolist(), strict=True)
     return Counter({STATES[kind].get(value, f"{kind} {value}"): count for value, count in pairs})
 
 
 def quality_findings(quality: InsQuality) -> Iterator[Finding]:
-    """Yield what is poor in an INS's log.
+    """Yield findings for large sigmas and poor states in an INS's log.
 
-    A poor state within the passes, and sigmas with which no mount can be found, are faults. What may yet do, and a
-    state of the log as a whole, where the passes are not known, is to be looked at.
+    Sigmas above the second limit are a fault. An attitude that has not settled within the passes is a fault too, unless
+    the log states a sigma of the heading or another sigma is a fault already. All other findings are a ``look``.
     """
     where = "in the passes" if quality.of_passes else "in the whole log"
     judged = False

@@ -1,8 +1,8 @@
-"""Small offsets of a clock, as the adjustment of a sample of the session estimates them.
+"""Small offsets of the sensors' clocks, estimated by the adjustment of a sample of the session.
 
-With a wrong clock the target's planes sway with the boat. The adjustment tests each of its fixed parameters by itself
-(table ``freed``). Where one of the two latencies stands out, and explains more than any other parameter would, that
-clock is off.
+With a wrong clock the target's planes sway with the boat. The adjustment makes a single-parameter test of each of its
+fixed parameters (table ``freed``). If a latency has the largest statistic of all, each latency that differs clearly
+from zero is a finding.
 """
 
 from collections.abc import Iterator
@@ -13,12 +13,12 @@ import pandas as pd
 from pipeline.checking.findings import Finding
 from pipeline.mount import WITHIN_95
 
-SIGMAS, LEAST_S = 4.0, 0.005  # far enough from zero, and worth a word
-SAME = 3.0  # sigmas within which two offsets are one, of the INS
+SIGMAS, LEAST_S = 4.0, 0.005  # least statistic (in sigmas) and least size of a latency that counts
+SAME = 3.0  # two offsets that differ by fewer sigmas are one offset of the INS's clock
 
 
 def latency_findings(freed: pd.DataFrame) -> Iterator[Finding]:
-    """Yield the sensors whose clock is clearly off; where both are by the same amount, the INS's.
+    """Yield a finding for each sensor whose clock is clearly off; if both are off equally, one for the INS's clock.
 
     ``freed`` is the adjustment's table of single-parameter tests.
     """
@@ -53,7 +53,7 @@ def latency_findings(freed: pd.DataFrame) -> Iterator[Finding]:
 
 
 def _between(seconds: float, sigma: float) -> str:
-    """Return the interval of 95 %, from the sample alone.
+    """Return the 95 % interval of a clock's offset as text, from the random sigma alone.
 
     >>> _between(-0.0204, 0.001)
     '18.4 to 22.4 ms, 95 %'
@@ -63,7 +63,7 @@ def _between(seconds: float, sigma: float) -> str:
 
 
 def _offset(ahead_s: float) -> str:
-    """Return the amount and the direction of a clock's offset.
+    """Return the amount and the direction of a clock's offset as text.
 
     >>> _offset(-0.0204)
     '20 ms behind'

@@ -1,4 +1,4 @@
-"""Samples of a sensor's points, and where they lie in the pool with a mount, a clock and a scale."""
+"""Samples of a sensor's points, and their places in the pool frame with a trial mount, clock and scale."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,20 +22,20 @@ NAMES = {"laser": "laser points", "mbes": "soundings"}
 
 @dataclass(frozen=True)
 class PointSample:
-    """Points of a sensor.
+    """A sample of a sensor's points.
 
     Attributes
     ----------
     sensor : str
         ``laser`` or ``mbes``.
     t_ns : ndarray of int64, shape (n,)
-        Their times.
+        Times of the points.
     points_m : ndarray, shape (n, 3)
-        In the sensor's own frame; in the pool frame where they are ``georeferenced``.
+        Points in the sensor's own frame, or in the pool frame if they are ``georeferenced``.
     mount : Mount
         The sensor's coarse mount.
     georeferenced : bool
-        Whether others have placed the points, so that the mount moves nothing.
+        Whether another program has placed the points. The mount then has no effect.
     """
 
     sensor: str
@@ -45,11 +45,11 @@ class PointSample:
     georeferenced: bool = False
 
     def with_pose(self, track: InsTrack) -> "PointSample":
-        """Return the points for which the INS, which may have been read in part, has a pose."""
+        """Return the sample without the points at times for which no pose of the INS was read."""
         return self._rows(track.trajectory.covers(self.t_ns, NS))
 
     def in_good_legs(self, track: InsTrack) -> "PointSample":
-        """Return the points of the legs on which the target is to starboard, and in front of it."""
+        """Return the points of the good legs: the boat is in front of the target and has it to starboard."""
         rows = np.zeros(len(self.t_ns), dtype=bool)
         for leg in track.legs:
             if leg.good:
@@ -62,16 +62,16 @@ class PointSample:
 
 @dataclass(frozen=True)
 class TrialPlacement:
-    """How a sensor's points are placed, where not as the settings say.
+    """Assumptions, other than those of the settings, with which a sensor's points are placed.
 
     Attributes
     ----------
     mount : Mount or None
-        Another mount than the sample's; None: the sample's.
+        Mount in place of the sample's; None: the sample's.
     clock_ahead_s : float
-        By how much the sensor's clock is ahead of the INS's.
+        How far the sensor's clock is ahead of the INS's.
     scale : float
-        Metres in a unit of the points.
+        Unit of the points in metres.
     """
 
     mount: Mount | None = None
@@ -83,7 +83,7 @@ AS_GIVEN = TrialPlacement()
 
 
 def sampled_rows(files: Sequence[SurveyedFile], sensor: str, rows: int) -> Columns:
-    """Return rows of a sensor, evenly over its files.
+    """Return a sample of a sensor's rows, spread evenly over its files.
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ def sampled_rows(files: Sequence[SurveyedFile], sensor: str, rows: int) -> Colum
     sensor : str
         ``ins``, ``laser`` or ``mbes``.
     rows : int
-        About how many.
+        About the number of rows to return.
 
     Returns
     -------
     Columns
-        The columns as the reader gives them; none where the sensor has no row.
+        Canonical raw columns; empty if the sensor has no row.
     """
     pieces = [file.columns for file in files if file.sensor == sensor and file.records and file.columns]
     if not pieces:
@@ -107,7 +107,7 @@ def sampled_rows(files: Sequence[SurveyedFile], sensor: str, rows: int) -> Colum
 
 
 def rows_with_pose(columns: Columns, track: InsTrack) -> Columns:
-    """Return the rows, as they were read, for which the INS has a pose."""
+    """Return the raw rows for which the INS has a pose."""
     rows = track.trajectory.covers(columns["t_ns"], NS) if columns else slice(None)
     return {name: values[rows] for name, values in columns.items()}
 
@@ -115,7 +115,7 @@ def rows_with_pose(columns: Columns, track: InsTrack) -> Columns:
 def sample_points(
     files: Sequence[SurveyedFile], session: SessionConfig, sensor: str, track: InsTrack, rows: int
 ) -> PointSample | None:
-    """Return points of a sensor, evenly over its files; None where it has none.
+    """Return a sample of a sensor's points, spread evenly over its files; None if it has no row.
 
     Parameters
     ----------
@@ -126,9 +126,9 @@ def sample_points(
     sensor : str
         ``laser`` or ``mbes``.
     track : InsTrack
-        Of the INS; its frame is that of georeferenced points.
+        The INS's track. Georeferenced points are returned in its pool frame.
     rows : int
-        About how many.
+        About the number of points to return.
     """
     columns = sampled_rows(files, sensor, rows)
     if not columns:
@@ -153,9 +153,9 @@ def sample_points(
 
 
 def place_points(track: InsTrack, sample: PointSample, placing: TrialPlacement = AS_GIVEN) -> Array:
-    """Return a sample's points (n, 3) m in the pool frame; NaN where the INS has no pose.
+    """Return a sample's points (n, 3) m in the pool frame; NaN for times without a pose of the INS.
 
-    Another placing changes nothing of points that others have placed.
+    ``placing`` has no effect on georeferenced points.
     """
     if sample.georeferenced:
         return sample.points_m

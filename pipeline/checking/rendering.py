@@ -1,4 +1,4 @@
-"""What poolcal check says, for people and for programs."""
+"""The output of poolcal check: text for people, JSON for programs."""
 
 import json
 from typing import Any
@@ -15,7 +15,7 @@ from pipeline.text_table import text_table
 
 
 def check_text(examined: SessionCheck) -> str:
-    """Return files, passes and findings for the screen."""
+    """Return the text for the screen: files, quality of the INS, passes, soundings and findings."""
     heads = ("sensor", "file", "kind", "records", "from (UTC)", "to", "rate")
     lines = text_table("<7<4  <24>11  <21<10>9", heads, [_file_cells(file) for file in examined.files])
     if any(file.share < 1 or not file.ended for file in examined.files):
@@ -51,7 +51,7 @@ def _pass_lines(examined: SessionCheck) -> list[str]:
 
 
 def _quality_lines(found: InsQuality) -> list[str]:
-    """Return what the INS says of itself; nothing where it says nothing."""
+    """Return the text lines with the states and sigmas in the INS's log; none if the log has neither."""
     lines = []
     for name, kinds in found.by_file.items():
         for counts in kinds.values():
@@ -66,7 +66,7 @@ def _quality_lines(found: InsQuality) -> list[str]:
 
 
 def _by_face(examined: SessionCheck) -> list[dict[str, Any]]:
-    """Return wet faces with the soundings expected and found on them; none where they were not counted."""
+    """Return a mapping for each wet face, with the soundings expected and found; none if they were not counted."""
     if examined.model is None or examined.soundings is None:
         return []
     both = zip(examined.model.faces, examined.soundings.expected, examined.soundings.found, strict=True)
@@ -79,7 +79,7 @@ def _by_face(examined: SessionCheck) -> list[dict[str, Any]]:
 
 
 def _soundings_lines(examined: SessionCheck) -> list[str]:
-    """Return the soundings by family; by face they are in the JSON."""
+    """Return the text lines with expected and found soundings by family. The JSON has them by face."""
     faces = _by_face(examined)
     if not faces:
         return []
@@ -101,7 +101,7 @@ def _file_cells(file: SurveyedFile) -> tuple[str, ...]:
 
 
 def _rate(rate_hz: float) -> str:
-    """Return a rate to three digits.
+    """Return a rate as text, to three significant digits.
 
     >>> _rate(10638.7), _rate(199.98), _rate(9.9)
     ('10600 Hz', '200 Hz', '9.9 Hz')
@@ -110,7 +110,7 @@ def _rate(rate_hz: float) -> str:
 
 
 def check_json(examined: SessionCheck) -> str:
-    """Return the same as JSON, times as GPS nanoseconds."""
+    """Return files, quality of the INS, passes, soundings and findings as JSON; times are GPS nanoseconds."""
     content: dict[str, Any] = {
         "faulty": examined.faulty,
         "findings": [{"question": f.question, "severity": f.severity, "words": f.words} for f in examined.findings],

@@ -1,4 +1,4 @@
-"""Do the points fall onto the target? If not: with which clock, unit or sign they would."""
+"""The check that the points hit the target, and, if they do not, the search for a wrong height, clock, unit or sign."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -16,23 +16,23 @@ from pipeline.config.pool import PoolConfig
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-BETTER, AT_LEAST = 2.0, 0.02  # times the score as it is, and above it: what is wrong shows so clearly
-NOTHING, FEW = 0.01, 50  # of the points in passes, so few hit; too few points to tell
-LEAP_WITHIN_S = 1.5  # an origin half a metre off along the track looks like a second
+BETTER, AT_LEAST = 2.0, 0.02  # an error is accepted if its score is this many times the present one, and this much more
+NOTHING, FEW = 0.01, 50  # agreement in good passes below which points miss the target; too few points to judge
+LEAP_WITHIN_S = 1.5  # an origin half a metre off along the track looks like a clock that is a second off
 
 
 def points_off_target(
     track: InsTrack, samples: Sequence[PointSample], closest: ClosestSurface, pool: PoolConfig
 ) -> Iterator[Finding]:
-    """Yield what is wrong with each sensor whose points miss the target.
+    """Yield a finding about the likely error of each sensor whose points miss the target.
 
-    A clock that is off by the same against both sensors is the INS's. A height that both sensors are off by is the
-    target's, whatever a mount might explain of it.
+    Heights are checked first. If both sensors are off by the same height, the target's height is wrong, even if a mount
+    could explain part of it. If both sensors' clocks are off by about the same amount, the INS's clock is wrong.
 
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        The INS's track.
     samples : Sequence[PointSample]
         Points of each sensor.
     closest : ClosestSurface
@@ -92,7 +92,7 @@ def _clocks(clocks: Mapping[str, float], sensors: int) -> Iterator[Finding]:
 
 
 def _offset(ahead_s: float) -> str:
-    """Return the amount and the direction of a clock's offset, and what it is known as.
+    """Return the amount, the known cause (if any) and the direction of a clock's offset as text.
 
     >>> _offset(18.4), _offset(-5.0)
     ('18.4 s (likely 18 s: UTC and GPS time are mixed up) ahead of', '5.0 s behind')

@@ -1,4 +1,4 @@
-"""The INS's track by the target: legs along it, and what ran in each."""
+"""The INS's track at the target: the legs past it, and the sensors that ran in each leg."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,35 +16,35 @@ from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
-NEAR_M = 30.0  # from the target: a leg past it
-SHORTEST_M = 1.0
+NEAR_M = 30.0  # largest distance of a leg from the target's front
+SHORTEST_M = 1.0  # shortest leg along the target
 BIN_NS = NS
-MOST_RECORDS = 400_000  # of the INS that are placed; more are thinned
+MOST_RECORDS = 400_000  # INS records; twice as many or more are thinned
 NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One way of the boat past the target, while it is abeam of it.
+    """The part of a pass in which the boat is beside the target.
 
     Attributes
     ----------
     start_ns, end_ns : int
-        Times at which it begins and ends.
+        First and last time.
     distance_m : float
-        Of the INS from the target's front; positive on the side to which the front looks.
+        Median distance of the INS from the target's front; positive in front of it, negative behind it.
     speed_m_s : float
-        Along the target.
+        Mean speed along the target.
     heading_swing_deg : float
         Standard deviation of the heading.
     height_m : float
-        Of the INS in the target frame.
+        Median height of the INS in the pool frame.
     starboard : bool
         Whether the target is to starboard.
     ran : Mapping[str, float]
-        By sensor the share of the time in which it ran.
+        By sensor the share of the leg's time in which it ran.
     astern : bool
-        Whether the boat goes against its own heading.
+        Whether the boat moves against its heading.
     """
 
     start_ns: int
@@ -59,7 +59,7 @@ class Leg:
 
     @property
     def good(self) -> bool:
-        """Whether the boat is in front of the target, and has it to starboard, as a session wants it."""
+        """Whether the boat is in front of the target and has it to starboard, as a session requires."""
         return self.starboard and self.distance_m > 0
 
 
@@ -73,7 +73,7 @@ class InsTrack:
 
 
 def joined(files: Sequence[SurveyedFile]) -> Columns:
-    """Return all records of the INS in order of time, each time once, thinned where they are many."""
+    """Return the records of all INS files in order of time, without repeated times; thinned if they are many."""
     pieces = [file.columns for file in files if file.sensor == "ins" and file.records]
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in ("t_ns", *NAMES)}
     _, first = np.unique(columns["t_ns"], return_index=True)
@@ -82,7 +82,7 @@ def joined(files: Sequence[SurveyedFile]) -> Columns:
 
 
 def frame_of(ins: Columns, place: TargetPlace) -> PoolFrame | None:
-    """Return the pool frame; None where its azimuth is to follow from the track, and does not."""
+    """Return the pool frame; None if no azimuth is configured and none follows from the track."""
     at = (np.radians(place.origin.latitude_deg), np.radians(place.origin.longitude_deg), place.origin.height_m)
     if place.azimuth_deg is not None:
         return PoolFrame.at(*at, float(np.radians(place.azimuth_deg)))
@@ -105,9 +105,9 @@ def track_of(
     model : TargetModel
         The target.
     files : Sequence[SurveyedFile]
-        The session's files, which tell what ran in each leg.
+        The session's files. Their times show which sensors ran in each leg.
     settings : Ingest
-        What ends a pass.
+        Limits that end a pass.
     """
     positions, R = poses_in_pool(frame, GeodeticPoses(**{name: ins[name] for name in NAMES}))
     t_ns = ins["t_ns"]
@@ -127,7 +127,7 @@ def track_of(
 def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile]) -> Leg:
     start, end = int(t_ns[0]), int(t_ns[-1])
     away = float(np.median(positions[:, 0]))
-    ahead = R[:, :2, 1]  # of the body's y axis, level
+    ahead = R[:, :2, 1]  # level part of the body's y axis
     heading = np.arctan2(ahead[:, 0], ahead[:, 1])
     forward = float(np.median(ahead[:, 1])) > 0
     run = float(positions[-1, 1] - positions[0, 1])
@@ -146,10 +146,11 @@ def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile])
 
 
 def askew_deg(track: InsTrack) -> float | None:
-    """Return by how much the boat sailed to the right of the target's +y, within ±180 degrees.
+    """Return the clockwise angle (degrees, within ±180) from the target's +y to the direction in which the boat sailed.
 
-    It is taken while the boat had target.origin to starboard and near: the lesser of what it headed and what it made
-    good, 0 where the two do not agree. None where the boat never had target.origin there.
+    Only records count in which target.origin is near and abeam to starboard. The direction is the mean heading or the
+    course made good, whichever is nearer to +y. The angle is 0 if the two lie on different sides of +y, and None if no
+    record counts.
     """
     x, y = track.trajectory.positions_m[:, :2].T
     ahead = track.trajectory.R_frame_from_body[:, :2, 1]
@@ -163,7 +164,11 @@ def askew_deg(track: InsTrack) -> float | None:
 
 
 def _ran(start: int, end: int, files: Sequence[SurveyedFile]) -> float:
-    """Return the share of a time in which a sensor ran: by seconds; by pieces, of files that were read in pieces."""
+    """Return the share of the time from ``start`` to ``end`` in which a sensor ran.
+
+    The time is divided into bins of one second, or of the files' coarseness if they were read in pieces. The sensor ran
+    in a bin if the bin has a record.
+    """
     known = [file for file in files if len(file.epochs_ns)]
     width = max([BIN_NS, *(round(file.coarseness_ns) for file in known)])
     bins = max(1, (end - start) // width)

@@ -1,4 +1,4 @@
-"""Questions to the track: is the boat where the target is, does it pass it as it should, did every sensor run."""
+"""Checks of the track: the boat is at the target, passes it as required, and every sensor runs in every pass."""
 
 from collections.abc import Iterator, Sequence
 
@@ -18,15 +18,15 @@ from pipeline.maths.target.model import TargetModel
 Times = NDArray[np.int64]
 ASTRAY_M = 1_000.0
 NEARBY_M = 60.0
-HIGHEST_M = 15.0  # of the INS above the target's upper end, or below its lower one
-ALIKE_M = 0.5  # passes whose distances differ by less tell yaw and lever arm badly apart
-RAN, NOT = 0.6, 0.2  # of a pass: a sensor ran, or did not
-ASKEW_DEG = 15.0  # between the boat's heading and the target's +y: no coarse azimuth
-HOLE_S = 0.3  # without the INS while a sensor saw the target
+HIGHEST_M = 15.0  # largest height of the INS above the target's upper end, or depth below its lower end
+ALIKE_M = 0.5  # passes whose distances differ by less separate yaw and lever arm y badly
+RAN, NOT = 0.6, 0.2  # share of a pass: from the first on a sensor ran, below the second it did not run
+ASKEW_DEG = 15.0  # angle between the boat's direction and the target's +y that no coarse azimuth explains
+HOLE_S = 0.3  # shortest hole in the INS's log that counts
 
 
 def origin_findings(ins: Columns, pool: PoolConfig, model: TargetModel) -> Iterator[Finding]:
-    """Yield where the track is far from target.origin; nothing more is asked about the target then.
+    """Yield findings if the track is far from target.origin. Then no further question is asked about the target.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def origin_findings(ins: Columns, pool: PoolConfig, model: TargetModel) -> Itera
 
 
 def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
-    """Return the nearest horizontal distance of the track from a place."""
+    """Return the smallest horizontal distance (m) of the track from a place; infinite for an impossible latitude."""
     if not -90 <= latitude_deg <= 90:
         return np.inf
     frame = PoolFrame.at(np.radians(latitude_deg), np.radians(longitude_deg), 0.0, 0.0)
@@ -68,7 +68,7 @@ def _away_m(ins: Columns, latitude_deg: float, longitude_deg: float) -> float:
 
 
 def _why_astray(ins: Columns, origin: Origin) -> str:
-    """Return the remedy: what would bring target.origin to the track."""
+    """Return the likely error of target.origin that explains its distance from the track, and the remedy."""
     latitude, longitude = origin.latitude_deg, origin.longitude_deg
     for words, place in (
         ("latitude and longitude are interchanged", (longitude, latitude)),
@@ -82,7 +82,10 @@ def _why_astray(ins: Columns, origin: Origin) -> str:
 
 
 def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
-    """Yield passes on the wrong side, none at all, all at one distance; ``place`` has the azimuth as configured."""
+    """Yield findings if there is no pass, if passes are on the wrong side or askew, or if all are at one distance.
+
+    ``place`` holds the configured azimuth.
+    """
     sounded = [leg for leg in track.legs if max(leg.ran.values()) > NOT]
     legs = f"in {'all ' * (len(track.legs) > 1)}{plural(len(track.legs), 'pass')}"
     if not track.legs:
@@ -113,7 +116,7 @@ def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
 
 
 def azimuth_remedy(track: InsTrack, place: TargetPlace) -> str:
-    """Return what to do about an azimuth that the boat did not sail by; nothing where it did, or is not known to."""
+    """Return the remedy for an azimuth far from the boat's direction; an empty text if it is near or one is unknown."""
     turn = askew_deg(track)
     if turn is None or place.azimuth_deg is None or abs(turn) < ASKEW_DEG:
         return ""
@@ -125,7 +128,7 @@ def azimuth_remedy(track: InsTrack, place: TargetPlace) -> str:
 
 
 def missing_pass_findings(track: InsTrack, files: Sequence[SurveyedFile]) -> Iterator[Finding]:
-    """Yield passes of which one sensor has nothing, or not all."""
+    """Yield a finding for each good pass in which one sensor ran, and the other did not or only for a part."""
     there = {file.sensor for file in files if file.records} - {file.sensor for file in files if not file.ended}
     for leg in track.legs:
         if not leg.good or not {"laser", "mbes"} <= there:
@@ -144,18 +147,18 @@ def missing_pass_findings(track: InsTrack, files: Sequence[SurveyedFile]) -> Ite
 def ins_hole_findings(
     track: InsTrack, epochs: dict[str, Times], max_interval_s: float, coarse_ns: float
 ) -> Iterator[Finding]:
-    """Yield holes in the INS's log while the boat was by the target and a sensor ran.
+    """Yield one finding for all holes in the INS's log while the boat passed the target and a sensor ran.
 
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        The INS's track.
     epochs : dict[str, Times]
-        Times at which each sensor ran.
+        By sensor the times of its records.
     max_interval_s : float
         The longest interval between two INS records that is interpolated over.
     coarse_ns : float
-        Time between two places at which the INS's files were read; 0 where they were read whole.
+        ``coarseness_ns`` of the INS's files, the largest; 0 if they were read whole.
     """
     t_ns, y = track.trajectory.t_ns, track.trajectory.positions_m[:, 1]
     by = [np.abs(y[(t_ns >= leg.start_ns) & (t_ns <= leg.end_ns)]).max() for leg in track.legs]

@@ -1,4 +1,4 @@
-"""What calibrating a sample of the session gives, as far as it gets."""
+"""The result of calibrating a sample of the session, as far as the calibration goes."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ Raw = Mapping[str, Mapping[str, NDArray[np.generic]]]  # canonical columns by se
 
 @dataclass(frozen=True)
 class TrialCalibration:
-    """Tables of a trial calibration; None where it got no farther.
+    """Tables of a trial calibration; None for tables that it did not reach.
 
     Attributes
     ----------
     soundings : Stream
-        Soundings, each with the face that it is on.
+        Soundings with their faces.
     target_pose, provisional_mount, freed : pd.DataFrame or None
-        The pose of the target, the mount that the labels are made with, and the adjustment's ``freed``.
+        The target's pose, the provisional mount, and the adjustment's single-parameter tests.
     """
 
     soundings: Stream = EMPTY_STREAM

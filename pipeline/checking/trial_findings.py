@@ -1,4 +1,4 @@
-"""What the calibration of a sample says against the settings: another pose of the target, other signs of the mount."""
+"""Findings from a sample's calibration: another pose of the target, or other signs in the sonar's mount."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -21,34 +21,35 @@ from pipeline.mount import corrected_mount, mount_of
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
-REACH_M = 0.15  # in the pose found, whose place along x and y is known
+REACH_M = 0.15  # distance from a face beyond which a point counts 0; small, because the pose's x and y are known
 STEP_M = 0.05
 SHIFTS_M = np.arange(-5.0, 5.0 + STEP_M / 2, STEP_M)
-CLEARLY = 0.95  # of the best agreement: what has less is another
-SMALLEST_M = 0.15  # a height within it is right, as near as this tells
+CLEARLY = 0.95  # a pose with a smaller share of the best agreement is clearly worse
+SMALLEST_M = 0.15  # smaller errors of the height do not show
 ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
-LEAST_DEG, SMALL_DEG = 1.5, 0.3  # off by less the coarse mount is as good as may be; a sign of less changes nothing
+LEAST_DEG, SMALL_DEG = 1.5, 0.3  # a coarse mount off by less is good; the sign of a smaller angle changes nothing
 DIRECTIONS = 0.3  # smallest singular value of normals that span all directions
-HALF = 0.5  # of its error, which a reversed sign must leave at most
+HALF = 0.5  # largest share of the mount's error that may remain after a sign is reversed
 
 
 def pose_findings(
     track: InsTrack, laser: PointSample, pose: pd.DataFrame, model: TargetModel, pool: PoolConfig
 ) -> Iterator[Finding]:
-    """Yield where the laser's points lie better on the target than in the pose of the trial calibration.
+    """Yield a finding if the laser's points fit the target better in another pose than the trial calibration's.
 
-    It may stand at another height, or with its sides exchanged; where the points cannot tell, that is said.
+    The target may stand at another height, or with left and right exchanged. There is also a finding if the points fit
+    several poses equally well, or if the pose lies beyond the limits of the search.
 
     Parameters
     ----------
     track : InsTrack
-        Of the INS.
+        The INS's track.
     laser : PointSample
         The laser's points.
     pose : pd.DataFrame
         The table ``segment/target_pose`` of the trial calibration.
     model : TargetModel
-        The target as it is configured.
+        The configured target.
     pool : PoolConfig
         The pool's settings.
     """
@@ -65,7 +66,7 @@ def pose_findings(
         [profile(points, ClosestSurface(shape), SHIFTS_M, side, REACH_M) for shape in models]
     )
     exchanged, place = map(int, np.unravel_index(int(agreed.argmax()), agreed.shape))
-    higher = SHIFTS_M - origin[2]  # than the target is configured
+    higher = SHIFTS_M - origin[2]  # shifts upwards from the configured pose
     alike = _peaks(agreed, higher)
     height, shift = pool.target.origin.height_m, float(higher[place])
     how = f"{way(-shift, 'higher', 'lower')} ({height - shift:.1f} in place of {height:g})"
@@ -92,7 +93,7 @@ def pose_findings(
 
 
 def _beyond_search(origin_m: Array, turn_deg: float) -> Finding:
-    """Return the finding of a target farther from its origin, or turned more, than the search allows."""
+    """Return the finding about a target that is farther from its origin, or turned farther, than the search allows."""
     away = ", ".join(f"{value:+.2f}" for value in origin_m)
     return Finding(
         "origin",
@@ -103,7 +104,7 @@ def _beyond_search(origin_m: Array, turn_deg: float) -> Finding:
 
 
 def _peaks(agreed: Array, shifts: Array) -> list[tuple[bool, float]]:
-    """Return the peaks that agree as well as the best: whether sides are exchanged, and the shift."""
+    """Return each peak that agrees as well as the best: whether left and right are exchanged, and the shift (m)."""
     peaks = []
     for exchanged, row in enumerate(agreed):
         for k in np.flatnonzero(row >= CLEARLY * agreed.max()).tolist():
@@ -129,21 +130,21 @@ def _sides(target: Target) -> str:
 def sign_findings(
     coarse: Mount, provisional: pd.DataFrame, model: TargetModel, within_deg: float
 ) -> Iterator[Finding]:
-    """Yield angles whose reversed sign is nearer to the mount that the sample asks for.
+    """Yield a finding if reversed signs of angles bring the coarse mount clearly nearer to the provisional mount.
 
-    Nothing is said with a target whose faces do not look into three directions: with a plain wall some angles are not
-    determined, and come out as chance has it.
+    There is none if the target's faces do not span three directions. With a plain wall some angles are not determined,
+    and come out at random.
 
     Parameters
     ----------
     coarse : Mount
-        The sonar's coarse mount as configured.
+        The sonar's configured coarse mount.
     provisional : pd.DataFrame
         The table ``segment/provisional_mount`` of the trial calibration.
     model : TargetModel
         The target.
     within_deg : float
-        How far off a coarse mount may be, so that the calibration finds the rest.
+        Largest error of a coarse mount from which the calibration finds the mount (degrees). A larger one is a fault.
     """
     normals = np.array([face.normal for face in model.faces if face.seen != "dry"])
     if np.linalg.matrix_rank(normals, tol=DIRECTIONS) < 3:

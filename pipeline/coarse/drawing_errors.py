@@ -1,7 +1,7 @@
-"""Errors of drawings and surveys of marks, named before any result.
+"""Errors in drawings and surveys of marks, refused before there is any result.
 
-Refused, one frame at a time: fewer than three marks, marks in a line, drawings in other units, mirror-imaged ones,
-names interchanged.
+A frame is refused if it has fewer than three marks, if its marks lie in a line, or if its drawing has other units, is
+mirror-imaged or has names interchanged.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,23 +19,23 @@ from pipeline.maths.survey.data_snooping import LINE_RAD, SNOOPING_LEVEL, fit_of
 from pipeline.maths.survey.frame_adjustment import closed_form
 from pipeline.maths.survey.frames import MarkSurvey, RigidFrame
 
-UNITS = {"mm": 1000.0, "cm": 100.0, "inches": 1 / 0.0254, "feet": 1 / 0.3048}  # how many of them are a metre
-NEAR_UNIT, NEAR_ONE = 0.05, 0.4  # natural logarithms: a drawing's size may be wrong by these
-STEEPEST_DEG = 60.0  # of an axis through two marks: the vertical must give the turn about it
-LIKELY = 3  # pairs of names that are tried in full
+UNITS = {"mm": 1000.0, "cm": 100.0, "inches": 1 / 0.0254, "feet": 1 / 0.3048}  # number of units in a metre
+NEAR_UNIT, NEAR_ONE = 0.05, 0.4  # limits of |ln(drawn size / surveyed)| about another unit's value, about 0
+STEEPEST_DEG = 60.0  # of an axis through two marks: the vertical must determine the turn about it
+LIKELY = 3  # pairs of names that are tried with a full adjustment
 
 
 def check_frames(frames: MarkFrames, where: str, R_present: Mapping[str, Array]) -> None:
-    """Refuse frames that cannot be meant as they stand.
+    """Refuse frames whose drawing or survey has an error.
 
     Parameters
     ----------
     frames
         The marks in use.
     where
-        The file of the marks, which an error names.
+        The file of the marks, for errors.
     R_present
-        By sensor R_body_from_sensor of the session's mount, (3, 3). It tells which axis of a drawing is reversed.
+        By sensor R_body_from_sensor (3, 3) of the session's mount. It shows which axis of a drawing is reversed.
 
     Raises
     ------
@@ -88,9 +88,10 @@ def _refuse_axes(frames: MarkFrames, frame: RigidFrame, key: str) -> None:
 
 
 def _refuse_units(survey: MarkSurvey, frame: RigidFrame, key: str) -> None:
-    """Refuse a drawing of another size than the survey says.
+    """Refuse a drawing whose size differs from the survey's.
 
-    The size is the root mean square of the marks' distances from their centre: no rotation changes it, nor do names.
+    The size is the root mean square of the marks' distances from their centre. It does not depend on the rotation or on
+    the marks' names.
     """
     drawn, measured = (
         float(np.sqrt(np.mean(np.sum((at - at.mean(axis=0)) ** 2, axis=1))))
@@ -108,10 +109,11 @@ def _refuse_units(survey: MarkSurvey, frame: RigidFrame, key: str) -> None:
 
 
 def _refuse_misfit(frames: MarkFrames, name: str, key: str, R_present: Mapping[str, Array]) -> None:
-    """Refuse a frame that does not fit, but clearly does as its mirror image or with two names interchanged.
+    """Refuse a frame that does not fit, if its mirror image or two interchanged names fit clearly better.
 
-    Clearly: the quotient of the two Ω is beyond F at SNOOPING_LEVEL. The explanations that are named are those that fit
-    as well as the best. Where leaving out one mark explains the misfit too, interchanged names must explain it in full.
+    Ω is the weighted sum of squared residuals. A fit is clearly better if the quotient of the two Ω exceeds the limit
+    of F at SNOOPING_LEVEL. The error names the best explanation, and all that pass the global test. If leaving out one
+    mark explains the misfit too, interchanged names count only if they pass the global test.
     """
     frame, survey = frames.by_name[name], frames.survey
     squares, redundancy = fit_of_frame(survey, frame)
@@ -140,14 +142,14 @@ def _refuse_misfit(frames: MarkFrames, name: str, key: str, R_present: Mapping[s
 
 
 def _fits_without_one(survey: MarkSurvey, frame: RigidFrame) -> bool:
-    """Whether all marks but one fit."""
+    """Return whether the frame fits without one of its marks."""
     count = len(frame.marks)
     limit = global_limit(3 * count - 9)
     return count > 3 and any(fit_of_frame(survey, frame.without(k))[0] <= limit for k in range(count))
 
 
 def _likely_pairs(survey: MarkSurvey, frame: RigidFrame) -> Sequence[tuple[int, ...]]:
-    """Return the pairs of marks that, interchanged, leave the smallest residuals to the closed form."""
+    """Return the LIKELY pairs of marks whose interchange leaves the smallest residuals in the closed-form solution."""
     at, weight = survey.at_m[frame.marks], np.ones(len(frame.marks))
 
     def left(pair: tuple[int, ...]) -> float:
@@ -159,7 +161,7 @@ def _likely_pairs(survey: MarkSurvey, frame: RigidFrame) -> Sequence[tuple[int, 
 
 
 def interchanged(frame: RigidFrame, first: int, second: int) -> RigidFrame:
-    """Return the frame with two marks interchanged in its drawing; ``first``, ``second``: their numbers there."""
+    """Return the frame with two marks interchanged in its drawing; ``first``, ``second``: their places in the frame."""
     order = np.arange(len(frame.marks))
     order[[first, second]] = second, first
     return replace(frame, drawing_m=frame.drawing_m[order])

@@ -10,7 +10,7 @@ from pipeline.config.marks import Mark, Marks, Sigmas
 from pipeline.maths.survey.frames import FORWARD, STARBOARD, FrameAxis, MarkSurvey, RigidFrame
 
 Array = NDArray[np.float64]
-NEAR_DEG = 30.0  # a mount that is nearer to the session's is right
+NEAR_DEG = 30.0  # a mount within this angle of the session's mount is right
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class MarkFrames:
     mark_names
         Names of the survey's marks in use, in the survey's order.
     survey
-        Their surveyed places.
+        Surveyed coordinates of these marks.
     by_name
         The frames by name, the body first.
     """
@@ -33,7 +33,7 @@ class MarkFrames:
 
 
 def frames_of_marks(marks: Marks) -> MarkFrames:
-    """Return the frames with those marks that a frame names and that are not left out."""
+    """Return the frames with the marks in use: marks that a frame names, without the marks in ``leave_out``."""
     wanted = {name for names in marks.named.values() for name in names} - set(marks.leave_out)
     names = tuple(name for name in marks.survey.marks if name in wanted)
     surveyed = [marks.survey.marks[name] for name in names]

@@ -15,12 +15,12 @@ from pipeline.mount import Mounted, setting_change
 from pipeline.text_table import text_table
 
 MOST_NAMED = 8
-CAUTIOUS = 30  # degrees of freedom below which a variance factor tells little
+CAUTIOUS = 30  # degrees of freedom below which a variance factor is uncertain
 
 
 @dataclass(frozen=True)
 class MarkResidual:
-    """A mark's residual, survey minus drawing, (3,) mm in body axes; its test, if an error of it would show."""
+    """A mark's residual (survey minus drawing, (3,) mm, body axes) and its test; None if its error would not show."""
 
     frame: str
     mark: str
@@ -34,7 +34,7 @@ class MarkResidual:
 
 
 def marks_text(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> str:
-    """Return the mounts, residuals and tests for the screen; ``present``: the mounts that session.yaml has."""
+    """Return the mounts, residuals and tests as text for the screen; ``present``: the mounts in session.yaml."""
     lines: list[str] = []
     for name in assessment.mounts:
         lines += [*_mount_table(assessment, name, present.get(name)), ""]
@@ -49,7 +49,7 @@ def marks_text(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> s
 
 
 def marks_values(assessment: MarksAssessment, present: Mapping[str, Mounted]) -> dict[str, Any]:
-    """Return all of it as plain values, for YAML; ``present``: the mounts that session.yaml has."""
+    """Return the mounts, residuals and tests as plain values for YAML; ``present``: the mounts in session.yaml."""
     first = assessment.snooped.first
     tests = {
         "level": SNOOPING_LEVEL,
@@ -138,7 +138,7 @@ def _global_line(assessment: MarksAssessment) -> str:
 
 
 def _normalised(test: MarkTest) -> float:
-    """Return the test's statistic as a normalised residual, near one where the mark is right."""
+    """Return the test's statistic as a normalised residual, about one if the mark is right."""
     return float(np.sqrt(test.statistic / test.rank))
 
 
@@ -148,7 +148,7 @@ def _mark_name(assessment: MarksAssessment, test: MarkTest) -> str:
 
 
 def _contradictions(assessment: MarksAssessment) -> list[str]:
-    """Return in words which marks do not agree, and what to do."""
+    """Return the sentences that name the marks that do not agree."""
     snooped = assessment.snooped
     words = []
     for suspect in snooped.suspects:

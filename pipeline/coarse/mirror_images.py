@@ -1,4 +1,4 @@
-"""Drawings of marks that are mirror images: in one plane the marks do not show it, but the session's mount may."""
+"""Mirror-imaged drawings of marks. Marks in one plane do not show the error; the session's mount may show it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from pipeline.maths.survey.frame_adjustment import adjust_frames
 from pipeline.maths.survey.frames import MarkSurvey, RigidFrame
 
 AXES = "xyz"
-FAR_DEG = 90.0  # a mount that is farther from the session's is turned over
+FAR_DEG = 90.0  # a mount farther than this from the session's mount is turned over
 MIRRORED = "mirror-imaged (left-handed, or one axis with the wrong sign)"
 
 
@@ -26,7 +26,7 @@ class AxisFlip:
     as_drawn_deg
         The angle with the drawing as it stands.
     axis
-        The axis of the drawing that, reversed, brings the mounts nearest to the session's.
+        The axis of the drawing whose reversal brings the mounts nearest to the session's.
     reversed_deg
         The angle with that axis reversed.
     """
@@ -47,10 +47,10 @@ def mirrored(frame: RigidFrame, axis: int) -> RigidFrame:
 
 
 def is_flat(survey: MarkSurvey, frame: RigidFrame) -> bool:
-    """Whether all marks lie so nearly in one plane that a mirror image would not show.
+    """Return whether all marks lie so nearly in one plane that a mirror image would not show.
 
-    The mirror image is the drawing with its distances h from that plane changed in sign. It raises Ω by no more than
-    4 Σ h² / σ².
+    The mirror image is the drawing with its distances h from that plane changed in sign. It raises Ω, the weighted sum
+    of squared residuals, by no more than 4 Σ h² / σ².
     """
     variance = float(np.trace(survey.covariance[frame.marks] + frame.covariance, axis1=1, axis2=2).mean()) / 3
     thickness = np.linalg.svd(frame.drawing_m - frame.drawing_m.mean(axis=0), compute_uv=False)[-1]
@@ -58,7 +58,9 @@ def is_flat(survey: MarkSurvey, frame: RigidFrame) -> bool:
 
 
 def nearest_flip(frames: MarkFrames, name: str, R_present: Mapping[str, Array]) -> AxisFlip | None:
-    """Return which axis of a drawing, reversed, brings the mounts nearest to the session's; None if there are none.
+    """Return the axis of a drawing whose reversal brings the mounts nearest to the session's, with the angles.
+
+    Return None if the session has no mount of the sensor (for the body's drawing: of any sensor).
 
     Parameters
     ----------
@@ -67,7 +69,7 @@ def nearest_flip(frames: MarkFrames, name: str, R_present: Mapping[str, Array]) 
     name
         The frame whose drawing is tried.
     R_present
-        By sensor R_body_from_sensor of the session's mount, (3, 3).
+        By sensor R_body_from_sensor (3, 3) of the session's mount.
     """
     sensors = [sensor for sensor in R_present if sensor in frames.by_name and name in ("body", sensor)]
     if not sensors:
@@ -91,28 +93,28 @@ def nearest_flip(frames: MarkFrames, name: str, R_present: Mapping[str, Array]) 
 
 
 def axis_hint(flip: AxisFlip | None) -> str:
-    """Return in words which axis of a mirror-imaged drawing to reverse, in brackets."""
+    """Return a hint, in brackets, that names the reversed axis of a drawing if the session's mount shows it."""
     if flip is None or not flip.explains:
         return " (any one of them turned makes it right-handed)"
     return f" (with the sign of {flip.axis} changed the mount is {flip.reversed_deg:.1f}° from session.yaml's)"
 
 
 def check_flat_frames(frames: MarkFrames, where: str, R_present: Mapping[str, Array]) -> list[str]:
-    """Return a warning for each frame whose marks lie in one plane, for its mirror image, turned over, fits as well.
+    """Return a warning for each frame whose marks lie in one plane: its mirror image, turned over, fits as well.
 
     Parameters
     ----------
     frames
         The marks in use.
     where
-        The file of the marks, which an error names.
+        The file of the marks, for errors.
     R_present
-        By sensor R_body_from_sensor of the session's mount, (3, 3).
+        By sensor R_body_from_sensor (3, 3) of the session's mount.
 
     Raises
     ------
     ConfigError
-        The session's mount says that the drawing is a mirror image.
+        The session's mount shows that the drawing is a mirror image.
     """
     warnings = []
     for name, frame in frames.by_name.items():

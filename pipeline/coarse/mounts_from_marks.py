@@ -19,23 +19,23 @@ from pipeline.maths.survey.frame_adjustment import relative_mount
 from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
-FARTHEST_M = 100.0  # of a lever arm that session.yaml takes
+FARTHEST_M = 100.0  # largest component of a lever arm that session.yaml accepts
 
 
 @dataclass(frozen=True)
 class MarksAssessment:
-    """Coarse mounts with the adjustment that they come from.
+    """Coarse mounts, and the adjustment that they come from.
 
     Attributes
     ----------
     frames
         The marks in use.
     snooped
-        Their adjustment and its tests.
+        The adjustment of the marks and its tests.
     mounts
         By sensor its mount, with covariance (6, 6) in the order of CONVENTIONS.md.
     warnings
-        What the user should look at.
+        Sentences about doubts that do not stop the program.
     """
 
     frames: MarkFrames
@@ -45,26 +45,26 @@ class MarksAssessment:
 
     @property
     def agrees(self) -> bool:
-        """Every mark agrees with every other: none had to be left out."""
+        """Whether every mark agrees with every other, so that none had to be left out."""
         return self.snooped.agrees and not self.snooped.suspects
 
 
 def assess_marks(marks: Marks, where: str, present: Mapping[str, Mounted]) -> MarksAssessment:
-    """Return the mounts that the marks give.
+    """Return the coarse mounts that follow from the marks, with the adjustment.
 
     Parameters
     ----------
     marks
         Marks of the survey and of the drawings.
     where
-        The file of the marks, which an error names.
+        The file of the marks, for errors.
     present
-        The mounts that session.yaml has.
+        By sensor the mount in session.yaml.
 
     Raises
     ------
     ConfigError, DegenerateGeometryError
-        The marks cannot be meant as they stand, or do not determine a mount.
+        A drawing or the survey has an error, or the marks do not determine a mount.
     NotConvergedError
         The adjustment does not converge.
     """
@@ -91,5 +91,5 @@ def assess_marks(marks: Marks, where: str, present: Mapping[str, Mounted]) -> Ma
 
 
 def mount_blocks(assessment: MarksAssessment, origin: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return by sensor the keys that session.yaml is to have; ``origin``: where the mounts come from."""
+    """Return by sensor the keys to write into session.yaml; ``origin``: the source of the mounts."""
     return {name: mount_block(mounted, covariance, origin) for name, (mounted, covariance) in assessment.mounts.items()}

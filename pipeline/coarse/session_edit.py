@@ -1,16 +1,16 @@
 """Mounts written into the text of session.yaml, through the YAML library that keeps comments (ruamel.yaml).
 
 The text becomes YAML nodes, the nodes of the mounts are changed, and the nodes become text again. Comments, the order
-of keys, quotes, block and flow style, line ends and a byte order mark stay. Every list, mapping or text in brackets or
-over several lines that is not itself changed is taken over as it was written. The library writes the rest in one style:
+of keys, quotes, block and flow style, line ends and a byte order mark stay. Unchanged lists and mappings in brackets,
+and unchanged texts over several lines, are copied letter by letter. The library writes the rest in one style:
 
 * the indentation of nested blocks and of lists is the same everywhere, that of the first one;
 * there is one space after a key's colon and none before it, and a comment may move along its line;
-* ``? key`` on a line of its own becomes ``key:``, and a tag that says nothing (``!!map``) goes;
+* ``? key`` on a line of its own becomes ``key:``, and a redundant tag (``!!map``) is dropped;
 * a changed mapping or list in brackets stands on one line.
 
-The library loses a comment inside such brackets. So the edited text is read again: it must say what was meant, with
-every comment in its order, or the edit is refused.
+The library loses a comment inside the brackets of a changed mapping or list. Therefore the edited text is read again.
+The edit is refused unless the content is the intended one and every comment is there in its order.
 """
 
 import re
@@ -28,15 +28,15 @@ from pipeline.config.yaml_file import content_of
 from pipeline.errors import ConfigError
 
 Content = dict[str, Any]
-DOCUMENT = re.compile(  # the library keeps neither a byte order mark nor what stands outside the document's own marks
+DOCUMENT = re.compile(  # the library keeps neither a byte order mark nor the text before --- and after ...
     r"(\ufeff?(?:(?:[#%].*)?\n)*---[ \t]*\n|\ufeff?)(.*?)(^\.\.\.(?:\s.*)?)?", re.DOTALL | re.MULTILINE
 )
-FIRST_MARKER = 0xF0000  # of characters for private use: each stands for one text that is taken over
+FIRST_MARKER = 0xF0000  # first of the characters for private use: each one replaces one copied text
 MARKER = re.compile("([\U000f0000-\U0010fffd])\\1*")
 TEXT_BLOCK = ("|", ">")
 TAGS = {str: "tag:yaml.org,2002:str", float: "tag:yaml.org,2002:float", dict: "tag:yaml.org,2002:map",
         list: "tag:yaml.org,2002:seq"}  # fmt: skip
-DIGITS = {"mount_covariance": ".9e"}  # always with a point: YAML takes 1e-06 for a word
+DIGITS = {"mount_covariance": ".9e"}  # with a decimal point, because YAML reads 1e-06 as text
 
 
 def edit_mounts(text: str, blocks: Mapping[str, Content], path: Path) -> str:
@@ -45,40 +45,40 @@ def edit_mounts(text: str, blocks: Mapping[str, Content], path: Path) -> str:
     Parameters
     ----------
     text
-        What session.yaml says now. It is valid for :func:`~pipeline.config.yaml_file.content_of`.
+        The present text of session.yaml, which :func:`~pipeline.config.yaml_file.content_of` accepts.
     blocks
         By sensor, values of ``mount``, ``mount_origin`` and ``mount_covariance``.
     path
-        The file that an error names.
+        The file, for errors.
 
     Raises
     ------
     ConfigError
-        A sensor's block has no format, after which a mount could be written; or the edit would change or lose
-        something else.
+        A sensor's block has no ``format`` (a new mount is written after it), or the edit would change or lose something
+        else.
     """
     for name in blocks:
         if "format" not in content_of(text, path).get(name, {}):
             raise ConfigError(f"{path}: {name}: has no format; add it")
     try:
         new = _edited(text, blocks)
-    except Exception as error:  # the library alone runs here, and raises anything at a text that it cannot write
+    except Exception as error:  # the library may raise any exception for a text that it cannot write
         raise _refusal(path) from error
     check_edit(text, new, blocks, path)
     return new
 
 
 def check_edit(before: str, after: str, blocks: Mapping[str, Content], path: Path) -> None:
-    """Raise ConfigError unless the new text says what the old one did but for the blocks, with every comment.
+    """Raise ConfigError unless the new text has the old content except for the blocks, and every comment.
 
     Parameters
     ----------
     before, after
         Texts of session.yaml.
     blocks
-        By sensor, the keys that were to change.
+        By sensor, the keys to change, with their new values.
     path
-        The file that an error names.
+        The file, for errors.
     """
     content = content_of(before, path)
     meant = content | {name: content[name] | block for name, block in blocks.items()}
@@ -104,7 +104,7 @@ def _refusal(path: Path) -> ConfigError:
 
 
 def _comments(text: str) -> list[str]:
-    """Return all comments in their order: they stand between YAML's tokens, or behind the head of a block of text."""
+    """Return all comments in their order. They stand between YAML's tokens, or after the head (| or >) of a text."""
     comments: list[str] = []
     end = 0
     for token in yaml.scan(text, Loader=yaml.SafeLoader):
@@ -121,7 +121,7 @@ def _edited(text: str, blocks: Mapping[str, Content]) -> str:
     assert parts is not None
     head, body, tail = parts.groups(default="")
     library = YAML()
-    library.width = len(text) + 10_000  # lines are not broken
+    library.width = len(text) + 10_000  # so that no line is broken
     root = library.compose(body)
     _keep_indents(library, root)
     taken: list[str] = []
@@ -151,7 +151,7 @@ def _keep_indents(library: YAML, root: Node) -> None:
 
 
 def _nested_blocks(parent: Node) -> Iterator[tuple[Node, Node]]:
-    """Yield each block mapping or list with the block that it stands in."""
+    """Yield each nested block mapping or list, after the block that contains it: (outer, nested)."""
     if not isinstance(parent, CollectionNode) or parent.flow_style:
         return
     for item in parent.value:
@@ -162,16 +162,16 @@ def _nested_blocks(parent: Node) -> Iterator[tuple[Node, Node]]:
 
 
 def _taken_over(node: Node, text: str, taken: list[str]) -> Node:
-    """Return the node with a marker in place of what was written in brackets or over several lines.
+    """Return the node with a marker in place of each text that stands in brackets or over several lines.
 
     Parameters
     ----------
     node
         A node that does not change.
     text
-        The text that the node's marks count in.
+        The text in which the node's marks (its start and end) count.
     taken
-        Texts taken over so far; this call adds to them.
+        Texts replaced by markers so far; this call adds to them.
     """
     start, end = node.start_mark, node.end_mark
     if isinstance(node, CollectionNode) and not node.flow_style:
@@ -190,7 +190,7 @@ def _taken_over(node: Node, text: str, taken: list[str]) -> Node:
 
 
 def _edit_sensor(sensor: Node, block: Content, text: str, taken: list[str]) -> None:
-    """Set the block's keys in a sensor's mapping; a key that is missing comes after ``mount``, or after ``format``."""
+    """Set the block's keys in a sensor's mapping; new keys come after ``mount``, or ``format`` if that is new too."""
     places = {key.value: position for position, (key, _) in enumerate(sensor.value)}
     for key, position in places.items():
         name, node = sensor.value[position]
@@ -221,7 +221,7 @@ def _changed(node: Node, value: Any, key: str) -> Node:
 
 
 def _new(value: Any, key: str) -> Node:
-    """Return a node that says a value of one of the keys; a matrix is a list of rows, one a line."""
+    """Return a node with a value of the key; a matrix becomes a list of rows, one per line."""
     if isinstance(value, dict):
         pairs = [(ScalarNode(TAGS[str], name), _new(entry, key)) for name, entry in value.items()]
         return MappingNode(TAGS[dict], pairs, flow_style=True)
@@ -234,7 +234,7 @@ def _new(value: Any, key: str) -> Node:
 
 
 def _last(node: Node) -> Node:
-    """Return the node that a comment behind this one belongs to: of a block, its last entry."""
+    """Return the node that carries the comment after this node: the last entry of a block, else the node itself."""
     if isinstance(node, CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         return _last(last[1] if isinstance(last, tuple) else last)
@@ -242,7 +242,7 @@ def _last(node: Node) -> Node:
 
 
 def _move_comments(old: Node, new: Node) -> None:
-    """Move the lines of comment below the old node below the new one; a comment on the old node's own line stays."""
+    """Move comment lines from below the old node to below the new one; a comment on the old node's own line stays."""
     if not old.comment or old.comment[0] is None:
         return
     comment = old.comment[0]

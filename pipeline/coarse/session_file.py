@@ -1,4 +1,4 @@
-"""session.yaml as ``poolcal coarse`` and ``poolcal laser`` read it, and write mounts into it."""
+"""Reading session.yaml, and writing mounts into it, for ``poolcal coarse`` and ``poolcal laser``."""
 
 import itertools
 import os
@@ -29,7 +29,7 @@ Content = dict[str, Any]
 
 
 def read_session(folder: Path) -> tuple[str, Content]:
-    """Return text and content of session.yaml, which may still lack mounts; all else in it is checked."""
+    """Return text and content of session.yaml. Everything in it is checked; only mounts may be missing."""
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
     path = folder / "session.yaml"
@@ -49,7 +49,7 @@ def _check(content: Content, folder: Path) -> SessionConfig:
 
 
 def mount_origin(method: str, file: Path, **more: Any) -> Content:
-    """Return where a mount comes from, as session.yaml says it beside the mount.
+    """Return the block ``mount_origin`` of session.yaml, which names the source of a mount.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def mount_origin(method: str, file: Path, **more: Any) -> Content:
     file
         The file that the mount was computed from.
     more
-        Further keys.
+        Further keys of the block.
     """
     name = "".join(letter if letter.isprintable() else "?" for letter in file.name)[:300]
     today = datetime.now(UTC).date().isoformat()
@@ -76,7 +76,7 @@ def mount_block(mounted: Mounted, covariance: Array, origin: Content) -> Content
     covariance
         Its covariance, (6, 6): rotation x, y, z and lever arm x, y, z in body axes; rad and m.
     origin
-        Where the mount comes from, of :func:`mount_origin`.
+        Source of the mount, from :func:`mount_origin`.
     """
     mount = {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()}
     return {
@@ -87,18 +87,18 @@ def mount_block(mounted: Mounted, covariance: Array, origin: Content) -> Content
 
 
 def write_mounts(folder: Path, text: str, content: Content, blocks: Mapping[str, Content]) -> str:
-    """Write mounts into session.yaml and return in words what was done.
+    """Write mounts into session.yaml and return a sentence for the user about it.
 
-    Nothing is written where session.yaml has these mounts already; their date and software version may differ.
+    Nothing is written if session.yaml has these mounts already; their date and software version may differ.
 
     Parameters
     ----------
     folder
         The session's folder.
     text, content
-        What session.yaml says, of :func:`read_session`.
+        Text and content of session.yaml, from :func:`read_session`.
     blocks
-        By sensor, the keys to write, of :func:`mount_block`.
+        By sensor, the keys to write, from :func:`mount_block`.
     """
     path = folder / "session.yaml"
     if all(_is_same(content[name], block) for name, block in blocks.items()):
@@ -118,7 +118,7 @@ def _is_same(present: Content, block: Content) -> bool:
 def _replace_session(folder: Path, old: str, new: str) -> Path:
     """Keep the old text as session.1.yaml, session.2.yaml … (the first name that is free) and return that file's path.
 
-    The new text is written whole or not at all: beside session.yaml, then renamed over it.
+    The new text is written whole or not at all, because it is written beside session.yaml and then renamed over it.
     """
     kept = _keep(folder, old.encode("utf-8"))
     try:

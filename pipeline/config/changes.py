@@ -1,4 +1,4 @@
-"""Which settings differ from their defaults."""
+"""Settings that differ from their defaults."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,9 +7,9 @@ from pydantic import BaseModel
 
 
 def changed_settings(model: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield key, default (None: it has none) and value of each setting that is not at its default.
+    """Yield key, default (None if it has none) and value of each setting that differs from its default.
 
-    ``prefix`` stands before the keys: the block's own key and a dot.
+    ``prefix`` comes before the keys: the key of the block and a dot.
     """
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)

@@ -1,4 +1,4 @@
-"""The one line that tells a fault in a settings file: its key, the value there, and what to do."""
+"""The message, one line, about a fault in a settings file: the key, its value, and the remedy."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -10,7 +10,7 @@ from pipeline.config.model_fields import Location, field_names, known_keys, with
 
 LETTERS = tuple(f"target.{letter}" for letter in "abce")
 FOOT_M = 0.3048
-SENTENCES = {  # where pydantic speaks to programmers
+SENTENCES = {  # in place of pydantic's, which are for programmers
     "too_short": "has too few entries: {actual_length} of at least {min_length}",
     "too_long": "has more entries than {max_length}; a decimal comma makes two of one",
     "union_tag_invalid": "has kind {tag}, which is none of {expected_tags}",
@@ -19,7 +19,7 @@ OUT_OF_BOUNDS = ("less_than_equal", "greater_than_equal")
 
 
 def fault_line(model: type[BaseModel], faults: Sequence[Any], where: str) -> str:
-    """Return what to say of the first fault that matters.
+    """Return the message about the first fault that matters.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def fault_line(model: type[BaseModel], faults: Sequence[Any], where: str) -> str
 
 
 def _first(faults: Sequence[Any]) -> Any:
-    """Return the fault to tell: an unknown key before one that is missing beside it, which may be that one misspelt."""
+    """Return the fault to report: before a missing key an unknown one beside it, which may be that key misspelt."""
     first = faults[0]
     if first["type"] != "missing":
         return first
@@ -59,7 +59,7 @@ def _first(faults: Sequence[Any]) -> Any:
 
 
 def _meant(unknown: str, known: list[str]) -> str:
-    """Return what an unknown key may be.
+    """Return a hint about an unknown key: the known keys like it; an empty text if there are none.
 
     >>> _meant("roll", ["roll_deg", "x_m"]), _meant("mbes2", ["ins", "mbes"])
     ('is it roll_deg? ', 'one mbes is calibrated at a time: write one session.yaml for each; ')
@@ -73,7 +73,7 @@ def _meant(unknown: str, known: list[str]) -> str:
 
 
 def _missing(model: type[BaseModel], location: Location) -> str:
-    """Return what to do about a key that is missing."""
+    """Return the remedy for a missing key."""
     if location[-1] == "mount":
         keys = ", ".join(field_names(model, location))
         return f"add it with its six keys, {keys}, or let poolcal coarse write it"
@@ -81,7 +81,7 @@ def _missing(model: type[BaseModel], location: Location) -> str:
 
 
 def _in_metres(key: str, fault: Any) -> str:
-    """Return a word where a length is out of bounds in metres, and would not be if it were given in millimetres."""
+    """Return a hint if a length is out of bounds in metres, but not if read in millimetres; else an empty text."""
     value, bounds = fault["input"], fault.get("ctx", {})
     last = key.rpartition(".")[2]
     length = last.endswith("_m") or ".corners." in key or key in LETTERS
@@ -92,7 +92,7 @@ def _in_metres(key: str, fault: Any) -> str:
 
 
 def _in_m_s(key: str, fault: Any) -> str:
-    """Return a word where a sound speed is out of bounds in m/s but not in another unit, and how a cast's row is read.
+    """Return a hint about a sound speed out of bounds: a unit in which it is plausible, and the order of a cast's row.
 
     >>> _in_m_s("mbes.svp.0.1", {"type": "less_than_equal", "input": 4855.0})
     ' (m/s; is it in feet a second? It is then 1479.8); each row of svp is [depth in m, speed in m/s]'

@@ -1,9 +1,9 @@
-"""Presets of instruments: published figures of an instrument, under the session's own keys.
+"""Presets of instruments: published figures of an instrument, under the keys of session.yaml.
 
 session.yaml names a preset by ``instrument: r2sonic_2024`` in the sensor's block. The file is
-SESSION/instruments/NAME.yaml, else configs/instruments/NAME.yaml. A value of the session goes before the preset's, and
-the preset's before the default; nested blocks are merged key by key. The sensor's block keeps where each value was
-taken from (:class:`InstrumentUsed`), so that run.yaml is read again without presets.
+SESSION/instruments/NAME.yaml, else configs/instruments/NAME.yaml. The session's values take precedence over the
+preset's, and the preset's over the defaults. Nested blocks are merged key by key. The sensor's block records the source
+of each figure (:class:`InstrumentUsed`), so that run.yaml can be read again without presets.
 """
 
 import os
@@ -27,12 +27,12 @@ Sensor = Literal["ins", "laser", "mbes"]
 Block = dict[str, Any]
 PRESETS = CONFIGS / "instruments"
 SENSORS: Mapping[Sensor, type[Model]] = {"ins": Ins, "laser": Laser, "mbes": Mbes}
-SETTINGS: Mapping[Sensor, tuple[str, ...]] = {  # what a preset may say, and the report shows
+SETTINGS: Mapping[Sensor, tuple[str, ...]] = {  # keys that a preset may set and the report shows
     "ins": ("drift", "white"),
     "laser": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg"),
     "mbes": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg", "beam_deg", "projector_offset_m"),
 }
-MOST_PRESETS = 1000  # that a message looks through
+MOST_PRESETS = 1000  # most files that are read for a message
 
 
 class Instrument(Model):
@@ -41,29 +41,29 @@ class Instrument(Model):
     title: InstrumentTitle
     sensor: Sensor
     settings: Block = Field(default_factory=dict)  # keys of the sensor's block
-    rates: Block = Field(default_factory=dict)  # keys of PLAN.yaml, of the sensor
-    unverified: tuple[str, ...] = Field(default=(), max_length=100)  # range_sigma_m, drift.heading_deg, rates.beams
+    rates: Block = Field(default_factory=dict)  # keys of PLAN.yaml for the sensor
+    unverified: tuple[str, ...] = Field(default=(), max_length=100)  # keys without a document, such as rates.beams
 
 
 def _part(model: type[BaseModel], names: tuple[str, ...]) -> type[Model]:
-    """Return a model of some of the fields alone."""
+    """Return a model with only the named fields of another model."""
     fields: Block = {name: (model.model_fields[name].annotation, model.model_fields[name]) for name in names}
     return create_model(f"{model.__name__}Part", __base__=Model, **fields)
 
 
 def settings_model(sensor: Sensor) -> type[Model]:
-    """Return the model of what a preset may say of the sensor under ``settings``."""
+    """Return the model of a preset's block ``settings`` for the sensor."""
     return _part(SENSORS[sensor], SETTINGS[sensor])
 
 
 def rates_model(sensor: Sensor) -> type[Model]:
-    """Return the model of what a preset may say of the sensor under ``rates``."""
+    """Return the model of a preset's block ``rates`` for the sensor."""
     plans: Mapping[Sensor, type[Model]] = {"laser": LaserFigures, "mbes": MbesFigures}
     return plans[sensor] if sensor in plans else _part(Plan, ("ins_rate_hz",))
 
 
 def load_instrument(path: Path) -> Instrument:
-    """Return the preset in a file, checked; raise ConfigError where it is none."""
+    """Return the preset in a file, checked; raise ConfigError if the file is no valid preset."""
     instrument = parse(Instrument, read_yaml(path), str(path))
     parse(settings_model(instrument.sensor), instrument.settings, f"{path}: settings")
     parse(rates_model(instrument.sensor), instrument.rates, f"{path}: rates")
@@ -81,22 +81,22 @@ def merge_presets(content: Block, folder: Path) -> tuple[Block, frozenset[str]]:
     Parameters
     ----------
     content : dict[str, Any]
-        What session.yaml says; its own keys go before a preset's.
+        Content of session.yaml. Its keys take precedence over a preset's.
     folder : Path
         The session folder, which may have presets of its own.
 
     Returns
     -------
     tuple[dict[str, Any], frozenset[str]]
-        The content with the presets' values, and the keys that session.yaml itself has (``ins.drift``,
-        ``ins.drift.heading_deg``): what a preset says was not said by the session.
+        The content with the presets' values, and the dotted keys of session.yaml itself (``ins.drift``,
+        ``ins.drift.heading_deg``), without keys that only a preset has.
     """
     full = {sensor: _with_preset(sensor, content[sensor], folder) for sensor in SENSORS if sensor in content}
     return content | full, frozenset(_dotted_keys(content))
 
 
 def _with_preset(sensor: Sensor, block: Any, folder: Path) -> Any:
-    """Return a sensor's block with the preset that it names, and with where each figure comes from."""
+    """Return a sensor's block merged with the preset that it names, and with the source of each figure."""
     name = block.get("instrument") if isinstance(block, dict) else None
     if name is None:
         return block
@@ -115,7 +115,7 @@ def _with_preset(sensor: Sensor, block: Any, folder: Path) -> Any:
 
 
 def deep_merge(defaults: Any, own: Any) -> Any:
-    """Return ``own`` with what it lacks taken from ``defaults``, block by block.
+    """Return ``own`` with its missing keys taken from ``defaults``, block by block.
 
     >>> deep_merge({"a": 3, "b": {"d": 4}, "e": 5}, {"a": 1, "b": {"c": 2}})
     {'a': 1, 'b': {'d': 4, 'c': 2}, 'e': 5}
@@ -126,7 +126,7 @@ def deep_merge(defaults: Any, own: Any) -> Any:
 
 
 def figures(sensor: Sensor) -> list[str]:
-    """Return the dotted keys of all that a preset may say of the sensor."""
+    """Return the dotted keys of all figures that a preset may set for the sensor."""
     fields = SENSORS[sensor].model_fields
     blocks = {name: getattr(fields[name].annotation, "model_fields", None) for name in SETTINGS[sensor]}
     keys = ([f"{name}.{key}" for key in inner] if inner else [name] for name, inner in blocks.items())
@@ -134,7 +134,7 @@ def figures(sensor: Sensor) -> list[str]:
 
 
 def _dotted_keys(content: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
-    """Yield the keys of nested blocks, those of a block after its own."""
+    """Yield the dotted keys of nested blocks: first a block's own key, then the keys in it."""
     for key, value in content.items():
         yield f"{prefix}{key}"
         if isinstance(value, dict):
@@ -158,7 +158,7 @@ def _instrument_by_name(sensor: Sensor, name: Any, folder: Path) -> Instrument:
 
 
 def _path(name: str, folder: Path) -> Path | None:
-    """Return the preset's file, the session's own before the program's; None where there is none."""
+    """Return the path of a preset in the session folder, or else of the program's preset; None if there is neither."""
     in_session, in_program = folder / "instruments" / f"{name}.yaml", PRESETS / f"{name}.yaml"
     if os.path.lexists(in_session):
         if not os.path.isfile(in_session) or not in_session.resolve().is_relative_to(folder.resolve()):
@@ -168,16 +168,16 @@ def _path(name: str, folder: Path) -> Path | None:
 
 
 def _known(sensor: Sensor, folder: Path) -> str:
-    """Return for a message which presets there are for the sensor."""
+    """Return the part of a message that lists the presets for the sensor."""
     names = {path.stem for place in (PRESETS, folder / "instruments") for path in sorted(place.glob("*.yaml"))}
     fitting = [name for name in sorted(names)[:MOST_PRESETS] if _sensor_of(name, folder) == sensor]
     return f"known for {sensor}: {', '.join(fitting) or 'none'}"
 
 
 def _sensor_of(name: str, folder: Path) -> Sensor | None:
-    """Return the sensor that a preset is for; None where it cannot be read."""
+    """Return the sensor that a preset is for; None if the preset cannot be read."""
     try:
         path = _path(name, folder)
         return load_instrument(path).sensor if path else None
-    except ConfigError:  # told when it is asked for
+    except ConfigError:  # reported when a session names it
         return None

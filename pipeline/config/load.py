@@ -1,4 +1,4 @@
-"""Read the YAML files of a pool and of a session whole."""
+"""Reading of the YAML files of a pool and of a session, together with the files that they name."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -31,13 +31,14 @@ def load_session(
     folder : Path
         The session folder.
     with_cast : Callable, optional
-        Puts a cast in the place of its file's name in the file's content (readers/casts.py, which the simulator must
-        not reach through here). A session that names a cast's file cannot be loaded without it.
+        Function that replaces the name of a cast's file by the cast, in the content of session.yaml. It stands in
+        readers/casts.py, which no module of config may import. A session that names such a file cannot be loaded
+        without it.
 
     Raises
     ------
     ConfigError
-        In one line, of what is wrong in session.yaml or in a preset that it names.
+        session.yaml, or a preset that it names, has a fault. The message is one line.
     """
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
@@ -46,6 +47,6 @@ def load_session(
     content = content if with_cast is None else with_cast(content, folder)
     ins = content.get("ins")
     if isinstance(ins, dict) and "drift" in ins and "ins.drift" not in own_keys:
-        # The drift is a preset's: what the files tell goes before it.
+        # The drift comes from a preset: sigmas in the INS files take precedence over it.
         content = content | {"ins": {"drift_from": "files"} | ins}
     return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | content, str(path))

@@ -26,7 +26,7 @@ TiltSigma = Annotated[float, Field(ge=1e-4, le=10)]
 
 
 class Mark(Model):
-    """A mark: its coordinates (m) and, where it has its own, their standard deviations."""
+    """A mark: its coordinates (m), and their standard deviations if they differ from those of all marks."""
 
     at: tuple[Coordinate, Coordinate, Coordinate]
     sigma_m: Sigmas | None = None
@@ -47,7 +47,11 @@ class Drawing(Model):
 
 
 class Axes(Model):
-    """y through two marks (aft, forward) and the INS's roll, or x through two (port, starboard) and its pitch."""
+    """The body axes from two marks and one angle of the INS.
+
+    Either the y axis runs through the marks ``forward`` (aft, forward), and ``roll_deg`` is the INS's roll. Or the x
+    axis runs through the marks ``starboard`` (port, starboard), and ``pitch_deg`` is the INS's pitch.
+    """
 
     origin: Name
     forward: tuple[Name, Name] | None = None
@@ -69,7 +73,7 @@ class Axes(Model):
 
 
 class Body(Model):
-    """Marks in the body frame, or what gives its axes."""
+    """Marks in the body frame, or the marks that define its axes."""
 
     marks: Annotated[dict[Name, Mark], Field(min_length=1, max_length=30)] | None = None
     axes: Axes | None = None
@@ -105,7 +109,7 @@ class Marks(Model):
 
     @property
     def named(self) -> dict[str, list[str]]:
-        """The marks that must have been surveyed, by key."""
+        """The names of marks that the survey must have, by the key that names them."""
         axes = self.body.axes
         found = {"body.marks": list(self.body.marks or {})}
         if axes is not None:
@@ -115,7 +119,7 @@ class Marks(Model):
 
 
 def load_marks(path: Path) -> Marks:
-    """Return the marks in a file, checked, every name in it known; raise ConfigError where they are not."""
+    """Return the marks in a file, checked; raise ConfigError if a value is invalid or a name is not in the survey."""
     content = read_yaml(path)
     for name in ("survey", "body", "laser", "mbes"):
         _spell_out(content.get(name))
@@ -133,7 +137,7 @@ def load_marks(path: Path) -> Marks:
 
 
 def _spell_out(block: Any) -> None:
-    """Write a mark's short form, [x, y, z], and one sigma for all three in full; leave the rest to the model."""
+    """Expand short forms in place: a mark written as [x, y, z], and one sigma for all three axes."""
     inside = block.get("marks") if isinstance(block, dict) else None
     if isinstance(inside, dict):
         for name, mark in inside.items():

@@ -4,7 +4,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, Tag
 
-Location = tuple[int | str, ...]  # of a value in a file, as pydantic gives it: keys and numbers in lists
+Location = tuple[int | str, ...]  # place of a value in a file, as pydantic reports it: keys, and numbers in lists
 
 
 def known_keys(model: type[BaseModel], location: Location) -> list[str]:
@@ -13,14 +13,14 @@ def known_keys(model: type[BaseModel], location: Location) -> list[str]:
 
 
 def field_names(model: type[BaseModel], location: Location) -> list[str]:
-    """Return the keys of the model at this place, in its order; none where there is no model."""
+    """Return the keys of the model at this place, in the model's order; an empty list if there is no model."""
     current: Any = model
     for part in location:
         field = getattr(current, "model_fields", {}).get(part)
         current = field.annotation if field is not None else _tagged(current).get(part)
         members = get_args(current)
         models = (model for model in members if isinstance(model, type) and issubclass(model, BaseModel))
-        current = next(models, current)  # a block that may be left out altogether
+        current = next(models, current)  # the model of an optional block
     return list(getattr(current, "model_fields", ()))
 
 
@@ -34,7 +34,7 @@ def _tagged(annotation: Any) -> dict[int | str, Any]:
 
 
 def without_tags(model: type[BaseModel], location: Location) -> Location:
-    """Return a fault's place as the file has it, where no tag of a union stands."""
+    """Return a fault's place as in the file: without the tags of unions, which pydantic adds."""
     current: Any = model
     kept = []
     for part in location:

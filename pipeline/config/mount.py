@@ -1,4 +1,4 @@
-"""A sensor's mount on the body, how sure it is, and where it comes from."""
+"""A sensor's mount on the body, its uncertainty, and its source."""
 
 from typing import Annotated, Literal
 
@@ -40,19 +40,19 @@ Covariance = Annotated[  # of (ε about body x, y, z; lever arm x, y, z), R_true
 
 
 class MountOrigin(Model):
-    """Where a mount comes from: what poolcal has written beside it."""
+    """The source of a mount, which poolcal writes beside the mount."""
 
     method: Literal["coarse", "fine"]
     file: Annotated[str, Field(max_length=300)]
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
     software: Annotated[str, Field(max_length=100)]
-    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # of the six what a fine calibration left as it was
-    mount: Mount | None = None  # as it was written: mount_covariance belongs to no other
+    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # mount parameters that a fine calibration kept fixed
+    mount: Mount | None = None  # the mount as written: mount_covariance belongs to this mount only
 
 
 class MountSigma(Model):
-    """Sigmas that hold for each of the three angles and for each component of the lever arm."""
+    """Standard deviations: one for each of the three angles, one for each component of the lever arm."""
 
     angle_deg: SigmaDeg = 0.005
     lever_arm_m: SigmaM = 0.0015

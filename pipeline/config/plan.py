@@ -1,4 +1,4 @@
-"""PLAN.yaml: passes that are to be sailed, and the figures of instruments that a session's settings do not have."""
+"""PLAN.yaml: planned passes, and the figures of the instruments that session.yaml does not have."""
 
 from typing import Annotated
 
@@ -12,7 +12,7 @@ Sway = Annotated[float, Field(ge=0, le=5)]
 
 
 class LaserFigures(Model):
-    """Rates and field of the scanner: lines athwart, by an angle from its z axis towards its x axis."""
+    """Rates and field of view of the scanner. Its lines run athwart; angles count from its z axis to its x axis."""
 
     point_rate_hz: Rate = 20_000.0
     line_rate_hz: Rate = 50.0
@@ -43,18 +43,18 @@ class Unrest(Model):
 class Pass(Model):
     """One pass along the wall."""
 
-    distance_m: Annotated[float, Field(ge=0.5, le=100)]  # of the INS from the wall
+    distance_m: Annotated[float, Field(ge=0.5, le=100)]  # distance of the INS from the wall
     speed_m_s: Annotated[float, Field(ge=0.01, le=10)] = 0.4
     heading_swing_deg: Annotated[float, Field(ge=0, le=45)] = 1.5  # amplitude
-    half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the blocks
+    half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the target
 
     def seconds(self, half_length_m: float) -> float:
-        """Return the time of the pass; ``half_length_m``: where it has none of its own."""
+        """Return the time of the pass in seconds; ``half_length_m`` is used if the pass has none of its own."""
         return 2 * (self.half_length_m or half_length_m) / self.speed_m_s
 
 
 class Budget(Model):
-    """Time for all passes; between two passes the boat has to turn."""
+    """Time for all passes, with the turns between them, and time of one turn."""
 
     seconds: Annotated[float, Field(gt=0, le=36_000)]
     turn_s: Annotated[float, Field(ge=0, le=3600)] = 60.0
@@ -63,11 +63,11 @@ class Budget(Model):
 class Plan(Model):
     """PLAN.yaml: the passes to be sailed, and the rates of the instruments."""
 
-    ins_height_m: Lever = 1.3  # of the INS above the water
+    ins_height_m: Lever = 1.3  # height of the INS above the water
     ins_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 200.0
     laser: LaserFigures = LaserFigures()
     mbes: MbesFigures = MbesFigures()
     unrest: Unrest = Unrest()
     passes: Annotated[tuple[Pass, ...], Field(min_length=1, max_length=100)]
-    candidates: Annotated[tuple[Pass, ...], Field(max_length=30)] = ()  # to choose from within the budget
+    candidates: Annotated[tuple[Pass, ...], Field(max_length=30)] = ()  # passes to choose from within the budget
     budget: Budget | None = None

@@ -1,7 +1,7 @@
 """The pool's config: the target, and a block of thresholds for each stage.
 
-Settings keep the units of the contract (degrees, metres); code that computes converts at once to radians. Unknown
-keys, wrong types and impossible values are errors that name file and key.
+Settings are in degrees and metres; code that computes converts degrees to radians at once. Unknown keys, wrong types
+and impossible values are errors that name file and key.
 """
 
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ from pipeline.config.target import Origin, Target
 
 
 class AsBuilt(Model):
-    """The target as surveyed: faces off their design, and how far the wet ones of a family may stand off besides."""
+    """The target as surveyed: offsets of faces from the design, and sigmas of the wet faces against the dry ones."""
 
     faces: dict[str, Annotated[float, Field(ge=-0.05, le=0.05)]] = Field(default_factory=dict)  # m outward, by name
     offset_sigma_m: SigmaM = 0.001
@@ -21,28 +21,28 @@ class AsBuilt(Model):
 
 
 class TargetPlace(Model):
-    """What reading the files needs of the target: changing a letter must not read them again."""
+    """Settings of the target that the readers need. A change of its shape does not make them read the files again."""
 
     origin: Origin
     azimuth_deg: float | None
 
 
 class Ingest(Model):
-    """What ends a pass."""
+    """Limits that end a pass."""
 
     max_gap_s: Positive = 5.0  # a longer gap in INS or soundings ends a pass
     reversal_m: Positive = 1.0  # going back along the track by more than this ends a pass
 
 
 class Georeference(Model):
-    """How far round the target points are kept, and how far apart INS records may be."""
+    """Size of the box round the target in which points are kept, and the longest interval between INS records."""
 
-    box_margin_m: Annotated[float, Field(ge=1.5, le=20)] = 1.5  # round the target; what lies outside is dropped
+    box_margin_m: Annotated[float, Field(ge=1.5, le=20)] = 1.5  # round the target; points outside are dropped
     max_ins_interval_s: Annotated[float, Field(gt=0, le=1)] = 0.1  # never interpolate over a longer hole in the INS
 
 
 class Segment(Model):
-    """How the target and the coarse mounts are searched for, and which points get a label."""
+    """Limits of the searches for the target and the provisional mount, and of labelling."""
 
     margin_m: NotNegative = 0.03  # to a face's edges, beyond the footprint's half extent
     gate_m: Positive = 0.05  # smallest gate round a face; widened to five times the robust scale
@@ -53,29 +53,29 @@ class Segment(Model):
     search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
-    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # the laser's angles, where it is calibrated
-    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # of the wall that a pose half a period off must lose
+    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # how wrong the laser's angles may be, if calibrated
+    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # least loss of wall half a period off, not ambiguous
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
-        0.02  # another mount that explains so nearly as many soundings
+        0.02  # the mount is ambiguous if a rival's score is smaller by less than this share
     )
 
     @property
     def farthest_mount(self) -> tuple[float, float]:
-        """Angle (degrees) and lever arm (m) from the coarse mount beyond which no mount is taken.
+        """Largest angle (degrees) and lever arm (m) of a correction that is accepted.
 
-        The coarse mount's error may be half as large again as it is said to be.
+        The limits allow an error of the coarse mount half as large again as the configured search.
         """
         return 1.5 * self.search_mount_deg, 1.5 * self.search_mount_m
 
 
 class FitPlanes(Model):
-    """Which planes are fitted."""
+    """Limit on the planes that are fitted."""
 
     min_points: Annotated[int, Field(ge=10)] = 50  # a plane of fewer points is not fitted
 
 
 class AngleIterate(Model):
-    """When the patent's iteration of angles ends."""
+    """Limits that end the patent's iteration of angles."""
 
     max_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
     step_tolerance_deg: Positive = 1e-6
@@ -83,7 +83,7 @@ class AngleIterate(Model):
 
 
 class Offsets(Model):
-    """How the patent's offsets are found, and when their iteration ends."""
+    """Options of the patent's offsets, and limits that end their iteration."""
 
     max_iterations: Annotated[int, Field(ge=1, le=10000)] = 500
     step_tolerance_deg: Positive = 1e-7
@@ -95,15 +95,15 @@ Freeable = Literal["mbes_latency", "laser_latency", "sound_speed"]
 
 
 class Adjust(Model):
-    """What the adjustment estimates, and how it weights and tests."""
+    """Additional unknowns of the adjustment, its weights, and its tests."""
 
-    free: tuple[Freeable, ...] = ()  # estimated besides the mount and the surfaces
+    free: tuple[Freeable, ...] = ()  # unknowns beside the mount, the surfaces and the INS's drift
     max_iterations: Annotated[int, Field(ge=1, le=100)] = 20
     robust_k0: Annotated[float, Field(ge=0.5, le=1000)] = 3.0  # IGG III: full weight below, in sigmas
-    robust_k1: Annotated[float, Field(ge=0.5, le=1000)] = 6.0  # no weight above
+    robust_k1: Annotated[float, Field(ge=0.5, le=1000)] = 6.0  # IGG III: no weight above, in sigmas
     moment_s: Annotated[float, Field(ge=0.001, le=1000)] = 0.1  # observations within it share the INS's noise
     test_level: Annotated[float, Field(gt=0, lt=0.5)] = 0.001
-    test_tolerance_m: SigmaM = 0.003  # mean residual, step or difference of passes that is not held against a session
+    test_tolerance_m: SigmaM = 0.003  # smaller mean residuals, steps and differences of passes do not matter
 
     @model_validator(mode="after")
     def _ordered(self) -> "Adjust":
@@ -113,16 +113,16 @@ class Adjust(Model):
 
 
 class LaserFit(Model):
-    """What is known where the laser itself is calibrated: of the target, and of the coarse mount."""
+    """Prior information for a calibration of the laser itself: sigmas of the target and of the coarse mount."""
 
     face_sigma_deg: SigmaDeg = 0.02  # each family of faces against the design, about either axis
-    face_sigma_m: SigmaM = 0.002  # and along its normal
+    face_sigma_m: SigmaM = 0.002  # the same along its normal
     plumb_sigma_deg: SigmaDeg = 0.02  # the target as a whole out of plumb
     origin_sigma_m: SigmaM | None = None  # of target.origin, each axis, in the INS's datum; null: not surveyed
     azimuth_sigma_deg: SigmaDeg | None = None  # of target.azimuth_deg; null: not surveyed
-    coarse_sigma_deg: SigmaDeg = 0.5  # of each coarse angle, where laser.mount_covariance does not say
+    coarse_sigma_deg: SigmaDeg = 0.5  # of each coarse angle, without laser.mount_covariance
     coarse_sigma_m: SigmaM = 0.05
-    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # one that comes out no surer than this of coarse is held
+    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # of its coarse sigma; a less certain one is fixed
 
 
 class VerdictLimits(Model):
@@ -153,5 +153,5 @@ class PoolConfig(Model):
 
     @property
     def target_place(self) -> TargetPlace:
-        """What reading the files needs of the target."""
+        """The settings of the target that the readers need."""
         return TargetPlace(origin=self.target.origin, azimuth_deg=self.target.azimuth_deg)

@@ -1,4 +1,4 @@
-"""What settings are made of: a strict model, and numbers within what can be meant."""
+"""Parts of which settings are made: a strict model, and numbers within plausible bounds."""
 
 from typing import Annotated
 

@@ -53,13 +53,13 @@ class Ins(Model):
     max_records: MaxRecords = None
     latency_s: Latency = 0.0
     drift: Drift = Drift()
-    drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, where they tell; else those of drift
+    drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, if they hold any; else those of drift
     white: White = White()
 
     @model_validator(mode="after")
     def _given_drift_goes_first(self) -> "Ins":
         if "drift" in self.model_fields_set and "drift_from" not in self.model_fields_set:
-            object.__setattr__(self, "drift_from", "settings")  # frozen from here on
+            object.__setattr__(self, "drift_from", "settings")  # the model is frozen
         return self
 
     @model_validator(mode="after")
@@ -76,14 +76,14 @@ class Laser(Model):
     files: Files
     format: Literal["las", "e57", "table"]
     gps_week: Week = None
-    time: LasTime = None  # what the times of LAS count from, where its header says it wrongly; null: as that says
+    time: LasTime = None  # zero of the times in LAS, if the header has it wrong; null: by the header
     max_records: MaxRecords = None
     frame: Annotated[str, Field(min_length=1, max_length=200)] = "laser"
-    heights: Heights = None  # above what, where frame is a CRS that does not say
+    heights: Heights = None  # their reference, if frame is a CRS without one
     mount: Mount
     mount_sigma: MountSigma = MountSigma()  # of the fine calibration
     mount_origin: MountOrigin | None = None
-    mount_covariance: Covariance | None = None  # goes before mount_sigma
+    mount_covariance: Covariance | None = None  # takes precedence over mount_sigma
     range_sigma_m: RangeSigma = 0.005
     range_bias_sigma_m: SigmaM = 0.002  # common to all ranges
     angle_sigma_deg: SigmaDeg = 0.003
@@ -122,14 +122,14 @@ class Mbes(Model):
     max_records: MaxRecords = None
     mount: Mount
     mount_origin: MountOrigin | None = None
-    mount_covariance: Covariance | None = None  # told, not used: the adjustment starts from the mount alone
+    mount_covariance: Covariance | None = None  # not used: the adjustment starts from the mount alone
     sound_speed_m_s: SoundSpeed | None = None
     svp: Annotated[tuple[tuple[Depth, SoundSpeed], ...], Field(min_length=2, max_length=10_000)] | None = None  # a cast
     svp_number: Annotated[int, Field(ge=1, le=10_000)] | None = None  # which cast of a file that holds several
-    svp_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.05  # of one of its speeds, beside what all share
-    svp_from: CastUsed | None = None  # where svp was a file's name
+    svp_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.05  # of each of its speeds, beside their common error
+    svp_from: CastUsed | None = None  # if svp was the name of a file
     sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2
-    sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m: 0.03 °C per metre
+    sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m, as with 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
     range_sigma_m: RangeSigma = 0.008
     range_bias_sigma_m: SigmaM = 0.002  # common to all detections
@@ -147,32 +147,28 @@ class Mbes(Model):
         return self
 
 
-
-
-
-
 class SessionConfig(Model):
     """The session's config: SESSION/session.yaml."""
 
-    name: Annotated[str, Field(min_length=1, max_length=300)]  # left out: the session folder's name
+    name: Annotated[str, Field(min_length=1, max_length=300)]  # default: the session folder's name
     ins: Ins
     laser: Laser
-    mbes: Mbes | None = None  # none: only the laser can be calibrated
+    mbes: Mbes | None = None  # None: the laser is calibrated
 
     @property
     def calibrated(self) -> Calibrated:
-        """Which sensor is calibrated: the laser, where there is no sonar."""
+        """The sensor that is calibrated: the sonar, or the laser if there is no sonar."""
         return "laser" if self.mbes is None else "mbes"
 
     @property
     def sonar(self) -> Mbes:
-        """The sonar; raise ConfigError where there is none."""
+        """The sonar; raise ConfigError if there is none."""
         if self.mbes is None:
             raise ConfigError("session.yaml: mbes is missing: there is no sonar to be calibrated; add its block")
         return self.mbes
 
     @property
     def recordings(self) -> Recordings:
-        """What the readers need of the three sensors."""
+        """The settings of the three sensors that the readers need."""
         mbes = None if self.mbes is None else recording_of(self.mbes)
         return Recordings(ins=recording_of(self.ins), laser=recording_of(self.laser), mbes=mbes)

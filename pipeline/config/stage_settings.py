@@ -1,8 +1,8 @@
-"""What each stage gets of the settings: no more than it uses, so that another setting does not run it again.
+"""The settings of each stage: only settings that it uses, so that a change of another one does not run it again.
 
-A stage names in its Config the blocks it wants (``laser``, ``mbes``, ``segment``, ...). Where it annotates one with a
-narrower model than the block's own, it gets that model, filled with the block's fields of the same names. Keys keep the
-names of session.yaml, and so do the reasons why a stage is run again.
+A stage names in its Config the blocks that it needs (``laser``, ``mbes``, ``segment``, ...). If it annotates a block
+with a narrower model than the block's own, it gets that model, filled with the block's fields of the same names. Keys
+have the names of session.yaml, also in the reasons why a stage is run again.
 """
 
 from collections.abc import Mapping
@@ -27,14 +27,14 @@ class SensorMount(Model):
 
 
 class LaserPlacement(Model):
-    """What places the laser's points in the pool: its mount, and the frame that its files are in."""
+    """Settings that place the laser's points in the pool: its mount, and the frame of its files."""
 
     mount: Mount
     frame: str
 
 
 class SonarPlacement(Model):
-    """What places soundings in the pool: the mount, and what turns times and angles into points."""
+    """Settings that place soundings in the pool: the mount, and the settings that turn times and angles into points."""
 
     mount: Mount
     sound_speed_m_s: float | None
@@ -43,7 +43,7 @@ class SonarPlacement(Model):
 
 
 class SonarBeams(Model):
-    """What footprints on the target depend on: the mount, the width of the beams, and how far their angles stray."""
+    """Settings that determine footprints on the target: the mount, the beams' width, and the sigma of their angles."""
 
     mount: Mount
     beam_deg: tuple[float, float]
@@ -51,21 +51,21 @@ class SonarBeams(Model):
 
 
 class LaserCalibration(LaserFit):
-    """How a laser is calibrated by itself: ``laser_fit`` with the verdict's limits of the sigmas."""
+    """Settings of a calibration of the laser itself: ``laser_fit``, and the verdict's limits of the sigmas."""
 
     max_sigma_deg: float
     max_sigma_m: float
 
 
 def narrow(model: type[M], block: BaseModel) -> M:
-    """Return the fields that ``model`` has, taken from a block of settings that has more."""
+    """Return an instance of ``model``, filled with the fields of the same names from a larger block of settings."""
     return model.model_validate({name: getattr(block, name) for name in model.model_fields})
 
 
 def settings_by_name(pool: PoolConfig, session: SessionConfig) -> dict[str, Any]:
     """Return every setting by the name under which a stage's Config asks for it.
 
-    ``mbes`` is None where the laser is calibrated, ``laser_fit`` where the sonar is.
+    ``mbes`` is None if the laser is calibrated, ``laser_fit`` is None if the sonar is calibrated.
     """
     blocks: tuple[BaseModel, ...] = (pool, session)
     settings = {name: getattr(block, name) for block in blocks for name in type(block).model_fields}
@@ -78,7 +78,7 @@ def settings_by_name(pool: PoolConfig, session: SessionConfig) -> dict[str, Any]
 
 
 def laser_calibration(pool: PoolConfig) -> LaserCalibration:
-    """Return how the pool's settings have a laser calibrated by itself."""
+    """Return the settings of a calibration of the laser itself, from the pool's settings."""
     limits = pool.verdict
     return LaserCalibration(
         **pool.laser_fit.model_dump(), max_sigma_deg=limits.max_sigma_deg, max_sigma_m=limits.max_sigma_m
@@ -93,7 +93,7 @@ def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:
     config : type
         The stage's Config, a dataclass.
     settings : Mapping[str, Any]
-        Every setting by its name, of :func:`settings_by_name`.
+        Every setting by its name, from :func:`settings_by_name`.
     """
     annotations = get_type_hints(config)
     names = [field.name for field in fields(config)]  # type: ignore[arg-type]
@@ -101,7 +101,7 @@ def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:
 
 
 def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings as JSON has them."""
+    """Return settings as plain values for JSON."""
     return {
         name: value.model_dump(mode="json") if isinstance(value, BaseModel) else value
         for name, value in settings.items()
@@ -109,7 +109,7 @@ def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _as_annotated(annotation: Any, value: Any) -> Any:
-    """Return a setting as a Config annotates it: as it is, or narrowed."""
+    """Return a setting in the model that a Config annotates: unchanged, or narrowed."""
     choices = get_args(annotation) or (annotation,)
     models = [choice for choice in choices if isinstance(choice, type) and issubclass(choice, BaseModel)]
     if not isinstance(value, BaseModel) or not models or isinstance(value, tuple(models)):

@@ -1,4 +1,4 @@
-"""The target in a pool's config: the patent's, by its letters, or any other, by its faces."""
+"""The target in a pool's config: the patent's target by its letters, or any other target by its faces."""
 
 import re
 from typing import Annotated, Any, Literal
@@ -19,7 +19,7 @@ FaceNames = Annotated[tuple[FaceName, ...], Field(min_length=2)]
 
 
 class Origin(Model):
-    """Origin of the target frame: of the patent's target the middle of the centre wall's front face."""
+    """Origin of the target frame. For the patent's target it is the centre of the wall's front face."""
 
     latitude_deg: Annotated[float, Field(ge=-90, le=90)]
     longitude_deg: Annotated[float, Field(ge=-180, le=360)]
@@ -65,12 +65,12 @@ class Letters(Model):
 
     @property
     def shape(self) -> str:
-        """Which settings give the shape, for people."""
+        """The settings that define the shape, for messages."""
         return "target.a, b, c, e and low_side"
 
     @property
     def sides(self) -> str:
-        """Which setting tells left from right."""
+        """The setting that distinguishes left from right, for messages."""
         return "target.low_side"
 
 
@@ -78,16 +78,16 @@ class FaceSettings(Model):
     """A planar convex polygon: corners in the target frame, counter-clockwise as the sensors see it."""
 
     corners: Annotated[tuple[tuple[Lever, Lever, Lever], ...], Field(min_length=3, max_length=60)]
-    seen: Literal["both", "dry", "wet"] = "both"  # by the laser alone: dry; by the sonar alone: wet
+    seen: Literal["both", "dry", "wet"] = "both"  # dry: by the laser only; wet: by the sonar only
     role: Literal["P1", "P2", "P3"] | None = None  # in the patent's steps
 
 
 class RelationSettings(Model):
-    """One of four things known of some faces; ``name``: of the family that they make."""
+    """A known relation between faces, of one of four kinds; ``name``: the name of the family that they form."""
 
     same_plane: FaceNames | None = None
-    distance: FaceNames | None = None  # parallel, as far apart as the corners say
-    height: FaceNames | None = None  # horizontal, as high above each other as the corners say
+    distance: FaceNames | None = None  # parallel, with the distances that follow from the corners
+    height: FaceNames | None = None  # horizontal, with the height differences that follow from the corners
     parallel: FaceNames | None = None  # at an unknown distance
     name: FaceName | None = None
 
@@ -99,7 +99,7 @@ class RelationSettings(Model):
 
     @property
     def given(self) -> dict[Literal["same_plane", "distance", "height", "parallel"], tuple[str, ...]]:
-        """The faces by the kind of relation; one entry."""
+        """The names of the faces by the kind of relation, with one entry."""
         kinds = {
             "same_plane": self.same_plane, "distance": self.distance, "height": self.height, "parallel": self.parallel,
         }
@@ -119,12 +119,12 @@ class Faces(Model):
 
     @property
     def shape(self) -> str:
-        """Which settings give the shape, for people."""
+        """The settings that define the shape, for messages."""
         return "target.faces"
 
     @property
     def sides(self) -> str:
-        """Which setting tells left from right."""
+        """The setting that distinguishes left from right, for messages."""
         return "the sign of y in target.faces"
 
 

@@ -1,7 +1,8 @@
 """A target's faces from a mesh with face groups: OBJ (``g`` or ``o``) or PLY (an integer property ``group`` of faces).
 
-trimesh reads the files. A group's polygons make one face, their common outline, whose corners go into the settings as
-if they stood there, so that everything after knows polygons only and a run's settings hold what was used.
+trimesh reads the files. The polygons of a group form one face, whose border is their common outline. The corners of the
+outline are put into the settings. Therefore all other code knows polygons only, and a run's settings hold the corners
+that were used.
 """
 
 import io
@@ -22,16 +23,16 @@ from pipeline.errors import ConfigError
 Array = NDArray[np.float64]
 Polygon = Sequence[int]
 MOST_BYTES, MOST_GROUPS = 20_000_000, 500
-SAME_M = 1e-4  # vertices nearer to each other are one: an exporter writes them once for every face
-STRAIGHT = 1e-4  # sine of the bend at a corner that is none
+SAME_M = 1e-4  # vertices nearer to each other are one: exporters write a vertex once for every face
+STRAIGHT = 1e-4  # sine of the bend up to which a vertex is no corner
 GROUP = "group"
 
 
 def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
     """Return the content of a pool's (or scenario's) file with the corners of its ``target.mesh`` written out.
 
-    The mesh is a file beside ``path``. What ``target.faces`` says of a group (seen, role) stays; a face with corners of
-    its own is one more. Raises ConfigError where the mesh cannot be used.
+    The mesh is a file beside ``path``, or in a folder beside it. Keys of a group in ``target.faces`` (seen, role) stay.
+    Faces in ``target.faces`` with corners of their own are added. Raise ConfigError if the mesh cannot be used.
     """
     target = content.get("target")
     if not isinstance(target, dict) or target.get("kind") != "faces" or "mesh" not in target:
@@ -59,7 +60,7 @@ Groups = Mapping[str, tuple[Array, Sequence[Polygon]]]
 
 
 def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
-    """Yield by group its outline's corners (k, 3), in the polygons' sense of turning."""
+    """Yield the name of each group, and the corners (k, 3) of its outline in the polygons' sense of rotation."""
     read = {".obj": _obj, ".ply": _ply}.get(path.suffix.lower())
     if read is None:
         raise ConfigError(f"{where}: is neither .obj nor .ply; export it as one of them")
@@ -72,7 +73,7 @@ def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
         raise ConfigError(f"{where}: cannot be read ({error.strerror}); check the path") from error
     except ConfigError:
         raise
-    except Exception as error:  # whatever a damaged file makes of the library
+    except Exception as error:  # the library may raise any exception for a damaged file
         reason = " ".join(str(error).split())[:100] or type(error).__name__
         raise ConfigError(f"{where}: holds no faces that can be read ({reason}); export it again") from error
     if not 0 < len(groups) <= MOST_GROUPS:
@@ -122,7 +123,7 @@ def _array(values: Any) -> Array:
 
 
 def _outline(vertices: Array, polygons: Sequence[Polygon], where: str) -> Array:
-    """Return the corners (k, 3) of the single outline of polygons: their edges that no neighbour runs the other way."""
+    """Return the corners (k, 3) of the polygons' single outline: the edges that belong to one polygon only."""
     pairs = cKDTree(vertices).query_pairs(SAME_M, output_type="ndarray")
     count = len(vertices)
     _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count)))

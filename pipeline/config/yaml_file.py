@@ -1,4 +1,4 @@
-"""A YAML file read strictly: every way in which this can fail is one line that names the file."""
+"""Strict reading of a YAML file. Every failure is an error of one line that names the file."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +14,7 @@ MAX_INTEGER = 2**63
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Load safe YAML; refuse a key given twice (YAML would silently take the last) and aliases (no bombs)."""
+    """Load safe YAML; refuse repeated keys (YAML would silently take the last) and aliases (they may expand hugely)."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.events.AliasEvent):
@@ -43,12 +43,12 @@ _StrictLoader.add_constructor("tag:yaml.org,2002:int", _StrictLoader.construct_y
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Return the mapping in a YAML file; every way in which this can fail is a ConfigError."""
+    """Return the mapping in a YAML file; raise ConfigError on every failure."""
     return content_of(text_of(path), path)
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a YAML file as it stands, line ends and all."""
+    """Return the text of a YAML file unchanged, with its line ends."""
     try:
         content = read_regular(path, MAX_YAML_BYTES)
         if len(content) > MAX_YAML_BYTES:
@@ -71,7 +71,7 @@ def content_of(text: str, path: Path) -> dict[str, Any]:
 
 
 def compose(text: str, path: Path) -> yaml.Node:
-    """Return the nodes of a YAML text, which know their places in it; ``path`` is the file that messages name."""
+    """Return the root node of a YAML text; all nodes know their places in it. ``path`` is the file for messages."""
     node: yaml.Node = _loaded(text, path, _StrictLoader.get_single_node)
     return node
 
@@ -83,7 +83,7 @@ def _loaded(text: str, path: Path, load: Callable[[_StrictLoader], Any]) -> Any:
         raise ConfigError(f"{path}: not valid YAML: {error}; correct the file") from error
     except RecursionError as error:
         raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; correct the file") from error
-    except Exception as error:  # the library alone runs here, and raises anything at a value it cannot read
+    except Exception as error:  # the library may raise any exception for a value that it cannot read
         raise ConfigError(
             f"{path}: not valid YAML: a value is not what it is said or seems to be ({type(error).__name__}: {error}); "
             "put it in quotes, and take tags such as !!float out"

@@ -1,4 +1,4 @@
-"""YAML content into models: strictly, and every fault in one line that names file and key."""
+"""Strict conversion of YAML content into models. Every fault is an error of one line that names file and key."""
 
 import json
 import math
@@ -32,7 +32,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
     Raises
     ------
     ConfigError
-        In one line, of the first fault.
+        The content has a fault. The message is one line, about the first fault that matters.
     """
     try:
         return model.model_validate_json(_to_json(content, where), strict=True)
@@ -41,7 +41,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
 
 
 def _to_json(content: dict[str, Any], where: str) -> str:
-    """Return JSON for the model: its strict mode reads lists as tuples and whole numbers as floats, nothing else."""
+    """Return the content as JSON, from which strict models accept lists for tuples, and whole numbers for floats."""
 
     def check(value: Any, key: str) -> None:
         if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Which rows of a recorded cast can be used, and what makes the cast unusable."""
+"""Checks of a recorded cast: the choice of its usable rows, and the refusal of a cast that cannot be used."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from pipeline.maths.sonar.cast_profile import ascending, largest_difference, one
 Array = NDArray[np.float64]
 DEEPEST_M = 200.0
 MIN_WATER_SPEED_M_S, MAX_WATER_SPEED_M_S = 1300.0, 1700.0
-MAX_DIFFERENCE_M_S = 2.0  # between the ways down and up
-JUMP_M_S, WITHIN_M = 10.0, 0.5  # from row to row: more is a bubble, or air
+MAX_DIFFERENCE_M_S = 2.0  # between the speeds on the probe's way down and on its way up
+JUMP_M_S, WITHIN_M = 10.0, 0.5  # a larger step of speed between two rows nearer than this shows a bubble, or air
 
 
 @dataclass(frozen=True)
 class UsableRows:
-    """Depths ascending [m] and sound speeds [m/s], and how many rows were left out, by reason."""
+    """Ascending depths [m], their sound speeds [m/s], and the counts of rows left out, by reason."""
 
     depth_m: Array
     speed_m_s: Array
@@ -27,12 +27,13 @@ class UsableRows:
 
 
 def usable_rows(rows: Array, name: str) -> UsableRows:
-    """Return the rows of a cast (n, 2) that can be used, one for each depth.
+    """Return the usable rows of a cast, one for each depth; ``rows`` (n, 2): recorded depths [m] and speeds [m/s].
 
     Raises
     ------
     RawDataError
-        No row or only one can be used, units or signs are others, speeds jump, or the ways down and up differ.
+        Fewer than two depths can be used, most depths are negative, speeds are not in m/s, speeds jump from row to row,
+        or the speeds on the way down and on the way up differ.
     """
     left_out: Counter[str] = Counter()
 

@@ -1,7 +1,8 @@
-"""Casts of sound speed in columns under a line of names (AML, Valeport, CastAway and others).
+"""Read casts of sound speed from columns below a header line (AML, Valeport, CastAway and others).
 
-The first line that names a depth and a sound speed counts, its names parted by commas, semicolons, tabs or blanks.
-Units stand in the names, in brackets, or in the line below; without units, m and m/s hold.
+The header line is the first line that names a depth and a sound speed. Commas, semicolons, tabs or blanks separate the
+names. The unit of a column stands in its name (in brackets or at the end), or in the line below the header line. The
+unit of depth may also stand in an earlier line of its own. Without units depths are in metres and speeds in m/s.
 """
 
 import re
@@ -12,7 +13,7 @@ from datetime import datetime
 from pipeline.errors import RawDataError
 from pipeline.readers.cast_values import NAN, DepthAndSpeed, RecordedCast, is_number, number_of, place_of
 
-MAX_HEADER_LINES = 300  # lines before the names of columns
+MAX_HEADER_LINES = 300  # lines in which the header line is searched
 SPEED = re.compile(
     r"\b(sound (speed|velocity)|speed of sound|soundspeed|soundvelocity|svp?|ssp?)\b|^(speed|velocity|vel)\b|声速"
 )
@@ -25,13 +26,13 @@ METRES_PER_SECOND = {
     "metres per second", "meters/second", "metres/second", "meter/second", "米/秒",
 }  # fmt: skip
 OTHER_UNIT = re.compile(r"\b(ft/s|ft|feet|foot|f/s|fps|fm|fathoms?|yards?|yd|km|dm|cm|mm|dbar)\b|英尺|厘米|毫米")
-DEPTH_UNIT = re.compile(r"\bdepth[ _]?units?\b\W*(\w+)", re.IGNORECASE)  # a line of its own, before the columns
+DEPTH_UNIT = re.compile(r"\bdepth[ _]?units?\b\W*(\w+)", re.IGNORECASE)  # in a line above the header line
 _ADVICE = "export depth in metres and sound speed in m/s"
 
 
 @dataclass(frozen=True)
 class _Header:
-    """The line of names: its number, what parts its cells, and the columns of depth and of sound speed."""
+    """The header line: its number, the separator of its cells, and the column numbers of depth and sound speed."""
 
     number: int
     separator: str
@@ -39,12 +40,12 @@ class _Header:
 
 
 def cast_of_columns(lines: Sequence[str], name: str) -> RecordedCast:
-    """Return the cast in the text ``lines`` of the file ``name``.
+    """Return the cast in the text ``lines`` of a file; ``name`` names the file in messages.
 
     Raises
     ------
     RawDataError
-        No line names a depth and a sound speed, several columns have one, or the units are others.
+        No line names a depth and a sound speed, several columns hold one of them, or a unit is not metres or m/s.
     """
     header = _header(lines, name)
     before, below = lines[: header.number], header.number + 1
@@ -64,7 +65,7 @@ def _header(lines: Sequence[str], name: str) -> _Header:
         cells = _cells(line, separator)
         depths, speeds = _matching(cells, DEPTH), _matching(cells, SPEED)
         if separator == " " and (len(cells) > 6 or any(is_number(cell) for cell in cells)):
-            continue  # a sentence, or a row
+            continue  # a sentence, or a row of numbers
         if depths and speeds and depths != speeds:
             columns = (_only(depths, cells, "depth", name), _only(speeds, cells, "sound speed", name))
             return _Header(number, separator, columns)
@@ -77,7 +78,7 @@ def _separator(line: str) -> str:
 
 def _cells(line: str, separator: str) -> list[str]:
     line = re.sub(r"^\s*(columns|units)\s*=", "", line.strip("\r\n"), flags=re.I).lstrip("#%/ ")
-    if separator == " ":  # a unit in brackets and sound speed are one cell with what they belong to
+    if separator == " ":  # no blank may divide a name from its unit in brackets, nor the words "sound speed"
         line = re.sub(r"\([^()]*\)", lambda bracketed: bracketed.group().replace(" ", "_"), line)
         line = re.sub(r"(?i)\bsound (speed|velocity)", r"sound_\1", re.sub(r"\s+(?=[\[(])", "", line))
     cells = line.split() if separator == " " else line.split(separator)
@@ -98,7 +99,7 @@ def _without_unit(cell: str) -> str:
 
 
 def _only(columns: Sequence[int], cells: Sequence[str], quantity: str, name: str) -> int:
-    """Return the column of a quantity; raise RawDataError where there are several."""
+    """Return the only one of the ``columns`` of a quantity; raise RawDataError if there are several."""
     if len(columns) > 1:
         names = " and ".join(cells[k] for k in columns[:3])
         raise RawDataError(f"{name}: has {len(columns)} columns of {quantity}: {names}; leave in it the one to be used")
@@ -106,7 +107,7 @@ def _only(columns: Sequence[int], cells: Sequence[str], quantity: str, name: str
 
 
 def _units_below(lines: Sequence[str], header: _Header, below: int) -> tuple[str, ...]:
-    """Return the units of depth and speed in the line ``below`` the names; empty where it is a row of numbers."""
+    """Return the units of depth and speed from line number ``below``; two empty texts if it is no line of units."""
     cells = _cells(lines[below], header.separator) if below < len(lines) else []
     units = tuple(cells[k].strip("()[] ").lower() for k in header.columns if k < len(cells))
     has_numbers = any(is_number(cell, header.separator != ",") for cell in cells)
@@ -128,7 +129,7 @@ def _refuse_other_units(lines: Sequence[str], header: _Header, units: Sequence[s
 
 
 def _unit_in(cell: str) -> str:
-    """Return the unit in a column's name, or nothing.
+    """Return the unit in a column's name, in lower case; an empty text without a unit.
 
     >>> _unit_in("Depth (Meter)"), _unit_in("depth_m"), _unit_in("Sound Velocity"), _unit_in("sound_speed_m_s")
     ('meter', 'm', '', 'm s')
@@ -144,7 +145,7 @@ def _unit_in(cell: str) -> str:
 
 
 def _rows(lines: Sequence[str], header: _Header) -> list[DepthAndSpeed]:
-    """Return depth and speed of each line that is not empty; NaN where the line is too short."""
+    """Return depth and speed of each line that is not empty; NaN for a missing cell or a cell without a number."""
     rows = []
     depth, speed = header.columns
     decimal_comma = header.separator != ","
@@ -158,7 +159,7 @@ def _rows(lines: Sequence[str], header: _Header) -> list[DepthAndSpeed]:
 
 
 def _time_in(lines: Sequence[str]) -> datetime | None:
-    """Return the time in UTC, else any, that a line names as the cast's: year, month, day, time."""
+    """Return date and time from a line with the word cast, time or date; lines that also have UTC come first."""
     for zone in ("utc", ""):
         for line in lines:
             digits = re.search(r"(\d{4})[-/](\d\d)[-/](\d\d)[ T,]+(\d\d):(\d\d):(\d\d)", line)
@@ -171,7 +172,7 @@ def _time_in(lines: Sequence[str]) -> datetime | None:
 
 
 def _place_in(lines: Sequence[str]) -> tuple[float, float] | None:
-    """Return the latitude and longitude [degrees] that lines name."""
+    """Return latitude and longitude [degrees] from the lines that name them; None without a possible position."""
     values = []
     for word in ("latitude", "longitude"):
         line = next((line for line in lines if word in line.lower()), "")
@@ -181,7 +182,7 @@ def _place_in(lines: Sequence[str]) -> tuple[float, float] | None:
 
 
 def _why_no_cast(lines: Sequence[str]) -> str:
-    """Return why there is no cast in these lines, and what to do."""
+    """Return the words of a message: why these lines hold no cast, and what the user should do."""
     head = [
         " ".join(_without_unit(cell) for cell in _cells(line, _separator(line))) for line in lines[:MAX_HEADER_LINES]
     ]

@@ -1,10 +1,11 @@
-"""Texts of casts of sound speed as rows: CARIS .svp, Kongsberg .asvp, HYPACK .vel, and columns under a line of names.
+"""Read casts of sound speed from text: CARIS .svp, Kongsberg .asvp, HYPACK .vel, and columns below a header line.
 
-CARIS: ``[SVP_VERSION_2]``, a name, then sections ``Section 2020-195 07:29:11 54:18:31.20 11:56:51.00`` (year and its
-day, time, latitude, longitude), each with rows of depth and speed. Kongsberg: ``( SoundVelocity 1.0 0 YYYYMMDDhhmm[ss]
-latitude longitude -1 0 0 NAME P 0035 )``, the last number that of the rows below, of which the first two columns are
-depth and speed. HYPACK: ``FTP NEW 2`` or ``FTP NEW 3 ...``, then rows. All three are in metres and metres a second.
-:mod:`pipeline.readers.cast_columns` reads columns under a line of names.
+CARIS: the first line is ``[SVP_VERSION_2]``, and a name follows. Then come sections, which begin with a line such as
+``Section 2020-195 07:29:11 54:18:31.20 11:56:51.00`` (year and day of the year, time, latitude, longitude). Rows of
+depth and speed follow each. Kongsberg: a cast begins with the line ``( SoundVelocity 1.0 0 YYYYMMDDhhmm[ss] latitude
+longitude -1 0 0 NAME P 0035 )``. Its last number is the number of rows below. The first two columns of a row are depth
+and speed. HYPACK: rows follow the line ``FTP NEW 2`` or ``FTP NEW 3 ...``. All three are in metres and metres per
+second. :mod:`pipeline.readers.cast_columns` reads columns below a header line.
 """
 
 import re
@@ -15,16 +16,16 @@ from pipeline.errors import RawDataError
 from pipeline.readers.cast_columns import cast_of_columns
 from pipeline.readers.cast_values import RecordedCast, first_two_numbers, place_of, time_of_day_of_year, time_of_digits
 
-_WIDE = str.maketrans("（），；：", "(),;:")  # as Chinese and Japanese keyboards have them
+_WIDE = str.maketrans("（），；：", "(),;:")  # full-width marks of Chinese and Japanese keyboards
 
 
 def casts_of(text: str, name: str) -> tuple[str, list[RecordedCast]]:
-    """Return the kind of the text, and the casts in it.
+    """Return the name of the text's format, and the casts in the text.
 
     Raises
     ------
     RawDataError
-        It is none of the kinds, or not depth in metres and sound speed in m/s.
+        The text has none of the formats, or other units than metres and m/s, or it is not complete.
     """
     lines = text.translate(_WIDE).splitlines()
     first = next((line.strip() for line in lines if line.strip()), "")
@@ -40,7 +41,7 @@ def casts_of(text: str, name: str) -> tuple[str, list[RecordedCast]]:
 
 
 def _sections(lines: Sequence[str], begins: Callable[[str], bool]) -> Iterator[tuple[str, list[str]]]:
-    """Yield each line with which a cast begins, and the lines below it that are not empty."""
+    """Yield the first line of each cast, and the other lines of the cast that are not empty."""
     starts = [number for number, line in enumerate(lines) if begins(line)]
     for start, end in pairwise([*starts, len(lines)]):
         yield lines[start], [line for line in lines[start + 1 : end] if line.strip()]

@@ -1,10 +1,11 @@
-"""A cast of sound speed from a file: ``mbes.svp: casts/today.svp`` in session.yaml becomes depths and speeds.
+"""Replace a cast's file name in session.yaml (``mbes.svp: casts/today.svp``) by the cast's depths and speeds.
 
-:class:`pipeline.config.references.CastUsed` (run.yaml, calibration.json) records what was done to its rows. Rows above
-the surface, of speeds that no water has, or deeper than 200 m are left out and counted. A cast with a way down and a
-way up is used on its way down; it is refused if the two differ by more than 2 m/s. Rows of one depth become their mean,
-and the rest is thinned (``maths/sonar/cast_profile.py``). Nothing is filled in: beyond the cast's ends the speed stays
-(``maths/sonar/ray_tracing.py``).
+:class:`pipeline.config.references.CastUsed` (run.yaml, calibration.json) records how the rows were chosen and thinned.
+Rows above the surface, rows deeper than 200 m, and rows with speeds outside 1300 to 1700 m/s are left out and counted.
+If a cast has a way down and a way up, only the way down is used. The cast is refused if the speeds on the two differ by
+more than 2 m/s. Rows of the same depth are replaced by their mean. Then the profile is thinned
+(``maths/sonar/cast_profile.py``). No depths are added: above the first depth and below the last one, ray tracing uses
+the speed at that depth (``maths/sonar/ray_tracing.py``).
 """
 
 import hashlib
@@ -24,17 +25,18 @@ from pipeline.readers.raw_file import opened
 from pipeline.readers.session_files import files_matching
 
 MAX_BYTES = 20_000_000
-MAX_SCATTER_M_S = 0.5  # of rows about the profile
+MAX_SCATTER_M_S = 0.5  # RMS of the rows' speeds about the profile
 MAX_LISTED = 10  # casts that a message lists
 
 
 def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return session.yaml's content with the cast in place of its file's name.
+    """Return session.yaml's content with the cast's rows in place of its file's name, and their record ``svp_from``.
 
     Raises
     ------
     ConfigError, RawDataError
-        The file is not there, holds several casts, or none that can be used.
+        The keys contradict each other, the file does not exist, no number chooses among several casts, or the cast
+        cannot be used.
     """
     block = content.get("mbes")
     if not isinstance(block, dict):
@@ -66,19 +68,19 @@ def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def read_cast(path: Path, name: str, number: Any = None) -> tuple[list[list[float]], dict[str, Any]]:
-    """Return a cast's rows of depth [m] and speed [m/s], and how they were made (``CastUsed``).
+    """Return a cast's thinned rows of depth [m] and speed [m/s], and the record of their making (``CastUsed``).
 
     Parameters
     ----------
     path, name
         The file, and its name in messages.
     number
-        Which of the file's casts, from 1; None: the file must hold one.
+        Number of the cast in the file, from 1; None: the file must hold exactly one cast.
 
     Raises
     ------
     RawDataError
-        The file is too large or cannot be read, does not hold that cast, or holds rows that cannot be used.
+        The file is too large or cannot be read, does not hold that cast, or the cast cannot be used.
     """
     with opened(path, name) as file:
         content = file.read(MAX_BYTES + 1)
@@ -115,7 +117,7 @@ def read_cast(path: Path, name: str, number: Any = None) -> tuple[list[list[floa
 
 
 def _text(content: bytes, name: str) -> str:
-    """Return the file's text, in the encoding that its mark or its bytes show."""
+    """Return the file's text: UTF-16 or UTF-8 by its byte-order mark, else UTF-8 if valid, else Latin-1."""
     for mark, code in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig")):
         if content.startswith(mark):
             return content.decode(code, "replace")
@@ -128,7 +130,7 @@ def _text(content: bytes, name: str) -> str:
 
 
 def _chosen(casts: Sequence[RecordedCast], number: Any, name: str) -> tuple[RecordedCast, int]:
-    """Return the cast that mbes.svp_number names, and its number; the only one where it names none."""
+    """Return the cast that mbes.svp_number chooses (without svp_number the file's only cast), and its number."""
     if number is None and len(casts) == 1:
         return casts[0], 1
     if isinstance(number, int) and 1 <= number <= len(casts):

@@ -1,7 +1,8 @@
-"""A bound on how many records a file may claim to hold: a few bytes can stand for any number of equal points.
+"""Limit of the number of records that a file may claim to hold.
 
-Without a bound a file of 2 MB keeps the program busy for hours, and fills the disk. Real points and records differ from
-each other, and take a byte each at least, however they are packed; points on a perfect grid go ten to a byte.
+In a compressed file a few bytes can stand for any number of equal points. Without a limit a file of 2 MB keeps the
+program busy for hours, and fills the disk. Real points and records differ from each other, and each takes at least one
+byte, even if compressed. Points on a perfect grid take a tenth of a byte each.
 """
 
 from pipeline.errors import RawDataError
@@ -19,7 +20,7 @@ def refuse_claim(claimed: int, size: int, most: int | None, sensor: str, name: s
     size : int
         Size of the file, bytes.
     most : int or None
-        ``max_records`` of session.yaml; None: RECORDS_PER_BYTE records a byte.
+        ``max_records`` of session.yaml; None: the limit is RECORDS_PER_BYTE records per byte.
     sensor : str
         ins, laser or mbes, for the message.
     name : str
@@ -28,7 +29,7 @@ def refuse_claim(claimed: int, size: int, most: int | None, sensor: str, name: s
     Raises
     ------
     RawDataError
-        The file claims more records than that, or a negative number.
+        The file claims more records than the limit, or a negative number.
     """
     if 0 <= claimed <= (RECORDS_PER_BYTE * size if most is None else most):
         return

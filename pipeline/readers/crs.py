@@ -1,7 +1,8 @@
-"""Points in a coordinate reference system (CRS) -> ECEF of its own datum, metres (:mod:`pipeline.readers.datums`).
+"""Transform points from a coordinate reference system (CRS) to ECEF of the CRS's own datum, metres.
 
-A CRS of two axes, such as UTM, says nothing of heights: ``laser.heights: ellipsoidal`` must. Heights are then in the
-unit of the CRS's own axes (feet with feet), with degrees in metres. Heights above a geoid are refused.
+A CRS of two axes, such as UTM, does not define heights. session.yaml must then have ``laser.heights: ellipsoidal``. The
+heights are in the unit of x and y (feet if these are in feet), or in metres if x and y are in degrees. Heights above a
+geoid are refused. :mod:`pipeline.readers.datums` describes what is assumed of datums.
 """
 
 import math
@@ -24,8 +25,8 @@ Box = tuple[float, float, float, float]
 ECEF = "EPSG:4978"
 LASER_FRAME = "laser"
 COORDINATES = ("x_m", "y_m", "z_m")
-DEGREE_M = 111_320.0  # along a meridian
-MARGIN_DEG = 1.0  # beyond a CRS's area of use, which is rounded
+DEGREE_M = 111_320.0  # length of a degree along a meridian
+MARGIN_DEG = 1.0  # added round a CRS's area of use, whose published limits are rounded
 ZONE_M = 1e6  # Gauss-Krueger eastings may begin with the number of their zone: 39 500 000
 _LEAST_POINTS = 100  # with fewer points coordinates may be float32 numbers by chance
 
@@ -40,15 +41,15 @@ class LaserFrame:
 
 @dataclass(frozen=True)
 class FrameTransform:
-    """How coordinates in a frame become ECEF, and where the frame may be used."""
+    """The transform of a frame's coordinates to ECEF, and the area in which the frame may be used."""
 
     to_ecef: ToEcef
     box: Box | None  # area of use in the frame's own coordinates: west, south, east, north
     unit_m: float  # metres in one unit of x and y
-    height_unit_m: float  # and of z
+    height_unit_m: float  # metres in one unit of z
 
     def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Return which points lie in the CRS's area of use, (n,) bool."""
+        """Return a mask (n,): true for points in the CRS's area of use."""
         if self.box is None:
             return np.ones(len(x), dtype=bool)
         west, south, east, north = self.box
@@ -71,8 +72,8 @@ def transform_to_ecef(rows: RowFilter, frame: LaserFrame, name: str) -> None:
     Raises
     ------
     RawDataError
-        The coordinates have lost their digits (all are float32 numbers), or x and y are interchanged, or the zone's
-        digits before x are other ones than the CRS's.
+        The coordinates have lost digits (all are float32 numbers), or x and y are interchanged, or x begins with
+        another zone number than the eastings of the CRS.
     """
     transform = frame_transform(frame)
     if frame.name != LASER_FRAME:
@@ -89,7 +90,7 @@ def transform_to_ecef(rows: RowFilter, frame: LaserFrame, name: str) -> None:
 
 
 def _refuse_misread(transform: FrameTransform, x: Array, y: Array, name: str) -> None:
-    """Refuse points that would all lie in the CRS's area with x and y interchanged, or in another zone."""
+    """Refuse points that would all lie in the CRS's area if x and y were interchanged, or x had another zone number."""
     if np.all(transform.inside(y, x)):
         raise RawDataError(
             f"{name}: its x and y are interchanged for laser.frame (x {x[0]:.3f}, y {y[0]:.3f}): x must be east or "
@@ -106,7 +107,11 @@ def _refuse_misread(transform: FrameTransform, x: Array, y: Array, name: str) ->
 
 
 def _refuse_float32(x: Array, y: Array, unit_m: float, name: str) -> None:
-    """Refuse coordinates that all lie within rounding of float32 numbers, where these lie far apart."""
+    """Refuse coordinates that were stored as float32.
+
+    All x and y then lie within 0.6 mm (degrees: 6 mm) of float32 numbers. Other coordinates may do so by chance. The
+    test therefore needs 100 points, and float32 numbers that are more than ten times that distance apart.
+    """
     rounding = (0.006 if unit_m == DEGREE_M else 0.0006) / unit_m
     for values in (x, y):
         singles = values.astype(np.float32)
@@ -119,12 +124,13 @@ def _refuse_float32(x: Array, y: Array, unit_m: float, name: str) -> None:
 
 @lru_cache(maxsize=8)
 def frame_transform(frame: LaserFrame) -> FrameTransform | None:
-    """Return the transform of x, y, z (or longitude, latitude, height) to ECEF; None for laser and EPSG:4978.
+    """Return the transform of x, y, z (or longitude, latitude, height) to ECEF; None for ``laser`` and EPSG:4978.
 
     Raises
     ------
     ConfigError
-        The frame is no CRS, or its datum is not one of an INS's positions, or its heights are not ellipsoidal.
+        The frame is no CRS; its ellipsoid, axes or prime meridian do not fit the INS's positions; its heights are not
+        ellipsoidal; or PROJ cannot transform it.
     """
     if frame.name in (LASER_FRAME, ECEF):
         return None
@@ -133,7 +139,7 @@ def frame_transform(frame: LaserFrame) -> FrameTransform | None:
 
     where = f"session.yaml: laser.frame = {frame.name!r}"
     try:
-        with warnings.catch_warnings(action="ignore", category=FutureWarning):  # of +init=epsg:...
+        with warnings.catch_warnings(action="ignore", category=FutureWarning):  # PROJ warns of +init=epsg:...
             crs = CRS.from_user_input(frame.name)
     except ProjError as error:
         raise ConfigError(
@@ -167,20 +173,20 @@ def _refuse_other_heights(crs: Any, frame: LaserFrame, where: str) -> None:
 
 
 def _unit_m(crs: Any) -> float:
-    """Return the metres in one unit of x and y; a degree counts as it does along a meridian."""
+    """Return the metres in one unit of x and y; for degrees the length of a degree along a meridian."""
     factor = float(crs.axis_info[0].unit_conversion_factor)
     return DEGREE_M * math.degrees(factor) if horizontal_part(crs).is_geographic else factor
 
 
 def height_unit_m(crs: Any) -> float:
-    """Return the metres in one unit of z: of a CRS of two axes their unit, and 1 where these are angles."""
+    """Return the metres in one unit of z; a CRS of two axes has heights in their unit, or in metres for angles."""
     if len(crs.axis_info) == 3:
         return float(crs.axis_info[2].unit_conversion_factor)
     return 1.0 if crs.is_geographic else _unit_m(crs)
 
 
 def _to_ecef(crs: Any) -> ToEcef:
-    """Return the function from coordinates (x: east or longitude, y: north or latitude) to ECEF of the CRS's datum."""
+    """Return a function that transforms x (east or longitude), y (north or latitude), z to ECEF of the same datum."""
     from pyproj import Transformer
 
     horizontal = horizontal_part(crs)
@@ -197,7 +203,10 @@ def _to_ecef(crs: Any) -> ToEcef:
 
 
 def _box(crs: Any) -> Box | None:
-    """Return the area of use, widened by MARGIN_DEG; None where the CRS has none, or one across the date line."""
+    """Return the area of use in the CRS's coordinates, widened by MARGIN_DEG.
+
+    None: the CRS has no area of use, the area crosses the date line, or PROJ cannot transform its corners.
+    """
     from pyproj import Transformer
 
     area = crs.area_of_use
@@ -205,7 +214,7 @@ def _box(crs: Any) -> Box | None:
         return None
     south, north = max(area.south - MARGIN_DEG, -90.0), min(area.north + MARGIN_DEG, 90.0)
     if crs.is_geographic:
-        margin = 360.0 if (area.west, area.east) == (-180.0, 180.0) else MARGIN_DEG  # the whole earth: 190 too
+        margin = 360.0 if (area.west, area.east) == (-180.0, 180.0) else MARGIN_DEG  # whole earth: also 190°
         return area.west - margin, south, area.east + margin, north
     bounds = (max(area.west - MARGIN_DEG, -180.0), south, min(area.east + MARGIN_DEG, 180.0), north)
     flat = crs.to_2d()

@@ -1,9 +1,10 @@
 """Parts of a coordinate reference system (CRS): horizontal part, heights, ellipsoid, geocentric form of its datum.
 
-The INS's positions and the points are taken to be in one datum, whichever that is. No step from datum to datum is ever
-made: for most of them the parameters depend on place and date. "ECEF" is then the geocentric form of that datum. The
-INS's latitudes and longitudes go through the ellipsoid of WGS 84 (``pipeline.maths.geometry.geodesy``), points through
-that of their CRS: GRS 80 and CGCS2000 differ from it by 0.12 mm at most. Others differ by metres.
+The program assumes that the INS's positions and the laser's points are in the same datum. It never transforms from one
+datum to another, because for most pairs of datums the parameters depend on place and date. "ECEF" is the geocentric
+form of the common datum. The INS's latitudes and longitudes are converted with the ellipsoid of WGS 84
+(``pipeline.maths.geometry.geodesy``), points with the ellipsoid of their CRS. GRS 80 and CGCS2000 differ from WGS 84 by
+0.12 mm at most. Other ellipsoids differ by metres, and are refused.
 """
 
 from typing import Any
@@ -14,20 +15,20 @@ _HORIZONTAL_DIRECTIONS, _UP = {"east", "north"}, "up"
 
 
 def horizontal_part(crs: Any) -> Any:
-    """Return the CRS without a compound's heights, and without a bound transformation to another datum."""
+    """Return the CRS without the vertical part of a compound CRS, and without a bound transformation to a datum."""
     if crs.is_compound:
         return horizontal_part(crs.sub_crs_list[0])
     return horizontal_part(crs.source_crs) if crs.is_bound else crs
 
 
 def height_system(crs: Any) -> str | None:
-    """Return the name of a compound CRS's vertical part; None without one, or where heights are ellipsoidal."""
+    """Return the name of a compound CRS's vertical part; None without one, or if its heights are ellipsoidal."""
     names = [part.name for part in crs.sub_crs_list if part.is_vertical]
     return next((name for name in names if "ellipsoid" not in name.lower()), None)
 
 
 def unusable_reason(crs: Any) -> str | None:
-    """Return why points in this CRS do not fit the INS's positions, in words; None where they do."""
+    """Return the words that say why points in this CRS do not fit the INS's positions; None if they fit."""
     horizontal = horizontal_part(crs)
     if horizontal.geodetic_crs is None:
         return "is no CRS of points on the earth; write laser, EPSG:4978 or the like"
@@ -48,7 +49,7 @@ def unusable_reason(crs: Any) -> str | None:
 
 
 def is_like_wgs84(ellipsoid: Any) -> bool:
-    """Tell whether an ellipsoid agrees with that of WGS 84 to 1 mm, as GRS 80 and CGCS2000 do."""
+    """Return whether an ellipsoid's semi-axes agree with WGS 84 within 1 mm, as those of GRS 80 and CGCS2000 do."""
     axes = (ellipsoid.semi_major_metre, ellipsoid.semi_minor_metre)
     return all(abs(axis - wgs84) < _AXIS_TOLERANCE_M for axis, wgs84 in zip(axes, WGS84_AXES_M, strict=True))
 

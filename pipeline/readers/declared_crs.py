@@ -12,19 +12,19 @@ CLEARLY_ELSEWHERE_M = 1000.0
 
 
 def refuse_other_crs(frame: LaserFrame, declared: str, points: tuple[Array, Array, Array], name: str) -> None:
-    """Refuse a file that declares clearly another CRS than session.yaml.
+    """Refuse a file whose declared CRS contradicts that of session.yaml.
 
-    It does where the points' median lies more than 1 km elsewhere, or nowhere; where its ellipsoid is not one of
-    WGS 84, GRS 80 and CGCS2000; where its heights are above a geoid, or in another unit. Two datums on the same
-    ellipsoid (NAD83 and WGS 84, say) give the same ECEF coordinates here, whichever the session names: the user must
-    know the points' datum, which must be the INS's. A declaration that PROJ does not understand is ignored.
+    The two contradict each other if they place the points' median more than 1 km apart, or only one can place it; if
+    the declared ellipsoid is none of WGS 84, GRS 80 and CGCS2000; or if the declared heights are above a geoid, or in
+    another unit. Two datums on the same ellipsoid (NAD83 and WGS 84, for example) give the same ECEF coordinates in
+    this program. Therefore the user must know that the points' datum is the INS's. A CRS unknown to PROJ is ignored.
 
     Parameters
     ----------
     frame : LaserFrame
-        Frame that session.yaml gives.
+        Frame of the coordinates by session.yaml.
     declared : str
-        CRS in the file, WKT; empty where there is none.
+        CRS that the file declares, WKT; empty: none.
     points : tuple of three (n,) arrays
         Coordinates as they stand in the file.
     name : str
@@ -73,7 +73,10 @@ def refuse_other_crs(frame: LaserFrame, declared: str, points: tuple[Array, Arra
 
 
 def _position_m(crs: Any, x: float, y: float, z: float) -> Array:
-    """Return a point in ECEF of the CRS's own datum, at height 0: a height in feet is no other place."""
+    """Return a point in ECEF of the CRS's own datum.
+
+    The height is set to 0, because heights in another unit must not count as another place. A geocentric CRS keeps z.
+    """
     from pyproj import Transformer
 
     horizontal = horizontal_part(crs)

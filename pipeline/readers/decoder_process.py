@@ -1,8 +1,9 @@
-"""Native decoders in a process of their own, for damaged files that end the process instead of raising.
+"""Run native decoders in a process of their own, because a damaged file may end that process without an exception.
 
-A worker writes to its standard output, native byte order: per batch an int64 count, then that many float64 of each
-column; at the end a count of 0. An error is -1, an int64 length, and that many bytes of UTF-8. Any other output, or
-none, is a RawDataError of the file.
+The process (the worker) writes to its standard output in native byte order. For each batch it writes the number of rows
+n as int64, and then the columns one after another, each as n float64. A number 0 ends the output. To report an error it
+writes -1, the length of a message as int64, and the message in UTF-8. A worker may write one text in place of batches:
+its length as int64, and the text in UTF-8. Any other output, or none, raises a RawDataError of the file.
 """
 
 import struct
@@ -30,7 +31,7 @@ def decoded_batches(program: Path, arguments: list[str], name: str, width: int, 
     program : Path
         The worker's Python file.
     arguments : list of str
-        Its command line.
+        The worker's command-line arguments.
     name : str
         The raw file's path in the session folder, for messages.
     width : int
@@ -54,7 +55,7 @@ def decoded_batches(program: Path, arguments: list[str], name: str, width: int, 
 
 
 def decoded_text(program: Path, arguments: list[str], name: str, most: int) -> str:
-    """Return the text that a worker writes: an int64 length, and that many bytes of UTF-8.
+    """Return the one text that a worker writes in place of batches.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Recognise what a file is by its content, never by its name."""
+"""Recognise the kind of a file by its content, never by its name."""
 
 import re
 from pathlib import Path
@@ -31,11 +31,11 @@ from pipeline.readers.file_kind import (
 from pipeline.readers.float32_checks import through_float32
 from pipeline.readers.inertial_explorer_layout import header_line_number
 from pipeline.readers.kongsberg_all_datagrams import is_datagram_header
-from pipeline.readers.r2sonic_packets import BTH0, OTHER_PACKETS, packet_size
+from pipeline.readers.r2sonic_framing import BTH0, OTHER_PACKETS, packet_size
 from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.table_columns import csv_header
 
-HEAD_BYTES = 65_536  # of a file, by which its kind is known
+HEAD_BYTES = 65_536  # length of the file's beginning from which its kind is recognised
 
 _MAGICS = ((0, b"LASF", LAS), (0, b"PAR1", PARQUET), (0, b"ASTM-E57", E57), (8, b"GSF-v", GSF))
 RDBX = FileKind("a RIEGL .rdbx file", advice=f"{unread_formats.EXPORT_LAS} (RiSCAN PRO or RiPROCESS)")
@@ -50,11 +50,12 @@ def kind_of(path: Path, name: str) -> FileKind:
         return kind_of_bytes(file.read(HEAD_BYTES), size)
 
 
-@np.errstate(all="ignore")  # whatever the bytes are as numbers
+@np.errstate(all="ignore")  # any bytes may be read as numbers
 def kind_of_bytes(head: bytes, size: int) -> FileKind:
-    """Return the kind of a file of ``size`` bytes that begins with ``head``, its first HEAD_BYTES.
+    """Return the kind of a file of ``size`` bytes that begins with ``head``, its first HEAD_BYTES bytes.
 
-    Tests that are certain come first: marks of many bytes at a fixed place, then whole headers, then shapes of data.
+    The most certain tests come first: marks of several bytes at a fixed place, then whole headers, then the shape of
+    the data.
     """
     if not size:
         return EMPTY_FILE
@@ -67,7 +68,7 @@ def kind_of_bytes(head: bytes, size: int) -> FileKind:
         return KMALL
     if is_datagram_header(head[:20]):
         return KONGSBERG_ALL
-    if head[:1] == b"\x7b" and _is_xtf(head):  # which a datagram of 123 bytes begins with as well
+    if head[:1] == b"\x7b" and _is_xtf(head):  # a datagram of 123 bytes begins with 0x7B as well
         return XTF
     if head.startswith(_NOVATEL_SYNCS):
         return NOVATEL
@@ -92,9 +93,10 @@ def kind_of_bytes(head: bytes, size: int) -> FileKind:
 
 
 def _is_xtf(head: bytes) -> bool:
-    """Return whether it is XTF, by what follows the format byte 0x7B.
+    """Return whether a file that begins with XTF's format byte 0x7B is XTF.
 
-    A record's mark follows the file header of 1024 bytes or a multiple, or the file ends within the header.
+    A record's mark must follow the file header of 1024 bytes or a multiple, or the file must end within the header and
+    be no text.
     """
     marks = (head[start : start + 2] for start in range(1024, len(head), 1024))
     return b"\xce\xfa" in marks or (len(head) <= 1024 and not _is_text(head))
@@ -110,7 +112,7 @@ def _has_packet(head: bytes) -> bool:
 
 
 def _kind_of_doubles(head: bytes, size: int) -> FileKind | None:
-    """Return the kind of a file of doubles without header: records of 17 (SBET) or 10 (SMRMSG) with sound values."""
+    """Return SBET or SMRMSG if the file has records of 17 or 10 doubles with possible values; None otherwise."""
     if size >= 80 and size % 80 < 8:
         rows = np.frombuffer(head, "<f8", len(head) // 80 * 10).reshape(-1, 10)[:20]
         if _rising(rows[:, 0]) and np.all(np.isfinite(rows)) and np.all((rows[:, 1:] >= 0) & (rows[:, 1:] < 1e4)):
@@ -121,18 +123,18 @@ def _kind_of_doubles(head: bytes, size: int) -> FileKind | None:
     limits = [1.3e6, np.pi / 2, 2 * np.pi, 2e4, 1e3, 1e3, 1e3, np.pi, np.pi / 2, 13, 13, 1e3, 1e3, 1e3, 1e2, 1e2, 1e2]
     first = rows[0]
     possible = np.all(np.isfinite(first)) and np.all(np.abs(first) <= limits)
-    normal = possible and not np.any((first != 0) & (np.abs(first) < 1e-290))  # integers read as doubles are tiny
+    normal = possible and not np.any((first != 0) & (np.abs(first) < 1e-290))  # integers are tiny if read as doubles
     return SBET if normal and first[0] >= 0 and np.any(first[1:3] != 0) else None
 
 
 def _rising(seconds: np.ndarray) -> bool:
-    """Return whether times [s] rise by less than 1000 s a step, within two weeks."""
+    """Return whether times [s] lie within two weeks, and ascend in steps below 1000 s."""
     steps = np.diff(seconds)
     return bool(np.all((seconds >= 0) & (seconds < 1.3e6)) and np.all((steps > 0) & (steps < 1000)))
 
 
 def _is_text(head: bytes) -> bool:
-    # the last letter may be cut in two
+    # HEAD_BYTES may end within a letter of several bytes
     whole_letters = head.removesuffix(head[-3:]) if len(head) == HEAD_BYTES else head
     try:
         letters = whole_letters.decode("utf-8-sig")
@@ -159,7 +161,7 @@ def _kind_of_text(head: bytes) -> FileKind:
 
 
 def _names_trajectory(line: str) -> bool:
-    """Return whether a line names columns of position and attitude, in the words of any program."""
+    """Return whether a line names columns of position and attitude, in the words that programs use for them."""
     words = re.findall(r"[a-z]+", line.lower())
     return all(
         any(word.startswith(start) for word in words for start in starts)

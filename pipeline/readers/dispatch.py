@@ -1,20 +1,21 @@
-"""The formats that are read, and the way from session.yaml to the parts of a sensor's files.
+"""The list of the formats that are read, and the function that opens a sensor's files as parts.
 
-``raw_parts`` finds a sensor's files, recognises each by its content, and returns parts whose ``chunks()`` stream
-canonical columns together with counts of what was left out and why. Names and units of the columns are those of the
-tables of stage ingest (:mod:`pipeline.artefacts`); INS angles are NovAtel's: roll starboard down +, pitch bow up +,
-azimuth clockwise from north. Damaged files give RawDataError or fewer rows, never another exception.
+``raw_parts`` finds a sensor's files, checks the format of each by its content, and returns their parts. ``chunks()`` of
+a part yields batches of canonical columns, with the counts of rows left out, by reason. Canonical columns have the
+names and units of the tables and streams of stage ingest (:mod:`pipeline.artefacts`). INS angles are NovAtel's: roll
+starboard down +, pitch bow up +, azimuth clockwise from north. A damaged file raises RawDataError or yields fewer rows.
+It never raises another exception.
 
 A new format needs four steps:
 
 1. **Read it.** Write ``readers/<format>.py`` with a frozen dataclass that fulfils the protocol
-   :class:`pipeline.artefacts.streams.Part`: a ``name``, and ``chunks()``, which yields :class:`Chunk` after
-   :class:`Chunk` of canonical columns. Rows are checked with :mod:`pipeline.readers.row_checks`; a sonar's pings are
-   gathered with :mod:`pipeline.readers.sounding_chunks`. :class:`pipeline.readers.sbet.SbetPart` is the shortest
-   example.
-2. **Recognise it.** Add a ``FileKind`` with the format's word to :mod:`pipeline.readers.file_kind`, and its mark or
-   test to :func:`pipeline.readers.detect.kind_of_bytes`.
-3. **Open it.** Write its function in :mod:`pipeline.readers.openers`, and add it to ``FORMATS`` below.
+   :class:`pipeline.artefacts.streams.Part`: a ``name``, and ``chunks()``, which yields one
+   :class:`~pipeline.artefacts.streams.Chunk` of canonical columns after another. Check the rows with
+   :mod:`pipeline.readers.row_checks`. Gather a sonar's pings with :mod:`pipeline.readers.sounding_chunks`.
+   :class:`pipeline.readers.sbet.SbetPart` is the shortest example.
+2. **Recognise it.** Add a ``FileKind`` with session.yaml's word for the format to :mod:`pipeline.readers.file_kind`,
+   and the format's mark or test to :func:`pipeline.readers.detect.kind_of_bytes`.
+3. **Open it.** Write the function that opens it in :mod:`pipeline.readers.openers`, and add it to ``FORMATS`` below.
 4. **Accept its word.** Add the word to the ``Literal`` of the sensor's ``format`` in :mod:`pipeline.config.session`.
 
 ``tests/readers/test_dispatch.py`` fails while the lists of steps 2, 3 and 4 differ.
@@ -52,12 +53,12 @@ FORMATS: Mapping[tuple[Sensor, str], Callable[[openers.SensorFiles[Any]], tuple[
 
 
 def raw_files(settings: SensorSettings, folder: Path) -> list[Path]:
-    """Return the files that session.yaml's patterns name, each once, in order of their paths in the session folder.
+    """Return the files that match a sensor's patterns in session.yaml, each once, ordered by their paths in the folder.
 
     Raises
     ------
     RawDataError
-        A pattern matches no file, or a file that lies outside the session folder (by way of a symbolic link).
+        A pattern matches no file, or a file that lies outside the session folder (through a symbolic link).
     """
     files = {
         *files_matching(folder, settings.files, f"{_sensor_of(settings)}.files"),
@@ -67,7 +68,7 @@ def raw_files(settings: SensorSettings, folder: Path) -> list[Path]:
 
 
 def raw_parts(sensor: Sensor, settings: SensorSettings, folder: Path) -> tuple[Part, ...]:
-    """Return the parts of one sensor's files, in order.
+    """Return the parts of one sensor's files, in the order of the files' names.
 
     Parameters
     ----------
@@ -81,9 +82,9 @@ def raw_parts(sensor: Sensor, settings: SensorSettings, folder: Path) -> tuple[P
     Raises
     ------
     RawDataError
-        A file cannot be read, or is not what session.yaml says it is.
+        A file cannot be read, or its content is not in the format that session.yaml names.
     ConfigError
-        Something is missing or wrong in session.yaml: ``gps_week``, ``laser.frame``, ``laser.heights``.
+        ``gps_week``, ``laser.frame`` or ``laser.heights`` is missing or wrong in session.yaml.
     """
     if isinstance(settings, Laser):
         frame_transform(openers.laser_frame(settings))
@@ -105,7 +106,7 @@ def _accuracy_files(settings: SensorSettings, folder: Path) -> list[SessionFile]
 
 
 def _refuse_other_format(file: SessionFile, sensor: Sensor, settings: SensorSettings) -> None:
-    """Raise RawDataError where the file's content is not of the sensor and format that session.yaml gives."""
+    """Raise RawDataError if the file's content is not of this sensor, or not in the format that session.yaml names."""
     kind = kind_of(file.path, file.name)
     if kind.format == settings.format and sensor in kind.sensors:
         return

@@ -1,15 +1,16 @@
-"""E57 (ASTM E2807), by pye57's libE57Format in a process of its own (:mod:`pipeline.readers.e57_worker`).
+"""E57 (ASTM E2807), read with pye57's libE57Format in a process of its own (:mod:`pipeline.readers.e57_worker`).
 
-pye57's own class reads a scan whole and knows no times, so the worker uses the library's reader beneath it, which fills
-buffers of a batch and looks at every page's checksum. That reader cannot seek: a scan is one part.
+pye57's own class reads a whole scan at once, and reads no times. The worker therefore uses the reader of libE57Format
+below that class. It fills buffers of one batch, and verifies the checksum of every page. It cannot seek, and therefore
+one scan is one part.
 
-A point's ``timeStamp`` is seconds since the scan's ``acquisitionStart``, which is seconds since the GPS epoch without
-leap seconds, if its clock was set by GPS (``isAtomicClockReferenced``). Both are optional in the format and needed
-here. Coordinates are metres, Cartesian or spherical (range, azimuth from x to y, elevation from the xy plane); the
-scan's pose brings them into the frame of the file, which ``laser.frame`` names. Points and times that are marked as
-invalid are left out.
+A point's ``timeStamp`` is in seconds since the scan's ``acquisitionStart``. If the scanner's clock was set by GPS
+(``isAtomicClockReferenced``), ``acquisitionStart`` is in seconds since the GPS epoch, without leap seconds. Both are
+optional in E57, but this reader needs them. Coordinates are in metres, Cartesian or spherical (range, azimuth from x to
+y, elevation from the xy plane). The scan's pose transforms them to the frame of the file, which ``laser.frame`` names.
+A point is left out if the point or its time is marked as invalid.
 
-Integers of one constant value take no bits, so that a damaged count of points would have no limit: see
+Integers of one constant value take no space in the file. A damaged number of points would therefore have no limit; see
 :mod:`pipeline.readers.claimed_counts`.
 """
 
@@ -34,14 +35,14 @@ from pipeline.readers.raw_file import opened, size_of
 from pipeline.readers.row_checks import LAST_WEEK, latency_ns, possible_ns
 from pipeline.readers.row_filter import LASER_COLUMNS, RowFilter, chunk, no_rows
 
-_MAX_SECONDS = 1e8  # of a time stamp: three years
-_COARSEST_M = 0.001  # of coordinates in single precision
+_MAX_SECONDS = 1e8  # largest time stamp: three years
+_COARSEST_M = 0.001  # largest step of coordinates in single precision
 RETIME = "export it again with a time stamp for each point, or as LAS or LAZ with GPS time"
 
 
 @dataclass(frozen=True)
 class E57Part:
-    """One scan of a file."""
+    """One scan of an E57 file."""
 
     path: Path
     name: str
@@ -64,7 +65,7 @@ class E57Part:
         if dropped["truncated"]:
             yield no_rows(LASER_COLUMNS, dropped)
 
-    @np.errstate(all="ignore")  # damaged decoded are counted, not warned of
+    @np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
     def _chunk(self, decoded: DecodedColumns, dropped: Counter[str]) -> Chunk:
         self._refuse_float32(decoded)
         seconds, *_, invalid, untimed = decoded
@@ -119,7 +120,8 @@ def e57_parts(
     Raises
     ------
     RawDataError
-        The file is damaged or cut off, has no points or an unlikely number of them, or points without GPS time.
+        The file is damaged or cut off, claims more points than it can hold, or a scan has no coordinates or no GPS
+        times.
     """
     scans, crs = read_scans(path, name)
     with opened(path, name) as file:

@@ -1,6 +1,6 @@
-"""Scans of an E57 file and their points as stored, read by a process of its own.
+"""The scans of an E57 file, and their points as stored. A process of its own reads both.
 
-The library opens a file only after :mod:`pipeline.readers.e57_xml` has checked its header and its XML part.
+libE57Format opens a file only after :mod:`pipeline.readers.e57_xml` has checked its header and its XML part.
 """
 
 import json
@@ -28,10 +28,10 @@ class E57Scan:
 
     points: int
     timed: bool  # points have time stamps
-    axes: str  # cartesian, spherical; "" where neither is there
+    axes: str  # cartesian or spherical; empty: no coordinates
     single: bool  # coordinates in single precision
     start_s: float  # acquisitionStart, seconds since the GPS epoch
-    atomic: bool  # its clock was set by GPS
+    atomic: bool  # the scanner's clock was set by GPS
     rotation: list[float]  # quaternion w, x, y, z of the scan's pose
     translation: list[float]  # m
 
@@ -66,13 +66,13 @@ def stored_points(path: Path, name: str, number: int) -> Iterator[DecodedColumns
     iterator over tuples of six (n,) arrays
         Seconds, three coordinates, marks of invalid points and of invalid times (not 0: invalid).
     """
-    e57_xml.check_header_and_xml(path, name)  # again: the file may be another by now
+    e57_xml.check_header_and_xml(path, name)  # checked again: the file may have been replaced
     return decoded_batches(E57_WORKER, [str(path), str(number), str(BATCH_ROWS)], name, 6, BATCH_ROWS)
 
 
 @np.errstate(all="ignore")
 def file_coordinates(decoded: DecodedColumns, scan: E57Scan) -> tuple[Array, Array, Array]:
-    """Return Cartesian coordinates x, y, z (m) in the file's frame from a scan's points as stored, by its pose."""
+    """Return a scan's points as stored as Cartesian x, y, z (m) in the file's frame, transformed by the scan's pose."""
     x, y, z = decoded[1:4]
     if scan.axes == "spherical":
         distance, azimuth, elevation = x, y, z

@@ -1,11 +1,11 @@
 """Reads an E57 file in a process of its own: ``python -P e57_worker.py FILE`` or ``FILE SCAN BATCH``.
 
-libE57Format can die of a damaged file, or allocate what a damaged number claims. Here only this process dies, and
-:mod:`pipeline.readers.e57` says which file it was. It imports nothing of the project.
+A damaged file can crash libE57Format, or make it allocate as much memory as a damaged number claims. Only this process
+ends then, and the process that started it reports the file. This module imports nothing of the project.
 
-With FILE alone it writes JSON that describes the scans. With SCAN it writes that scan's points as stored, batch by
-batch: seconds, the three coordinates, and whether point and time are marked as invalid; a field that the scan lacks
-is 0. :mod:`pipeline.readers.decoder_process` describes the form of both.
+With FILE alone it writes a JSON text that describes the scans. With SCAN and BATCH it writes the points of that scan as
+stored, in batches: seconds, the three coordinates, the marks of invalid points and of invalid times. A field that the
+scan lacks is 0. :mod:`pipeline.readers.decoder_process` describes the bytes of both.
 """
 
 import json
@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from pye57 import libe57
 
-_MEMORY_BYTES = 1 << 30  # written to; the buffers of a batch need a hundredth
-DESCRIBING_S = 60  # of computing; a millisecond is usual
+_MEMORY_BYTES = 1 << 30  # limit of this process; the buffers of a batch need a hundredth of it
+DESCRIBING_S = 60  # limit of processor time for the description; a millisecond is usual
 MAX_SCANS = 10_000
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
@@ -31,7 +31,7 @@ def _scan_nodes(image: Any) -> list[Any]:
 
 
 def _number_at(node: Any, *path: str, default: float) -> float:
-    """Return the number at a path of names below ``node``; ``default`` where there is none."""
+    """Return the number at a path of names below ``node``; ``default`` if there is none."""
     for name in path[:-1]:
         if not node.isDefined(name):
             return default
@@ -117,8 +117,8 @@ def _main(path: str, *numbers: str) -> None:
 if __name__ == "__main__":
     try:
         _main(*sys.argv[1:])
-    except Exception as error:  # the parent makes one RawDataError of it
-        words = str(error).partition("****")[0].strip()[:300]  # the library's own sources and lines follow
+    except Exception as error:  # the parent process turns it into a RawDataError
+        words = str(error).partition("****")[0].strip()[:300]  # the library's source lines follow ****
         text = f"{type(error).__name__}: {words}".encode()
         sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(text)).tobytes() + text)
         sys.stdout.buffer.flush()

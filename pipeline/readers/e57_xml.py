@@ -1,13 +1,13 @@
 """Checks of an E57 file's header and XML part, made before libE57Format opens the file.
 
 libE57Format's XML parser follows references in the XML: to an external document type, to external entities, and to the
-schemas of ``schemaLocation``. A file made for it could read other files of this computer and send them away. A file
-that has one of these is refused; no scanner writes them. Another encoding cannot hide them, because only UTF-8 is
-accepted.
+schemas of ``schemaLocation``. With these references a malicious file could read other files of the computer and send
+them over the network. A file with any of them is refused; no scanner writes them. Only UTF-8 is accepted, so that
+another encoding cannot hide a reference.
 
-Header (little-endian): 8 u32 x 2 version, 16 u64 size of the file, 24 u64 where the XML part is, 32 u64 its length, 40
-u64 size of a page. Pages are of 1024 bytes, the last four of each a checksum. Where the XML part is counts checksums;
-its length does not (ASTM E2807, 6.2).
+Offsets in the header (little-endian): 8 u32 x 2 version, 16 u64 size of the file, 24 u64 byte at which the XML part
+begins, 32 u64 length of the XML part, 40 u64 size of a page. A page has 1024 bytes, and its last four are a checksum.
+The beginning of the XML part counts the checksums before it; its length does not count them (ASTM E2807, 6.2).
 """
 
 import re
@@ -37,7 +37,7 @@ def check_header_and_xml(path: Path, name: str) -> int:
     Raises
     ------
     RawDataError
-        The file is cut off, its header is damaged, or its XML part could fetch something.
+        The file is cut off, its header is damaged, or its XML part has an external reference or is not in UTF-8.
     """
     with opened(path, name) as file:
         size = size_of(file)

@@ -1,4 +1,4 @@
-"""Kinds of files that the content tells apart: what each is called, and how it is read or what to do with it."""
+"""Kinds of files that are recognised by content: the title of each, and its format or the advice to the user."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,15 +11,15 @@ class FileKind:
     Parameters
     ----------
     title
-        What messages call it.
+        The kind's name in messages.
     format
-        session.yaml's word for it; None if it is not read.
+        session.yaml's word for the format; None: files of this kind are not read.
     sensors
-        The sensors whose data it may hold, if it is read.
+        Sensors whose data a file of this kind may hold; empty if it is not read.
     advice
-        What to do with a file that is not read.
+        What the user should do with a file of a kind that is not read.
     advice_by_sensor
-        Advice that differs for some sensors.
+        Advice by sensor, if it differs from ``advice``.
     """
 
     title: str
@@ -29,7 +29,7 @@ class FileKind:
     advice_by_sensor: Mapping[str, str] = field(default_factory=dict)
 
     def advice_for(self, sensor: str) -> str:
-        """Return what to do with a file that is listed for this sensor."""
+        """Return the advice for a file that session.yaml lists under this sensor."""
         return self.advice_by_sensor.get(sensor, self.advice)
 
 

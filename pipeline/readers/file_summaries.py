@@ -1,4 +1,4 @@
-"""Summaries of the raw files: refusals of sensors without data, and the tables of files, gaps and counts."""
+"""Summaries of the raw files: the tables of files, gaps and counts, and the refusal of sensors that cannot be used."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -21,24 +21,24 @@ from pipeline.maths.geometry.passes import split_at_gaps
 from pipeline.readers.rates import rate_hz
 from pipeline.readers.whole_days import DAY_NS, whole_days_apart
 
-_SPACING_NS = NS // 2  # of the sigmas that are kept
+_SPACING_NS = NS // 2  # one row of INS sigmas is kept per interval of this length
 
 
 @dataclass(frozen=True)
 class ChunkSummary:
-    """Counts and times of one chunk, and what an INS adds to them."""
+    """Counts and times of one chunk; for an INS also its records and sigmas, for a sonar its sound speeds."""
 
     count: int  # good rows
     dropped: dict[str, int]  # rows left out, by reason
-    epochs_ns: NDArray[np.int64]  # INS records or pings; of laser points the first in each second, and the last
+    epochs_ns: NDArray[np.int64]  # INS records or sigmas, pings, the laser's first point in each second and its last
     trajectory: dict[str, NDArray[Any]] = field(default_factory=dict)  # columns of INS records
-    sigmas: dict[str, NDArray[Any]] = field(default_factory=dict)  # of the INS, thinned
-    accuracy: bool = False  # of a file that holds sigmas only
+    sigmas: dict[str, NDArray[Any]] = field(default_factory=dict)  # columns of INS sigmas, thinned
+    accuracy: bool = False  # the chunk has INS sigmas only
     lowest_speed_m_s: float = np.inf  # sound speeds recorded with the pings
     highest_speed_m_s: float = -np.inf
 
 
-Summaries = Sequence[tuple[str, ChunkSummary]]  # with the name of each chunk's part: a file's, or file#stretch
+Summaries = Sequence[tuple[str, ChunkSummary]]  # part's name (file, or file#stretch), and a chunk's summary
 _REMEDIES = {
     "ins": "log again after the INS has aligned, with INSPVA(S) on",
     "laser": "export the scan again, with time stamps",
@@ -47,7 +47,7 @@ _REMEDIES = {
 
 
 def refuse_empty_sensors(partials: Mapping[str, Summaries]) -> None:
-    """Refuse a session in which a sensor has no usable record, by a RawDataError; ``partials``: by sensor."""
+    """Raise RawDataError if a sensor has no usable record; ``partials``: summaries by sensor."""
     for sensor, summaries in partials.items():
         if not sum(summary.count for _, summary in summaries):
             names = sorted({_file_name(name) for name, _ in summaries})
@@ -64,7 +64,7 @@ def _file_name(part_name: str) -> str:
 
 
 def _overlap(ins: tuple[int, int], sensor: tuple[int, int], offset_ns: int) -> bool:
-    """Tell whether a sensor's times (first, last; ns), less an offset, overlap those of the INS."""
+    """Return whether a sensor's times (first, last; ns), minus an offset, overlap those of the INS."""
     return ins[0] <= sensor[1] - offset_ns and sensor[0] - offset_ns <= ins[1]
 
 
@@ -76,12 +76,12 @@ def refuse_disjoint_times(ins: tuple[int, int], spans: Mapping[str, tuple[int, i
     ins : tuple of two ints
         First and last time of the INS, GPS ns.
     spans : mapping
-        The same by sensor.
+        First and last time by sensor, GPS ns.
 
     Raises
     ------
     RawDataError
-        A sensor's times lie before or behind those of the INS; the message names a likely cause.
+        A sensor's times all lie before or after those of the INS. The message names a likely cause.
     """
     for sensor, (first, last) in spans.items():
         start, end = ins
@@ -93,7 +93,7 @@ def refuse_disjoint_times(ins: tuple[int, int], spans: Mapping[str, tuple[int, i
 
 
 def _likely_cause(ins: tuple[int, int], sensor: str, span: tuple[int, int]) -> str:
-    """Return why a sensor's times may lie apart from those of the INS, with the remedy."""
+    """Return the words of a message: why a sensor's times may differ from those of the INS, and the remedy."""
     apart_ns = span[0] - ins[0]
     days = whole_days_apart(ins, span, partial(_overlap, ins, span))
     weeks = round(apart_ns / WEEK_NS)
@@ -146,7 +146,7 @@ def gaps_table(epochs_ns: dict[str, NDArray[np.int64]], max_gap_ns: int) -> pd.D
     epochs_ns : dict
         Ascending times of records or pings by sensor, GPS ns.
     max_gap_ns : int
-        Longest interval without a record that is no gap, ns.
+        An interval without a record is a gap if it is longer, ns.
     """
     rows: list[dict[str, Any]] = []
     for sensor, t_ns in epochs_ns.items():
@@ -166,9 +166,9 @@ def ingest_counts_table(
     partials : mapping
         Summaries by sensor.
     repeated : mapping
-        By sensor: good rows that were left out later, because another file has a record of the same time.
+        Number by sensor of good rows that were left out later, because another file has a record of the same time.
     sigmas_outside : int
-        Rows of INS sigmas at times without INS records.
+        Number of rows of INS sigmas at times without INS records.
     """
     counts: dict[str, list[tuple[str, Mapping[str, int]]]] = {}
     for sensor, summaries in partials.items():
@@ -181,7 +181,7 @@ def ingest_counts_table(
 
 
 def thin_sigmas(sigmas: Batch) -> dict[str, NDArray[Any]]:
-    """Return the first row of each half second, in order of time."""
+    """Return the INS sigmas thinned to the first row of each half second, in order of time."""
     if not sigmas:
         return {}
     order = np.argsort(sigmas["t_ns"], kind="stable")

@@ -1,4 +1,4 @@
-"""Recognise times and positions that have lost their digits by being stored as float32."""
+"""Recognise times and positions that have lost digits because a program stored them as float32."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,9 +11,9 @@ from pipeline.errors import RawDataError
 
 @np.errstate(all="ignore")
 def through_float32(values: NDArray[np.float64]) -> bool:
-    """Return whether times (or other large numbers) have lost their digits by being stored as float32.
+    """Return whether times (or other large numbers) have lost digits because a program stored them as float32.
 
-    All values are then float32 numbers, which by chance happens only to multiples of 1/8 s and the like.
+    All values are then float32 numbers. Multiples of 1/8 s are float32 numbers by chance, and do not count as proof.
 
     >>> through_float32(np.array([76892.6953125, 76892.703125])), through_float32(np.array([76892.5, 76893.0]))
     (True, False)
@@ -31,7 +31,7 @@ def through_float32(values: NDArray[np.float64]) -> bool:
 
 @np.errstate(all="ignore")
 def refuse_float32(columns: Mapping[str, NDArray[Any]], name: str) -> None:
-    """Raise RawDataError where seconds_of_week, latitude_deg or longitude_deg have lost their digits as float32."""
+    """Raise RawDataError if seconds_of_week, latitude_deg or longitude_deg were stored as float32."""
     seconds = columns.get("seconds_of_week")
     degraded = seconds is not None and through_float32(seconds)
     for column in ("latitude_deg", "longitude_deg"):

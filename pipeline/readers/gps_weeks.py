@@ -1,4 +1,4 @@
-"""The GPS weeks of files that have seconds of week alone."""
+"""GPS weeks of files whose times are seconds of the week without the week's number."""
 
 from collections.abc import Mapping
 
@@ -8,21 +8,22 @@ from pipeline.gps_time import WEEK_S
 
 
 def gps_weeks(first_s: Mapping[str, float], gps_week: int | None, sensor: Sensor) -> dict[str, int]:
-    """Return the GPS week in which each file starts, by the file's name; nothing for no files.
+    """Return the GPS weeks in which files begin, by file name; empty without files.
 
     Parameters
     ----------
     first_s
         Seconds of week of each file's first record, by the file's name.
     gps_week
-        The week of the first file, from session.yaml. The other files get the week that puts them nearest to it.
+        Week in which the first file begins, from session.yaml. Every other file gets the week that brings its beginning
+        nearest to that of the first file.
     sensor
         The sensor, for the message.
 
     Raises
     ------
     ConfigError
-        session.yaml gives no week, and there are files.
+        There are files, but session.yaml has no week.
     """
     if not first_s:
         return {}

@@ -1,21 +1,24 @@
 """GSF ("Generic Sensor Format Specification", 03.06, Leidos 98-16v), ping by ping; big-endian, times in UTC.
 
-gsfu decodes a record (:mod:`pipeline.readers.gsf_pings`). It cannot lead through a file: its index holds all records
-and refuses the whole file for the first damaged one, and its iterator ends there. So records are found by
-:mod:`pipeline.readers.gsf_records`.
+The library gsfu decodes single records (:mod:`pipeline.readers.gsf_pings`). It cannot read a whole file: its index
+holds all records and refuses the file at the first damaged one, and its iterator ends there. Therefore
+:mod:`pipeline.readers.gsf_records` finds the records.
 
-BEAM_ANGLE is, in the specification's words, the "incoming beam angle at transducer face" (table 4-3) and elsewhere the
-"rotation from vertical" (4.3.4.9). The writers examined (CARIS HIPS, gsfu's own converter) put the former there, not
-roll corrected. ROLL_COMPENSATED is about depths and changes nothing. Their angles are positive to port, the first
-beam's side, which the specification leaves open; here starboard +. The format does not say how the fan was sent, so the
-fan must be fixed to the boat. Files are refused that say that pitch or yaw were stabilised, that sectors were tilted,
-or that there are several receivers or swaths (Kongsberg's newer sonars say so), and files whose distances along track
-show it (:mod:`pipeline.readers.gsf_fans`). A file without such distances cannot be tested.
+The specification describes BEAM_ANGLE in two ways: as the "incoming beam angle at transducer face" (table 4-3), and as
+the "rotation from vertical" (4.3.4.9). The programs whose files were examined (CARIS HIPS, gsfu's own converter) write
+the former, not roll corrected. The flag ROLL_COMPENSATED concerns depths, and is ignored. In these files BEAM_ANGLE is
+positive to port, the side of the first beam; the specification does not define the sign. The reader turns the angles to
+starboard +.
 
-Angles and times are 16-bit numbers in most files, and some writers overflow them: an angle then jumps by 65536 steps.
-Pings in which two neighbouring beams lie more than 20 degrees apart, and ten times as far as is usual in the ping, are
-left out. So are pings and beams flagged as not usable. The sound speed is the sensor's own of the ping, else that of
-the last profile at its top, else session.yaml's.
+GSF does not record how the fan was sent. Therefore the fan must be fixed to the boat. A file is refused if its records
+show stabilisation of pitch or yaw, tilted sectors, or several receivers or swaths. (Records of Kongsberg's newer sonars
+contain this.) A file is also refused if its along-track distances show that the fan is not fixed
+(:mod:`pipeline.readers.gsf_fans`). A file without along-track distances cannot be tested.
+
+Most files store angles and times as 16-bit numbers. Some programs let them overflow: an angle then jumps by 65536
+steps. A ping is left out if two neighbouring beams lie more than 20 degrees apart, and more than ten times the median
+spacing of the ping. Pings and beams with the flag "not usable" are left out too. The sound speed is the one that the
+sensor recorded with the ping. Otherwise the speed at the top of the last profile is used, or else session.yaml's.
 """
 
 from collections import Counter
@@ -62,11 +65,11 @@ class _NumberedPing:
 
 @dataclass(frozen=True)
 class GsfPart:
-    """One file; pings are numbered from 0, for not every sensor's record has a number."""
+    """One GSF file. Its pings are numbered from 0, because not every sensor records a ping number."""
 
     path: Path
     name: str
-    sound_speed_m_s: float | None  # for pings of a file that has none
+    sound_speed_m_s: float | None  # from session.yaml, for pings without a recorded sound speed
     latency_s: float
 
     def chunks(self) -> Iterator[Chunk]:
@@ -81,7 +84,7 @@ class GsfPart:
             )
 
     def _usable_pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[_NumberedPing]:
-        """Yield the pings that have soundings, each once; refuse the file if its fans are not fixed to the boat."""
+        """Yield each ping with soundings once; raise RawDataError if the file's fans are not fixed to the boat."""
         first: GsfPing | None = None
         stabilisation, repeated = StabilisationTest(), RepeatedPings()
         for number, ping, body, profile_speed_m_s in _pings(file, dropped):
@@ -109,7 +112,7 @@ class GsfPart:
         stabilisation.refuse_stabilised(self.name)
 
     def _refuse_moving_fan(self, number: int, ping: GsfPing, first: GsfPing) -> None:
-        """Raise RawDataError where a ping says that its fan is not fixed to the boat, or not the first ping's fan."""
+        """Raise RawDataError if the ping's record shows a moving fan, another receiver or swath, or a single beam."""
         if ping.stabilised:
             raise RawDataError(
                 f"{self.name}: ping {number} was sent with pitch or yaw stabilisation: its fan has another direction "
@@ -129,7 +132,7 @@ class GsfPart:
                 "head alone, without dual swath"
             )
 
-    @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+    @np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
     def _chunk(self, group: list[_NumberedPing], dropped: Counter[str]) -> Chunk:
         pings = [numbered.ping for numbered in group]
         counts = np.array([len(ping.angle_deg) for ping in pings])
@@ -153,7 +156,7 @@ class GsfPart:
 
 
 def _pings(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, GsfPing | None, bytes, float | None]]:
-    """Yield each ping's number, contents (None: damaged) and bytes, and the speed at the top of the last profile."""
+    """Yield each ping's number, contents (None: damaged) and bytes, and the last profile's sound speed at its top."""
     version, number = 3, -1
     scales: GsfScales = {}
     profile_speed_m_s = None

@@ -1,13 +1,13 @@
 """Test whether the fans of a GSF file are fixed to the boat, by the positions of its soundings.
 
-GSF has along-track and across-track distances and depths of beams, level and along the boat's heading, and the boat's
-roll (starboard down +) and pitch (bow up +). A fan fixed to the boat is one plane of the body's frame,
+GSF records the along-track distance, the across-track distance and the depth of each beam. Their axes are level and
+follow the boat's heading. GSF also records roll (starboard down +) and pitch (bow up +). If the fan is fixed to the
+boat, the soundings of all pings lie in one plane of the body axes,
 
-    y = y_0 + p x + q z     (x starboard, y forward, z down),
+    y = y_0 + p x + q z     (x starboard, y forward, z down).
 
-in all pings. A fan stabilised in pitch is one plane of the level frame instead. A fan stabilised in yaw, or of tilted
-sectors, is no plane of either. Both planes are fitted by least squares, with residuals divided by the distance: they
-are angles.
+If it is stabilised in pitch, they lie in one plane of the level axes instead. If it is stabilised in yaw, or has tilted
+sectors, they lie in neither. Least squares fit both planes. Residuals are divided by the distance: they are angles.
 """
 
 from dataclasses import dataclass, field
@@ -19,11 +19,11 @@ from pipeline.errors import RawDataError
 from pipeline.maths.geometry.rotations import rotation_x, rotation_y
 
 Array = NDArray[np.float64]
-MIN_PINGS, MIN_BEAMS = 3, 5  # of a file, of a ping
+MIN_PINGS, MIN_BEAMS = 3, 5  # needed pings of a file, needed beams of a ping
 NEAREST_M = 0.1
-UNSTEADY_DEG = 0.2  # residuals of no plane
-STABILISED_DEG = 0.1  # residuals of the body's plane that show stabilisation,
-STABILISED_RATIO = 2.0  # if they are that many times those of the level plane
+UNSTEADY_DEG = 0.2  # larger residuals of the body's plane: the fan is not fixed
+STABILISED_DEG = 0.1  # larger residuals of the body's plane show stabilisation,
+STABILISED_RATIO = 2.0  # if they are more than this number of times those of the level plane
 _ADVICE = (
     "give the sonar's own files (.kmall and .all tell how each ping was sent), or sail again without stabilisation"
 )
@@ -31,7 +31,7 @@ _ADVICE = (
 
 @dataclass(frozen=True)
 class BeamPositions:
-    """One ping's soundings (n,) [m], level and along the heading, and the boat's roll and pitch [degrees]."""
+    """One ping's soundings (n,) [m] in level axes along the heading, and the boat's roll and pitch [degrees]."""
 
     along_m: Array
     across_m: Array
@@ -42,14 +42,14 @@ class BeamPositions:
 
 @dataclass
 class FanPlaneFit:
-    """Sums of the least-squares fit of one plane to all fans."""
+    """Sums of the least-squares fit of one plane to the fans of all pings."""
 
     normal_matrix: Array = field(default_factory=lambda: np.zeros((3, 3)))
     right_side: Array = field(default_factory=lambda: np.zeros(3))
     sum_of_squares: float = 0.0
 
     def add(self, positions_m: Array, weight: Array) -> None:
-        """Add soundings (3, n), forward, starboard, down, with the square root of each one's weight (n,)."""
+        """Add soundings (3, n): forward, starboard, down, m; ``weight`` (n,): square roots of their weights."""
         forward, starboard, down = positions_m
         design = np.stack([np.ones_like(starboard), starboard, down]) * weight
         self.normal_matrix += design @ design.T
@@ -74,7 +74,7 @@ class StabilisationTest:
 
     @np.errstate(all="ignore")  # damaged numbers are left out
     def add(self, positions: BeamPositions, usable: NDArray[np.bool_]) -> None:
-        """Add one ping's usable beams; pings without along-track distances are left out, for they tell nothing."""
+        """Add one ping's usable beams; ignore a ping with too few of them, or without along-track distances."""
         positions_m = np.stack([positions.along_m[usable], positions.across_m[usable], positions.depth_m[usable]])
         distance = np.linalg.norm(positions_m, axis=0)
         good = np.isfinite(distance) & (distance > NEAREST_M)
@@ -88,7 +88,7 @@ class StabilisationTest:
         self.beams += len(weight)
 
     def refuse_stabilised(self, name: str) -> None:
-        """Raise RawDataError where the fans are not fixed to the boat."""
+        """Raise RawDataError if the fans are not fixed to the boat; fewer than MIN_PINGS pings cannot show it."""
         if self.pings < MIN_PINGS:
             return
         body_deg, level_deg = self.body.rms_deg(self.beams), self.level.rms_deg(self.beams)

@@ -1,7 +1,7 @@
-"""The contents of GSF's ping and profile records, as gsfu decodes them.
+"""Contents of GSF's ping and profile records, decoded by gsfu.
 
-Scale factors are those of the last ping that had any; a file begins with them. The sensor's own part of a record may
-have the sound speed, and say how the ping was sent.
+A ping without scale factors uses those of the last ping that has them; the first ping of a file has them. The
+sensor-specific subrecord of a ping may hold the sound speed, stabilisation modes, tilts of sectors, and receiver.
 """
 
 import struct
@@ -19,43 +19,43 @@ from pipeline.readers.sounding_chunks import MAX_BEAMS
 TIME = struct.Struct(">2I")
 UNUSABLE = 1  # bit of a ping's or a beam's flags
 MAX_STEP_DEG = 20.0
-STABILISED = 0b11  # of Kongsberg's modeAndStabilisation: pitch, yaw
+STABILISED = 0b11  # bits of Kongsberg's modeAndStabilisation: pitch, yaw
 SPEEDS = ("SurfaceVelocity_mps", "SoundSpeed_mps", "SoundVelocity_mps", "SoundSpeedAtTxDepth_mPerSec")
 GsfScales = dict[int, tuple[float, float, int]]
 
 
 @dataclass(frozen=True)
 class GsfPing:
-    """One ping record's soundings (n,), all of them; angles are positive to port."""
+    """All soundings (n,) of one ping record; angles are positive to port."""
 
     t_ns: int
     usable: NDArray[np.bool_]
     angle_deg: NDArray[np.float64]
     two_way_time_s: NDArray[np.float64]
-    sound_speed_m_s: float | None = None  # as the sensor's own part of the record has it
+    sound_speed_m_s: float | None = None  # None: not recorded
     stabilised: bool = False
-    tilt_deg: float = 0.0  # of the sector tilted most, where the sensor's own part tells it
-    receiver_and_swath: tuple[Any, ...] = ()  # where the sensor's own part tells them
-    positions: BeamPositions | None = None  # where the record has them
-    missing: str = ""  # what the record has not, and without which there are no soundings
+    tilt_deg: float = 0.0  # of the sector with the largest tilt; 0: not recorded
+    receiver_and_swath: tuple[Any, ...] = ()  # two numbers; None in place of a number that is not recorded
+    positions: BeamPositions | None = None  # None: not recorded
+    missing: str = ""  # values that the record lacks, and without which it has no soundings; empty: none
 
 
 @np.errstate(all="ignore")  # damaged numbers
 def angles_are_smooth(angle_deg: NDArray[np.float64]) -> bool:
-    """Return whether no angle of a ping jumps, as a 16-bit number does that has overflowed."""
+    """Return whether the angles of a ping are free of jumps, which the overflow of a 16-bit number causes."""
     steps_deg = np.abs(np.diff(angle_deg))
     return bool(len(steps_deg) < 2 or steps_deg.max() <= max(MAX_STEP_DEG, 10 * float(np.median(steps_deg))))
 
 
 def major_version(header: bytes) -> int:
-    """Return the format's major version, from a header record: "GSF-v03.06"."""
+    """Return the format's major version from a header record such as "GSF-v03.06"; 3 if it has no digits."""
     digits = header[5:7]
     return int(digits) if digits.isdigit() else 3
 
 
 @np.errstate(all="ignore")
 def decode_gsf_ping(body: bytes, version: int, scales: GsfScales) -> GsfPing | None:
-    """Return a ping record's contents; None where they contradict themselves.
+    """Return a ping record's contents; None if the record is damaged.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def decode_gsf_ping(body: bytes, version: int, scales: GsfScales) -> GsfPing | N
     version
         The format's major version.
     scales
-        Scale factors of the pings before, which the record may replace.
+        Scale factors of the preceding pings; changed in place if the record has its own.
     """
     from GSFU.gsfu import _decode_swath_bathymetry_ping
 
@@ -100,7 +100,7 @@ def decode_gsf_ping(body: bytes, version: int, scales: GsfScales) -> GsfPing | N
 
 
 def _largest_tilt_deg(sensor: dict[str, Any]) -> float:
-    """Return the largest tilt of a sector in a sensor's own part; 0 where it has none."""
+    """Return the largest tilt of a sector in a sensor-specific subrecord; 0 if it has no tilts."""
     sectors = sensor.get("TxSectors") or {}
     tilts = np.ravel(np.asarray(sectors.get("TiltAngleReTx_deg", sectors.get("TiltAngle_deg", 0.0)), dtype=np.float64))
     return float(tilts[np.argmax(np.abs(tilts))]) if len(tilts) else 0.0
@@ -114,13 +114,13 @@ def _positions(record: dict[str, Any]) -> BeamPositions | None:
 
 
 def _sound_speed(sensor: dict[str, Any]) -> float | None:
-    """Return the sound speed in a sensor's own part of a ping, if it has one."""
+    """Return the sound speed [m/s] in a sensor-specific subrecord; None if it has no possible one."""
     speeds = (float(sensor.get(name) or 0.0) for name in SPEEDS)
     return next((speed for speed in speeds if MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S), None)
 
 
 def top_of_profile(body: bytes) -> float | None:
-    """Return the sound speed [m/s] at the top of a profile record, if it is one of water."""
+    """Return the sound speed [m/s] at the top of a profile record; None if it is impossible in water, or damaged."""
     from GSFU.gsfu import _decode_sound_velocity_profile
 
     try:

@@ -1,7 +1,8 @@
-"""Find the headers, pings and profiles of GSF files (big-endian).
+"""Find the header, ping and profile records in GSF files (big-endian).
 
-A record: u32 size, u32 of checksum flag (bit 31) and kind (bits 0 to 21); with the flag, the u32 sum of the bytes; then
-the bytes. Where no record begins, the next ping or profile is searched for, and the gap is counted.
+A record begins with u32 size, and u32 with a checksum flag (bit 31) and the kind (bits 0 to 21). If the flag is set,
+the u32 sum of the contents' bytes follows. Then come the contents. Where no record begins, the reader searches for the
+next ping or profile, and counts the gap.
 """
 
 import struct
@@ -19,7 +20,7 @@ _SEARCH_BLOCK = 1 << 16
 
 
 def gsf_records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, bytes]]:
-    """Yield the kind and the bytes of each header, ping and profile."""
+    """Yield the kind and the contents of each header, ping and profile record."""
     size, position = size_of(file), 0
     while position < size:
         head = read_at(file, position, RECORD_HEAD.size + 4)
@@ -41,7 +42,7 @@ def gsf_records(file: BinaryIO, dropped: Counter[str]) -> Iterator[tuple[int, by
 
 
 def _span(head: bytes) -> tuple[int, int] | None:
-    """Return where a record's bytes begin and end, counted from the record's start; None where no record begins."""
+    """Return the bytes, from a record's start, at which its contents begin and end; None where no record begins."""
     if len(head) < RECORD_HEAD.size:
         return None
     size, word = RECORD_HEAD.unpack_from(head)
@@ -50,7 +51,10 @@ def _span(head: bytes) -> tuple[int, int] | None:
 
 
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
-    """Return the start of the next ping or profile that a record or the end of the file follows, or the file's end."""
+    """Return the byte at which the next whole ping or profile begins; the file's size if there is none.
+
+    A record is whole if another record, or the end of the file, follows it.
+    """
     marks = [struct.pack(">I", flag | kind) for kind in (PING, PROFILE) for flag in (0, CHECKED)]
     while start < size:
         block = read_at(file, start, _SEARCH_BLOCK + 8)

@@ -1,15 +1,15 @@
 """NovAtel Inertial Explorer's text exports (Waypoint), of any layout (``inertial_explorer_layout``).
 
-Its angles are those of this project: z up, y forward, x to the right; R_level_from_body = Rz(-heading) Rx(pitch)
-Ry(roll), heading clockwise from true north (Waypoint Software User Manual, OM-20000166: "yaw = -heading"); it may run
-from -180 to 180. Heights are ellipsoidal (H-Ell), or H-MSL + Undulation. Times are GPS seconds of week with Week, with
-a date, or with ``ins.gps_week`` (the week in which the file begins), or UTC with UTCDate
-(``inertial_explorer_times``). Angles of three columns have their sign at the degrees, -0 included.
+Axes and angles are those of this project: z up, y forward, x to the right; R_level_from_body = Rz(-heading) Rx(pitch)
+Ry(roll). The heading is clockwise from true north (Waypoint Software User Manual, OM-20000166: "yaw = -heading"), and
+may run from -180 to 180. Heights are ellipsoidal (H-Ell), or H-MSL + Undulation. Times are GPS seconds of week with
+Week, with a date, or with ``ins.gps_week`` (the week in which the file begins); or they are UTC with UTCDate
+(``inertial_explorer_times``). An angle in three columns has its sign at the degrees, also at -0.
 
-Q is the quality of the position, from 1 to 6; from 4 on (0.5 to 2 m) it may be worse than the 0.5 m within which the
-target is searched, and such rows are left out. SDNorth, SDEast, SDHeight, RollSD, PitchSD and HdngSD are taken as the
-INS's own sigmas. Other columns are ignored. Rows of another number of columns (footers, cut lines), rows with a word
-where a number should be and a last line without line end are left out and counted.
+Q is the quality of the position, from 1 to 6. Rows with Q 4 (0.5 to 2 m) or worse are left out, because the target is
+searched within 0.5 m. SDNorth, SDEast, SDHeight, RollSD, PitchSD and HdngSD are used as the INS's own sigmas. Other
+columns are ignored. Rows with another number of columns (footers, cut lines), rows with a word in place of a number,
+and a last line without line end are left out and counted.
 """
 
 from collections import Counter
@@ -35,11 +35,11 @@ WORST_Q = 3
 
 @dataclass(frozen=True)
 class InertialExplorerPart:
-    """One export."""
+    """One export file."""
 
     path: Path
     name: str
-    gps_week: int | None  # week of the first row, where the file tells none
+    gps_week: int | None  # week of the first row; None: the file has weeks or dates
     latency_s: float
 
     def chunks(self) -> Iterator[Chunk]:
@@ -62,10 +62,10 @@ class InertialExplorerPart:
 
 
 def _refuse_float32(columns: Columns, layout: ExportLayout, name: str) -> None:
-    """Refuse numbers that went through float32 before they were printed.
+    """Refuse numbers that were stored as float32 before they were printed.
 
-    They are float32 numbers to within half a printed step. Where float32 numbers lie as near together as the printed
-    ones, nothing can be said.
+    Each of them lies within half a printed step of a float32 number. The test counts only numbers at which neighbouring
+    float32 numbers are more than four printed steps apart.
     """
     rounded_columns = {}
     for column, step in layout.steps.items():
@@ -79,9 +79,9 @@ def _refuse_float32(columns: Columns, layout: ExportLayout, name: str) -> None:
     refuse_float32(rounded_columns, name)
 
 
-@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+@np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
 def _chunk(columns: Columns, layout: ExportLayout, order: TimeOrder, latency_s: float, dropped: Counter[str]) -> Chunk:
-    """Return the possible rows of a block as poses, with their sigmas; others are counted in ``dropped``."""
+    """Return the possible rows of a block as poses, with their sigmas; count the other rows in ``dropped``."""
     angles = {f"{name}_rad": np.radians(columns[name]) for name in (*POSITION, "roll", "pitch")}
     height = columns["h-ell"] if "h-ell" in columns else columns["h-msl"] + columns["undulation"]
     rows = RowFilter({"row": np.arange(len(height)), "height_m": height, **angles}, dropped)
@@ -101,8 +101,8 @@ def _chunk(columns: Columns, layout: ExportLayout, order: TimeOrder, latency_s: 
 
 
 def _keep_quality(rows: RowFilter) -> None:
-    """Leave out rows whose Q is worse than WORST_Q, counted by Q."""
+    """Leave out rows whose Q is worse than WORST_Q, and count them by Q."""
     bad = ~((rows["q"] >= 1) & (rows["q"] <= WORST_Q))
-    for quality in np.unique(rows["q"][bad])[:10].tolist():  # no more by name: of a damaged file there may be many
+    for quality in np.unique(rows["q"][bad])[:10].tolist():  # damaged files may have many values of Q
         rows.keep(rows["q"] != quality, f"quality Q {quality:g}")
     rows.keep((rows["q"] >= 1) & (rows["q"] <= WORST_Q), "quality Q of another number")

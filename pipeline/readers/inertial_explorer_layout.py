@@ -1,8 +1,8 @@
-"""The layout of an Inertial Explorer export: which columns its rows have, where, and in which units.
+"""The layout of an Inertial Explorer export: the names, places and units of the columns of its rows.
 
-The user chooses the layout (an export profile). Free lines of text come first, then one line of names, then mostly one
-of units, then the rows (``inertial_explorer_names``, ``inertial_explorer_units``); columns are separated by
-blanks, or by commas. ``inertial_explorer_times`` chooses the columns that tell the time.
+The user chooses the layout in an export profile. Free lines of text come first. Then come one line of names, in most
+files one line of units, and the rows (``inertial_explorer_names``, ``inertial_explorer_units``). Blanks or commas
+separate the columns. ``inertial_explorer_times`` chooses the columns of the time.
 """
 
 import re
@@ -39,7 +39,7 @@ from pipeline.readers.inertial_explorer_units import (
 from pipeline.readers.raw_file import opened
 
 _HEAD = 65_536
-SAMPLE = 20  # rows of which the printed digits are counted
+SAMPLE = 20  # number of first rows from which the header is checked and printed digits are counted
 
 
 @dataclass(frozen=True)
@@ -47,18 +47,18 @@ class ExportLayout:
     """The layout of one file."""
 
     start: int  # byte of the first row
-    separators: bytes  # beside blanks
-    width: int  # columns of a row
-    places: Mapping[str, tuple[int, ...]]  # by name: the one or three columns that are read
-    scales: Mapping[str, float]  # by name: factor to degrees, metres
-    clock: Clock  # what tells the week of a time: a column, or session.yaml (gps_week)
-    order: str  # of a date: mdy, dmy or ymd
-    first_s: float  # time of the first row (NaN: no row, or hours, minutes, seconds)
-    steps: Mapping[str, float]  # of the last printed digit: of the time (s), latitude and longitude (degrees)
+    separators: bytes  # separators of columns beside blanks
+    width: int  # number of columns of a row
+    places: Mapping[str, tuple[int, ...]]  # by name of a value: the numbers of its column, or of its three columns
+    scales: Mapping[str, float]  # by name of a value: factor to degrees, metres or seconds
+    clock: Clock  # source of a time's week: a column, or session.yaml (gps_week)
+    order: str  # order of the parts of a date: mdy, dmy or ymd; empty: no date is read
+    first_s: float  # time of the first row; NaN: no row, or a time in hours, minutes, seconds
+    steps: Mapping[str, float]  # size of the last printed digit of the time (s), latitude and longitude (degrees)
 
     @property
     def time(self) -> str:
-        """Name of the column that tells the time."""
+        """Name of the column of the time."""
         return "utctime" if self.clock == "utcdate" else "gpstime"
 
 
@@ -81,7 +81,8 @@ def read_layout(path: Path, name: str) -> ExportLayout:
     Raises
     ------
     RawDataError
-        Something that is needed is missing, is there twice, or has a unit that is not understood.
+        A needed column is missing, stands twice or has an unknown unit; or its numbers cannot be read or are too
+        coarse.
     """
     with opened(path, name) as file:
         head = file.read(_HEAD)
@@ -93,7 +94,7 @@ def read_layout(path: Path, name: str) -> ExportLayout:
     separators = between + b":"[: "hms" in header.units]
     words = _split(rows, separators)
     if "dms" in header.units and not any(len(row) == width for row in words):
-        separators = between + b":"  # 36:30:15.2
+        separators = between + b":"  # dms may be printed as 36:30:15.2
         words = _split(rows, separators)
     refuse_single_columns(header, {len(row) for row in words}, width, name)
     words = [row for row in words if len(row) == width]
@@ -145,7 +146,7 @@ def _split(rows: list[str], separators: bytes) -> list[list[str]]:
 
 
 def _seconds(rows: list[list[str]], places: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return a time in some rows, s; three columns are hours, minutes, seconds; NaN for a word that is no number."""
+    """Return a time in some rows (n,), s, from one column or from hours, minutes, seconds; NaN for other words."""
     cells = [[float(row[k]) if _is_number(row[k]) else np.nan for k in places] for row in rows]
     factors = np.array([3600.0, 60.0, 1.0] if len(places) == 3 else [1.0])
     return np.asarray(np.array(cells, dtype=np.float64).reshape(-1, len(places)) @ factors)
@@ -166,7 +167,13 @@ def _is_number(word: str) -> bool:
 def _needed_columns(
     header: HeaderColumns, sample: Mapping[int, NDArray[np.float64]], file: str
 ) -> tuple[list[tuple[str, int]], Clock]:
-    """Return the columns to read, with their numbers, and the clock; a RawDataError where one is missing or twice."""
+    """Return the names and numbers of the columns to read, and the clock (see ExportLayout).
+
+    Raises
+    ------
+    RawDataError
+        A column is missing, or stands twice.
+    """
     names = header.names
     present = set(names)
     times, clock = choose_time_columns(header, sample, file)

@@ -1,12 +1,13 @@
 """Names and units of the columns of an Inertial Explorer export, from two lines of its header.
 
-Names are those of the Waypoint Software User Manual, or as exports print them: ``Date`` is the date of ``GPSTime``
-(with the unit d it is the day of the week, as ``D`` is), ``CorrTime`` the GPS time corrected for the receiver's clock.
-``Project Name`` is one column. A name may lack up to two letters at its end, cut off by the width of its column: it is
-completed where exactly one known name begins with it. ``UT UT UTCTim`` over ``ho mi (sec)`` is one time in three
-columns.
+Known names are those of the Waypoint Software User Manual, and some others that exports print. ``Date`` is the date of
+``GPSTime``; with the unit d it is the day of the week, like ``D``. ``CorrTime`` is the GPS time corrected for the
+receiver's clock. ``Project Name`` is one column. The width of a column may cut off up to two letters at the end of its
+name. The name is completed if exactly one known name begins with the remaining letters. ``UT UT UTCTim`` above
+``ho mi (sec)`` is one time in three columns.
 
-Some columns (Q) have no unit. Each unit belongs to the name above it, the one that ends nearest.
+Some columns (such as Q) have no unit. A unit belongs to the name above it whose end is nearest to the unit's end, or
+units belong in order to the names that need one. A file for which the two ways disagree is refused.
 """
 
 import re
@@ -18,8 +19,8 @@ import numpy as np
 
 from pipeline.errors import RawDataError
 
-LONGEST = 8192  # letters of the line of names, or of units
-LEAST_NAMES, MOST_NAMES = 4, 300  # known names at least; names at most
+LONGEST = 8192  # most letters of the line of names, or of units
+LEAST_NAMES, MOST_NAMES = 4, 300  # least number of known names, most names in the line of names
 TITLES = {name.lower(): name for name in (
     "Week", "GPSTime", "GPSDate", "UTCTime", "UTCDate", "Latitude", "Longitude", "H-Ell", "H-MSL", "Undulation", "Roll",
     "Pitch", "Heading", "Q", "SDNorth", "SDEast", "SDHeight", "RollSD", "PitchSD", "HdngSD",
@@ -32,12 +33,12 @@ UNITLESS = frozenset({"q", "ambstatus", "seqnum", "ns", "project name"})
 TWO_WORDS = {("project", "name")}
 SYNONYMS = {"date": "gpsdate", "corrtime": "gpstime"}
 _CHARACTERISTIC = frozenset({"gpstime", "utctime", "h-ell", "h-msl"})  # a header has at least one of these
-MOST_CUT, LEAST_LEFT = 2, 3  # letters that a name may lack, and those that it must have
+MOST_CUT, LEAST_LEFT = 2, 3  # most letters that may be cut off a name, least letters that must remain
 TIME_COLUMNS = ("gpstime", "utctime")
 SPLIT_TIME = (("ho", "hr", "h", "hour", "hours"), ("mi", "min", "minutes"), ("sec", "s", "seconds"))
-DAY_OF_WEEK = "d"  # the unit
+DAY_OF_WEEK = "d"  # the unit of a day of the week
 DATE_ORDERS = ("mdy", "dmy", "ymd")
-THREE_COLUMN_UNITS = ("dms", "hms", *DATE_ORDERS)  # units of three columns
+THREE_COLUMN_UNITS = ("dms", "hms", *DATE_ORDERS)  # each stands for three columns
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class HeaderColumns:
 
 
 def export_column_names(line: str) -> list[str] | None:
-    """Return the names in lower case; None where this is not a line of Inertial Explorer's names."""
+    """Return the column names of a line in lower case; None if it is no line of Inertial Explorer's names."""
     if len(line) > LONGEST:
         return None
     names = _known([word for word, _ in _words(line)])
@@ -59,21 +60,21 @@ def export_column_names(line: str) -> list[str] | None:
 
 
 def names_and_units(names: str, units: str | None, file: str) -> HeaderColumns:
-    """Read the header's two lines.
+    """Return names and units by column from the header's two lines.
 
     Parameters
     ----------
     names : str
         The line of names.
     units : str or None
-        The line below it; None: it has no units.
+        The line of units below it; None: the header has no units.
     file : str
         The file's path in the session folder, for messages.
 
     Raises
     ------
     RawDataError
-        Units stand under no name, or it cannot be told to which name they belong.
+        Units do not stand below the names, or may belong to other names as well.
     """
     words = _words(names)
     printed = [word for word, _ in words]
@@ -85,7 +86,7 @@ def names_and_units(names: str, units: str | None, file: str) -> HeaderColumns:
 
 # --- names -----------------------------------------------------------------------------------------------------------
 def _words(line: str) -> list[tuple[str, int]]:
-    """Return the words as printed, and where each ends; in a line with commas what stands between these."""
+    """Return the words as printed, each with the place of its end; in a line with commas the texts between, with 0."""
     if "," in line:
         return [(word.strip(), 0) for word in line.split(",")]
     words: list[tuple[str, int]] = []
@@ -99,7 +100,7 @@ def _words(line: str) -> list[tuple[str, int]]:
 
 
 def _known(printed: Sequence[str]) -> list[str]:
-    """Return each word's known name, else the word itself, in lower case; names written in full take precedence."""
+    """Return each word's known name, or else the word itself, in lower case; names in full precede shortened ones."""
     words = [re.sub(r"\.\d+$", "", word.lower()) for word in printed]  # GPSTime.1 is a second GPSTime
     full = set(words)
     return [_full_name(word, full) for word in words]
@@ -122,7 +123,7 @@ def _full_name(word: str, full: set[str]) -> str:
 
 
 def _weekday(name: str, printed: str, unit: str) -> str:
-    """Return weekday for a column of the day of the week, else the name.
+    """Return "weekday" for a column of the day of the week, and the name for any other column.
 
     >>> _weekday("gpsdate", "Date", "d"), _weekday("d", "D", "d"), _weekday("gpsdate", "Date", "mdy")
     ('weekday', 'weekday', 'gpsdate')
@@ -131,20 +132,20 @@ def _weekday(name: str, printed: str, unit: str) -> str:
 
 
 def _join_times(header: HeaderColumns) -> HeaderColumns:
-    """Join a time with its hours and minutes in the two columns before it: one column of the unit hms."""
+    """Join the three columns of hours, minutes and seconds of a time into one column with the unit hms."""
     names, printed, units = list(header.names), list(header.printed), list(header.units)
     for k in range(len(names) - 1, 1, -1):
         if names[k] not in TIME_COLUMNS:
             continue
         last_units = units[k - 2 : k + 1]
-        start = names[k - 1]  # the name's beginning, over hours and minutes: UT UT UTCTim
+        start = names[k - 1]  # beginning of the time's name, above hours and minutes: UT UT UTCTim
         split = names[k - 2] == start and names[k].startswith(start) and start != names[k]
         if _are_sixtieths(last_units) or (split and not any(last_units)):
             names[k - 2 : k + 1] = [names[k]]
             printed[k - 2 : k + 1] = [printed[k]]
             units[k - 2 : k + 1] = ["hms"]
         elif split:
-            names[k] = printed[k].lower()  # its units are others: it is not known as a time
+            names[k] = printed[k].lower()  # with other units it does not count as a time
     return HeaderColumns(tuple(names), tuple(printed), tuple(units))
 
 
@@ -154,7 +155,7 @@ def _are_sixtieths(units: Sequence[str]) -> bool:
 
 # --- units -----------------------------------------------------------------------------------------------------------
 def _units(names: str, words: list[tuple[str, int]], below: str, file: str) -> list[str]:
-    """Return the unit of each of the ``words`` in the line of names, from the line ``below`` it."""
+    """Return one unit for each of the ``words`` in the line of names, from the line ``below`` it; empty: no unit."""
     known = _known([word for word, _ in words])
     if "," in names:
         bare = [_bare(unit) for unit in below.split(",")]
@@ -180,7 +181,7 @@ def _units(names: str, words: list[tuple[str, int]], below: str, file: str) -> l
 
 
 def _placed(units: Sequence[str], places: Sequence[int], count: int) -> list[str]:
-    """Return ``count`` units: these at their places, the others empty."""
+    """Return a list of ``count`` units: ``units`` at their ``places``, and empty texts at the others."""
     all_units = [""] * count
     for place, unit in zip(places, units, strict=True):
         all_units[place] = unit
@@ -188,7 +189,7 @@ def _placed(units: Sequence[str], places: Sequence[int], count: int) -> list[str
 
 
 def _bare(unit: str) -> str:
-    """Return a unit in lower case without brackets; of three columns without separators."""
+    """Return a unit in lower case without brackets; a unit of three columns also without separators."""
     unit = unit.strip().removeprefix("(").removesuffix(")").lower().replace("+/-", "")
     letters = re.sub(r"[\s/:]", "", unit)
     return letters if letters in THREE_COLUMN_UNITS else unit.strip()

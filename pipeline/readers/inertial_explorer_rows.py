@@ -1,4 +1,4 @@
-"""Rows of an Inertial Explorer export as columns of numbers, by the layout of its header."""
+"""Read the rows of an Inertial Explorer export as columns of numbers, with the layout from its header."""
 
 import io
 import re
@@ -21,7 +21,7 @@ _NUMBER = r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
 
 
 def read_blocks(file: BinaryIO, layout: ExportLayout, name: str, dropped: Counter[str]) -> Iterator[Columns]:
-    """Yield the columns that are needed, in degrees, metres and seconds, block by block.
+    """Yield the needed columns in degrees, metres and seconds, block by block.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def read_blocks(file: BinaryIO, layout: ExportLayout, name: str, dropped: Counte
     name : str
         Its path in the session folder, for messages.
     dropped : Counter
-        Counts of rows that are left out, by reason; added to.
+        Counts of rows that are left out, by reason; changed in place.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def read_blocks(file: BinaryIO, layout: ExportLayout, name: str, dropped: Counte
 
 
 def _refuse_second_header(block: bytes, name: str) -> None:
-    """Refuse a second line of names: rows below it would be read in the order and the units of the first."""
+    """Refuse a second line of names: the rows below it would be read with the order and units of the first line."""
     letters, end = block.lower(), 0
     while (place := letters.find(b"latitude", end)) >= 0:
         start, end = block.rfind(b"\n", 0, place) + 1, block.find(b"\n", place) % (len(block) + 1)
@@ -81,9 +81,9 @@ def _refuse_second_header(block: bytes, name: str) -> None:
 
 
 def _normalised(block: bytes, separators: bytes) -> bytes:
-    """Return rows with one blank between columns and none at their ends.
+    """Return a block's rows with one blank between columns, and none at the ends of rows.
 
-    Empty rows at the start and plus signs before numbers are taken away; bytes that are no printable ASCII become '?'.
+    Empty rows at the start, and plus signs before numbers, are removed. Bytes that are not printable ASCII become '?'.
     """
     blanks, end = b" \t\v\f\r" + separators, ord("\n")
     letters = bytes(
@@ -98,7 +98,7 @@ def _normalised(block: bytes, separators: bytes) -> bytes:
 
 
 def _parsed(rows: bytes, layout: ExportLayout, dropped: Counter[str]) -> pa.Table:
-    """Return the needed columns as doubles; rows that do not fit are counted."""
+    """Return the needed columns as doubles; leave out rows that do not fit the layout, and count them."""
     from pyarrow import csv
 
     def skip(row: csv.InvalidRow) -> Literal["skip"]:
@@ -151,14 +151,14 @@ def _columns(table: pa.Table, layout: ExportLayout) -> Columns:
         columns[date] = unix_days(parts["y"], parts["m"], parts["d"])
     for time in {"gpstime", "utctime", SECOND_GPS_TIME} & raw.keys():
         if len(raw[time]) == 3:
-            columns[time] *= 3600  # hours
+            columns[time] *= 3600  # from hours to seconds
     combine_gps_times(columns)
     return columns
 
 
 @np.errstate(all="ignore")
 def _from_sixtieths(whole: NDArray[np.float64], minutes: NDArray[Any], seconds: NDArray[Any]) -> NDArray[np.float64]:
-    """Return degrees or hours with the first column's sign, also of -0; NaN for impossible minutes or seconds."""
+    """Return degrees or hours (n,) with the sign of the first column, even of -0; NaN for impossible values."""
     possible = (minutes >= 0) & (minutes < 60) & (seconds >= 0) & (seconds <= 60) & (whole == np.rint(whole))
     value = np.copysign(np.abs(whole) + minutes / 60 + seconds / 3600, whole)
     return np.where(possible, value, np.nan)

@@ -1,13 +1,13 @@
-"""Times of an Inertial Explorer export: the columns that tell them, and the times of its rows.
+"""Times of an Inertial Explorer export: the choice of the columns of the time, and the times of the rows.
 
 ``GPSTime`` (or ``CorrTime``) is in seconds of the week or of the day, both with the unit (sec), or in hours, minutes,
-seconds; the file may hold it twice. From 86 400 s on it counts from the start of the week. Below, it counts from the
-start of the day, or the day is Sunday: a date, UTC with its date, a second column of time, or the day of the week tells
-which. Where nothing does, Sunday is taken, and ``poolcal check`` reports it where the other sensors ran whole days
-later.
+seconds. The file may have two columns of it. A time of 86 400 s or more counts from the start of the week. A smaller
+time counts from the start of the day; or it counts from the start of the week, and the day is Sunday. A date, UTC with
+its date, a second column of the time, or the day of the week decides between the two. Without any of these Sunday is
+assumed. ``poolcal check`` then reports it if the times of the other sensors lie whole days later.
 
-With a date, seconds of the week and of the day are used alike, but those of the week must fall on the date's own day of
-the week. Rows in which two columns contradict each other are left out and counted.
+With a date, seconds of the week and seconds of the day are both accepted. Seconds of the week must fall on the date's
+day of the week. Rows in which two columns contradict each other are left out and counted.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,23 +25,23 @@ from pipeline.readers.row_filter import RowFilter
 _Array = NDArray[np.float64]
 Clock = Literal["week", "gpsdate", "utcdate", "gps_week"]
 DAY_S = 86_400
-WEEKDAY_OF_1970 = 4  # Thursday; Sunday is 0
+WEEKDAY_OF_1970 = 4  # 1970-01-01 was a Thursday; Sunday is 0
 SECOND_GPS_TIME = "gpstime 2"  # the name of a second column GPSTime
 _TOLERANCE_S = 0.02  # two printed times of one instant differ by less
-_LONGEST_S = 14 * DAY_S  # seconds of the week; larger numbers count from elsewhere
+_LONGEST_S = 14 * DAY_S  # limit of seconds of the week; larger numbers count from another epoch
 
 
 def choose_time_columns(
     header: HeaderColumns, sample: Mapping[int, _Array], file: str
 ) -> tuple[list[tuple[str, int]], Clock]:
-    """Choose the columns that tell the time.
+    """Choose the columns from which the times of the rows follow.
 
     Parameters
     ----------
     header : HeaderColumns
         Names and units.
     sample : mapping
-        By number of a column of times: the times in its first rows, s.
+        Times of the first rows (n,), s, by number of the column.
     file : str
         The file's path in the session folder, for messages.
 
@@ -50,7 +50,7 @@ def choose_time_columns(
     columns : list of tuples
         Names and numbers of the columns; empty without a time.
     clock : Clock
-        What tells the week.
+        Source of a time's week.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def choose_time_columns(
 
 @np.errstate(all="ignore")
 def _largest(seconds: _Array) -> float:
-    """Return the largest possible time, s; 0 without one."""
+    """Return the largest of the possible times, s; 0 if none is possible."""
     return float(np.max(seconds[(seconds >= 0) & (seconds < _LONGEST_S)], initial=0.0))
 
 
@@ -98,7 +98,7 @@ def _has_utc(names: Sequence[str]) -> bool:
 
 
 def _refuse_contradictory(times: Sequence[int], sample: Mapping[int, _Array], file: str) -> None:
-    """Refuse three columns GPSTime, or two that differ by more than whole days."""
+    """Refuse more than two columns GPSTime, or two whose difference is not a whole number of days."""
     if len(times) > 2:
         raise RawDataError(f"{file}: has column GPSTime {len(times)} times; take all but one out of the export profile")
     if len(times) == 2:
@@ -111,13 +111,13 @@ def _refuse_contradictory(times: Sequence[int], sample: Mapping[int, _Array], fi
 
 
 def _refuse_of_day(seconds: _Array, utc: Sequence[_Array], file: str) -> None:
-    """Refuse seconds of the day where UTCTime, in seconds of the week or of the Unix epoch, gives another day."""
+    """Refuse GPSTime in seconds of the day if UTCTime (seconds of the week or Unix seconds) is not on a Sunday."""
     if not (len(utc) == 1 and len(seconds)):
         return
     utc_s = float(np.median(utc[0]))
     of_week = utc_s - GPS_EPOCH_UNIX_S if utc_s >= 1e9 else utc_s
     days = np.mod(of_week - float(np.median(seconds)) + DAY_S / 2, 7 * DAY_S) // DAY_S
-    if utc_s >= DAY_S and days > 0:  # false where one of them is no number
+    if utc_s >= DAY_S and days > 0:  # false if one of them is NaN
         raise RawDataError(
             f"{file}: GPSTime is in seconds of the day: by UTCTime it is not Sunday; export GPSTime in seconds of the "
             "week, or GPSDate as well"
@@ -126,7 +126,7 @@ def _refuse_of_day(seconds: _Array, utc: Sequence[_Array], file: str) -> None:
 
 @np.errstate(all="ignore")
 def _difference_of_day(first: _Array, second: _Array) -> _Array:
-    """Return the difference of two times without its whole days, -half to half a day, s; NaN where one is missing."""
+    """Return the difference (n,) of two times without whole days, s: minus half to plus half a day; NaN from NaN."""
     return np.mod(first - second + DAY_S / 2, DAY_S) - DAY_S / 2
 
 
@@ -137,8 +137,8 @@ def combine_gps_times(columns: dict[str, NDArray[Any]]) -> None:
     Parameters
     ----------
     columns : dict
-        Columns by name, changed in place. Column ``contradict`` is added where there is something to join: rows in
-        which the two contradict each other. Their GPSTime becomes NaN.
+        Columns by name, changed in place. If two columns are joined, the mask ``contradict`` is added: true for rows
+        in which the two contradict each other. GPSTime of these rows becomes NaN.
     """
     with np.errstate(all="ignore"):
         time = columns.get("gpstime")
@@ -159,18 +159,18 @@ def combine_gps_times(columns: dict[str, NDArray[Any]]) -> None:
 def keep_possible_times(
     rows: RowFilter, columns: Mapping[str, NDArray[Any]], clock: Clock, name: str, in_sixtieths: bool
 ) -> None:
-    """Add column t_ns, GPS; rows at impossible or contradictory times are left out.
+    """Add column t_ns (GPS), and leave out rows whose time is impossible or contradictory.
 
     Parameters
     ----------
     rows : RowFilter
-        Rows with column ``row``, their numbers in ``columns``; changed in place.
+        Rows to filter, changed in place; their column ``row`` is the row number in ``columns``.
     columns : mapping
         All columns of the block.
     clock : Clock
-        What tells the week.
+        Source of a time's week.
     name : str
-        The column of the time.
+        Name of the column of the time.
     in_sixtieths : bool
         The time is in hours, minutes, seconds: it counts from the start of the day.
     """
@@ -201,7 +201,7 @@ def keep_possible_times(
 
 @np.errstate(all="ignore")
 def unix_days(year: _Array, month: NDArray[Any], day: NDArray[Any]) -> _Array:
-    """Return days since 1970-01-01, (n,); NaN where there is no such date."""
+    """Return days since 1970-01-01, (n,); NaN for an impossible date."""
     possible = (year >= 1980) & (year <= 2100) & (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31)
     whole = np.where(possible, [year, month, day], 1.0)
     possible &= np.all(whole == np.rint(whole), axis=0)

@@ -1,7 +1,7 @@
-"""Units of the columns of an Inertial Explorer export: their factors, units that the header leaves out, printed steps.
+"""Units of the columns of an Inertial Explorer export: factors, units that the header omits, sizes of printed digits.
 
-The units D M S, HMS and MDY stand for three columns: 36 30 15.2, 6 29 6.0 or 6:29:06.0, 5/12/2026. Without a unit
-numbers are degrees, metres and seconds; dates must tell the order of day and month, unless the year stands first.
+The units D M S, HMS and MDY each stand for three columns: 36 30 15.2, 6 29 6.0 or 6:29:06.0, 5/12/2026. Numbers without
+a unit are in degrees, metres or seconds. A date without a unit is accepted only if its year stands first.
 """
 
 import re
@@ -42,13 +42,14 @@ _UNITS: dict[str, Mapping[str, float]] = {
     SECOND_GPS_TIME: _SECONDS,
     **{name: _METRES if column.endswith("_m") else _DEGREES for column, name in SIGMA_COLUMN_NAMES.items()},
 }  # fmt: skip
-COARSEST_DEG = 2e-7  # 2 cm: positions printed more coarsely are of no use
+COARSEST_DEG = 2e-7  # 2 cm: positions printed in larger steps are refused
 
 
 def complete_units(header: HeaderColumns, row: str) -> list[str]:
-    """Fill units that the header does not give, from the first row.
+    """Add the units that the header omits, from the first row.
 
-    A date gets its unit by its form, a time with colons hms, latitude and longitude dms by the number of columns.
+    A date gets the order of its parts if the year stands first. A time gets hms if the row has colons. Latitude and
+    longitude get dms if the row has four columns more than the header.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def complete_units(header: HeaderColumns, row: str) -> list[str]:
     Returns
     -------
     list of str
-        Units by column; "?dy": a date whose day and month cannot be told apart.
+        Units by column; "?dy": a date whose day and month cannot be distinguished.
     """
     filled = []
     for column, unit in zip(header.names, header.units, strict=True):
@@ -112,7 +113,7 @@ def refuse_single_columns(header: HeaderColumns, widths: set[int], width: int, f
     header : HeaderColumns
         Names and units.
     widths : set of int
-        Numbers of columns that some rows have.
+        Numbers of columns of the first rows.
     width : int
         Number of columns by the header.
     file : str
@@ -121,7 +122,7 @@ def refuse_single_columns(header: HeaderColumns, widths: set[int], width: int, f
     Raises
     ------
     RawDataError
-        All rows lack two columns for each of these units.
+        All these rows lack two columns for each unit of three columns, or for each unit D M S.
     """
     printed_units = zip(header.printed, header.units, strict=True)
     three = [(word, unit) for word, unit in printed_units if unit in THREE_COLUMN_UNITS]
@@ -136,7 +137,7 @@ def refuse_single_columns(header: HeaderColumns, widths: set[int], width: int, f
 
 
 def printed_step(rows: list[list[str]], places: tuple[int, ...]) -> float:
-    """Return the step of the last printed digit.
+    """Return the size of one step of the last printed digit.
 
     Parameters
     ----------
@@ -148,14 +149,14 @@ def printed_step(rows: list[list[str]], places: tuple[int, ...]) -> float:
     Returns
     -------
     float
-        In the number's unit; of three columns the last one's step, in the unit of the first.
+        Step in the number's unit; for three columns the step of the last, in the unit of the first.
     """
     decimals = max((len(row[places[-1]].partition(".")[2]) for row in rows), default=0)
     return float(10.0 ** -min(decimals, 18)) / (3600 if len(places) == 3 else 1)
 
 
 def refuse_coarse_positions(steps: Mapping[str, float], file: str) -> None:
-    """Refuse latitudes and longitudes printed in steps above COARSEST_DEG, by a RawDataError; ``steps``: degrees."""
+    """Raise RawDataError if latitude or longitude is printed in ``steps`` (degrees) above COARSEST_DEG."""
     for column in POSITION:
         if steps[column] > COARSEST_DEG:
             raise RawDataError(

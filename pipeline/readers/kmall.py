@@ -1,22 +1,23 @@
 """Kongsberg .kmall: the soundings of #MRZ datagrams ("KMALL datagram description", 410224; little-endian).
 
-pykmall decodes a datagram's heads, each from its own bytes. It cannot lead through a file: its index and scan print,
-hold all of the file's index, end with any exception at the first damaged datagram, and may not end at all. It also
-makes a dictionary of each sounding, and ignores the size that the datagram gives for one. So
-:mod:`pipeline.readers.kmall_datagrams` finds the datagrams, and all soundings of a datagram are read at once.
+The library pykmall decodes the parts of a datagram before its soundings. It cannot read a whole file: its functions
+print, hold the index of the whole file, raise various errors at the first damaged datagram, and may never return. It
+also makes a dictionary of each sounding, and ignores the size of a sounding that the datagram states. Therefore
+:mod:`pipeline.readers.kmall_datagrams` finds the datagrams, and numpy reads all soundings of a datagram at once.
 
 Offsets in bytes within a sounding: 2 u8 transmit sector, 3 u8 type (0 normal, 1 extra, 2 rejected), 72 f32 angle to the
-array [degrees], 80 f32 two-way travel time [s]; corrections at 76 and 84 are applied in them already. Time is the
-datagram's, that of the first sector, and the delay of the sounding's own sector. Angles are positive to port, as is the
-sign of the sectors' edges (port +, starboard -); here starboard +. The sound speed is that at the transducer's depth.
+array [degrees], 80 f32 two-way travel time [s]. Angle and time contain the corrections at 76 and 84 already. The time
+of a sounding is the datagram's time (that of the first sector) plus the delay of the sounding's sector. In the file
+angles and the edges of sectors are positive to port. The reader turns the angles to starboard +. The sound speed is the
+one at the transducer's depth.
 
-The frame ``mbes`` is that of the receiver's array, to which the beam angles refer. The angles of the installation
-(#IIP, TRAI_RX) are not applied: the estimated mount stands in their place, and the yaw of an array mounted the other
-way round is near 180 degrees. Each sector is tilted along track by itself (txSectorInfo, tiltAngleReTx: the steering of
-the main lobe as sent, in the transmitter's own frame), and sends from its own part of the transmitter. The installation
-turns both into the frame ``mbes`` (:mod:`pipeline.readers.kongsberg_arrays`). The tilt includes all that steered the
-sector: stabilisation of pitch or yaw, the swath of a dual swath, the mode of a ping. Only one of two receivers can
-be calibrated; pings of a single beam are no fan.
+The frame ``mbes`` is that of the receiving array, because the beam angles refer to this array. The receiver's
+installation angles (#IIP, TRAI_RX) are not applied, because the estimated mount replaces them. If the array is mounted
+the other way round, the yaw of the mount is near 180 degrees. Each sector has its own tilt along track (txSectorInfo,
+tiltAngleReTx: the steering of the main lobe as sent, in the transmitter's own frame), and is sent from its own part of
+the transmitter. Both are transformed to the frame ``mbes`` with the installation
+(:mod:`pipeline.readers.kongsberg_arrays`). The tilt includes all steering: stabilisation of pitch or yaw, the swath of
+a dual swath, the mode of a ping. A file of two receivers, or of single-beam pings, is refused.
 """
 
 import io
@@ -36,15 +37,15 @@ from pipeline.readers.kongsberg_installation import SINGLE_HEAD, transmitters_of
 from pipeline.readers.repeated_pings import RepeatedPings
 from pipeline.readers.sounding_chunks import MAX_BEAMS
 
-MIN_MRZ_BYTES = 200  # its heads alone are longer
-MIN_SOUNDING_BYTES = 88  # of a sounding, those that are needed
+MIN_MRZ_BYTES = 200  # the parts before the soundings alone are longer
+MIN_SOUNDING_BYTES = 88  # least size of a sounding that holds the fields to read
 NORMAL, EXTRA, REJECTED = 0, 1, 2
-Installation = Mapping[tuple[int, int], Transmitter]  # by transmitter and receiver
+Installation = Mapping[tuple[int, int], Transmitter]  # by the numbers of transmitter and receiver
 
 
 @dataclass(frozen=True)
 class KmallPart(KongsbergPart):
-    """One file."""
+    """One .kmall file."""
 
     def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[KongsbergPing]:
         installation: Installation = {}
@@ -59,9 +60,9 @@ class KmallPart(KongsbergPart):
                 dropped["damaged datagram"] += 1
 
 
-@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+@np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
 def decode_mrz(datagram: bytes, installation: Installation) -> KongsbergPing | None:
-    """Return the contents of one #MRZ datagram; None where they contradict themselves, or are one part of several."""
+    """Return the ping of one #MRZ datagram; None if it is damaged, or one of several datagrams of the same ping."""
     from KMALL import kmall
 
     if len(datagram) < MIN_MRZ_BYTES:
@@ -104,7 +105,7 @@ def decode_mrz(datagram: bytes, installation: Installation) -> KongsbergPing | N
 
 
 def _sounding_layout(step: int) -> np.dtype[Any]:
-    """Return the layout of a sounding of ``step`` bytes."""
+    """Return the numpy type of a sounding of ``step`` bytes."""
     return np.dtype(
         {
             "names": ["sector", "type", "angle", "time"],
@@ -116,7 +117,7 @@ def _sounding_layout(step: int) -> np.dtype[Any]:
 
 
 def _sector_infos(reader: Any, info: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the datagram's txSectorInfo, and leave the reader behind them."""
+    """Return the txSectorInfo of all sectors, and set the reader's position to the byte after the last one."""
     sector_infos = []
     start = reader.FID.tell()
     for number in range(min(info["numTxSectors"], 256)):
@@ -127,7 +128,7 @@ def _sector_infos(reader: Any, info: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _transmit_sectors(sector_infos: list[dict[str, Any]], receiver: int, installation: Installation) -> PingSectors:
-    """Return the sectors, each with its transmitter; a head of both arrays has one number for them."""
+    """Return the sectors, each with its transmitter; in a head with both arrays the receiver's number selects it."""
     names = ("sectorTransmitDelay_sec", "tiltAngleReTx_deg", "txSubArray")
     delay_s, tilt_deg, array_part = (np.array([sector[name] for sector in sector_infos]) for name in names)
     head = installation.get((SINGLE_HEAD, receiver))

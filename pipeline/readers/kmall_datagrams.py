@@ -1,8 +1,8 @@
 """Find the #MRZ and #IIP datagrams of Kongsberg's .kmall files (little-endian).
 
-A datagram: u32 length, '#' and three letters, u8 version, u8 system, u16 sonar, u32 Unix seconds (UTC), u32
-nanoseconds, its body, u32 length again. Where the two lengths differ, or no datagram begins, the next whole one is
-searched for, and the gap is counted.
+A datagram consists of u32 length, '#' and three letters, u8 version, u8 system, u16 sonar, u32 Unix seconds (UTC), u32
+nanoseconds, its body, and u32 length again. Where the two lengths differ, or no datagram begins, the reader searches
+for the next whole datagram, and counts the gap.
 """
 
 import struct
@@ -34,7 +34,7 @@ def kmall_datagrams(file: BinaryIO, dropped: Counter[str]) -> Iterator[bytes]:
 
 
 def _length_at(file: BinaryIO, position: int, size: int) -> int | None:
-    """Return the length of the datagram that begins here; None where none does, or its two lengths differ."""
+    """Return the length of the datagram at ``position``; None if none begins there, or if it is cut off or damaged."""
     head = read_at(file, position, 8)
     length = int.from_bytes(head[:4], "little")
     if not _is_head(head) or position + length > size:
@@ -54,7 +54,7 @@ def _cut_off(file: BinaryIO, position: int, size: int) -> bool:
 
 
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
-    """Return the start of the next whole datagram, or the file's end."""
+    """Return the byte at which the next whole datagram begins; the file's size if there is none."""
     while start < size:
         block = read_at(file, start, _SEARCH_BLOCK + 8)
         mark = block.find(b"#", 4)

@@ -1,4 +1,4 @@
-"""What .kmall and .all have in common: pings of transmit sectors, each tilted by itself and sent at its own time."""
+"""The common part of the readers of .kmall and .all: pings of transmit sectors, each with its own tilt and time."""
 
 from abc import ABC, abstractmethod
 from collections import Counter
@@ -36,13 +36,13 @@ class PingSectors:
     Parameters
     ----------
     delay_s
-        When each was sent, after the ping's time.
+        Times at which the sectors were sent, s after the ping's time.
     tilt_deg
-        Tilt in the transmitter's own frame, forward +.
+        Tilts in the transmitters' own frames, forward +.
     array_part
-        Number of the part of the transmitter that sent.
+        Numbers of the transmitters' parts that sent the sectors.
     transmitters
-        The transmitter; None where the file does not say how it is mounted.
+        The sectors' transmitters; None: the file does not say how the transmitter is mounted.
     """
 
     delay_s: Array
@@ -53,7 +53,7 @@ class PingSectors:
 
 @dataclass(frozen=True)
 class KongsbergPing:
-    """One datagram's soundings (n,), all of them; angles in degrees, port +."""
+    """All soundings (n,) of one datagram; angles in degrees, port +."""
 
     t_ns: int
     number: int
@@ -76,7 +76,7 @@ def are_possible(sectors: PingSectors, sector: NDArray[np.integer[Any]]) -> bool
 
 @dataclass(frozen=True)
 class KongsbergPart(ABC):
-    """One file; ``projector_offset_m`` is session.yaml's, and goes before the file's own."""
+    """One file; ``projector_offset_m`` of session.yaml, if not None, replaces the transmitter's centre in the file."""
 
     path: Path
     name: str
@@ -85,7 +85,7 @@ class KongsbergPart(ABC):
 
     @abstractmethod
     def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[KongsbergPing]:
-        """Yield the file's pings; count what is damaged."""
+        """Yield the file's pings; count damaged datagrams in ``dropped``."""
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield the soundings, chunk by chunk."""
@@ -106,7 +106,7 @@ class KongsbergPart(ABC):
             yield ping
 
     def _refuse_unusable(self, ping: KongsbergPing, first: KongsbergPing) -> None:
-        """Raise RawDataError for a second receiver, a single beam, and tilts of a transmitter of unknown mount."""
+        """Raise RawDataError for a second receiver, a single beam, or a tilted sector of an unknown transmitter."""
         if ping.receiver != first.receiver:
             raise RawDataError(
                 f"{self.name}: has soundings of several receivers (dual head), each with a mount of its own; "
@@ -122,7 +122,7 @@ class KongsbergPart(ABC):
                     "the sonar's program wrote it, with its installation at the beginning"
                 )
 
-    @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+    @np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
     def _chunk(self, pings: list[KongsbergPing], dropped: Counter[str]) -> Chunk:
         counts = np.array([len(ping.sector) for ping in pings])
 
@@ -163,7 +163,7 @@ class KongsbergPart(ABC):
         return checked_chunk(rows, self.latency_s)
 
     def _axes_and_positions(self, ping: KongsbergPing) -> NDArray[Any]:
-        """Return for each sounding (n, 3, 3): the axis of its transmitter, and the positions of part and centre."""
+        """Return per sounding three rows (n, 3, 3): transmitter's axis, position of the sending part, of the centre."""
         by_sector = [
             (transmitter or COINCIDENT_TRANSMITTER).axis_and_positions(
                 int(part), self.projector_offset_m if transmitter else None

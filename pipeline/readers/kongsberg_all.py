@@ -1,15 +1,15 @@
 """Kongsberg .all: the soundings of raw range and angle datagrams N (78; "EM series datagram formats", 160692).
 
-Offsets in bytes from the datagram's 2: 16 u16 sound speed at the transducer [0.1 m/s], 18 u16 sectors, 20 u16 beams;
-from 32 on 24 a sector: 0 i16 tilt [0.01 degrees, in the transmitter's frame, forward +], 8 f32 delay [s], 19 u8 part of
-the transmitter; then 16 a beam: 0 i16 angle to the receiving array [0.01 degrees, port +], 2 u8 sector, by the order of
-sectors, 3 u8 detection info (bit 7: none is valid), 8 f32 two-way time [s], 14 i8 cleaning (negative: flagged out).
-Times are UTC, in whole milliseconds.
+Offsets in bytes from the datagram's start byte STX: 16 u16 sound speed at the transducer [0.1 m/s], 18 u16 number of
+sectors, 20 u16 number of beams. From 32 on each sector has 24 bytes: 0 i16 tilt [0.01 degrees, in the transmitter's
+frame, forward +], 8 f32 delay [s], 19 u8 part of the transmitter. Then each beam has 16 bytes: 0 i16 angle to the
+receiving array [0.01 degrees, port +], 2 u8 number of the sector in the order above, 3 u8 detection info (bit 7 set: no
+valid detection), 8 f32 two-way time [s], 14 i8 cleaning (negative: flagged out). Times are UTC, in whole milliseconds.
 
-The tilt is what the sector was sent with. It includes the steering of pitch and yaw stabilisation: in files of
-stabilised sonars, soundings computed with it lie where Kongsberg's XYZ datagrams have them. Frame and installation
-(datagram I) are as in :mod:`pipeline.readers.kmall`. Datagrams F (70) and f (102) of older sonars, which have no such
-sectors, are not read.
+The tilt is the steering with which the sector was sent. It includes pitch and yaw stabilisation: in files of stabilised
+sonars, soundings computed with it agree with Kongsberg's XYZ datagrams. The frame and the installation (datagram I) are
+treated as in :mod:`pipeline.readers.kmall`. Datagrams F (70) and f (102) of older sonars lack these sectors, and are
+not read.
 """
 
 import struct
@@ -47,7 +47,7 @@ INVALID = 0x80
 
 @dataclass(frozen=True)
 class AllPart(KongsbergPart):
-    """One file."""
+    """One .all file."""
 
     def _pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[KongsbergPing]:
         installation, has_pings, older, repeated = "", False, 0, RepeatedPings()
@@ -71,7 +71,7 @@ class AllPart(KongsbergPart):
 
 
 def decode_raw_ranges(datagram: bytes, installation: str) -> KongsbergPing | None:
-    """Return the contents of one datagram N; None where they contradict themselves."""
+    """Return the ping of one datagram N; None if the datagram is damaged."""
     start = HEAD_WITHOUT_LENGTH.size
     if len(datagram) < start + RAW_RANGES_HEAD.size + TAIL:
         return None

@@ -1,8 +1,8 @@
 """Find the datagrams of Kongsberg's .all files (little-endian; some old files are big-endian, and are not read).
 
-A datagram: u32 length of what follows, 2, u8 type, u16 model, u32 date (year month day), u32 milliseconds of the day,
-u16 number, u16 serial number, its body, 3, u16 sum of the bytes between 2 and 3. Where no datagram begins,
-the next whole one is searched for, and the gap is counted.
+A datagram consists of u32 length of the bytes that follow, the start byte STX (2), u8 type, u16 model, u32 date (year
+month day), u32 milliseconds of the day, u16 number, u16 serial number, its body, the end byte ETX (3), and u16 sum of
+the bytes between STX and ETX. Where no datagram begins, the reader searches for the next whole one, and counts the gap.
 """
 
 import struct
@@ -18,11 +18,11 @@ STX, ETX = 2, 3
 TAIL = 3  # bytes of ETX and the sum
 _MAX_DATAGRAM = 1 << 20
 _SEARCH_BLOCK = 1 << 16
-DATAGRAM_TYPES = frozenset(b"0123ACDEFGHIJKLMNOPQRSTUVWXYabcdfhijklmnprsv")  # of the datagrams of all models
+DATAGRAM_TYPES = frozenset(b"0123ACDEFGHIJKLMNOPQRSTUVWXYabcdfhijklmnprsv")  # of all sonar models
 
 
 def kongsberg_all_datagrams(file: BinaryIO, types: bytes, dropped: Counter[str]) -> Iterator[bytes]:
-    """Yield the whole datagrams of the ``types``, one after another, without their length."""
+    """Yield the whole datagrams of the ``types``, one after another, from STX on (without the length)."""
     size, position = size_of(file), 0
     while position < size:
         head = read_at(file, position, ALL_HEAD.size)
@@ -42,7 +42,7 @@ def kongsberg_all_datagrams(file: BinaryIO, types: bytes, dropped: Counter[str])
 
 
 def is_datagram_header(head: bytes, order: str = "<") -> bool:
-    """Return whether a datagram begins here; ``order`` is that of the bytes, as in :mod:`struct`."""
+    """Return whether ``head`` begins with the header of a datagram; ``order``: byte order, as in :mod:`struct`."""
     if len(head) < ALL_HEAD.size:
         return False
     length, begin, kind, _, date, milliseconds, _, _ = struct.unpack(order + ALL_HEAD.format[1:], head[: ALL_HEAD.size])
@@ -51,7 +51,7 @@ def is_datagram_header(head: bytes, order: str = "<") -> bool:
 
 
 def _whole_length(file: BinaryIO, position: int, head: bytes, size: int) -> int | None:
-    """Return the length of the datagram with this head at ``position``; None where it is not whole."""
+    """Return the length of the datagram with this head at ``position``; None if it is damaged or cut off."""
     length = int.from_bytes(head[:4], "little")
     if not is_datagram_header(head) or position + 4 + length > size:
         return None
@@ -59,7 +59,7 @@ def _whole_length(file: BinaryIO, position: int, head: bytes, size: int) -> int 
 
 
 def _next_start(file: BinaryIO, start: int, size: int) -> int:
-    """Return the start of the next whole datagram, or the file's end."""
+    """Return the byte at which the next whole datagram begins; the file's size if there is none."""
     while start < size:
         block = read_at(file, start, _SEARCH_BLOCK + ALL_HEAD.size)
         mark = block.find(STX, 4)

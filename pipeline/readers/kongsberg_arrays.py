@@ -1,8 +1,9 @@
 """Geometry of Kongsberg's two arrays: soundings of tilted sectors, in the receiver's frame ``mbes``.
 
-Beam angles refer to the receiving array, tilts of sectors to the transmitting one, which may look the other way: then a
-tilt forward of its own is one aft in ``mbes``. Ranges run from the sector's part of the transmitter to the target and
-back to the receiver. :mod:`pipeline.readers.kongsberg_installation` knows how the arrays are mounted.
+Beam angles refer to the receiving array, tilts of sectors to the transmitting array. If the latter is mounted the other
+way round, a forward tilt in its own frame is an aft tilt in ``mbes``. Travel times are those from the sector's part of
+the transmitter to the target and back to the receiver. :mod:`pipeline.readers.kongsberg_installation` reads how the
+arrays are mounted.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from pipeline.maths.sonar.crossed_arrays import tilt_in_mbes
 
 Array = NDArray[np.float64]
-MIN_PATH_RATIO = 3.0  # of the path to the transmitter's distance: no shorter path is possible
-_ITERATIONS = 4  # the error falls by (distance of the arrays / range)² with each
+MIN_PATH_RATIO = 3.0  # least ratio of the path to |t| + |q| of ``in_mbes``; a smaller ratio counts as impossible
+_ITERATIONS = 4  # each reduces the error by the factor (distance of the arrays / range)²
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,9 @@ class Transmitter:
     axis_mbes
         The array's own forward axis (3,).
     centre_mbes_m
-        Its centre (3,).
+        Position of the array's centre (3,).
     parts_mbes_m
-        The parts of the array, by number: their positions from the centre (3,).
+        Positions of the array's parts from its centre (3,), by number of the part.
     """
 
     axis_mbes: Array
@@ -37,15 +38,15 @@ class Transmitter:
     parts_mbes_m: Mapping[int, Array] = field(default_factory=dict)
 
     def axis_and_positions(self, part: int, centre_mbes_m: Sequence[float] | None) -> Array:
-        """Return rows (3, 3): the axis, the position of a part and that of the centre.
+        """Return rows (3, 3): the axis, the position of a part, and the position of the centre.
 
-        ``centre_mbes_m`` is session.yaml's, and replaces the transmitter's own; None: it has none.
+        ``centre_mbes_m`` of session.yaml replaces the transmitter's own centre; None: session.yaml has none.
         """
         centre = self.centre_mbes_m if centre_mbes_m is None else np.array(centre_mbes_m)
         return np.array([self.axis_mbes, centre + self.parts_mbes_m.get(part, np.zeros(3)), centre])
 
 
-COINCIDENT_TRANSMITTER = Transmitter(np.array([0.0, 1.0, 0.0]), np.zeros(3))  # nothing is known, or nothing to be known
+COINCIDENT_TRANSMITTER = Transmitter(np.array([0.0, 1.0, 0.0]), np.zeros(3))  # where no transmitter is known
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class SectorSoundings:
     part_mbes_m, centre_mbes_m
         Positions (n, 3) in ``mbes`` of the part that sent and of its transmitter's centre.
     two_way_time_s, sound_speed_m_s
-        Time from the part to the target and back to the receiver (n,), and speed at the head (n,).
+        Time from the part to the target and back to the receiver (n,), and sound speed at the head (n,).
     """
 
     angle_rad: Array
@@ -77,14 +78,14 @@ class SectorSoundings:
     def in_mbes(self, projector_offset_m: Sequence[float] | None) -> tuple[Array, Array, Array]:
         """Return angles, tilts and two-way times (n,) as a head with both arrays in one point would have recorded them.
 
-        That point is M: starboard and up it is the receiver's centre, forward the transmitter's. From M the part that
-        sent lies at t and the receiver at q, and a target at x = r (s, p, -c) is where beam and fan meet on the path:
+        This point M has x and z of the receiver's centre, and y of the transmitter's centre. From M the part that sent
+        is at t, the receiver at q, and the target at x = r (s, p, -c). At the target, beam and fan meet on the path:
 
-            x_1 = |x - q| sin θ,   (x - t) · axis = |x - t| sin τ,   |x - t| + |x - q| = L = speed · time,
+            x_1 = |x - q| sin θ,   (x - t) · axis = |x - t| sin τ,   |x - t| + |x - q| = L = speed · time.
 
-        by iteration from the parallel fan. The results are arcsin s, arcsin p and 2 r / speed. Where session.yaml gives
-        ``projector_offset_m`` o, the time is (|x| + |x - o|) / speed, from which the range is then taken. The time of a
-        path that is too short is NaN; a time of 0, which is no detection, stays 0.
+        These equations are solved by iteration, which starts from the fan through M. The results are arcsin s, arcsin p
+        and 2 r / speed. If session.yaml has ``projector_offset_m`` o, the time is (|x| + |x - o|) / speed, from which a
+        later stage computes the range. The time is NaN if the path is too short. A time of 0 (no detection) stays 0.
         """
         if not self.part_mbes_m.any() and not self.centre_mbes_m.any():
             return self.angle_rad, tilt_in_mbes(self.angle_rad, self.tilt_rad, self.axis_mbes), self.two_way_time_s
@@ -115,5 +116,5 @@ class SectorSoundings:
 
 
 def _on_side(angle_rad: Array, side: Array) -> Array:
-    """Return angles of beams below (``side`` -1) or above (1) the array's plane, from those below."""
+    """Return the beam angles (n,), mirrored at the array's plane where ``side`` (n,) is 1 (above the plane)."""
     return np.where(side > 0, np.copysign(np.pi, angle_rad) - angle_rad, angle_rad)

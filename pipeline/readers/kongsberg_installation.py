@@ -1,11 +1,13 @@
-"""How Kongsberg's transmitter lies against its receiver, from the installation that .kmall and .all files begin with.
+"""Position and angles of Kongsberg's transmitter relative to its receiver, from the installation in .kmall and .all.
 
-Kongsberg's axes are forward, starboard, down; an array with the installation angles R, P, H [degrees] is turned by
-Rz(H) Ry(P) Rx(R). A transmitter with H near 180 degrees looks the other way.
+Kongsberg's axes are forward, starboard, down. An array with the installation angles R, P, H [degrees] is turned by
+Rz(H) Ry(P) Rx(R). A transmitter with H near 180 degrees is mounted the other way round.
 
-An installation is a text of KEY:VALUE or KEY=VALUE, parted by commas. .kmall: TRAI_TX1 and TRAI_RX1, or for one head
-TRAI_HD1, with X, Y, Z [m], R, P, H, and the parts of the array IPX, IPY, IPZ (port), IC. (centre), IS. (starboard), and
-the receiver's I. (of a head IR.); .all: S1X to S1H of the transmitter or head, S2 and S3 of receivers.
+An installation is a text of entries KEY:VALUE or KEY=VALUE, separated by commas. In .kmall TRAI_TX1 and TRAI_RX1, or
+TRAI_HD1 for a head with both arrays, have X, Y, Z [m], R, P, H. They also have the positions of the acoustic centres in
+the array's axes: IPX, IPY, IPZ (port part of the transmitter), ICX and so on (centre part), ISX (starboard part), IX
+(receiver), IRX (receiver of a head). In .all S1X to S1H are those of the transmitter or head, S2X and S3X those of
+receivers.
 """
 
 import re
@@ -18,12 +20,12 @@ from pipeline.maths.geometry.rotations import rotation_x, rotation_y, rotation_z
 from pipeline.readers.kongsberg_arrays import Array, Transmitter
 
 R_MBES_FROM_ARRAY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # starboard, forward, up
-SINGLE_HEAD = -1  # in place of a transmitter's number
-PARTS = ("P", "C", "S")  # of a transmitter, in the order of their numbers
-# models with both arrays in one head; S2 is another head's
+SINGLE_HEAD = -1  # transmitter number of a head with both arrays
+PARTS = ("P", "C", "S")  # port, centre and starboard part of a transmitter, in the order of their numbers
+# models with both arrays in one head; S2 belongs to a second head
 SINGLE_HEAD_MODELS = frozenset({1002, 2000, *range(3000, 3009), 3020})
-MIN_ALIGNMENT = 0.9  # of the transmitter's axis along the receiver's y: else they are no crossed arrays
-INNER_OFFSETS_M: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, and whether it is the portable head
+MIN_ALIGNMENT = 0.9  # least component of the transmitter's axis along y of mbes; with less the arrays are not crossed
+INNER_OFFSETS_M: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, and true for the portable head
     (2040, False): {
         "IPY": -0.0554, "IPZ": -0.012, "ICY": 0.0131, "ICZ": -0.006, "ISY": 0.0554, "ISZ": -0.012,
         "IRX": 0.011, "IRZ": -0.006,
@@ -34,14 +36,14 @@ INNER_OFFSETS_M: dict[tuple[int, bool], dict[str, float]] = {  # [m], by model, 
     },
 }  # fmt: skip
 _NUMBER = re.compile(r"[-+]?([0-9]{1,6}(\.[0-9]{0,15})?|\.[0-9]{1,15})")
-PLACEMENT = "XYZRPH"  # of an array
+PLACEMENT = "XYZRPH"  # keys of an array's position and angles
 _PLACEMENT_KEY = re.compile(rf"[{PLACEMENT}]|I[PCSR]?[XYZ]")
 
 
 def transmitters_of_kmall(text: str) -> dict[tuple[int, int], Transmitter]:
-    """Return the transmitters that #IIP describes, by the numbers of transmitter and receiver from 0.
+    """Return the transmitters that #IIP describes, by the numbers of transmitter and receiver, both from 0.
 
-    A head of both arrays has the key (SINGLE_HEAD, number).
+    A head with both arrays has the key (SINGLE_HEAD, its number).
     """
     entries = {name: _numbers(values) for name, values in re.findall(r"TRAI_((?:TX|RX|HD)\d):([^,]*)", text)}
     arrays = {name: numbers for name, numbers in entries.items() if numbers.keys() >= set(PLACEMENT)}
@@ -58,7 +60,7 @@ def transmitters_of_kmall(text: str) -> dict[tuple[int, int], Transmitter]:
 
 
 def _numbers(values: str) -> dict[str, float]:
-    """Return an array's numbers by key; nothing where one that is needed cannot be read, for it is not 0."""
+    """Return an array's numbers by key; empty if a needed one cannot be read, because it must not count as 0."""
     pairs = [(key.strip(), value.strip()) for key, _, value in (pair.partition("=") for pair in values.split(";"))]
     if any(_PLACEMENT_KEY.fullmatch(key) and not _NUMBER.fullmatch(value) for key, value in pairs):
         return {}
@@ -67,12 +69,12 @@ def _numbers(values: str) -> dict[str, float]:
 
 @lru_cache(maxsize=16)  # called for each ping
 def transmitter_of_all(text: str, serial: int, model: int) -> Transmitter | None:
-    """Return the transmitter of a receiver in a .all file; None where the installation does not say.
+    """Return the transmitter of a receiver in a .all file; None if the installation does not describe it.
 
-    STC is 0 for one transmitter and one receiver, 1, 2 and 5 for heads of both arrays, 3 for one transmitter and two
-    receivers, whose serial numbers are then R1S and R2S; older sonars do not say it (SINGLE_HEAD_MODELS). Only .kmall
-    files say where the parts of an array lie; for .all files of the same sonars, the EM 2040, whose parts send
-    different sectors, INNER_OFFSETS_M has them.
+    The system type STC is 0 for one transmitter and one receiver, 1, 2 or 5 for heads with both arrays, and 3 for one
+    transmitter and two receivers with the serial numbers R1S and R2S. Older sonars do not write STC; then the key S2X
+    and the model decide (SINGLE_HEAD_MODELS). The parts of the EM 2040's transmitter send different sectors. .kmall
+    files hold the positions of these parts, but .all files do not; for them INNER_OFFSETS_M has the positions.
 
     Parameters
     ----------
@@ -103,9 +105,9 @@ def _position(values: Mapping[str, float], prefix: str) -> Array:
 
 
 def _transmitter(tx: Mapping[str, float], rx: Mapping[str, float], acoustic_centre_m: Array) -> Transmitter | None:
-    """Return a transmitter in its receiver's frame; None where the arrays are not crossed.
+    """Return a transmitter in its receiver's frame; None if the arrays are not crossed.
 
-    ``acoustic_centre_m`` is the receiver's, from its X, Y, Z, in its own axes.
+    ``acoustic_centre_m`` is the position of the receiver's acoustic centre from its X, Y, Z, in the receiver's axes.
     """
     R_mbes_from_vessel = R_MBES_FROM_ARRAY @ _rotation(rx).T
     R_mbes_from_tx = R_mbes_from_vessel @ _rotation(tx)

@@ -2,8 +2,9 @@
 
 A file is read in *stretches* of at most 4,000,000 points, so that workers can share it.
 
-Seconds of week need ``laser.gps_week``, the week of the first point; points more than half a week before that belong
-to the next one. Adjusted standard time is GPS seconds since the epoch - 1e9 (:mod:`pipeline.readers.las_times`).
+A file with seconds of week needs ``laser.gps_week``, the week of its first point. A point whose seconds of week are
+smaller than the first point's by more than half a week belongs to the next week. Adjusted standard time is GPS seconds
+since the epoch minus 1e9 (:mod:`pipeline.readers.las_times`).
 """
 
 import logging
@@ -32,8 +33,8 @@ from pipeline.readers.row_checks import latency_ns, possible_ns
 from pipeline.readers.row_filter import LASER_COLUMNS, RowFilter, chunk, no_rows
 
 STRETCH_POINTS = 4_000_000
-_COARSEST_M = 0.01  # scale of coordinates; 1e-7 degrees are 11 mm
-_MAX_SECONDS = 1e10  # of adjusted time, which int64 nanoseconds must hold
+_COARSEST_M = 0.01  # coarsest scale of coordinates; 1e-7 degrees are 11 mm, and are accepted
+_MAX_SECONDS = 8e9  # adjusted times beyond are left out: with the offset of 1e9 s they must fit int64 nanoseconds
 logging.getLogger("laspy").addHandler(logging.NullHandler())  # its exceptions say the same as its log
 
 
@@ -74,7 +75,7 @@ class LasPart:
             return decompressed_points(self.path, self.name, self.start, self.stop, BATCH_ROWS)
         return _las_points(file, self.name, self.start, self.stop)
 
-    @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+    @np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
     def _chunk(self, points: DecodedColumns, dropped: Counter[str], first: bool) -> Chunk:
         seconds, x_m, y_m, z_m = points
         if first:
@@ -157,7 +158,7 @@ def las_parts(
 
 
 def _refuse_coarse(scales: tuple[float, ...], frame: LaserFrame, name: str) -> None:
-    """Refuse a scale too coarse for points measured to millimetres: coordinates are whole multiples of it."""
+    """Refuse a scale that is too coarse for points measured to millimetres; coordinates are multiples of the scale."""
     transform = frame_transform(frame)
     unit_m, height_unit_m = (1.0, 1.0) if transform is None else (transform.unit_m, transform.height_unit_m)
     units_m = (unit_m, unit_m, height_unit_m)
@@ -170,7 +171,7 @@ def _refuse_coarse(scales: tuple[float, ...], frame: LaserFrame, name: str) -> N
 
 
 def _crs_of(path: Path, name: str) -> str:
-    """Return the CRS in the file's variable-length records, WKT; empty without one that can be understood."""
+    """Return the CRS in the file's variable-length records, WKT; empty if there is none that can be read."""
     import laspy
     from pyproj.exceptions import ProjError
 

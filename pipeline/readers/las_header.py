@@ -1,9 +1,10 @@
-"""Header of a LAS or LAZ file (ASPRS, "LAS Specification 1.4 R15"), checked against the file before laspy sees it.
+"""Header of a LAS or LAZ file (ASPRS, "LAS Specification 1.4 R15"), checked against the file before laspy reads it.
 
-A damaged header may claim billions of points or of variable-length records, which must cost neither memory nor time.
-Header (little-endian): 6 u16 global encoding (bit 0: adjusted standard GPS time, else seconds of week), 24 u8 x 2
-version, 94 u16 header size, 96 u32 offset to points, 100 u32 number of VLRs, 104 u8 point format (bit 7: LAZ), 105 u16
-record length, 107 u32 points, 131 f64 x 3 scales, 155 f64 x 3 offsets, 247 u64 points (1.4).
+A damaged header may claim billions of points or of variable-length records (VLRs). They must cost neither memory nor
+time. Offsets in the header (little-endian): 6 u16 global encoding (bit 0: adjusted standard GPS time, else seconds of
+week), 24 u8 x 2 version, 94 u16 header size, 96 u32 offset to points, 100 u32 number of VLRs, 104 u8 point format (bit
+7: LAZ), 105 u16 record length, 107 u32 number of points, 131 f64 x 3 scales, 155 f64 x 3 offsets, 247 u64 number of
+points (from version 1.4 on).
 """
 
 import struct
@@ -30,8 +31,8 @@ class LasHeader:
     declared_time: LasTime  # laser.time of session.yaml, which takes precedence over the flag
     compressed: bool
     size: int  # of the file, bytes
-    claimed: int  # points by the header
-    present: int  # points that the file can hold
+    claimed: int  # number of points by the header
+    present: int  # the smaller of ``claimed`` and the number of points that the file can hold
     first_s: float  # GPS time of the first point
     scales: tuple[float, ...]
 

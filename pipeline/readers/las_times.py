@@ -1,8 +1,9 @@
-"""The zero point of GPS times in a LAS file: by ``laser.time`` of session.yaml, or else by the file's header.
+"""The zero point of GPS times in a LAS file, from ``laser.time`` of session.yaml or else from the file's header.
 
-Global encoding, bit 0: adjusted standard time, GPS seconds since the epoch - 1e9; else seconds of the GPS week. Many
-programs write adjusted times and leave the bit unset. The two do not overlap, but for the first two weeks of adjusted
-standard time, September 2011: a time outside these tells beyond doubt which of the two it is.
+If bit 0 of the global encoding is set, times are adjusted standard time: GPS seconds since the epoch minus 1e9. If the
+bit is not set, they are seconds of the GPS week. Many programs write adjusted standard time and leave the bit unset.
+The numbers of the two types overlap only in the first two weeks of adjusted standard time (September 2011). Every other
+number shows its type.
 """
 
 import numpy as np
@@ -19,7 +20,7 @@ _KEYS = {True: "adjusted_standard", False: "seconds_of_week"}
 
 
 def refuse_unusable_times(seconds: NDArray[np.float64], name: str, adjusted: bool, declared: LasTime) -> None:
-    """Refuse times that are all 0, are of the other type, or have lost their digits.
+    """Refuse times that are all 0, are not of the type that is assumed, or were stored as float32.
 
     Parameters
     ----------
@@ -28,7 +29,7 @@ def refuse_unusable_times(seconds: NDArray[np.float64], name: str, adjusted: boo
     name : str
         The file's path in the session folder, for messages.
     adjusted : bool
-        Whether they are taken as adjusted standard time, else as seconds of the week.
+        True: the times are read as adjusted standard time; false: as seconds of the week.
     declared : LasTime
         ``laser.time`` of session.yaml; None: the header's flag decides.
 
@@ -47,7 +48,7 @@ def refuse_unusable_times(seconds: NDArray[np.float64], name: str, adjusted: boo
 
 
 def refuse_wrong_time_type(seconds: NDArray[np.float64], name: str, adjusted: bool, declared: LasTime) -> None:
-    """Refuse times that cannot be of the type that they are taken for.
+    """Refuse times that are impossible for the type that is assumed.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def refuse_wrong_time_type(seconds: NDArray[np.float64], name: str, adjusted: bo
 
 
 def _refuse(name: str, first: float, adjusted: bool, declared: LasTime, likely: bool) -> None:
-    """Refuse times, the first of which is ``first``; ``likely``: they are possible as the other type."""
+    """Raise RawDataError for times; ``first``: the first of them, ``likely``: they are possible as the other type."""
     source = "its header" if declared is None else f"laser.time: {declared} in session.yaml"
     other = f"it seems to be {_TITLES[not adjusted]}" if likely else "it is neither of the two times that LAS has"
     remedy = "export it again with GPS time stamps"

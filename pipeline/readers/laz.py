@@ -1,8 +1,9 @@
-"""LAZ: the number of points that a file's tables allow, and its points by way of a process (``laz_worker``).
+"""LAZ: the largest number of points that a file's tables allow, and its points, unpacked by ``laz_worker``.
 
-LASzip specification; all little-endian. The LASzip record (user "laszip encoded", number 22204): 12 u32 points a chunk,
-32 u16 items, then each item u16 type, u16 size, u16 version. At the start of the points: i64 where the table of chunks
-is (u32 version, u32 chunks, ...), then the chunks, each beginning with its first point as it is in LAS.
+The layout is that of the LASzip specification, little-endian. Offsets in the LASzip record (user "laszip encoded",
+number 22204): 12 u32 points per chunk, 32 u16 number of items. Then come u16 type, u16 size, u16 version of each item.
+The point data begin with i64 byte at which the table of chunks begins (u32 version, u32 number of chunks, ...). Then
+come the chunks. Each chunk begins with its first point in the form of LAS.
 """
 
 import struct
@@ -17,23 +18,23 @@ from pipeline.readers.raw_file import read_at
 
 LAZ_WORKER = Path(__file__).with_name("laz_worker.py")
 VLR_HEAD = 54
-_VARIABLE = 0xFFFFFFFF  # chunks of different lengths
-MAX_POINTS_PER_BYTE = 1024  # what LASzip makes of points that are all the same
+_VARIABLE = 0xFFFFFFFF  # points per chunk if the chunks have different lengths
+MAX_POINTS_PER_BYTE = 1024  # LASzip reaches this if all points are the same
 MAX_CHUNK_POINTS = 10_000_000  # LASzip's own is 50,000
 
 
 @dataclass(frozen=True)
 class LazTables:
-    """Where the tables of a LAZ file are: numbers of its LAS header, and the file's size."""
+    """Places of a LAZ file's tables, from its LAS header, and the file's size."""
 
-    records: int  # variable-length records behind the header
+    records: int  # number of variable-length records after the header
     header_size: int  # bytes
     offset: int  # byte at which the points begin
     size: int  # of the file, bytes
 
 
 def max_point_count(file: BinaryIO, name: str, tables: LazTables) -> int:
-    """Return how many points the chunks can hold at most.
+    """Return the largest number of points that the chunks can hold.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def max_point_count(file: BinaryIO, name: str, tables: LazTables) -> int:
     name : str
         Its path in the session folder, for messages.
     tables : LazTables
-        Where its tables are.
+        Places of its tables.
 
     Raises
     ------
@@ -63,7 +64,7 @@ def max_point_count(file: BinaryIO, name: str, tables: LazTables) -> int:
 
 
 def _chunk_points(file: BinaryIO, tables: LazTables) -> int | None:
-    """Return the points a chunk, from the LASzip record; None where that is missing or damaged."""
+    """Return the number of points per chunk from the LASzip record; None if the record is missing or damaged."""
     start = tables.header_size
     for _ in range(min(tables.records, 65_536)):
         head = read_at(file, start, VLR_HEAD + 16)
@@ -78,7 +79,7 @@ def _chunk_points(file: BinaryIO, tables: LazTables) -> int | None:
 
 
 def decompressed_points(path: Path, name: str, start: int, stop: int, batch: int) -> Iterator[DecodedColumns]:
-    """Return an iterator over GPS time, x, y, z of points ``start`` to ``stop``; fewer where the file ends before.
+    """Return an iterator over batches of GPS time, x, y, z of points ``start`` to ``stop``, or to the file's end.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ def decompressed_points(path: Path, name: str, start: int, stop: int, batch: int
     name : str
         Its path in the session folder, for messages.
     start, stop : int
-        Numbers of the first point, and of the one behind the last.
+        Numbers of the first point, and of the one after the last.
     batch : int
         Largest number of points in a batch.
 

@@ -1,7 +1,7 @@
 """Unpacks points of a LAZ file in a process of its own: ``python -P laz_worker.py FILE START STOP BATCH``.
 
-lazrs 0.8 can die of a damaged file (segmentation fault, failed allocation, panic) instead of raising. Here only this
-process dies, and :mod:`pipeline.readers.laz` says which file it was. It imports nothing of the project.
+A damaged file can crash lazrs 0.8 (segmentation fault, failed allocation, panic) without an exception. Only this
+process ends then, and the process that started it reports the file. This module imports nothing of the project.
 
 It writes batches in the form that :mod:`pipeline.readers.decoder_process` describes: GPS time, x, y, z.
 """
@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-_MEMORY_BYTES = 1 << 30  # written to; a batch and its chunks need a twentieth
+_MEMORY_BYTES = 1 << 30  # limit of this process; a batch and its chunks need a twentieth of it
 
 
 def _main(path: str, start: int, stop: int, batch: int) -> None:
@@ -41,7 +41,7 @@ def _main(path: str, start: int, stop: int, batch: int) -> None:
 if __name__ == "__main__":
     try:
         _main(sys.argv[1], *(int(word) for word in sys.argv[2:]))
-    except Exception as error:  # the parent makes one RawDataError of it
+    except Exception as error:  # the parent process turns it into a RawDataError
         text = f"{type(error).__name__}: {error}".encode()
         sys.stdout.buffer.write(np.int64(-1).tobytes() + np.int64(len(text)).tobytes() + text)
         sys.stdout.buffer.flush()

@@ -1,11 +1,11 @@
 """NovAtel OEM/SPAN logs, binary and ASCII: INSPVA, INSPVAS and INSPVAX records, and the INS's own sigmas.
 
-Where a file holds several of the three, one is used: that with the most usable records, but INSPVA or INSPVAS, whose
-heights are ellipsoidal, unless INSPVAX has more than twice as many. INSPVAX heights are above sea level: its own
-undulation is added. Usable: status INS_SOLUTION_GOOD, INS_ALIGNMENT_COMPLETE or INS_SOLUTION_FREE.
+A record is usable if its status is INS_SOLUTION_GOOD, INS_ALIGNMENT_COMPLETE or INS_SOLUTION_FREE. If a file has
+several of the three kinds, the kind with the most usable records is used. INSPVAX must have more than twice as many,
+because INSPVA and INSPVAS have ellipsoidal heights. Heights of INSPVAX are above sea level: its undulation is added.
 
-The sigmas (latitude, longitude, height [m], velocities, roll, pitch, azimuth [degrees]) are those of INSSTDEV, else of
-INSSTDEVS, at the header's milliseconds, else those of usable INSPVAX.
+The sigmas (latitude, longitude, height [m], velocities, roll, pitch, azimuth [degrees]) are those of INSSTDEV. Without
+INSSTDEV they are those of INSSTDEVS, or else those of usable INSPVAX. Their time is the one in the record's header.
 """
 
 import threading
@@ -34,8 +34,8 @@ STATES = {"status": STATUS, "type": {
 }}  # kept with each record: the filter's state, and in INSPVAX the kind of position
 _SIGMA_PLACES = dict(zip(SIGMA_COLUMNS[1:], (0, 1, 2, 6, 7, 8), strict=True))  # places among the nine of a record
 _ANGLES = ("latitude", "longitude", "roll", "pitch", "azimuth")
-# Two decoders at work in two threads lose a record now and then. A whole file is taken at once (its records become a
-# table in memory anyway), so that nobody can hold the lock while waiting for something else.
+# Two decoders in two threads sometimes lose a record. The lock is kept for a whole file, whose records become a table
+# in memory anyway. Therefore no thread waits for anything else while it keeps the lock.
 _DECODER = threading.Lock()
 
 
@@ -71,11 +71,11 @@ class NovatelPart:
             order.check()
 
 
-@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+@np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
 def _chunk(
     records: Records, order: TimeOrder, latency_s: float, dropped: Counter[str], sigmas: Columns
 ) -> Chunk:
-    """Return the usable poses of some records, with their ``sigmas``; others are counted in ``dropped``."""
+    """Return a chunk of the records' usable poses, with ``sigmas``; count the other records in ``dropped``."""
     usable = np.isin(records["status"], USABLE)
     for status, count in zip(*np.unique(records["status"][~usable], return_counts=True), strict=True):
         dropped[f"ins status {STATUS.get(int(status), int(status))}"] += int(count)

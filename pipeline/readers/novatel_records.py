@@ -1,9 +1,9 @@
-"""NovAtel OEM/SPAN logs as arrays of records: framing, decoding, and the choice among kinds of records.
+"""Read NovAtel OEM/SPAN logs as arrays of records, and choose the kinds of records to use.
 
-Framing and ASCII are left to NovAtel's own decoder (novatel_edie), which turns every record into its binary form;
-the layouts below are those of the OEM7 Commands and Logs Reference Manual (INSPVA 507, INSPVAS 508, INSPVAX 1465,
-INSSTDEV 2051, INSSTDEVS 2052; binary header 28 bytes after sync 0xAA4412, short header 12 bytes after 0xAA4413, CRC
-4 bytes behind the body).
+NovAtel's own decoder (novatel_edie) finds the records in a file, and turns each into its binary form, those in ASCII
+too. The layouts below are those of the OEM7 Commands and Logs Reference Manual (INSPVA 507, INSPVAS 508, INSPVAX 1465,
+INSSTDEV 2051, INSSTDEVS 2052). The binary header has 28 bytes and begins with the sync bytes 0xAA4412. The short header
+has 12 bytes and begins with 0xAA4413. Then come the body, and a CRC of 4 bytes.
 """
 
 import re
@@ -35,7 +35,7 @@ _LAYOUTS = {  # by their size in bytes
 }
 _BLOCK = 32_768  # the decoder's buffer is 262,144 bytes
 RECORDS_PER_CHUNK = 65_536
-MAX_RESUMES = 100  # restarts behind false starts at a file's end; each costs a pass over at most the decoder's buffer
+MAX_RESUMES = 100  # restarts after false starts at a file's end; each reads the decoder's buffer at most once
 _START = re.compile(rb"\xaa\x44[\x12\x13]|[#%][A-Z]")
 _PROMPT = re.compile(rb"[\s\[\]A-Z0-9]{0,24}")  # a receiver's port prompt between records, such as [COM1]
 
@@ -49,7 +49,7 @@ class RecordKinds:
 
 
 def _blocks(file: BinaryIO) -> Iterator[bytes]:
-    """Yield the file in blocks that fit the decoder's buffer; lines of ASCII logs end with CR LF, as it needs."""
+    """Yield the file in blocks that fit the decoder's buffer; end lines of ASCII logs with CR LF for the decoder."""
     first = file.read(_BLOCK)
     if not first.isascii() or b"\0" in first:
         yield first
@@ -68,8 +68,8 @@ def _blocks(file: BinaryIO) -> Iterator[bytes]:
 def _feed(parser: Any, file: BinaryIO, dropped: Counter[str]) -> Iterator[None]:
     """Feed the file to a decoder, and yield whenever it may have records.
 
-    At the end the decoder may keep bytes back for a message of which it has only the start. Whole messages may follow
-    that start.
+    At the end the decoder may keep back the start of an incomplete message, and with it whole messages after that
+    start. The kept bytes are then fed again from the next start on.
     """
     for block in _blocks(file):
         parser.write(block)
@@ -93,7 +93,8 @@ def choose_records(file: BinaryIO, dropped: Counter[str]) -> RecordKinds:
     file : BinaryIO
         The log; read as a whole.
     dropped : Counter
-        Counts by reason; other records, and bytes that are no record, are added.
+        Counts by reason, changed in place: pose records of the kinds that are not used, and bytes that are no record;
+        in a file without pose records all its messages.
     """
     from novatel_edie.oem import Parser
 
@@ -121,7 +122,7 @@ def choose_records(file: BinaryIO, dropped: Counter[str]) -> RecordKinds:
 
 
 def _most_usable(file: BinaryIO, numbers: list[int]) -> int:
-    """Return the kind with the most usable records (INSPVAX needs more than twice as many); of equals the first."""
+    """Return the number with the most usable records (INSPVAX needs more than twice as many); if equal the first."""
     usable = {
         number: sum(int(np.isin(records["status"], USABLE).sum()) for records in read_records(file, number))
         for number in numbers

@@ -1,4 +1,4 @@
-"""How the files of each format become parts: one function a format, listed in :mod:`pipeline.readers.dispatch`."""
+"""Functions that open files as parts, one function for each format; :mod:`pipeline.readers.dispatch` lists them."""
 
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -36,7 +36,7 @@ class SensorFiles(Generic[BlockOfSensor]):
     sensor: Sensor
     settings: BlockOfSensor
     files: list[SessionFile]
-    accuracy_files: list[SessionFile]  # SMRMSG files, of an INS alone
+    accuracy_files: list[SessionFile]  # SMRMSG files, only for an INS
 
 
 def laser_frame(settings: Laser) -> LaserFrame:
@@ -69,7 +69,7 @@ def open_novatel(request: SensorFiles[Ins]) -> Parts:
 
 
 def open_inertial_explorer(request: SensorFiles[Ins]) -> Parts:
-    """Return one part for each export of Inertial Explorer; texts with seconds of week alone need ``gps_week``."""
+    """Return one part for each export of Inertial Explorer; exports without week or date need ``gps_week``."""
     settings = request.settings
     layouts = [(file.name, read_layout(file.path, file.name)) for file in request.files]
     first_s = {name: layout.first_s for name, layout in layouts if layout.clock == "gps_week"}
@@ -98,7 +98,7 @@ def open_sbet(request: SensorFiles[Ins]) -> Parts:
 
 # --- laser -----------------------------------------------------------------------------------------------------------
 def open_las(request: SensorFiles[Laser]) -> Parts:
-    """Return the parts of LAS and LAZ files: stretches of points; files with seconds of week need ``gps_week``."""
+    """Return the stretches of LAS and LAZ files as parts; files with seconds of week need ``gps_week``."""
     settings = request.settings
     headers = [las_header.read_header(file.path, file.name, settings.time) for file in request.files]
     for file, header in zip(request.files, headers, strict=True):

@@ -1,8 +1,9 @@
-"""R2Sonic bathymetry packets (BTH0), each by itself, into soundings.
+"""Decode R2Sonic bathymetry packets (BTH0) into soundings. :mod:`pipeline.readers.r2sonic_framing` finds the packets.
 
 Layout: R2Sonic Sonic 2026/2024/2022 Operation Manual, appendix "Uplink Data Formats", Bathy Data Format 0 (V5.0 and
-V6.3 agree). All big-endian. Header of 12 bytes: 'BTH0', u32 packet size, u32 stream. Then sections, each u16 name (two
-letters), u16 size (all of it), padded to 4 bytes; unknown ones are skipped by their size. At offsets in the section:
+V6.3 agree). All numbers are big-endian. The header has 12 bytes: 'BTH0', u32 packet size, u32 stream. Then come the
+sections: u16 name (two letters), u16 size of the whole section, contents padded to 4 bytes. Unknown sections are
+skipped. Offsets and fields in the known sections:
 
     H0   28 u32 Unix seconds (UTC), 32 u32 nanoseconds, 36 u32 ping number, 44 f32 sound speed [m/s],
          68 f32 steering of the transmit fan along track [rad], 114 u16 points N
@@ -10,9 +11,9 @@ letters), u16 size (all of it), padded to 4 bytes; unknown ones are skipped by t
     A0   4 f32 first, 8 f32 last                         angles evenly from first (port) to last (starboard) inclusive
     A2   4 f32 first, 8 f32 scale, 36 u16 step[N]        angle[n] = first + (step[0] + ... + step[n]) * scale
 
-Angles [rad] are from the array's normal, starboard +, not roll corrected; roll stabilisation only moves the sector.
-Pitch stabilisation (2020, 2026) steers the transmit fan by up to 10°. No document says which sign forward has, and no
-file at hand has such steering: such pings are refused. :mod:`pipeline.readers.r2sonic_packets` finds the packets.
+Angles [rad] are measured from the array's normal, starboard +. They are not roll corrected: roll stabilisation only
+moves the sector of the beams. Pitch stabilisation (models 2020, 2026) steers the transmit fan by up to 10° along track.
+No document states the sign of this steering, and no available file has it. A file with a steered ping is refused.
 """
 
 import math
@@ -29,14 +30,14 @@ from numpy.typing import NDArray
 from pipeline.artefacts.streams import Chunk
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS, gps_ns_from_unix_utc
-from pipeline.readers.r2sonic_packets import Sections, bare_packets, xtf_packets
+from pipeline.readers.r2sonic_framing import Sections, bare_packets, xtf_packets
 from pipeline.readers.raw_file import opened
 from pipeline.readers.repeated_pings import RepeatedPings
 from pipeline.readers.row_filter import RowFilter
 from pipeline.readers.sounding_chunks import MAX_BEAMS, beam_numbers, checked_chunk, chunks_of_pings, per_sounding
 
 H0 = struct.Struct(">28xIII4xf20xf42xH")
-MIN_STEERING, MAX_STEERING = 1e-4, 0.6  # rad: 0.006°; 20° is possible at 200 kHz
+MIN_STEERING, MAX_STEERING = 1e-4, 0.6  # rad: 0.006° and 34°; 20° is possible at 200 kHz
 TWO_FLOATS = struct.Struct(">4xff")
 SCALE = struct.Struct(">4xf")
 A2_STEPS_OFFSET = 36
@@ -46,8 +47,8 @@ A2_STEPS_OFFSET = 36
 class R2sonicPing:
     """One packet's contents.
 
-    ``steps`` is None where angles are evenly spaced from ``first_rad`` to ``last_rad_or_scale``; else the latter is the
-    scale of the steps.
+    If ``steps`` is None, the angles are evenly spaced from ``first_rad`` to ``last_rad_or_scale``. Otherwise
+    ``last_rad_or_scale`` is the scale of ``steps``.
     """
 
     seconds: int
@@ -91,7 +92,7 @@ class R2sonicPart:
             )
 
     def _usable_pings(self, file: BinaryIO, dropped: Counter[str]) -> Iterator[R2sonicPing]:
-        """Yield the pings, each once; count damaged packets."""
+        """Yield each ping once; count repeated pings and damaged packets."""
         repeated = RepeatedPings()
         for sections in xtf_packets(file, dropped) if self.xtf else bare_packets(file, dropped):
             ping = decode_bth0(sections)
@@ -112,7 +113,7 @@ class R2sonicPart:
 
 
 def decode_bth0(sections: Sections) -> R2sonicPing | None:
-    """Return the contents of one packet; None where they contradict themselves."""
+    """Return the ping of one packet; None if the packet is damaged."""
     h0, r0, a0, a2 = (sections.get(name, b"") for name in (b"H0", b"R0", b"A0", b"A2"))
     if len(h0) < H0.size or len(r0) < SCALE.size:
         return None
@@ -142,7 +143,7 @@ def decode_bth0(sections: Sections) -> R2sonicPing | None:
     )
 
 
-@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+@np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
 def _chunk(pings: list[R2sonicPing], latency_s: float, dropped: Counter[str]) -> Chunk:
     counts = np.array([len(ping.ranges) for ping in pings])
     seconds = np.array([ping.seconds for ping in pings], dtype=np.int64)

@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 from pipeline.gps_time import NS
 
-ONE_PING_NS = 4_000_000  # sectors of one ping are sent within milliseconds, and have times of their own
+ONE_PING_NS = 4_000_000  # the sectors of one ping are sent within this time, and each has a time of its own
 
 
 def rate_hz(sensor: str, epochs_ns: NDArray[np.int64], records: int) -> float:
-    """Return a sensor's rate: median of INS records and pings, mean of laser points; NaN of fewer than two epochs.
+    """Return a sensor's rate: the median for INS records and pings, the mean for laser points.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def rate_hz(sensor: str, epochs_ns: NDArray[np.int64], records: int) -> float:
     Returns
     -------
     float
-        Hz.
+        Hz; NaN for fewer than two epochs.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Raw files as bytes: opening them, and reading at any place without holding them in memory."""
+"""Open raw files, and read their bytes at any place without loading a whole file into memory."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,7 +34,7 @@ def read_at(file: BinaryIO, offset: int, count: int) -> bytes:
 
 
 def find(file: BinaryIO, pattern: bytes, start: int) -> int:
-    """Find the first occurrence of a pattern, reading longer and longer blocks.
+    """Return the first place of a pattern; the file is read in blocks of growing length.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def find(file: BinaryIO, pattern: bytes, start: int) -> int:
     Returns
     -------
     int
-        Byte at or after ``start`` at which the pattern begins; -1 without one.
+        Byte at or after ``start`` at which the pattern begins; -1 if the file does not contain it.
     """
     count = 4096
     while True:

@@ -1,6 +1,7 @@
-"""Checks of every reader's rows: finite, possible, in order of time. Nothing is repaired.
+"""Checks of the rows of all readers: values must be finite and possible. Nothing is repaired.
 
-Rows that fail are left out and counted under a reason. Limits are those of instruments and water, not of a session.
+Rows that fail are left out and counted under a reason. The limits are those of instruments and water, and the same for
+all sessions.
 """
 
 from collections import Counter
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.gps_time import NS, WEEK_NS
 from pipeline.readers.row_filter import SIGMA_COLUMNS, Columns, Mask, RowFilter
 
-FIRST_WEEK, LAST_WEEK = 1000, 5000  # as in config.session: March 1999 to 2075
+FIRST_WEEK, LAST_WEEK = 1000, 5000  # as in config/recording.py: March 1999 to November 2075
 MAX_ANGLE_RAD = 1.2 * np.pi / 2
 MAX_TILT_RAD = np.pi / 4
 MIN_SPEED_M_S, MAX_SPEED_M_S = 1300.0, 1700.0
@@ -23,16 +24,17 @@ MAX_SIGMA = {"m": 10.0, "deg": 45.0}  # as in config
 
 
 def possible_week_time(week: NDArray[Any], seconds: NDArray[Any]) -> Mask:
-    """Return where GPS weeks and seconds of week are possible.
+    """Return a mask (n,): true for possible GPS weeks and seconds of week.
 
-    Weeks are limited as in session.yaml; seconds may run on beyond the end of their week, by one week at most.
+    The limits of weeks are those of session.yaml. Seconds may continue beyond the end of their week, by less than one
+    week.
     """
     good: Mask = (week >= FIRST_WEEK) & (week <= LAST_WEEK) & (seconds >= 0) & (seconds < 2 * WEEK_NS / NS)
     return good
 
 
 def possible_ns(t_ns: NDArray[np.int64]) -> Mask:
-    """Return where GPS times lie in a week that session.yaml accepts."""
+    """Return a mask (n,): true for GPS times in the weeks that session.yaml accepts."""
     good: Mask = (t_ns >= FIRST_WEEK * WEEK_NS) & (t_ns <= LAST_WEEK * WEEK_NS)
     return good
 
@@ -43,9 +45,9 @@ def latency_ns(latency_s: float) -> int:
 
 
 def keep_possible_poses(rows: RowFilter) -> None:
-    """Keep the INS rows with a position on the earth and angles of an attitude; bring azimuths into [0, 2 pi).
+    """Keep the INS rows with a possible position, height and attitude; bring azimuths into [0, 2 pi).
 
-    The column t_ns is not needed yet.
+    The rows need not have a column t_ns yet.
     """
     rows.keep_finite()
     latitude, longitude = rows["latitude_rad"], rows["longitude_rad"]
@@ -58,7 +60,7 @@ def keep_possible_poses(rows: RowFilter) -> None:
 
 
 def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dropped: Counter[str]) -> Columns:
-    """Return an INS's own accuracy as the columns SIGMA_COLUMNS; nothing where nothing is recorded.
+    """Return an INS's own sigmas as the columns SIGMA_COLUMNS; an empty dictionary if none are recorded.
 
     Parameters
     ----------
@@ -67,7 +69,7 @@ def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dr
     recorded
         Standard deviations (n,) by the names of SIGMA_COLUMNS; columns that are not recorded become NaN.
     dropped
-        Counts rows with an impossible sigma. Zero is no standard deviation.
+        Counts by reason, changed in place: rows with an impossible sigma, such as 0.
     """
     if not recorded or not len(t_ns):
         return {}
@@ -81,7 +83,7 @@ def sigma_rows(t_ns: NDArray[np.int64], recorded: Mapping[str, NDArray[Any]], dr
 
 
 def keep_possible_soundings(rows: RowFilter) -> None:
-    """Keep the soundings with a detection, and a travel time, angles and a sound speed that are possible."""
+    """Keep the soundings that have a detection and a possible travel time, possible angles and sound speed."""
     rows.keep_finite()
     speed = rows["sound_speed_m_s"]
     rows.keep((speed >= MIN_SPEED_M_S) & (speed <= MAX_SPEED_M_S), "impossible sound speed")

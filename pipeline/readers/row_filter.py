@@ -1,4 +1,4 @@
-"""Rows of every reader: their canonical columns; a filter that counts what it leaves out; the order of times."""
+"""Rows of all readers: canonical columns, a filter that counts the rows left out, a filter for the order of times."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -27,18 +27,18 @@ def chunk(
     dropped: Counter[str],
     sigmas: Mapping[str, NDArray[Any]] | None = None,
 ) -> Chunk:
-    """Return a chunk with exactly the canonical columns and types, and empty ``dropped`` into it.
+    """Return a chunk with exactly the canonical columns and types, and move the counts of ``dropped`` into it.
 
     Parameters
     ----------
     columns
-        Arrays (n,) by name; further ones are left out.
+        Arrays (n,) by name; names that are not canonical are ignored.
     names
         The canonical columns: INS_COLUMNS, LASER_COLUMNS or MBES_COLUMNS.
     dropped
-        Counts of what was left out, by reason; empty afterwards.
+        Counts of rows left out, by reason; empty afterwards.
     sigmas
-        The INS's own accuracy: SIGMA_COLUMNS, at times of their own.
+        The INS's own sigmas: SIGMA_COLUMNS, with times of their own.
     """
     typed = {name: np.ascontiguousarray(columns[name], dtype=TYPES.get(name, np.float64)) for name in names}
     counts = {reason: number for reason, number in dropped.items() if number}
@@ -47,13 +47,13 @@ def chunk(
 
 
 def no_rows(names: tuple[str, ...], dropped: Counter[str]) -> Chunk:
-    """Return a chunk without rows, for the counts of what was left out."""
+    """Return a chunk without rows, with only the counts of rows left out."""
     return chunk({name: np.empty(0) for name in names}, names, dropped)
 
 
 @dataclass
 class RowFilter:
-    """Equally long columns that lose rows, test by test; each test's losses are counted under its reason."""
+    """Columns of equal length. Each test removes rows from them, and counts these rows under its reason."""
 
     columns: Columns
     dropped: Counter[str]
@@ -82,7 +82,7 @@ class RowFilter:
 
 @dataclass
 class TimeOrder:
-    """Keeps the INS records of one file in ascending order of time; records that step back are left out and counted."""
+    """A filter for the INS records of one file; records that do not ascend in time are left out and counted."""
 
     name: str
     last_ns: int = field(default=np.iinfo(np.int64).min)
@@ -90,7 +90,7 @@ class TimeOrder:
     backwards: int = 0
 
     def keep(self, rows: RowFilter) -> None:
-        """Keep the rows that are later than all rows before, in this batch and the ones before it."""
+        """Keep the rows with a later time than all preceding rows of the file (in this batch and earlier batches)."""
         t_ns = rows["t_ns"]
         latest = np.maximum.accumulate(np.concatenate([[self.last_ns], t_ns]))
         earlier = t_ns < latest[:-1]
@@ -102,7 +102,7 @@ class TimeOrder:
         rows.keep(later[later | earlier], "time running backwards")
 
     def check(self) -> None:
-        """Raise RawDataError where more than MAX_BACKWARDS_SHARE of the records run backwards."""
+        """Raise RawDataError if the time runs backwards in more than MAX_BACKWARDS_SHARE of the records."""
         if self.backwards > MAX_BACKWARDS_SHARE * self.records:
             raise RawDataError(
                 f"{self.name}: time runs backwards in {self.backwards} of {self.records} records; "

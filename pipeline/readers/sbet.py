@@ -1,12 +1,13 @@
-"""SBET, the smoothed trajectory of Applanix POSPac and others: 17 little-endian doubles a record, no header.
+"""SBET, the smoothed trajectory of Applanix POSPac and others: 17 little-endian doubles per record, no header.
 
-Time (GPS seconds of week), latitude, longitude [rad], ellipsoidal height [m], velocity x, y, z (wander frame) [m/s],
-roll, pitch, platform heading, wander angle [rad], acceleration x, y, z [m/s2], angular rate x, y, z [rad/s]; body axes
-forward, right, down. True heading = platform heading - wander. The week is not in the file: ``ins.gps_week``.
+A record has time (GPS seconds of week), latitude, longitude [rad], ellipsoidal height [m], velocity x, y, z (wander
+frame) [m/s], roll, pitch, platform heading, wander angle [rad], acceleration x, y, z [m/s2], angular rate x, y, z
+[rad/s]. The body axes are forward, right, down. True heading = platform heading - wander angle. The file does not hold
+the week; ``ins.gps_week`` does.
 
-A file whose length is no multiple of 136 bytes is used where fewer than 8 bytes are left over (less than one number: a
-line end or the like that a program put behind the last whole record). Where more are left over, the last record was cut
-off and the copy is not complete: such a file is refused, not used in part.
+If fewer than 8 bytes follow the last whole record of 136 bytes, the file is used: they are less than one number, such
+as a line end that a program added. If more bytes follow, the last record was cut off and the copy is not complete. The
+whole file is then refused.
 """
 
 from collections import Counter
@@ -59,12 +60,12 @@ class SbetPart:
 
 
 def stray_bytes(size: int, name: str) -> int:
-    """Return the number of bytes behind the last whole record of a file of ``size`` bytes.
+    """Return the number of bytes after the last whole record of a file of ``size`` bytes.
 
     Raises
     ------
     RawDataError
-        There are 8 or more, the beginning of a record that was cut off.
+        There are 8 bytes or more: the last record was cut off.
     """
     stray = size % SBET_RECORD
     if stray >= 8:
@@ -76,7 +77,7 @@ def stray_bytes(size: int, name: str) -> int:
 
 
 def check_size(path: Path, name: str) -> None:
-    """Refuse a file whose last record was cut off, by a RawDataError."""
+    """Raise RawDataError if the file's last record was cut off."""
     with opened(path, name) as file:
         stray_bytes(size_of(file), name)
 
@@ -87,18 +88,18 @@ def first_seconds(path: Path, name: str) -> float:
         return float(np.frombuffer(file.read(8).ljust(8, b"\0"), "<f8")[0])
 
 
-@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+@np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
 def running_weeks(seconds: NDArray[np.float64], week: int, last: float) -> tuple[NDArray[np.int64], int, float]:
-    """Return the week of each record, which grows by one where the seconds step back by about a week.
+    """Return the weeks of records; the week grows by one where the seconds of week step back by about a week.
 
     Parameters
     ----------
     seconds : (n,) array
         Seconds of week, n > 0.
     week : int
-        Week of the record before.
+        Week of the preceding record, or of the first record if there is no preceding one.
     last : float
-        Its seconds of week; not finite: there is none.
+        Seconds of week of the preceding record; not finite: there is none.
 
     Returns
     -------
@@ -106,7 +107,7 @@ def running_weeks(seconds: NDArray[np.float64], week: int, last: float) -> tuple
     week : int
         Week of the last record.
     last : float
-        Its seconds of week.
+        Seconds of week of the last record.
     """
     steps = np.diff(seconds, prepend=last if np.isfinite(last) else seconds[0])
     rollover = (steps < -0.9 * WEEK_S) & (steps > -1.1 * WEEK_S)
@@ -114,7 +115,7 @@ def running_weeks(seconds: NDArray[np.float64], week: int, last: float) -> tuple
     return weeks, int(weeks[-1]), float(seconds[-1])
 
 
-@np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+@np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
 def _chunk(
     records: NDArray[np.float64], weeks: NDArray[np.int64], order: TimeOrder, latency_s: float, dropped: Counter[str]
 ) -> Chunk:

@@ -1,4 +1,4 @@
-"""The files that the patterns of session.yaml name, inside the session folder."""
+"""The files in the session folder that match the patterns of session.yaml."""
 
 import os
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from pipeline.errors import ConfigError, RawDataError
 
 @dataclass(frozen=True, order=True)
 class SessionFile:
-    """A raw file: its path in the session folder, with / between the parts, and where it lies on this machine."""
+    """A raw file: its path in the session folder (with / as separator), and its full path."""
 
     name: str
     path: Path
@@ -25,14 +25,16 @@ def files_matching(folder: Path, patterns: Sequence[str], key: str) -> list[Sess
     folder
         The session folder.
     patterns
-        Glob patterns relative to it; a file that links to another of the files counts once, under the first name.
+        Glob patterns relative to the folder. A file that matches under several names (links) counts once, under the
+        first of them.
     key
         The key of session.yaml that holds the patterns, for the messages.
 
     Raises
     ------
     RawDataError
-        The folder is gone, a pattern matches no file, or a file lies outside the folder by way of a symbolic link.
+        The folder does not exist or cannot be read, a pattern matches no file, or a symbolic link leads to a file
+        outside the folder.
     ConfigError
         A pattern is not valid.
     """
@@ -69,7 +71,7 @@ def _matches(folder: Path, pattern: str, key: str) -> list[tuple[Path, Path]]:
 
 
 def _refuse_unreadable_folders(folder: Path, pattern: str) -> None:
-    """Raise OSError for a folder that may not be read: glob passes over it, and so over its files."""
+    """Raise OSError for a folder that the user may not read; glob skips its files without an error."""
     parts = PurePosixPath(pattern).parts
     literal_parts = list(takewhile(lambda part: not set(part) & set("*?["), parts[:-1]))
 

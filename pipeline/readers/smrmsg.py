@@ -1,7 +1,8 @@
 """SMRMSG, the accuracy file that POSPac and others write beside an SBET: 10 little-endian doubles a record, no header.
 
-Time (GPS seconds of week), RMS of position north, east, down [m], of velocity north, east, down [m/s], of roll, pitch,
-heading [arc-minutes]. The file holds no week: the one nearest to the SBET's is taken.
+A record has time (GPS seconds of week), and the RMS of position north, east, down [m], of velocity north, east, down
+[m/s], and of roll, pitch, heading [arc-minutes]. The file does not hold the week. It gets the week that brings its
+beginning nearest to that of the SBET.
 """
 
 from collections import Counter
@@ -20,7 +21,7 @@ from pipeline.readers.sbet import running_weeks
 _RECORD_BYTES = 10 * 8
 _ROWS = 65_536  # read at a time
 _COLUMNS = ("north_m", "east_m", "up_m", "roll_deg", "pitch_deg", "heading_deg")
-_PLACES = (1, 2, 3, 7, 8, 9)  # of these columns in a record
+_PLACES = (1, 2, 3, 7, 8, 9)  # places of these columns in a record
 _SCALES = (1.0, 1.0, 1.0, 1 / 60, 1 / 60, 1 / 60)
 
 

@@ -1,4 +1,4 @@
-"""Gather a sonar's pings into chunks of soundings of bounded size, and check their rows."""
+"""Gather a sonar's pings into chunks of soundings of limited size, and check their rows."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,10 +12,10 @@ from pipeline.errors import RawDataError
 from pipeline.readers.row_checks import keep_possible_soundings, latency_ns, possible_ns
 from pipeline.readers.row_filter import MBES_COLUMNS, RowFilter, chunk, no_rows
 
-CHUNK_SOUNDINGS = 131_072  # a chunk has at least so many, and at most one ping more
-CHUNK_PINGS = 8_192
-MAX_BEAMS = np.iinfo(np.int16).max  # of a ping: the type of the column beam
-NO_TILT_DEG = 0.005  # a sector is not tilted if its tilt is no larger
+CHUNK_SOUNDINGS = 131_072  # a chunk ends with the ping that reaches this number,
+CHUNK_PINGS = 8_192  # or this number of pings
+MAX_BEAMS = np.iinfo(np.int16).max  # most beams of a ping; column beam has this type
+NO_TILT_DEG = 0.005  # a sector with this tilt or less counts as not tilted
 PingT = TypeVar("PingT")
 
 
@@ -25,18 +25,18 @@ def chunks_of_pings(
     chunk_of: Callable[[list[PingT]], Chunk],
     dropped: Counter[str],
 ) -> Iterator[Chunk]:
-    """Yield chunks of pings, and at the end a chunk without rows if something was left out after the last ping.
+    """Yield chunks of pings, and at the end a chunk without rows if ``dropped`` still has counts.
 
     Parameters
     ----------
     pings
-        A file's pings, which are taken one by one.
+        A file's pings, which are read one by one.
     n_soundings
-        Returns the number of a ping's soundings.
+        Function that returns the number of a ping's soundings.
     chunk_of
-        Makes a chunk of successive pings, and empties ``dropped`` into it.
+        Function that makes a chunk of successive pings, and moves the counts of ``dropped`` into it.
     dropped
-        Counts of what was left out so far, by reason.
+        Counts of rows left out so far, by reason.
     """
     group: list[PingT] = []
     soundings = 0
@@ -53,7 +53,7 @@ def chunks_of_pings(
 
 
 def single_beam_error(name: str) -> RawDataError:
-    """Return the refusal of a file whose pings are of one beam."""
+    """Return the error for a file whose pings have one beam."""
     return RawDataError(
         f"{name}: its pings are of one beam (a single-beam echo sounder), which sees no planes; give the "
         "files of a multibeam sonar"
@@ -61,17 +61,17 @@ def single_beam_error(name: str) -> RawDataError:
 
 
 def per_sounding(values: Sequence[Any] | NDArray[Any], counts: NDArray[np.int64], dtype: Any) -> NDArray[Any]:
-    """Return values of pings (n,), each repeated for the ping's ``counts`` soundings."""
+    """Return one value per sounding: each ping's value (n,), repeated ``counts`` (n,) times."""
     return np.repeat(np.asarray(values, dtype=dtype), counts)
 
 
 def beam_numbers(counts: NDArray[np.int64]) -> NDArray[np.int16]:
-    """Return the numbers of beams from 0 in each ping, for pings of ``counts`` soundings."""
+    """Return one beam number per sounding, from 0 in each ping; ``counts`` (n,): numbers of the pings' soundings."""
     return np.concatenate([np.arange(count, dtype=np.int16) for count in counts])
 
 
 def checked_chunk(rows: RowFilter, latency_s: float) -> Chunk:
-    """Return a chunk of the possible soundings, with the latency taken off their times."""
+    """Return a chunk of the possible soundings, with the latency subtracted from their times."""
     rows.keep(possible_ns(rows["t_ns"]), "impossible time (clock not set)")
     keep_possible_soundings(rows)
     rows.columns["t_ns"] = rows["t_ns"] - latency_ns(latency_s)

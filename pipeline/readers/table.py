@@ -1,9 +1,9 @@
-"""Tables, CSV or Parquet, for instruments whose own format is not read: from a table's columns to canonical ones.
+"""Tables (CSV or Parquet) of instruments whose own format is not read: their columns become canonical columns.
 
-:mod:`pipeline.readers.table_files` reads the columns that :mod:`pipeline.readers.table_columns` asks for.
+:mod:`pipeline.readers.table_files` reads the columns that :mod:`pipeline.readers.table_columns` chooses.
 
-Columns by name (others are ignored; in CSV the first line that does not begin with # or // names them; separated by
-comma, semicolon or tab; numbers with a decimal point):
+In CSV the first line that is not empty, and does not begin with # or //, names the columns. Comma, semicolon or tab
+separates them. Numbers have a decimal point. The columns are these; others are ignored:
 
     every sensor  gps_ns                            nanoseconds since 1980-01-06 00:00:00 GPS, whole number; or
                   gps_week, seconds_of_week         GPS week (not modulo 1024) and seconds of week
@@ -13,8 +13,8 @@ comma, semicolon or tab; numbers with a decimal point):
     mbes          ping, beam, angle_deg (starboard +), sound_speed_m_s, and two_way_time_s or range_m (one way);
                   transmit_tilt_deg (along track, forward +) where the transmit fan is tilted: 0 without the column
 
-A CSV row of the wrong number of columns, and a last line without line end (it may be cut off), are left out and
-counted. A file with a word where a number should be is refused, as are times and positions that were stored as float32.
+A CSV row with another number of columns, and a last line without line end (it may be cut off), are left out and
+counted. A file is refused if it has a word in place of a number, or times or positions that were stored as float32.
 """
 
 from collections import Counter
@@ -48,7 +48,7 @@ _CANONICAL = {"ins": INS_COLUMNS, "laser": LASER_COLUMNS, "mbes": MBES_COLUMNS}
 
 @dataclass(frozen=True)
 class TablePart:
-    """One table."""
+    """One CSV or Parquet file."""
 
     path: Path
     name: str
@@ -74,7 +74,7 @@ class TablePart:
                 yield no_rows(canonical, dropped)
         order.check()
 
-    @np.errstate(all="ignore")  # damaged numbers are counted, not warned of
+    @np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
     def _chunk(self, columns: dict[str, NDArray[Any]], order: TimeOrder, dropped: Counter[str]) -> Chunk:
         rows = RowFilter(columns, dropped)
         _keep_possible_times(rows, self.latency_s)
@@ -102,7 +102,7 @@ def _numpy(batch: pa.RecordBatch, dropped: Counter[str]) -> dict[str, NDArray[An
 
 
 def _keep_possible_times(rows: RowFilter, latency_s: float) -> None:
-    """Add column t_ns, less the latency, and leave out rows at impossible times."""
+    """Add column t_ns with the latency subtracted, and leave out rows with impossible times."""
     for column in WHOLE_NUMBERS:
         if column in rows.columns and rows[column].dtype.kind == "f":
             rows.keep(np.isfinite(rows[column]) & (np.abs(rows[column]) < 1e15), "not a whole number")

@@ -1,4 +1,4 @@
-"""The columns of a sensor's table: names that are needed, names that are used, and the header line of a CSV file.
+"""The columns of a sensor's table: needed names, optional names, and the header line of a CSV file.
 
 :mod:`pipeline.readers.table` says what each column means.
 """
@@ -11,9 +11,9 @@ TableSensor = Literal["ins", "laser", "mbes"]
 INS_TABLE_COLUMNS = ("latitude_deg", "longitude_deg", "height_m", "roll_deg", "pitch_deg", "heading_deg")
 MBES_TABLE_COLUMNS = ("ping", "beam", "angle_deg", "sound_speed_m_s")
 WHOLE_NUMBERS = ("gps_ns", "gps_week", "ping", "beam")
-FLOAT64_ONLY = ("gps_ns", "seconds_of_week", "latitude_deg", "longitude_deg")  # useless as float32
+FLOAT64_ONLY = ("gps_ns", "seconds_of_week", "latitude_deg", "longitude_deg")  # refused as float32
 _TIME_ALTERNATIVES = (("gps_ns",), ("gps_week", "seconds_of_week"))
-_NEEDED = {  # alternatives by sensor, beside the time
+_NEEDED = {  # by sensor: alternative sets of columns, beside the time
     "ins": (INS_TABLE_COLUMNS,),
     "laser": (("x_m", "y_m", "z_m"),),
     "mbes": ((*MBES_TABLE_COLUMNS, "two_way_time_s"), (*MBES_TABLE_COLUMNS, "range_m")),
@@ -28,7 +28,7 @@ _SEPARATORS = (",", ";", "\t")
 
 
 def csv_header(line: str) -> tuple[str, list[str]] | None:
-    """Return separator and column names of a CSV's first line; None without a known name."""
+    """Return separator and column names from a CSV file's header line; None without two names, one of them known."""
     for separator in _SEPARATORS:
         names = [name.strip().strip('"').lower() for name in line.strip().split(separator)]
         if _KNOWN.intersection(names) and (len(names) > 1):
@@ -46,12 +46,12 @@ def choose_columns(names: list[str], name: str, sensor: TableSensor) -> list[str
     name : str
         The file's path in the session folder, for messages.
     sensor : TableSensor
-        Whose table it is.
+        The sensor of the table.
 
     Raises
     ------
     RawDataError
-        A column that is needed is missing, or one of those to read is there twice.
+        A needed column is missing, or a column to read stands twice.
     """
     chosen: list[str] = []
     for alternatives in (_TIME_ALTERNATIVES, _NEEDED[sensor]):

@@ -29,9 +29,9 @@ def record_batches(
     name : str
         Its path in the session folder, for messages.
     sensor : TableSensor
-        Whose table it is.
+        The sensor of the table.
     dropped : Counter
-        Counts of rows that are left out, by reason; added to.
+        Counts of rows that are left out, by reason; changed in place.
     max_records : int or None
         ``max_records`` of session.yaml.
 
@@ -43,7 +43,7 @@ def record_batches(
     Raises
     ------
     RawDataError
-        The file is no such table, or lacks a column.
+        The file cannot be read as a table, lacks a column, has a column of the wrong type, or claims too many rows.
     """
     is_parquet = read_at(file, 0, 4) == b"PAR1"
     size = size_of(file)
@@ -55,12 +55,12 @@ def record_batches(
         yield from _parquet(file, name, sensor, refuse) if is_parquet else _csv(file, name, sensor, dropped)
     except (pa.ArrowException, ValueError, OverflowError) as error:
         reason = str(error).split("\n")[0]
-        reason = reason if len(reason) <= 200 else f"{reason[:200]}..."  # it may quote whole cells
+        reason = reason if len(reason) <= 200 else f"{reason[:200]}..."  # the error may quote whole cells
         raise RawDataError(f"{name}: cannot be read as a table ({reason}); check or export it again") from error
 
 
 def _parquet(file: BinaryIO, name: str, sensor: TableSensor, refuse: Callable[[int], None]) -> Iterator[pa.RecordBatch]:
-    """Yield the columns of a Parquet file; ``refuse`` raises where a number of rows is more than can be."""
+    """Yield the needed columns of a Parquet file; ``refuse`` raises if the claimed number of rows is too large."""
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(file) as table:
@@ -81,7 +81,7 @@ def _parquet(file: BinaryIO, name: str, sensor: TableSensor, refuse: Callable[[i
 
 
 class _WholeLines(io.RawIOBase):
-    """A CSV file up to its last line end, with the methods that pyarrow needs."""
+    """The bytes ``start`` to ``stop`` of a CSV file as a file, with the methods that pyarrow needs."""
 
     def __init__(self, file: BinaryIO, start: int, stop: int) -> None:
         self.file, self.left = file, stop - start
@@ -132,7 +132,7 @@ def _csv(file: BinaryIO, name: str, sensor: TableSensor, dropped: Counter[str]) 
 
 
 def _last_line_end(file: BinaryIO, size: int) -> int:
-    """Return the byte behind the last line end; where the last MAX_LINE bytes hold none, the file's size."""
+    """Return the byte after the last line end; the file's size if the last MAX_LINE bytes have no line end."""
     before = max(size - MAX_LINE, 0)
     tail = read_at(file, before, MAX_LINE)
     return before + tail.rfind(b"\n") + 1 if b"\n" in tail else size

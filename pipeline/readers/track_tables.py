@@ -1,4 +1,4 @@
-"""Tables of the boat's track, from the INS records: the pool frame and the passes."""
+"""Tables that follow from the boat's track (INS records): the pool frame and the passes."""
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from pipeline.maths.geometry.passes import estimate_azimuth, find_passes, pass_o
 
 
 def pool_frame_table(trajectory: pd.DataFrame, target: TargetPlace) -> tuple[pd.DataFrame, PoolFrame]:
-    """Return the table ``pool_frame`` and the frame; the azimuth is estimated where the settings give none.
+    """Return the table ``pool_frame`` and the frame; without an azimuth in the settings it is estimated from the track.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def pool_frame_table(trajectory: pd.DataFrame, target: TargetPlace) -> tuple[pd.
     Raises
     ------
     RawDataError
-        There is no azimuth, and none can be estimated.
+        The settings have no azimuth, and none can be estimated.
     """
     origin = target.origin
     place = (np.radians(origin.latitude_deg), np.radians(origin.longitude_deg), origin.height_m)
@@ -97,7 +97,7 @@ def passes_table(
 def _pass_row(
     interval: tuple[int, int], points_pool_m: NDArray[np.float64], azimuth_rad: NDArray[np.float64]
 ) -> dict[str, float]:
-    """Return length, speed, heading and distance of the pass whose INS records are these (n may be 0)."""
+    """Return a pass's row of the table ``passes``, without its number, from its INS records (n, which may be 0)."""
     start, end = interval
     seconds = (end - start) / NS
     length, mean, swing, distance = (np.nan,) * 4

@@ -1,7 +1,7 @@
-"""Files of kinds that are not read: how to recognise them, and what to export in their place.
+"""Kinds of files that are not read: how they are recognised, and what the user should export in their place.
 
-Marks at a fixed place are those of the formats' documents or of public readers. A kind with a short mark, or none, is
-recognised by the shape of its first record (:mod:`pipeline.readers.unread_records`).
+Marks at a fixed place are taken from the formats' documents or from public readers. A kind with a short mark, or with
+none, is recognised by the shape of its first record (:mod:`pipeline.readers.unread_records`).
 """
 
 import re
@@ -28,7 +28,7 @@ PROCESS_GNSS = (
 
 
 def _recorded(title: str) -> FileKind:
-    """Return a kind of file that may hold each sensor's data."""
+    """Return a kind of file that may hold the data of any sensor."""
     return FileKind(
         title, advice="export each sensor's data in a format that README.md names", advice_by_sensor=EXPORT_BY_SENSOR
     )
@@ -100,17 +100,17 @@ _MARKS: tuple[tuple[int, bytes, FileKind], ...] = (
 
 
 def kind_by_mark(head: bytes) -> FileKind | None:
-    """Return the kind whose mark the file has; no other file begins with one of these marks."""
+    """Return the kind whose mark the file has; None without a mark. Files of other kinds do not have these marks."""
     return next((kind for at, magic, kind in _MARKS if head[at : at + len(magic)] == magic), None)
 
 
 def kind_by_first_record(head: bytes, size: int) -> FileKind | None:
-    """Return the kind that the first record of a binary file of ``size`` bytes has the shape of."""
+    """Return the kind of a binary file of ``size`` bytes by the shape of its first record; None if no shape fits."""
     return next((kind for has_shape, kind in _SHAPES if has_shape(head, size)), None)
 
 
 def kind_of_text(head: str) -> FileKind | None:
-    """Return the kind of a text, by its first lines."""
+    """Return the kind of a text by its first lines; None if no kind fits."""
     lines = [line.rstrip() for line in head.splitlines()]
     first = lines[0] if lines else ""
     if first[60:].strip() in ("RINEX VERSION / TYPE", "CRINEX VERS   / TYPE"):
@@ -127,7 +127,7 @@ _SENTENCE = re.compile(r"[$!]([A-Z]{2}[A-Z0-9]{3,},[^*$]*)\*([0-9A-Fa-f]{2})")
 
 
 def _is_sentence(line: str) -> bool:
-    """Return whether NMEA 0183 is in the line: talker and sentence, fields, and the exclusive or of their letters."""
+    """Return whether the line has an NMEA 0183 sentence: talker and type, fields, and their correct exclusive or."""
     sentence = _SENTENCE.search(line)
     if sentence is None or not sentence[1].isascii():
         return False

@@ -1,12 +1,12 @@
-"""Recognise files that are not read by their first record.
+"""Recognise formats that are not read, each by the first record of the file.
 
-Other files may begin with a mark of two or three bytes by chance. Such a mark therefore counts only where its record is
-whole: the length leads to the end mark, to a correct checksum, or to the next record. Each function takes the beginning
-of a file and the file's size in bytes. Little-endian:
+Other files may begin with a mark of two or three bytes by chance. Therefore a short mark counts only if its record is
+whole: the length leads to the end mark, to a correct checksum, or to the next record. Each function has the parameters
+``head``, the beginning of a file, and ``size``, the file's size in bytes. The layouts are (little-endian):
 
     .s7k                   u16 version, u16 offset 60, u32 0x0000FFFF, u32 size, ..., at byte 32 u32 type of record
-    EdgeTech .jsf          u16 0x1601, u8 version, u8 session, u16 type, 4 u8, u16, u32 bytes that follow
-    Applanix POS           $GRP or $MSG, u16 number, u16 bytes that follow, the last two $#
+    EdgeTech .jsf          u16 0x1601, u8 version, u8 session, u16 type, 4 u8, u16, u32 count of bytes that follow
+    Applanix POS           $GRP or $MSG, u16 number, u16 count of bytes that follow, the last two $#
     SBG                    FF 5A, u8 message, u8 class, u16 length, data, u16 checksum, 33
     Septentrio SBF         $@, u16 checksum, u16 number, u16 length of all, a multiple of 4
     u-blox UBX             B5 62, u8 class, u8 number, u16 length, data, two sums of the bytes from the class on
@@ -43,7 +43,7 @@ def is_jsf(head: bytes, size: int) -> bool:
 
 
 def _follows(head: bytes, size: int, end: int) -> bool:
-    """Return whether at ``end`` the next record begins with the first one's mark, or the file ends, or ``head``."""
+    """Return whether ``end`` is in the file and, if ``head`` reaches it, the next record begins there with the mark."""
     return end <= size and (end >= len(head) or head[end : end + 2] == head[:2])
 
 
@@ -91,7 +91,7 @@ def is_gsof(head: bytes, size: int) -> bool:
     return head[end : end + 2] == bytes((sum(head[1:end]) & 0xFF, 3))
 
 
-@np.errstate(all="ignore")  # whatever the bytes are as numbers
+@np.errstate(all="ignore")  # any bytes may be read as numbers
 def is_pof(head: bytes, size: int) -> bool:
     """Return whether the file is a trajectory of RIEGL (.pof)."""
     if len(head) < 97:
@@ -105,7 +105,7 @@ def is_pof(head: bytes, size: int) -> bool:
 
 @np.errstate(all="ignore")
 def is_poq(head: bytes, size: int) -> bool:
-    """Return whether the file is a file of a trajectory's accuracies of RIEGL (.poq)."""
+    """Return whether the file holds the accuracies of a RIEGL trajectory (.poq)."""
     if len(head) < 63:
         return False
     major, minor, mean, greatest, scatter = struct.unpack_from("<2H3d", head, 35)

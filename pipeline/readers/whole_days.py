@@ -1,6 +1,6 @@
-"""Clocks of sensors that lie whole days apart.
+"""Differences of whole days between the clocks of sensors.
 
-An INS export may have seconds of the day where those of the week should be.
+One cause is an INS export with seconds of the day in place of seconds of the week.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ DAY_NS = 86_400 * NS
 
 @dataclass(frozen=True)
 class WholeDays:
-    """How a sensor's clock stands to the INS's."""
+    """The difference of a sensor's clock from the INS's clock, in whole days."""
 
     amount: str  # such as "3 days"
     ahead: bool  # the sensor's clock is ahead of the INS's
@@ -24,19 +24,19 @@ class WholeDays:
 def whole_days_apart(
     ins: tuple[int, int], sensor: tuple[int, int], fits: Callable[[int], bool]
 ) -> WholeDays | None:
-    """Find the whole days, fewer than a week, by which a sensor's times must move to meet those of the INS.
+    """Find the whole number of days, fewer than seven, by which a sensor's times must be shifted to fit the INS's.
 
     Parameters
     ----------
     ins, sensor : tuple of two ints
         First and last time, GPS ns.
     fits : callable
-        Tells whether the sensor's times less an offset (ns) lie within those of the INS.
+        Function that returns whether the sensor's times minus an offset (ns) fit those of the INS.
 
     Returns
     -------
     WholeDays or None
-        None where no whole number of days makes them fit.
+        None: no whole number of days makes them fit.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""Finished runs for people: comparison, history, screen and pages."""
+"""Finished runs for people: their difference, their history, text for the screen, and pages."""

@@ -1,4 +1,4 @@
-"""A finished run as it was written, to be compared with others."""
+"""A finished run, read from its folder to be compared with others."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -43,14 +43,14 @@ class FinishedRun:
             estimate_of(result)
             for name in ("inputs", "software"):
                 manifest.flattened(result[name])
-            summary(result)  # with --rrd
+            summary(result)  # --rrd shows it
         return cls(path, read_settings(path), result, manifests)
 
 
 def estimate_of(result: Mapping[str, Any]) -> MountEstimate | None:
     """Return the adjustment's estimate of the mount, from the content of calibration.json; None if it has none.
 
-    The patent's methods have no covariance to test with.
+    The estimates of the patent's methods have no covariance, and cannot be tested.
     """
     block = result["methods"]["adjustment"]
     if block["covariance"] is None or block["mount"] is None:

@@ -1,7 +1,7 @@
-"""All sessions of one boat in one table: whether the mount has moved, and when.
+"""All sessions of one boat in one table, which shows whether and when the mount has moved.
 
-Each accepted session is compared with the accepted one before it by the joint test of :mod:`pipeline.maths.comparison`.
-Rejected sessions are shown, never compared.
+Each accepted session is compared with the accepted session before it, by the joint test of
+:mod:`pipeline.maths.comparison`. Rejected sessions are listed, but not compared.
 """
 
 import fnmatch
@@ -30,21 +30,21 @@ TEXT_COLUMNS = ("date_utc", "session", "run", "verdict", "moved")
 
 @dataclass(frozen=True)
 class SessionFilter:
-    """Sessions to show: a pattern of their names, and the first and last day of their first pass, UTC."""
+    """A filter of sessions: a pattern of the name, and the first and last day (UTC) on which a session may begin."""
 
     name: str = "*"
     since: date | None = None
     until: date | None = None
 
     def takes(self, session: str, day: str) -> bool:
-        """Whether a session of this name and day (YYYY-MM-DD) is shown."""
+        """Return whether a session of this name and day (YYYY-MM-DD) is shown."""
         inside = (self.since is None or day >= self.since.isoformat()) and (
             self.until is None or day <= self.until.isoformat()
         )
         return inside and fnmatch.fnmatchcase(session.casefold(), self.name.casefold())
 
     def words(self) -> str:
-        """Return the filter in words; nothing where all sessions are shown."""
+        """Return the filter in words; an empty text if all sessions are shown."""
         words = [f"name {self.name}"] if self.name != "*" else []
         words += [f"since {self.since}"] if self.since else []
         return ", ".join([*words, *([f"until {self.until}"] if self.until else [])])
@@ -57,11 +57,11 @@ class History:
     Attributes
     ----------
     table
-        One row a session in order of time.
+        One row for each session, in order of time.
     unreadable
-        Runs that could not be read, with the reason.
+        Texts, one for each run that could not be read, with the reason.
     lasers
-        Runs that calibrate a laser, which has a mount of its own.
+        Runs that calibrate a laser. They are not in the table, which has the sonar's mounts.
     """
 
     table: pd.DataFrame
@@ -70,13 +70,13 @@ class History:
 
     @property
     def not_shown(self) -> str:
-        """The runs that are not shown because they calibrate a laser, in words."""
+        """The text that lists the runs left out because they calibrate a laser; empty without such runs."""
         number = len(self.lasers)
         return f"{plural(number, 'laser run')} not shown: {', '.join(self.lasers)}" if number else ""
 
 
 def read_history(folder: Path, chosen: SessionFilter) -> History:
-    """Return the history of every run in ``folder``, up to two levels deep, that ``chosen`` takes."""
+    """Return the history of the runs in ``folder``, up to two levels deep, that pass the filter ``chosen``."""
     if not folder.is_dir():
         raise ConfigError(f"{folder}: is no folder; RUNS_DIR is the folder that holds run folders")
     sessions, unreadable, lasers = [], [], []
@@ -107,7 +107,7 @@ def read_history(folder: Path, chosen: SessionFilter) -> History:
 
 
 def _runs_in(folder: Path) -> tuple[list[Path], list[Path]]:
-    """Return run folders up to two levels deep: those with a result, and those without one that can be read."""
+    """Return two lists of run folders, up to two levels deep: folders with a result, folders without a readable one."""
     finished, begun = set(), set()
     for depth in ("*", "*/*"):
         finished |= {path.parent.parent for path in folder.glob(f"{depth}/report/{CALIBRATION_JSON.name}")}
@@ -133,7 +133,7 @@ def _columns() -> Iterator[str]:
 
 
 def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a session's row: the adjustment's values and sigmas, whichever method its result is; NaN for none."""
+    """Return a session's row: values and sigmas of the adjustment, whatever method gave the result; NaN if none."""
     block = result["methods"]["adjustment"]
     nothing = dict.fromkeys(SETTINGS, np.nan)
     mount, sigma = (block[name] or nothing for name in ("mount", "sigma_mount"))
@@ -152,7 +152,7 @@ def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _checked_time(text: str) -> str:
-    """Return the text if it is a date and time as poolcal writes them; else raise ValueError."""
+    """Return ``text`` if it is a date and time in poolcal's format; otherwise raise ValueError."""
     if not fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z", text):
         raise ValueError(f"{text!r} is no date and time")
     datetime.fromisoformat(text)
@@ -160,7 +160,7 @@ def _checked_time(text: str) -> str:
 
 
 def _with_jumps(sessions: list[tuple[dict[str, Any], MountEstimate | None]]) -> Iterator[dict[str, Any]]:
-    """Yield the rows, each accepted one tested against the accepted one before it."""
+    """Yield the rows. Each accepted session is tested against the accepted session before it."""
     before: MountEstimate | None = None
     for row, now in sessions:
         if row["verdict"] == "accepted" and now is not None:

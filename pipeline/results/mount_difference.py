@@ -1,4 +1,4 @@
-"""The difference of two runs' mounts, its tests, and the answer in a sentence."""
+"""The difference of the mounts of two runs, its tests, and the answer in one sentence."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,15 +10,15 @@ from pipeline.maths.comparison import compare_estimates
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.results.finished_run import FinishedRun, estimate_of
 
-SIGNIFICANCE = 0.01  # level of the joint test: the share of false alarms where nothing has moved
+SIGNIFICANCE = 0.01  # level of the joint test: the share of false alarms if no mount has moved
 UNITS = ("deg",) * 3 + ("m",) * 3
-SCALES = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}  # of a quantity on the screen: unit, factor, digits
+SCALES = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}  # by unit: unit, factor and digits on the screen
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Differences of an angle (degrees) and of a lever arm's component (mm) up to which a mount counts as unmoved."""
+    """Largest tolerated differences of an angle (degrees) and of a lever-arm component (mm); None: no limit."""
 
     angle_deg: float | None = None
     lever_arm_mm: float | None = None
@@ -38,9 +38,9 @@ def mount_difference(
     first, second
         The runs.
     tolerances
-        Differences beyond these are listed by name.
+        A mount parameter with a larger difference is listed by name.
     not_compared
-        What cannot be compared, in words; this call adds to it.
+        Sentences on results that cannot be compared; this function may add one.
     """
     estimates = [estimate_of(run.result) for run in (first, second)]
     before, after = estimates
@@ -80,26 +80,26 @@ def mount_difference(
 
 
 def is_moved(difference: Mapping[str, Any]) -> bool:
-    """Whether the mount differs significantly or beyond a tolerance, or there is no answer."""
+    """Return whether the mount differs significantly or beyond a tolerance; true also if there is no answer."""
     return not difference["answered"] or difference["joint"]["significant"] or bool(difference["beyond_tolerance"])
 
 
 def is_same_result(difference: Mapping[str, Any]) -> bool:
-    """Whether both runs have the very same mount."""
+    """Return whether both runs have exactly the same mount."""
     return difference["comparable"] and not any(row["difference"] for row in difference["parameters"])
 
 
 def quantity_text(value: float, unit: str, sign: str = "+") -> str:
-    """Return a difference or a sigma as people read it.
+    """Return a difference or a sigma as text for the screen.
 
     Parameters
     ----------
     value
-        In degrees or metres.
+        The quantity, in degrees or metres.
     unit
         ``deg`` or ``m``; metres are shown as mm.
     sign
-        ``+`` to show the sign of a positive value, too.
+        ``+`` to show the sign of a positive value too.
 
     >>> quantity_text(0.0012, "m"), quantity_text(0.5, "deg", "")
     ('+1.20 mm', '0.5000°')
@@ -109,7 +109,7 @@ def quantity_text(value: float, unit: str, sign: str = "+") -> str:
 
 
 def answer_sentence(difference: Mapping[str, Any]) -> str:
-    """Return in one sentence whether the mount has moved."""
+    """Return one sentence that says whether the mount has moved, or why there is no answer."""
     rejected = [
         f"{key} ({difference[key]['session']}) was rejected"
         for key in ("a", "b")

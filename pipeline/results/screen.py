@@ -22,7 +22,7 @@ SIGMAS_IN_WORDS = {
 
 
 def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
-    """Return the verdict as people read it; ``fixed``: mount parameters that an accepted calibration did not estimate.
+    """Return the verdict in words; ``fixed``: mount parameters that an accepted calibration did not estimate.
 
     >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
     ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
@@ -33,7 +33,7 @@ def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
 
 
 def summary(calibration: Mapping[str, Any]) -> str:
-    """Return the result's lines for the screen, from the content of calibration.json."""
+    """Return the result as text for the screen, from the content of calibration.json."""
     fixed = calibration.get("held", {})
     verdict, colon, estimated = verdict_in_words(calibration["verdict"], fixed).partition(": ")
     lines = [f"{calibration['session']}: {verdict.upper()}{colon}{estimated}"]
@@ -60,7 +60,7 @@ def summary(calibration: Mapping[str, Any]) -> str:
 
 
 def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
-    """Return lines of the mount's parameters: coarse and calibrated values, their difference and sigmas."""
+    """Return the text lines of the mount's table: coarse and calibrated values, their differences and sigmas."""
     block, coarse, fixed = calibration[sensor], calibration["coarse"]["mount"], calibration.get("held", {})
     rows = []
     for parameter, _, key, unit_of_setting in PARAMETERS:
@@ -82,7 +82,7 @@ def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
 
 
 def _pass_lines(passes: Sequence[Mapping[str, Any]], sensor: str) -> list[str]:
-    """Return lines that say for each pass how far the wall was and how many points lie on the target."""
+    """Return text lines with each pass's distance from the wall and number of points on the target."""
     is_sonar = sensor == "mbes"
     points = "soundings + laser points" if is_sonar else "laser points"
     listed = []
@@ -95,7 +95,7 @@ def _pass_lines(passes: Sequence[Mapping[str, Any]], sensor: str) -> list[str]:
 
 
 def _target_line(target: Mapping[str, Any]) -> str:
-    """Return the target's pose in words: an error of the laser's mount or of the origin shows here first."""
+    """Return the sentence on the target's pose. There an error of the laser's mount or of the origin shows first."""
     x, y, z = (signed(value, 3) for value in target["offset_m"])
     azimuth, first, second = (signed(angle, 2) for angle in (target["azimuth_correction_deg"], *target["tilt_deg"]))
     return f"Target found at x {x}, y {y}, z {z} m from target.origin, azimuth {azimuth}°, tilt {first}° {second}°."

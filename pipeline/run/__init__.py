@@ -1,1 +1,1 @@
-"""Run folders: what is out of date and why, stages run and written whole, no result lost."""
+"""Run folders: find the stages that are out of date and why, run them, and replace their results as a whole."""

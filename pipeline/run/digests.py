@@ -1,4 +1,4 @@
-"""Digests of large files, remembered: a file is hashed again only if its size or its time of change differ."""
+"""Digests (SHA-256) of files, remembered between runs. A file is hashed again only if its size or a time differs."""
 
 import json
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from pipeline.errors import ArtefactError
 
 
 class Digests:
-    """SHA-256 by file, remembered by path, size and times of change, so that large raw files are read once."""
+    """The digest of each file, remembered with the file's size and times, so that large raw files are hashed once."""
 
     def __init__(self, memory: Path | None, mapper: Mapper = serial) -> None:
         self._memory = memory
@@ -18,7 +18,7 @@ class Digests:
         self._known: dict[str, list[object]] = _read_memory(memory) if memory is not None else {}
 
     def of(self, paths: Iterable[Path]) -> list[str]:
-        """Return the digests of ``paths``, in their order; unknown files are hashed side by side."""
+        """Return the digests of ``paths``, in their order. New and changed files are hashed in parallel."""
         absolute = [path.absolute() for path in paths]
         marks = {path: _mark(path) for path in absolute}
         stale = [path for path, mark in marks.items() if self._known.get(str(path), [None])[1:] != mark]
@@ -38,7 +38,7 @@ def _mark(path: Path) -> list[object]:
 
 
 def _read_memory(path: Path) -> dict[str, list[object]]:
-    """Return what is remembered: nothing if the memory is damaged, for it only saves time."""
+    """Return the remembered entries by path. A damaged file gives none, because the memory only saves time."""
     try:
         content = read_json(path)
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Run one stage: read its inputs, call it, write its outputs, remember what it was made from."""
+"""Run one stage: read its inputs, call it, write its outputs, and record in its manifest what they depend on."""
 
 import time
 from pathlib import Path
@@ -19,7 +19,10 @@ from pipeline.run.stage_protocol import declared, evaluate, inputs_in, name_of
 
 
 def execute_stage(this: Run, stage: ModuleType) -> None:
-    """Run a stage into its partial folder, and put that in the place of the result; nothing is left of a failure."""
+    """Run a stage in its partial folder, and put this folder in the place of the old result.
+
+    If the stage fails, the partial folder is removed.
+    """
     start = time.perf_counter()
     target = this.folder(name_of(stage))
     partial = folder.partial(target)
@@ -58,13 +61,16 @@ def execute_stage(this: Run, stage: ModuleType) -> None:
 
 
 def _raw_has_changed(this: Run, stage: ModuleType) -> bool:
-    """Return whether a raw file that the stage has read is not what it was when this run first looked at it."""
+    """Return whether a raw file that the stage has read has changed since this run first hashed it."""
     sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, RawFiles)]
     return any(raw_digests(this, sensor) != raw_of(this, sensor) for sensor in sensors)
 
 
 def _remove_quietly(partial: Path) -> None:
-    """Remove it after a failure: the error to show is what made the stage fail, not what hinders the tidying up."""
+    """Remove the partial folder after a failure.
+
+    If that fails too, nothing is raised: the user must see the error of the stage.
+    """
     try:
         remove(partial)
     except ArtefactError:

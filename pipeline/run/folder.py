@@ -1,4 +1,4 @@
-"""A run folder: locked while in use; every stage is swapped in whole."""
+"""A run folder. It is locked while it is in use, and a stage's new folder replaces the old one as a whole."""
 
 import contextlib
 import errno
@@ -21,7 +21,10 @@ DIGESTS = "digests.json"
 # --- the lock --------------------------------------------------------------------------------------------------------
 @contextlib.contextmanager
 def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
-    """Make ``run`` if need be, keep other processes out, and tidy up its ``stages`` after a process that was killed."""
+    """Lock the folder ``run`` against other processes. The folder is made if it does not exist.
+
+    The folders of ``stages`` are then repaired, in case an earlier process was killed.
+    """
     with writing(run):
         run.mkdir(parents=True, exist_ok=True)
         strangers = sorted(entry.name for entry in run.iterdir() if entry.name not in (LOCK, DIGESTS))
@@ -41,7 +44,7 @@ def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def reading(run: Path) -> Iterator[None]:
-    """Keep writers out while a run is checked; a folder that cannot be written needs no lock."""
+    """Keep writing processes out of ``run`` while it is read; no lock if the lock file is missing or not readable."""
     try:
         file = _opened(run / LOCK, os.O_RDONLY)
     except OSError:
@@ -53,7 +56,7 @@ def reading(run: Path) -> Iterator[None]:
 
 
 def _opened(lock: Path, how: int) -> TextIO:
-    """Open the lock, but no link and no irregular file: a run folder may come from somebody else."""
+    """Open the lock file. A link or irregular file is refused, because a run folder may come from somebody else."""
     handle = os.open(lock, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
@@ -75,7 +78,7 @@ def _lock(file: TextIO, run: Path, how: int) -> None:
 
 # --- a stage's folder ------------------------------------------------------------------------------------------------
 def partial(stage: Path) -> Path:
-    """Return where a stage's files are written until they are complete."""
+    """Return the folder in which a stage writes its files until all are complete."""
     return stage.with_name(stage.name + ".partial")
 
 
@@ -84,15 +87,15 @@ def _old(stage: Path) -> Path:
 
 
 def keeping(stage: Path) -> Path:
-    """Return where an accepted result is copied to before it is kept."""
+    """Return the folder to which an accepted result is copied before the copy gets its number."""
     return stage.with_name(stage.name + ".keeping")
 
 
 def swap_in(stage: Path) -> None:
     """Put the finished partial folder in the stage's place.
 
-    If the process is killed at any step, :func:`recover` finds a whole result. So it does after a power cut, for the
-    disk holds every file before the first rename.
+    If the process is killed at any step, :func:`recover` still has a complete result. This is true after a power cut
+    too, because every file is on the disk before the first rename.
     """
     flush_to_disk(partial(stage))
     with writing(stage):
@@ -105,10 +108,14 @@ def swap_in(stage: Path) -> None:
 
 
 def recover(stage: Path) -> None:
-    """Bring a stage's folder into a whole state: keep the newest complete result, and remove all else."""
+    """Repair a stage's folder after a process that was killed.
+
+    If the folder itself is missing, the partial folder takes its place, or else the old one, if complete. The other
+    temporary folders are removed.
+    """
     with writing(stage):
         if not os.path.lexists(stage):
-            for candidate in (partial(stage), _old(stage)):  # between the two renames: both are complete
+            for candidate in (partial(stage), _old(stage)):  # killed between the two renames of swap_in
                 if manifest.read_manifest(candidate) is not None:
                     candidate.rename(stage)
                     break
@@ -119,7 +126,7 @@ def recover(stage: Path) -> None:
 
 
 def touch(stage: Path) -> None:
-    """Tell make that a result was looked at and found current."""
+    """Set the manifest's time to now, so that the program ``make`` takes the stage for current."""
     with writing(stage / manifest.NAME):
         (stage / manifest.NAME).touch()
 

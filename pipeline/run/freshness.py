@@ -1,4 +1,4 @@
-"""Which stages of a run folder are out of date, and why: decided by content, never by times."""
+"""Which stages of a run folder are out of date, and why. This is decided by content, never by times."""
 
 import dataclasses
 import hashlib
@@ -18,12 +18,12 @@ from pipeline.run.stage_protocol import inputs_in, name_of
 from pipeline.run.workers import SERIAL, Workers
 
 SENSORS = ("ins", "laser", "mbes")
-EMPTY = hashlib.sha256().hexdigest()  # empty files are all alike: the readers say what they think of them
+EMPTY = hashlib.sha256().hexdigest()  # the digest of every empty file; the readers report empty files
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run folder, open and locked."""
+    """One run folder in use, with its settings, digests and workers."""
 
     path: Path
     settings: Settings
@@ -31,7 +31,7 @@ class Run:
     stages: tuple[str, ...]  # names, in the order in which they run
     workers: Workers = SERIAL
     progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
-    raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # digests by sensor, as first computed
+    raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # first digests, by sensor
 
     def folder(self, stage: str) -> Path:
         """Return the stage's folder."""
@@ -39,7 +39,7 @@ class Run:
 
 
 def out_of_date(this: Run, stage: ModuleType) -> list[str]:
-    """Return the reasons why the stage has to be run; none if its result is current."""
+    """Return the reasons why the stage has to be run; an empty list if its result is current."""
     old = manifest.read_manifest(this.folder(name_of(stage)))
     if old is None:
         return ["has no result yet"]
@@ -48,7 +48,7 @@ def out_of_date(this: Run, stage: ModuleType) -> list[str]:
 
 
 def digests_now(this: Run, place: Path, old: manifest.Manifest) -> dict[str, str | None]:
-    """Return the digests of a stage's files as they are now.
+    """Return the present digests of a stage's files by name; None for a missing file.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def digests_now(this: Run, place: Path, old: manifest.Manifest) -> dict[str, str
     place
         The stage's folder.
     old
-        The manifest that names the files; a file that is gone has None.
+        The manifest that names the files.
     """
     present = [name for name in old.outputs if (place / name).is_file()]
     digests = dict(zip(present, this.digests.of(place / name for name in present), strict=True))
@@ -65,7 +65,7 @@ def digests_now(this: Run, place: Path, old: manifest.Manifest) -> dict[str, str
 
 
 def key_of(this: Run, stage: ModuleType) -> manifest.Key:
-    """Return everything that the stage's result would depend on, were it run now."""
+    """Return the key (everything on which the result depends) that the stage would have if it ran now."""
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
     for marker in inputs_in(this.stages, stage).values():
@@ -82,9 +82,9 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
 
 
 def raw_of(this: Run, sensor: str) -> dict[str, str]:
-    """Return the digests of one sensor's files as this run first found them.
+    """Return the digests of one sensor's files by name, as this run first computed them.
 
-    The later stages were made from these, and the report names these, whatever happens to the files meanwhile.
+    Later stages depend on these digests and the report names them, even if a file changes during the run.
     """
     if sensor not in this.raw:
         this.raw[sensor] = raw_digests(this, sensor)
@@ -92,19 +92,19 @@ def raw_of(this: Run, sensor: str) -> dict[str, str]:
 
 
 def all_raw(this: Run) -> dict[str, str]:
-    """Return the digests of all files from which the session was read."""
+    """Return the digests by name of all raw files of the session and of the cast's file."""
     return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()} | cast_digest(this)
 
 
 def raw_digests(this: Run, sensor: str) -> dict[str, str]:
-    """Return one sensor's digests by file, relative to the session folder, as the files are now."""
+    """Return the present digests of one sensor's files. Their names are paths relative to the session folder."""
     root, settings = this.settings.session_folder, getattr(this.settings.session, sensor)
     if settings is None:
         return {}
     paths = dispatch.raw_files(settings, root)
     names = [path.relative_to(root).as_posix() for path in paths]
     for name in names:
-        if any("\udc80" <= letter <= "\udcff" for letter in name):  # Python's stand-ins for other bytes
+        if any("\udc80" <= letter <= "\udcff" for letter in name):  # stands for a byte that is not UTF-8
             raise RawDataError(f"{name!a}: the file's name is not UTF-8; rename it")
     digests = dict(zip(names, this.digests.of(paths), strict=True))
     first: dict[str, str] = {}
@@ -115,7 +115,7 @@ def raw_digests(this: Run, sensor: str) -> dict[str, str]:
 
 
 def cast_digest(this: Run) -> dict[str, str]:
-    """Return the digest of the file of the cast of sound speed, by name; its depths are in the settings."""
+    """Return the digest of the cast's file by name; empty without a file. The cast itself is in the settings."""
     used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
     if used is None:
         return {}

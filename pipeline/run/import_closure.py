@@ -1,10 +1,10 @@
-"""Which of the program's files a stage's result can depend on: those that its module imports, and what these import.
+"""The files of the program on which a stage's result can depend: all files that its module imports, directly or not.
 
-The imports are read from the syntax trees. So nothing is run, and the answer is the same on every machine. An import
-counts wherever it stands in a file, except where only the type checker sees it. A program that a module starts counts
-as imported: the module names the file that lies beside it. An import merely passes through some packages (``pipeline``
-in ``pipeline.maths.geometry.planes``) and runs their first level only: imports in their functions count only where the
-package itself is imported.
+The imports are read from the syntax trees. Therefore no module is run, and the answer is the same on every machine. An
+import counts wherever it stands in a file, except in a block for the type checker. If a module names a program file in
+its own folder, because it starts this program, the file counts as imported. To import
+``pipeline.maths.geometry.planes``, Python also runs the packages above it (``pipeline``, ``pipeline.maths``, ...), but
+calls none of their functions. Imports in these functions count only if the package itself is imported.
 """
 
 import ast
@@ -12,18 +12,18 @@ import functools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-PACKAGES = ("pipeline", "stages")  # all else is a library, which its version stands for
+PACKAGES = ("pipeline", "stages")  # every other package is a library, identified by its version
 
 
 def import_closure(root: Path, modules: Sequence[str]) -> list[Path]:
-    """Return the files that modules can reach, and the data files that lie beside these; sorted.
+    """Return the files that ``modules`` import, directly or not, and the data files in their folders; sorted.
 
     Parameters
     ----------
     root
         The folder in which PACKAGES lie.
     modules
-        Dotted names.
+        Dotted names of modules.
     """
     closure: set[Path] = set()
     waiting = [(name, True) for name in modules]
@@ -43,7 +43,7 @@ def import_closure(root: Path, modules: Sequence[str]) -> list[Path]:
 
 
 def _is_data(path: Path) -> bool:
-    """Return whether it is a file that somebody wrote beside modules: nothing hidden, nothing that Python makes."""
+    """Return whether ``path`` is a data file: it is not hidden, and neither a module nor compiled by Python."""
     return not path.name.startswith(".") and path.suffix not in (".py", ".pyc") and path.is_file()
 
 
@@ -58,7 +58,7 @@ def _packages_above(name: str) -> list[str]:
 
 
 def file_of_module(root: Path, name: str) -> Path | None:
-    """Return the file of a module; None: there is none under ``root``."""
+    """Return the file of a module; None if ``root`` does not contain it."""
     place = root / name.replace(".", "/")
     for path in (place.with_name(place.name + ".py"), place / "__init__.py"):
         if path.is_file():
@@ -67,16 +67,16 @@ def file_of_module(root: Path, name: str) -> Path | None:
 
 
 def imported_modules(root: Path, path: Path, name: str, inside: bool = True) -> list[str]:
-    """Return the modules of PACKAGES that a module's file imports, and the programs beside it that it names.
+    """Return the modules of PACKAGES that a module's file imports, and the programs in its folder that it names.
 
     Parameters
     ----------
     root
         The folder in which PACKAGES lie.
     path, name
-        The module's file, which may lie elsewhere, and dotted name.
+        The module's file, which may lie outside ``root``, and its dotted name.
     inside
-        Also what its functions import.
+        True: also the imports in its functions.
     """
     modules: dict[str, None] = {}
     for base, word in _imports(path, name, inside):
@@ -88,7 +88,10 @@ def imported_modules(root: Path, path: Path, name: str, inside: bool = True) -> 
 
 @functools.cache
 def _imports(path: Path, name: str, inside: bool) -> tuple[tuple[str, str], ...]:
-    """Return ``import a.b`` as ("a.b", ""), ``from a import b`` as ("a", "b"), as is the program "b.py" beside a.c."""
+    """Return a file's imports as pairs: ``import a.b`` as ("a.b", ""), ``from a import b`` as ("a", "b").
+
+    If module a.c names the program "b.py" in its folder, the pair is ("a", "b") too.
+    """
     tree = ast.parse(path.read_bytes())
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     imports: list[tuple[str, str]] = []
@@ -105,12 +108,12 @@ def _imports(path: Path, name: str, inside: bool) -> tuple[tuple[str, str], ...]
 
 
 def _is_program(text: str, path: Path) -> bool:
-    """Return whether a text in a module's file is the name of another one beside it."""
+    """Return whether ``text`` is the name of a module's file in the folder of the module ``path``."""
     return text.endswith(".py") and "/" not in text and path.with_name(text).is_file()
 
 
 def _nodes(tree: ast.AST, inside: bool) -> Iterator[ast.AST]:
-    """Yield what a module runs; ``inside``: also what its functions run, once they are called."""
+    """Yield the syntax nodes that run when a module is imported; ``inside``: also the nodes in its functions."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING"):
             yield from (inner for branch in node.orelse for inner in (branch, *_nodes(branch, inside)))

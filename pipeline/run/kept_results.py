@@ -1,4 +1,4 @@
-"""An accepted calibration outlives what replaces it: its files stay in RUN/report.1, report.2 and so on."""
+"""Keep an accepted calibration when a new result replaces it: its files stay in RUN/report.1, report.2, ..."""
 
 from pathlib import Path
 
@@ -11,10 +11,11 @@ KEPT = (CALIBRATION_JSON.name, CALIBRATION_YAML.name, PAGE)
 
 
 def keep_accepted(stage: Path) -> Path | None:
-    """Where an accepted result that the finished partial folder is about to replace is kept from now on.
+    """Copy the accepted result that the partial folder is about to replace, and return the folder of the copy.
 
-    None: there is none, or the new one is the same, or it has been kept before. It is copied and renamed before
-    anything is replaced: killed at any step, the result is in its place, kept, or both.
+    None: there is no accepted result, the new result is the same, or the old one was kept before. The copy is complete
+    before anything is replaced. If the process is killed, the result is therefore in its old place, in the copy, or in
+    both.
     """
     if not _is_accepted(stage) or _result(stage) == _result(partial(stage)):
         return None
@@ -37,7 +38,7 @@ def keep_accepted(stage: Path) -> Path | None:
 
 
 def _copy(stage: Path, place: Path) -> None:
-    """Those of the files that are not there yet."""
+    """Copy the files of a result that ``place`` does not have yet."""
     for name in KEPT:
         if (stage / name).is_file() and not (place / name).is_file():
             with writing(place / name):

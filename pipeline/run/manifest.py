@@ -1,7 +1,7 @@
-"""A stage's manifest: what the result was made from, its files, and the reasons why it is out of date.
+"""A stage's manifest: what the result depends on, its files, and the reasons why it is out of date.
 
-A result is current when the same config section, the same input content, the same source of this program and the same
-versions of the libraries would be used again, and its files are still as they were written. Times are never compared.
+A result is current if a new run would use the same settings, the same content of inputs, the same source files of this
+program and the same versions of libraries, and if the result's own files are unchanged. Times are never compared.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ class Key:
     """Everything that a stage's result depends on."""
 
     config: Mapping[str, Any]  # by field of the stage's Config
-    raw: Mapping[str, str]  # digest by raw file, relative to the session folder
+    raw: Mapping[str, str]  # digest by raw file; names relative to the session folder
     inputs: Mapping[str, str]  # digest by artefact, "owner/name"
     source: Mapping[str, str]  # digest by file of this program
     versions: Mapping[str, str]
@@ -34,20 +34,20 @@ class Manifest:
 
     stage: str
     key: Key
-    outputs: Mapping[str, Mapping[str, Any]]  # sha256, bytes and, of tables and parts, rows, by file in the folder
+    outputs: Mapping[str, Mapping[str, Any]]  # sha256 and bytes, by file in the folder
     rows: Mapping[str, int]  # by artefact
-    counts: list[dict[str, Any]]  # points in and out, with the reason for every dropped one
+    counts: list[dict[str, Any]]  # numbers of records by source and reason; "used" is one of the reasons
     git_commit: str | None
     wall_s: float
 
     def write(self, folder: Path) -> None:
-        """Write it into a stage's folder."""
+        """Write the manifest into a stage's folder."""
         content = {"schema": SCHEMA, **asdict(self)}
         write_text(folder / NAME, json.dumps(content, indent=1, ensure_ascii=True) + "\n")
 
 
 def read_manifest(folder: Path) -> Manifest | None:
-    """Return the manifest in ``folder``; None if there is none, or none that makes sense."""
+    """Return the manifest in ``folder``; None if it is missing, damaged or of another schema."""
     try:
         content: Any = read_json(folder / NAME)
         if content.pop("schema") != SCHEMA:
@@ -73,7 +73,7 @@ def _is_file(name: str, entry: Any) -> bool:
 
 
 def artefact_digests(outputs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Return one digest for each table, document and stream; a stream's covers the names and digests of its parts.
+    """Return one digest for each table, document and stream. A stream's digest covers its parts' names and digests.
 
     >>> sorted(artefact_digests({"a.parquet": {"sha256": "1"}, "s/part-00000-000.parquet": {"sha256": "2"}}))
     ['a.parquet', 's']
@@ -90,7 +90,7 @@ def artefact_digests(outputs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]
 
 
 def consistent(manifests: Mapping[str, Manifest]) -> bool:
-    """Return whether each stage was made from what the others hold now."""
+    """Return whether each stage was made from the present artefacts of the others."""
     present = {name: artefact_digests(result.outputs) for name, result in manifests.items()}
 
     def is_present(name: str, digest: str) -> bool:
@@ -103,16 +103,16 @@ def consistent(manifests: Mapping[str, Manifest]) -> bool:
 
 # --- reasons ---------------------------------------------------------------------------------------------------------
 def reasons_out_of_date(old: Manifest, key: Key, digests: Mapping[str, str | None]) -> list[str]:
-    """Return why a result is out of date; nothing if it is current.
+    """Return the reasons why a result is out of date; an empty list if it is current.
 
     Parameters
     ----------
     old
         The result's manifest.
     key
-        What a new result would depend on.
+        The key that a new result would have.
     digests
-        By name, those of the result's files as they are now; None: gone.
+        The present digests of the result's files by name; None for a missing file.
     """
     written = {name: entry["sha256"] for name, entry in old.outputs.items()}
     return [
@@ -153,7 +153,7 @@ def _shown(value: Any) -> str:
 
 
 def flattened(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Join nested keys by dots.
+    """Return nested values on one level, with their keys joined by dots.
 
     >>> flattened({"segment": {"margin_m": 0.05}})
     {'segment.margin_m': 0.05}

@@ -1,9 +1,9 @@
-"""Refuse a run folder that holds another session's run, which nobody means to replace.
+"""Refuse a run folder with the run of another session, so that it is not replaced by mistake.
 
-Two runs are of the same session if they have one file of the calibrated sensor in common, by content. So a session may
-be moved, renamed, corrected in session.yaml, and have more files or fewer. A common file of the INS says nothing: one
-log may hold several sessions. If no file is in common (all were exported again), a session in the same folder under the
-same name is taken for the same.
+Two runs are of the same session if they have at least one file of the calibrated sensor in common, by content.
+Therefore a session may be moved or renamed, its session.yaml corrected, and files added or removed. A common file of
+the INS proves nothing, because one log may cover several sessions. If no file is in common (all were exported again), a
+session with the same folder and the same name is taken for the same one.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from pipeline.run.settings import RUN_YAML
 
 
 def refuse_other_session(this: Run, stages: Sequence[str]) -> None:
-    """Raise an ArtefactError if the run folder's results are of another session than ``this`` run's."""
+    """Raise an ArtefactError if the results in the run folder are of another session than ``this`` run."""
     session = this.settings.session
     recorded = _digests_in(this.path, stages)
     sensor = session.calibrated
@@ -41,7 +41,7 @@ def _digests_in(run: Path, stages: Sequence[str]) -> set[str]:
     """Return the digests of the raw files from which the results in a run folder were made."""
     manifests = [manifest.read_manifest(run / stage) for stage in stages]
     digests = {digest for old in manifests if old is not None for digest in old.key.raw.values()}
-    if not digests:  # manifests of another version of the program, say
+    if not digests:  # for example, another version of the program wrote the manifests
         try:
             content = read_json(run / "report" / CALIBRATION_JSON.name)
         except (OSError, ValueError):
@@ -52,11 +52,11 @@ def _digests_in(run: Path, stages: Sequence[str]) -> set[str]:
 
 
 def _recorded_session(run: Path) -> tuple[str, Path | None]:
-    """Return name and folder of the session in run.yaml, as far as they can be read."""
+    """Return name and folder of the session in run.yaml; the folder is None if it cannot be read."""
     try:
         content = read_yaml(run / RUN_YAML)
     except ConfigError:
         return "", None
     session, folder = content.get("session"), content.get("session_folder")
     name = session.get("name") if isinstance(session, dict) else None
-    return str(name), Path(folder) if isinstance(folder, str) else None
+    return str(name or ""), Path(folder) if isinstance(folder, str) else None

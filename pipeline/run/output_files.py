@@ -1,4 +1,4 @@
-"""Files that a command writes where its options say: none of them may replace anything of a run."""
+"""Files that a command writes to paths from its options. None may replace a file of a run or of a session."""
 
 import contextlib
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from pipeline.errors import ArtefactError, ConfigError
 
 @contextlib.contextmanager
 def as_written(run: Path) -> Iterator[None]:
-    """Turn an error in values of a run's calibration.json, which somebody changed then, into an ArtefactError."""
+    """Turn an error in reading values of calibration.json into an ArtefactError: somebody has changed the file."""
     try:
         yield
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
@@ -18,18 +18,18 @@ def as_written(run: Path) -> Iterator[None]:
 
 
 def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b"") -> None:
-    """Refuse a file that must not be written; None is none.
+    """Raise a ConfigError if a command must not write ``file``.
 
     Parameters
     ----------
     option
-        The option that names it, such as ``--html``: the file's name ends so.
+        The option with the path, for example ``--html``. The file must then have the suffix ``.html``.
     file
-        The file.
+        The path of the file; None: no file is written.
     runs
-        Folders with a run's results or a session's files, in which it must not lie.
+        Folders with a run's results or a session's files. The file must not lie in them.
     begins
-        Only a file that begins so is replaced: what we wrote, and never a plan or a config.
+        An existing file is replaced only if it begins with these bytes, as files that poolcal writes do.
     """
     if file is None:
         return

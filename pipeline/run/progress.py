@@ -1,4 +1,4 @@
-"""What a run prints while it works: a bar with rate and time left on a terminal, one plain line a stage elsewhere."""
+"""The progress of a run: on a terminal a bar with rate and time left, elsewhere one line for each finished stage."""
 
 import contextlib
 import sys
@@ -18,7 +18,7 @@ MAX_REASONS = 3
 
 @dataclass
 class Progress:
-    """Print how far a run is; workers may call it side by side."""
+    """Print the progress of a run. Several workers may use it at the same time."""
 
     stream: TextIO = field(default_factory=lambda: sys.stderr)
     quiet: bool = False
@@ -40,7 +40,7 @@ class Progress:
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Show one stage from its first row to its last; print at the end how long it took."""
+        """Show the progress of one stage. At the end print its time, its rows and its rate."""
         self._rows, start = 0, time.perf_counter()
         with self._shown(name):
             yield
@@ -66,13 +66,13 @@ class Progress:
                 self._bar = None
 
     def begin(self, total: int | None) -> None:
-        """Count rows from here on, towards ``total`` where that is known: now the streams are mapped."""
+        """Start to count the rows of the streams that are mapped next; ``total``: their number, None if unknown."""
         self._rows = 0
         if self._bar is not None:
             self._bar.reset(self._bar.task_ids[0], total=total, rate="")
 
     def advance(self, rows: int) -> None:
-        """Count rows that a worker has taken up."""
+        """Count rows that a worker has processed."""
         with self._lock:
             self._rows += rows
             if self._bar is not None:

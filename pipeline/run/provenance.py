@@ -1,6 +1,6 @@
 """What a result depends on beside its settings and inputs: files of this program, and versions of libraries.
 
-Presets and scenarios (``configs/``) are not among them: what a preset says stands in the settings, value by value.
+Presets and scenarios (``configs/``) do not count: the settings contain every value of a preset.
 """
 
 import functools
@@ -16,14 +16,14 @@ from pipeline.atomic_files import sha256
 from pipeline.run.import_closure import file_of_module, import_closure, imported_modules
 from pipeline.run.stage_protocol import declared
 
-LIBRARIES = (  # that can change a digit: they compute, or decode raw files, meshes or tables
+LIBRARIES = (  # libraries that can change a digit: they compute, or decode raw files, meshes or tables
     "numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "lazrs", "novatel-edie", "pye57", "gsfu",
     "pykmall", "trimesh",
 )  # fmt: skip
 ROOT = Path(pipeline.__file__).parent.parent
 CALLS = ("pipeline.run.stage_protocol",)  # calls every stage, and writes its streams
-READS = ("pipeline.readers.dispatch",)  # makes the parts of raw files that a stage is given
-# These carry data in and out; what else they import does not.
+READS = ("pipeline.readers.dispatch",)  # makes the parts of raw files for the stages that read them
+# These files pass data to and from a stage. The files that they import do not, and are left out.
 CARRIES = ("pipeline/run/execute.py", "pipeline/run/stage_files.py", "pipeline/run/workers.py")
 
 
@@ -40,7 +40,7 @@ def library_versions() -> dict[str, str]:
 
 
 def source_digests(stage: ModuleType) -> dict[str, str]:
-    """Return the digests of the program's files that the stage can reach; also of the readers, if it gets raw files."""
+    """Return the digests of the program's files on which the stage depends, with the readers if it reads raw files."""
     raw = any(isinstance(marker, RawFiles) for marker in declared(stage.Inputs).values())
     return dict(_source_digests(ROOT, stage.__name__, Path(str(stage.__file__)), raw))
 
@@ -50,7 +50,7 @@ def _source_digests(root: Path, name: str, own: Path, raw: bool) -> dict[str, st
     ours = file_of_module(root, name) == own
     begin = [*([name] if ours else imported_modules(root, own, name)), *CALLS, *(READS if raw else ())]
     files = {path.relative_to(root).as_posix(): path for path in import_closure(root, begin)}
-    if not ours:  # a stage from elsewhere
+    if not ours:  # the stage is not part of this program
         files[f"{own.parent.name}/{own.name}"] = own
     files |= {file: root / file for file in CARRIES}
     return {file: sha256(path) for file, path in sorted(files.items())}

@@ -26,25 +26,25 @@ class Tables:
     run: Path
 
     def table(self, artefact: Artefact, *columns: str) -> pd.DataFrame:
-        """Return the table, or these columns of it."""
+        """Return the table with all columns, or with these ``columns`` alone."""
         return read_table(self.run / artefact.owner / f"{artefact.name}.parquet", artefact, columns)
 
     def stream(self, artefact: Artefact, *columns: str) -> Stream:
-        """Return the stream, or these columns of it."""
+        """Return the stream with all columns, or with these ``columns`` alone."""
         folder = self.run / artefact.owner / artefact.name
         return Stream(tuple(ParquetPart(path, columns or None) for path in sorted(folder.glob("part-*.parquet"))))
 
     def sample(self, artefact: Artefact, at_most: int, *columns: str) -> tuple[dict[str, np.ndarray], int]:
-        """Return evenly spaced rows of a stream, and one in how many that is.
+        """Return every n-th row of a stream as arrays by column, and n.
 
         Parameters
         ----------
         artefact
             The stream.
         at_most
-            Number of rows.
+            The largest number of rows to return.
         columns
-            Their names.
+            Names of the columns.
         """
         stream = self.stream(artefact, *columns)
         total = sum(row_count(part.path) for part in stream.parts if isinstance(part, ParquetPart))
@@ -53,7 +53,7 @@ class Tables:
         for batch in stream.batches():
             rows = len(next(iter(batch.values())))
             first = -rows_before % step
-            pieces.append({name: values[first::step].copy() for name, values in batch.items()})  # no view of all
+            pieces.append({name: values[first::step].copy() for name, values in batch.items()})  # frees the batch
             rows_before += rows
         if not pieces:
             return {name: np.empty(0) for name in columns}, step
@@ -76,12 +76,12 @@ def calibration(run: Path) -> dict[str, Any]:
 
 
 def recording_path(run: Path, stage: str) -> Path:
-    """Return where a stage's recording lies."""
+    """Return the path of a stage's recording."""
     return run / stage / f"{stage}.rrd"
 
 
 def agreeing(run: Path, stages: Sequence[str]) -> dict[str, manifest.Manifest]:
-    """Return the manifests of the finished stages that follow from each other and from run.yaml, in order."""
+    """Return, by stage and in order, the manifests of the results that agree with each other and with run.yaml."""
     settings = plain_settings(read_settings(run).resolved())
     manifests: dict[str, manifest.Manifest] = {}
     for stage in stages:
@@ -97,7 +97,7 @@ def _is_as_set(result: manifest.Manifest, settings: Mapping[str, Any]) -> bool:
 
 
 def _covers(setting: Any, used: Any) -> bool:
-    """Return whether a stage used a setting as it is; of a block it may use only some fields."""
+    """Return whether ``used`` agrees with a setting. From a block of settings a stage may use only some fields."""
     if not (isinstance(setting, dict) and isinstance(used, dict)):
         return bool(setting == used)
     return all(name in setting and setting[name] == value for name, value in used.items())

@@ -1,6 +1,6 @@
-"""Bring a run folder's stages up to date, and run only those that are not.
+"""Bring the stages of a run folder up to date: only stages that are out of date are run.
 
-The stages themselves come from above (:mod:`stages`): this module knows their protocol
+The caller passes the stages (:mod:`stages`). This module knows only their protocol
 (:mod:`pipeline.run.stage_protocol`), not their names.
 """
 
@@ -45,21 +45,21 @@ def run(
     Parameters
     ----------
     stages
-        Their modules, in order.
+        The modules of the stages, in order.
     session_folder, config_path
         The session's folder and the pool's YAML file.
     run_folder
         The folder for the results.
     workers
-        Where parts are worked on.
+        The threads or the cluster that process the parts of streams.
     progress
-        What is printed; None: nothing.
+        The display of the progress; None: nothing is printed.
     finished
-        Called with the name of each stage that had to be run, as it is done.
+        Function that is called with the name of each stage that was run, when the stage has ended.
     calibrated
         The sensor that is calibrated.
     overwrite
-        Replace another session's results; else a folder with such is refused.
+        True: replace the results of another session. False: refuse a folder that holds such results.
 
     Returns
     -------
@@ -93,27 +93,27 @@ def run_stage(
     workers: Workers = SERIAL,
     progress: Progress | None = None,
 ) -> bool:
-    """Bring one stage up to date; those before it must be.
+    """Bring one stage up to date; the stages before it must be up to date already.
 
     Parameters
     ----------
     stages
         The modules of all stages, in order.
     name
-        The stage that is wanted.
+        The name of the stage to bring up to date.
     run_folder
         The run folder.
     settings
-        New ones; None: those in run.yaml.
+        New settings; None: the settings in run.yaml.
     workers
-        Where parts are worked on.
+        The threads or the cluster that process the parts of streams.
     progress
-        What is printed; None: nothing.
+        The display of the progress; None: nothing is printed.
 
     Returns
     -------
     bool
-        Whether it had to be run.
+        Whether the stage had to be run.
     """
     names = [name_of(stage) for stage in stages]
     new = settings is not None
@@ -134,7 +134,7 @@ def run_stage(
 def _open(
     path: Path, settings: Settings, stages: Sequence[str], workers: Workers, progress: Progress | None
 ) -> Run:
-    path = path.absolute()  # workers elsewhere have another working directory
+    path = path.absolute()  # workers of a cluster have another working directory
     digests = Digests(path / folder.DIGESTS, workers.here)
     return Run(
         path=path,
@@ -147,7 +147,7 @@ def _open(
 
 
 def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool:
-    """Return whether it had to be run; in a folder's ``first`` run no reasons are printed."""
+    """Run the stage if it is out of date; return whether it was. In a folder's ``first`` run no reasons are printed."""
     name = name_of(stage)
     reasons = out_of_date(this, stage)
     if not reasons:
@@ -164,7 +164,7 @@ def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool
 
 
 def _losses(done: manifest.Manifest | None) -> list[str]:
-    """Return lines on data that could not be used: a cut file, or a log that is too short, must not pass in silence."""
+    """Return text lines with the counts of data left out, so that a cut file or a short log is noticed."""
     if done is None or done.stage not in ("ingest", "georeference"):
         return []
     total: dict[str, int] = {}

@@ -1,4 +1,4 @@
-"""Settings of a run: read from YAML, kept in run.yaml, refused where they cannot be meant."""
+"""Settings of a run. They are read from YAML, kept in run.yaml, and refused if they cannot be correct."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ RUN_YAML = "run.yaml"
 
 @dataclass(frozen=True)
 class Settings:
-    """What a run is made from: the settings of the pool and of the session, checked, and where the raw files are."""
+    """The checked settings of a run, of the pool and of the session, and the folder with the raw files."""
 
     session_folder: Path
     pool: PoolConfig
@@ -48,8 +48,8 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
     config_path
         The pool's YAML file.
     calibrated
-        "mbes" for the sonar; "laser" for the laser itself, which leaves the sonar out; None for either, as the session
-        has it.
+        "mbes": the sonar. "laser": the laser; a sonar in the session is ignored. None: the sonar if the session has
+        one, otherwise the laser.
     """
     pool = load_pool(config_path)
     try:
@@ -69,7 +69,7 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
 
 
 def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:
-    """Refuse faces as built that the target does not have; ``path`` names the pool's file."""
+    """Raise a ConfigError if ``as_built.faces`` has a face that the target has not; ``path``: the pool's file."""
     names = [face.name for face in target_of(pool.target).faces]
     for name in pool.as_built.faces:
         if name not in names:
@@ -78,16 +78,16 @@ def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:
 
 
 def refuse_shallow_cast(target: Target, mbes: Mbes, path: Path) -> None:
-    """Refuse a cast that is not of the water through which the rays go: of less than half the depth of the target.
+    """Raise a ConfigError if a cast covers less than half the depths from 0 to the target's lower end.
 
     Parameters
     ----------
     target
-        The target; its lower end is the depth.
+        The target.
     mbes
         The sonar's settings, with the cast.
     path
-        session.yaml, for the message.
+        The path of session.yaml, for the message.
     """
     if mbes.svp is None:
         return
@@ -101,7 +101,10 @@ def refuse_shallow_cast(target: Target, mbes: Mbes, path: Path) -> None:
 
 
 def refuse_shared_folder(run: Path, session_folder: Path) -> None:
-    """Refuse a run folder in or round the session's, for it is swapped and cleared, and names that are no text."""
+    """Raise a ConfigError if one of the two folders lies in the other, or if a name is not UTF-8.
+
+    A run folder must hold no other files, because poolcal replaces and removes folders in it.
+    """
     for path in (run, session_folder):
         try:
             str(path).encode()
@@ -113,12 +116,12 @@ def refuse_shared_folder(run: Path, session_folder: Path) -> None:
 
 
 def holds_run(run: Path) -> bool:
-    """Return whether it is a run folder."""
+    """Return whether ``run`` is a run folder: run.yaml is in it."""
     return (run / RUN_YAML).is_file()
 
 
 def refuse_other_sensor(run: Path, calibrated: Calibrated) -> None:
-    """Refuse a run folder with a calibration of the other sensor; settings of an older program need not be readable."""
+    """Refuse a run folder with a calibration of the other sensor. A run.yaml that cannot be read is not refused."""
     try:
         session = read_yaml(run / RUN_YAML)["session"] if holds_run(run) else None
     except (ConfigError, KeyError):
@@ -143,7 +146,7 @@ def write_settings(run: Path, settings: Settings) -> None:
 
 
 def read_settings(run: Path) -> Settings:
-    """Read run.yaml: what the run in this folder was made from."""
+    """Return the settings in run.yaml, with which the run in this folder was made."""
     path = run / RUN_YAML
     if not path.is_file():
         raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")

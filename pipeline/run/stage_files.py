@@ -1,4 +1,4 @@
-"""A stage's inputs, read from the run folder and the raw files, and its outputs, written."""
+"""Read a stage's inputs from the run folder and the raw files, and write its outputs."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from pipeline.run.workers import Stopped
 
 
 def make_folders(partial: Path, stage: ModuleType) -> dict[str, Artefact]:
-    """Make the folders of a stage's streams in its partial folder; return the streams by field."""
+    """Make the folders of a stage's streams in its partial folder; return the streams' artefacts by field."""
     streams = {n: m for n, m in declared(stage.Outputs).items() if isinstance(m, Artefact) and is_stream(m)}
     with writing(partial):
         partial.mkdir()
@@ -28,7 +28,7 @@ def make_folders(partial: Path, stage: ModuleType) -> dict[str, Artefact]:
 
 
 def rows_to_map(this: Run, stage: ModuleType) -> int | None:
-    """Return the number of rows of the streams that are mapped; None where raw files do not tell."""
+    """Return the number of rows of the streams that are mapped; None if one of them comes from raw files."""
     markers = declared(stage.Inputs)
     total = 0
     for source in sources(stage):
@@ -41,7 +41,7 @@ def rows_to_map(this: Run, stage: ModuleType) -> int | None:
 
 
 def read_input(this: Run, marker: Artefact | Document | RawFiles | Provenance) -> Any:
-    """Return what a field of a stage's Inputs is annotated with: a table, a text, or a stream that is not read yet."""
+    """Return a field of a stage's Inputs: a table, a text, a stream that is not read yet, or the run's provenance."""
     if isinstance(marker, Provenance):
         return {"inputs": all_raw(this), "software": provenance.library_versions()}
     if isinstance(marker, RawFiles):
@@ -61,7 +61,7 @@ def read_input(this: Run, marker: Artefact | Document | RawFiles | Provenance) -
 
 @dataclass(frozen=True)
 class _Watched:
-    """A part that counts its rows for the progress bar, and ends when the run has failed elsewhere."""
+    """A part that counts its rows for the progress bar, and raises Stopped when the run has failed elsewhere."""
 
     part: Part
     this: Run
@@ -84,7 +84,7 @@ def _stream(this: Run, parts: Sequence[Part]) -> Stream:
 
 
 def write_outputs(partial: Path, stage: ModuleType, outputs: Any) -> dict[str, int]:
-    """Write tables and documents; streams have been written part by part.
+    """Write a stage's tables and documents. Its streams are already written, part by part.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def write_outputs(partial: Path, stage: ModuleType, outputs: Any) -> dict[str, i
     Returns
     -------
     dict
-        Rows by artefact.
+        Number of rows by artefact.
     """
     rows: dict[str, int] = {}
     for name, marker in declared(stage.Outputs).items():

@@ -1,14 +1,14 @@
-"""Call a stage: what it declares, how its parts are mapped, what it must return. No run folder is touched.
+"""The protocol of stages: what a stage declares, how it is called, what it must return. No run folder is touched.
 
-A stage is a module with frozen dataclasses ``Config``, ``Inputs`` and ``Outputs``, each field annotated with its
-artefact, and either ``run(inputs, config) -> Outputs`` (all tables), or, over streams,
+A stage is a module with the frozen dataclasses ``Config``, ``Inputs`` and ``Outputs``. Each field of the latter two is
+annotated with its artefact. A stage of tables alone has ``run(inputs, config) -> Outputs``. A stage over streams has
 
-    prepare(inputs, config) -> prepared                     once
-    run_batch(source, chunk, prepared, config) -> Piece     every chunk of every stream in SOURCES (default: all)
-    combine(prepared, partials, config) -> Outputs          once; its stream fields stay EMPTY
+    prepare(inputs, config) -> prepared                         called once
+    run_batch(source, chunk, prepared, config) -> BatchResult   called for each chunk of the streams in SOURCES (or all)
+    combine(prepared, partials, config) -> Outputs              called once; its fields of streams stay EMPTY_STREAM
 
-A field of a table with the default None is optional. An optional input is None where no stage of the run makes it, and
-an optional output that is None is not written.
+A table's field with the default None is optional. An optional input is None if no stage of the run writes it. An
+optional output that is None is not written.
 """
 
 import dataclasses
@@ -26,12 +26,12 @@ Marker = Artefact | RawFiles | Document | Provenance
 
 
 def name_of(stage: ModuleType) -> str:
-    """Return the stage's name: its module's last word."""
+    """Return the stage's name: its module's name without the package."""
     return stage.__name__.rpartition(".")[2]
 
 
 def declared(fields_of: type) -> dict[str, Marker]:
-    """Return the artefacts with which the fields of a stage's Inputs or Outputs are annotated."""
+    """Return the artefacts with which the fields of a stage's Inputs or Outputs are annotated, by field."""
     artefacts: dict[str, Marker] = {}
     for name, hint in get_type_hints(fields_of, include_extras=True).items():
         markers = [m() if m is Provenance else m for m in getattr(hint, "__metadata__", ())]
@@ -43,9 +43,9 @@ def declared(fields_of: type) -> dict[str, Marker]:
 
 
 def inputs_in(stages: Collection[str], stage: ModuleType) -> dict[str, Marker]:
-    """Return what a stage takes in a run of these ``stages``, by field.
+    """Return the artefacts that a stage reads in a run of these ``stages``, by field.
 
-    Optional tables that none of the stages makes are left out; the stage is then given None.
+    An optional table is left out if none of the stages writes it; the stage then gets None.
     """
     optional = {field.name for field in dataclasses.fields(stage.Inputs) if field.default is None}
     return {
@@ -56,12 +56,12 @@ def inputs_in(stages: Collection[str], stage: ModuleType) -> dict[str, Marker]:
 
 
 def is_stream(marker: Marker) -> bool:
-    """Return whether a field is a stream, and no table or document."""
+    """Return whether a field is a stream, and not a table or document."""
     return isinstance(marker, RawFiles) or (isinstance(marker, Artefact) and marker.kind == "stream")
 
 
 def sources(stage: ModuleType) -> tuple[str, ...]:
-    """Return the streams that are mapped, part by part; none for a stage of tables alone."""
+    """Return the fields of the streams that are mapped part by part; none for a stage of tables alone."""
     if not hasattr(stage, "run_batch"):
         return ()
     streams = tuple(name for name, marker in declared(stage.Inputs).items() if is_stream(marker))
@@ -77,20 +77,20 @@ def evaluate(
     mapper: Mapper = serial,
     begin: Callable[[], None] = lambda: None,
 ) -> Any:
-    """Return the stage's Outputs, checked against their artefacts.
+    """Call a stage and return its Outputs, checked against their artefacts.
 
     Parameters
     ----------
     stage
-        Its module.
+        The stage's module.
     inputs, config
-        Its Inputs and Config.
+        The stage's Inputs and Config.
     sink
-        Takes the batches of its streams.
+        Takes the batches of the streams that the stage writes.
     mapper
         Maps a function over the parts.
     begin
-        Is called before parts are mapped.
+        Called before the parts are mapped.
     """
     if not hasattr(stage, "run_batch"):
         return _checked(stage, stage.run(inputs, config), {}, mapper)
@@ -138,7 +138,7 @@ class _Work:
 
 
 def _run_part(work: _Work) -> tuple[list[object], Written]:
-    """Run one part from its first chunk to its last: a worker's whole task."""
+    """Run a stage over all chunks of one part. This is one task of a worker."""
     partials = []
     with work.sink.open(work.number) as sink:
         for chunk in work.part.chunks():
@@ -150,7 +150,7 @@ def _run_part(work: _Work) -> tuple[list[object], Written]:
 
 
 def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], mapper: Mapper) -> Any:
-    """Return the outputs with tables exactly as they come back from a file, and with the streams put in."""
+    """Return the outputs with the streams put in, and with the tables as they would be after writing and reading."""
     if not isinstance(outputs, stage.Outputs):
         raise TypeError(f"{stage.__name__} must return its Outputs, not {type(outputs).__name__}")
     values: dict[str, Any] = dict(streams)
@@ -165,19 +165,19 @@ def _checked(stage: ModuleType, outputs: Any, streams: Mapping[str, Stream], map
         elif isinstance(marker, Artefact) and marker.kind == "table":
             values[name] = from_arrow(to_arrow(value, marker))
         elif name not in streams or value != EMPTY_STREAM:
-            raise TypeError(f"{stage.__name__}: stream {name} is filled from run_batch's pieces; leave it EMPTY")
+            raise TypeError(f"{stage.__name__}: run_batch fills stream {name}: leave it EMPTY_STREAM")
     return dataclasses.replace(outputs, **values)
 
 
 def run_in_memory(stage: ModuleType, inputs: Any, config: Any, mapper: Mapper = serial) -> Any:
-    """Return the stage's Outputs without any file, for simulated campaigns and tests.
+    """Call a stage without any file, for campaigns of simulated sessions and for tests, and return its Outputs.
 
     Parameters
     ----------
     stage
-        Its module.
+        The stage's module.
     inputs, config
-        Its Inputs and Config.
+        The stage's Inputs and Config.
     mapper
         Maps a function over the parts.
     """

@@ -15,7 +15,7 @@ from pipeline.run.workers import SERIAL, Workers
 
 
 def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Workers = SERIAL) -> list[str]:
-    """Hash again everything that a run read and wrote; return what is not as recorded, a line each.
+    """Hash all files that a run read and wrote, and return one text line for each difference from its manifests.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Wor
     run_folder
         The run folder; it is only read.
     workers
-        For hashing side by side.
+        The threads that hash the files.
     """
     settings = read_settings(run_folder)
     with folder.reading(run_folder):

@@ -1,10 +1,11 @@
-"""Where parts are worked on: in this thread, in threads side by side, or on a dask.distributed cluster.
+"""Workers process the parts of streams: in this thread, in parallel threads, or on a dask.distributed cluster.
 
-A cluster's workers must see the session and the run folder under the same paths, and run one BLAS thread each: dask's
-own worker command does so.
+A cluster's workers must see the session and the run folder under the same paths, and each must run one BLAS thread, as
+workers started by dask's own command do.
 
-Threads, not processes: numpy, pyarrow and laspy release the interpreter's lock, nothing is copied between workers, and
-nothing is left behind when the program is killed. Results come back in order, so they never depend on the workers.
+Workers on this machine are threads, not processes: numpy, pyarrow and laspy release the interpreter's lock, no data are
+copied between workers, and no process is left when the program is killed. Results come back in order. Therefore they
+do not depend on the number of workers.
 """
 
 import contextlib
@@ -25,12 +26,12 @@ _inside = threading.local()
 
 
 class Stopped(Exception):
-    """The run has failed or was interrupted elsewhere, so the work on this part ends; never reaches the caller."""
+    """The run has failed or was interrupted elsewhere: this ends the work on one part, and never reaches the caller."""
 
 
 @dataclass(frozen=True)
 class Workers:
-    """An ordered map over an executor. ``jobs`` items are worked on at once; as many more wait in the queue."""
+    """An ordered map over an executor. ``jobs`` items are processed at once; the same number waits in the queue."""
 
     jobs: int
     executor: Executor | None = None  # None: this thread
@@ -39,11 +40,14 @@ class Workers:
 
     @property
     def here(self) -> Mapper:
-        """Return the map for small work on files that only this machine is sure to see."""
+        """Return a map that stays on this machine, for files that the workers of a cluster may not see."""
         return self.map if self.local else serial
 
     def map(self, function: Callable[..., T], *items: Iterable[object]) -> Iterable[T]:
-        """Yield ``function`` of each item, in order; a worker calls it itself, so workers never wait in turn."""
+        """Yield the result of ``function`` for each item, in order.
+
+        A worker that calls this runs the function itself, so that no worker waits for another.
+        """
         if self.executor is None or getattr(_inside, "worker", False):
             return map(function, *items)
         return self._ordered(self.executor, function, zip(*items, strict=True))
@@ -66,10 +70,10 @@ class Workers:
             self._abandon(waiting)
 
     def _abandon(self, waiting: deque[Future[T]]) -> None:
-        """Cancel what has not begun, stop what has begun, and wait until it has stopped.
+        """Cancel the tasks that have not begun, stop the others, and wait until all have ended.
 
-        A cluster cannot be stopped: all that was sent out (twice the workers, no more) is waited for, so that nothing
-        writes into a folder that is being removed or made anew.
+        Tasks on a cluster are neither cancelled nor stopped. They, too, are waited for (at most two for each worker),
+        so that none writes into a folder that is being removed or made anew.
         """
         if not waiting:
             return
@@ -96,13 +100,13 @@ SERIAL = Workers(1)
 
 
 def default_jobs() -> int:
-    """Return the number of processors that this process may use, at most four: more rarely help a disk."""
+    """Return the number of processors that this process may use, at most four: more rarely make reading faster."""
     return max(1, min(4, len(os.sched_getaffinity(0))))
 
 
 @contextlib.contextmanager
 def workers(jobs: int | None = None, address: str | None = None) -> Iterator[Workers]:
-    """Make workers for the time of a run: threads here, or the cluster whose scheduler listens at ``address``."""
+    """Provide the workers of a run: threads on this machine, or the cluster with the scheduler at ``address``."""
     if address is not None:
         yield from _cluster(address)
         return

@@ -1,16 +1,16 @@
 """Pool sessions with known truth, written as real instrument files.
 
-The forward model is independent: it is written from the conventions (frames, signs, units) alone and imports nothing of
-``pipeline.maths`` or ``pipeline.readers``, so that a wrong sign there cannot cancel itself here.
+The forward model is independent. It is written from the conventions (frames, signs, units) only, and does not import
+``pipeline.maths`` or ``pipeline.readers``. Therefore a wrong sign in these packages cannot cancel itself.
 
-scenario        what a session is like (YAML, strict)
+scenario        the settings of a session (YAML, strict)
 site            target frame <-> WGS 84, by pyproj
 motion          the vessel's true movement
 mesh            target and pool as triangles
-raycast         what a ray meets
+raycast         where a ray meets the mesh
 random_streams  one random generator for each purpose
 mounts          sensors on the body, and the coarse mount's errors
-ins, laser, mbes  what each instrument records
+ins, laser, mbes  the records of each instrument
 beams           recorded angles of a fan, and beams of finite width
 georeferenced   laser points placed in ECEF, as other programs deliver them
 novatel, sbet, las, r2sonic_packets (and its XTF shell), tables  the bytes of the instrument files

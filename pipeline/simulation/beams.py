@@ -1,8 +1,8 @@
-"""A fan of beams: the angles a head records, its transmit tilts, and ranges of beams of finite width.
+"""A fan of beams: the angles that a head records, its transmit tilts, and ranges of beams of finite width.
 
-Directions follow from rotations: a transmit fan tilted by τ consists of the ray (0, sin τ, -cos τ) swung round
-the transmitting array, the y axis, to starboard by ψ; its component along the receiving array, the x axis, is then
-cos τ sin ψ. The receive beam at the angle θ hears the ray of which that is sin θ.
+Directions follow from rotations. A transmit fan tilted by τ consists of the ray (0, sin τ, -cos τ), swung to starboard
+by ψ round the transmitting array (the y axis). The component of the swung ray along the receiving array (the x axis) is
+cos τ sin ψ. The receive beam at the angle θ hears the ray with the component sin θ.
 """
 
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from pipeline.simulation.raycast import RayCaster
 from pipeline.simulation.scenario import MbesScenario
 from pipeline.simulation.site import Floats
 
-LEAST_WEIGHT = 0.3  # share of a beam that must meet something; with less there is no detection
-LONGEST_STEP = 60_000  # section A2: of 65535
+LEAST_WEIGHT = 0.3  # least weight of the rays that meet a surface; with less there is no detection
+LONGEST_STEP = 60_000  # in section A2, whose steps are at most 65535
 
 
 @dataclass(frozen=True)
 class FanAngles:
     """Angles of a fan as a BTH0 packet holds them: evenly from first to last (A0), or first plus whole steps (A2)."""
 
-    first_rad: float  # a float32 number, as the last
+    first_rad: float  # a float32 number, as is last_rad
     last_rad: float
     angles_rad: Floats
     steps: NDArray[np.uint16] | None = None  # A2 only; the first is 0
@@ -50,7 +50,7 @@ def transmit_tilts_rad(scenario: MbesScenario, angles_rad: Floats, pings: NDArra
     Parameters
     ----------
     scenario : MbesScenario
-        Its sectors reach up to and including their to_deg.
+        The sonar; each of its sectors reaches up to and including its to_deg.
     angles_rad : (b,) array
         Recorded angles of the beams.
     pings : (p,) array
@@ -70,7 +70,7 @@ def transmit_tilts_rad(scenario: MbesScenario, angles_rad: Floats, pings: NDArra
 
 
 def swing_rad(sine: Floats, tilt_rad: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the swing ψ of the ray of a tilted fan that has a given starboard component.
+    """Return the swing ψ of the ray in a tilted fan with the starboard component ``sine``.
 
     The ray looks down: the widest fan of a scenario is 170°.
 
@@ -84,8 +84,9 @@ def swing_rad(sine: Floats, tilt_rad: Floats) -> tuple[Floats, NDArray[np.bool_]
     Returns
     -------
     swing : (p, b) array
-        ψ, to starboard, rad; 0 where there is no such ray.
+        ψ, to starboard, rad; 0 if the fan has no ray with this component.
     exists : (p, b) array of bool
+        Whether the fan has a ray with this component.
     """
     sideways = sine / np.cos(tilt_rad)
     exists = np.abs(sideways) < 1
@@ -107,7 +108,7 @@ class BeamBundles:
         self.projector_m = np.array(scenario.projector_offset_m)
         counts = (1, 1) if scenario.point_beams else scenario.sub_rays
         across, along = (np.arange(n) - n // 2 for n in counts)
-        parts = [offsets / max(n - 1, 1) for offsets, n in zip((across, along), counts, strict=True)]  # of the width
+        parts = [offsets / max(n - 1, 1) for offsets, n in zip((across, along), counts, strict=True)]  # in widths
         grid_across, grid_along = (grid.ravel() for grid in np.meshgrid(*parts, indexing="ij"))
         self.across_rad = grid_across * np.radians(scenario.beam_deg[0])
         self.along_rad = grid_along * np.radians(scenario.beam_deg[1])
@@ -121,7 +122,7 @@ class BeamBundles:
     ) -> tuple[Floats, Floats]:
         """Return half the sound's path of each beam, and the directions of the beams' axes.
 
-        A beam that lies entirely on one plane is phase detected, with the range along its axis. Any other beam's range
+        If a beam lies entirely on one plane, its range is that along its axis (phase detection). Any other beam's range
         is the weighted mean over its rays, which differ by parts of the receive width in θ and of the transmit width in
         τ. (From sin θ = cos τ sin ψ: dψ = √(1 + l²) dθ + l sin ψ dτ with l = tan τ / cos ψ.)
 
@@ -160,7 +161,7 @@ class BeamBundles:
         return detected, directions.reshape(*shape, 3)[:, :, self.axis]
 
     def _detect(self, paths: Floats, wet: NDArray[np.bool_], surfaces: NDArray[np.int64]) -> Floats:
-        """Return the detected path (p, b) from those of all rays (p, b, rays), inf without a detection."""
+        """Return the detected path (p, b) of each beam from the paths of its rays (p, b, rays); inf: no detection."""
         axis = slice(self.axis, self.axis + 1)
         one_plane = np.all(wet & (surfaces == surfaces[..., axis]), axis=-1)
         weights = self.weights * wet

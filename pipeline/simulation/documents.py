@@ -1,4 +1,4 @@
-"""The texts of a session: session.yaml, pool.yaml and the truth beside them."""
+"""The documents of a session: session.yaml, pool.yaml and the truth beside them."""
 
 from typing import Any
 
@@ -17,7 +17,8 @@ _Text = dict[str, Any]
 def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     """Return the content of session.yaml.
 
-    Its sigmas are those of the simulated noise; one that is zero is left out, so that the default holds.
+    Its sigmas are those of the simulated noise, or left out if the scenario does not declare them. A range or angle
+    sigma of zero is left out too, so that the default applies.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def _sigmas(range_m: float, angle_deg: float) -> _Text:
 
 
 def pool_text(scenario: Scenario, movement: Movement) -> _Text:
-    """Return the content of pool.yaml: the design of the target, at the position that the survey gave."""
+    """Return the content of pool.yaml: the target by its design, at its surveyed position (with survey errors)."""
     surroundings, target = scenario.surroundings, scenario.target.model_dump(mode="json")
     if any(surroundings.origin_error_m):
         surveyed = np.array([surroundings.origin_error_m])
@@ -76,7 +77,7 @@ def pool_text(scenario: Scenario, movement: Movement) -> _Text:
 
 
 def truth_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
-    """Return the truth: true mounts, errors of the coarse mounts, and all settings of the scenario.
+    """Return the truth: true mounts, the error of the sonar's coarse mount, and all settings of the scenario.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ _CHUNK = 200_000
 
 
 def laser_in_ecef(laser: Columns, ins: Columns, scenario: LaserScenario) -> Columns:
-    """Transform laser points to ECEF.
+    """Return laser points in ECEF.
 
     x_ecef = x_ins + R_ecef_from_level R_level_from_body (R_body_from_laser x_laser + lever arm). Poses are interpolated
     linearly between INS records, at recorded time - declared latency; the times stay as recorded.

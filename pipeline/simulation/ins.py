@@ -56,7 +56,7 @@ def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Co
 
 
 def _epochs(rate_hz: float, start_ns: int, end_ns: int) -> Times:
-    """Return epochs from start to before end, whole multiples of the interval in GPS time, as receivers give them."""
+    """Return epochs (GPS ns) from start to before end, at whole multiples of the interval, as receivers log them."""
     interval_ns = round(NS / rate_hz)
     return np.arange(-(-start_ns // interval_ns), -(-end_ns // interval_ns), dtype=np.int64) * interval_ns
 
@@ -89,7 +89,7 @@ def white_noise(scenario: InsScenario, count: int, seed: int) -> Floats:
 
 
 def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator) -> Floats:
-    """Return first-order Gauss-Markov errors; the process goes on through gaps.
+    """Return first-order Gauss-Markov errors. The process continues through gaps.
 
     x(t + dt) = f x(t) + sqrt(1 - f²) sigma w, f = exp(-dt / tau): stationary from the first record on.
 
@@ -100,7 +100,7 @@ def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator
     t_ns : (n,) array
         Times of the records, GPS ns.
     random : Generator
-        Random numbers.
+        Generator of the random numbers.
 
     Returns
     -------

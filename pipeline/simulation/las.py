@@ -1,4 +1,4 @@
-"""LAS 1.4, point format 6 (and LAZ): points in the scanner's frame with GPS time."""
+"""LAS 1.4, point format 6 (and LAZ): points with GPS time, in the scanner's frame or in ECEF."""
 
 from datetime import date
 from pathlib import Path
@@ -15,14 +15,14 @@ _CHUNK = 1_000_000
 
 
 def write_las(path: Path, laser: Columns, scenario: LaserScenario, day: date) -> None:
-    """Write one file.
+    """Write one LAS or LAZ file.
 
     Parameters
     ----------
     path : Path
         The file.
     laser : Columns
-        Points.
+        Points and their times.
     scenario : LaserScenario
         Format, scale, kind of times.
     day : date

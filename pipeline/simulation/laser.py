@@ -17,7 +17,7 @@ BELOW_WATER_M = 0.3
 
 
 def scan_directions(zenith_rad: Floats, azimuth_rad: Floats) -> Floats:
-    """Return unit vectors (n, 3): sin t cos p, sin t sin p, cos t in the scanner's frame; p = 0 is starboard."""
+    """Return unit vectors (n, 3), laser frame: (sin t cos p, sin t sin p, cos t); t from zenith, p from starboard."""
     return np.stack(
         [np.sin(zenith_rad) * np.cos(azimuth_rad), np.sin(zenith_rad) * np.sin(azimuth_rad), np.cos(zenith_rad)], axis=1
     )
@@ -35,7 +35,7 @@ def record_laser(
     movement : Movement
         True poses.
     pool : Pool
-        What its rays meet.
+        Surfaces that its rays meet.
     seed : int
         Seed of the session.
 
@@ -59,7 +59,7 @@ def record_laser(
 
 
 class _LaserPass:
-    """One pass; chunks must be taken in order, as they share the generators."""
+    """Records of one pass. Chunks must be taken in order, because they share the generators."""
 
     def __init__(self, scenario: LaserScenario, movement: Movement, pool: Pool, seed: int, k: int) -> None:
         self.scenario, self.movement, self.pool, self.k = scenario, movement, pool, k
@@ -86,7 +86,7 @@ class _LaserPass:
         return t_ns[kept] + round(scenario.latency_s * NS), points
 
     def _true_ranges(self, t_ns: Times, direction_laser: Floats) -> Floats:
-        """Return ranges (n,) to what stands above the water, inf: none; some rays meet the water, just beyond it."""
+        """Return ranges (n,) to surfaces above the water, for some rays to just below the water surface; inf: none."""
         pose = self.movement.pose(self.k, t_ns)
         direction_body = self.R_body_from_laser.apply(direction_laser)
         directions = np.einsum("nij,nj->ni", pose.R_target_from_body, direction_body)

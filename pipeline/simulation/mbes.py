@@ -13,7 +13,7 @@ from pipeline.simulation.scenario import MbesScenario
 from pipeline.simulation.site import Floats
 
 RAYS_AT_ONCE = 400_000
-CLOCK_RATE_ERROR = 3.7e-5  # the sonar's own clock: pings never fall into step with the INS
+CLOCK_RATE_ERROR = 3.7e-5  # error of the sonar's clock, so that pings never fall into step with the INS
 _SHORTEST_M = 0.5
 UPWARD_RAD = np.radians(-30.0)  # beams above this may get the water surface's echo
 
@@ -30,7 +30,7 @@ def record_mbes(
     movement : Movement
         True poses.
     pool : Pool
-        What its beams meet.
+        Surfaces that its beams meet.
     seed : int
         Seed of the session.
 
@@ -56,7 +56,7 @@ def record_mbes(
 
 
 class _SonarPass:
-    """One pass; batches of pings must be taken in order, as they share the generators."""
+    """Records of one pass. Batches of pings must be taken in order, because they share the generators."""
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class _SonarPass:
         self.random = {name: generator(seed, f"mbes_{name}", k) for name in names}
 
     def detections(self, part: slice) -> Columns:
-        """Return the canonical raw columns of some pings, without beams that have no echo."""
+        """Return the canonical raw columns of the pings in ``part``, without beams that have no echo."""
         scenario, t_ns = self.scenario, self.t_ns[part]
         shape = (len(t_ns), len(self.angles_rad))
         pose = self.movement.pose(self.k, t_ns)
@@ -118,11 +118,11 @@ class _SonarPass:
     def _bent(
         self, origins: Floats, R_target_from_mbes: Floats, swing: Floats, tilts: Floats
     ) -> tuple[Floats, Floats]:
-        """Return paths and directions of straight beams; where the sound speed changes with depth, of bent ones.
+        """Return paths and directions of the beams. The beams are bent if the sound speed changes with depth.
 
-        With dc/d(depth) = g a ray curves upward by g/c per metre across itself, so the chord to where it arrives after
-        r lies r g / 2c nearer to the vertical; and on the way down sound is on the average g · depth / 2 faster. The
-        part of "up" across the ray is split into the two directions in which its ψ and its τ grow.
+        With dc/d(depth) = g, a ray curves upward by g/c per metre, times the part of the vector "up" that is normal to
+        the ray. After a path r, its chord is turned upward by r g / 2c times this part. The part is split into the two
+        directions in which ψ and τ of the ray grow. The mean sound speed down to a depth is g · depth / 2 higher.
         """
         gradient, speed = self.scenario.sound_speed_gradient_1_s, self.scenario.sound_speed_true_m_s
         paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
@@ -138,7 +138,10 @@ class _SonarPass:
         return paths * (1 - gradient * depths / (2 * speed)), directions
 
     def _corners(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
-        """Replace echoes near an inner corner by the corner's: the nearest point of its line within the beam."""
+        """Return the paths, some of them near an inner corner replaced by the path to the corner's line.
+
+        The echo comes from the nearest point of the line within the beam.
+        """
         scenario = self.scenario
         dice = self.random["corner"].random(paths.shape)
         ping, beam = np.nonzero(np.isfinite(paths) & (dice < scenario.corner_share))
@@ -155,7 +158,7 @@ class _SonarPass:
         return result
 
     def _surface(self, paths: Floats, origins: Floats, directions: Floats) -> Floats:
-        """Replace some paths by echoes of the water surface: along the beam if it meets it, else straight above."""
+        """Return the paths, some replaced by the path to the water surface: along the beam, or else straight up."""
         dice = self.random["surface"].random(paths.shape)
         chosen = (dice < self.scenario.surface_share) & (directions[..., 2] > np.sin(UPWARD_RAD))
         depth = np.broadcast_to((self.pool.water_level_m - origins[:, 2])[:, None], paths.shape)

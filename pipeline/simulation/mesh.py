@@ -1,4 +1,4 @@
-"""Target and pool as planar polygons, built from the letters a, b, c, e or from a list of faces; and their triangles.
+"""Target and pool as planar polygons and as triangles, built from the letters a, b, c, e or from a list of faces.
 
 With letters the origin is the centre of the wall's front face; x runs into the wall, y along it ("north" is +y), z up.
 A block on side s = ±1 is the prism over (0, s b/2), (c, s b/2), (c, s(b/2 + c)), e high.
@@ -47,7 +47,7 @@ def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = 
     low_m, high_m : float
         Heights of bottom and top.
     caps : bool
-        Whether top and bottom are wanted.
+        Whether top and bottom are returned too.
     """
     def at(height_m: float) -> Floats:
         return np.column_stack([corners, np.full(len(corners), height_m)])
@@ -59,7 +59,7 @@ def prism(name: str, corners: Floats, low_m: float, high_m: float, caps: bool = 
 
 
 def target_polygons(target: Target) -> list[FacePolygon]:
-    """Return the listed faces; or, with letters, the wall as a box back to the pool's wall, and the blocks."""
+    """Return the listed faces; or, with letters, the blocks and the wall (a box back to the pool's wall)."""
     if isinstance(target, Faces):
         return [FacePolygon(name, np.array(face.corners, dtype=np.float64)) for name, face in target.faces.items()]
     a, half, c, e = target.a, target.b / 2, target.c, target.e
@@ -82,7 +82,7 @@ def target_extents(target: Target) -> Floats:
 
 
 def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygon]:
-    """Return back wall (with letters the plane x = c) and floor."""
+    """Return the back wall (with letters the plane x = c), if there is one, and the floor."""
     (_, c), _, (low, high) = target_extents(target)
     reach = surroundings.half_length_m
     floor, top = low - surroundings.floor_gap_m, high + surroundings.wall_above_m
@@ -92,9 +92,9 @@ def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygo
 
 
 def corner_lines(target: Target) -> Floats:
-    """Return inner corners with the back wall, (n, 4): x, y, lowest z, highest z; none without letters.
+    """Return the vertical inner corners at the back wall, (n, 4): x, y, lowest z, highest z; none without letters.
 
-    Slanted faces meet the back wall at y = ±(b/2 + c); in the gaps between blocks the wall's sides do at y = ±b/2.
+    Slanted faces meet the back wall at y = ±(b/2 + c). In the gaps between blocks the wall's sides meet it at y = ±b/2.
     """
     if isinstance(target, Faces):
         return np.empty((0, 4))

@@ -60,12 +60,15 @@ class Movement:
         return range(len(self.distances_m))
 
     def sensors_run_ns(self, k: int) -> tuple[int, int]:
-        """Return when laser and sonar run in pass ``k``; with ``log_between_passes`` until the next one begins."""
+        """Return first and last time (GPS ns) of laser and sonar in pass ``k``.
+
+        With ``log_between_passes`` the last time is the start of the next pass.
+        """
         goes_on = self.between and k + 1 < len(self.starts_ns)
         return self.starts_ns[k], self.starts_ns[k + 1] if goes_on else self.ends_ns[k]
 
     def ins_runs_ns(self, k: int) -> tuple[int, int]:
-        """Return when the INS is logged for pass ``k``: the sensors' time and the margins."""
+        """Return first and last time (GPS ns) of the INS's log for pass ``k``: the sensors' times with the margins."""
         start, end = self.sensors_run_ns(k)
         before = 0 if self.between and k > 0 else self.margin_ns
         after = 0 if end != self.ends_ns[k] else self.margin_ns
@@ -118,7 +121,7 @@ class Movement:
 
 
 def R_level_from_body(roll_rad: Floats, pitch_rad: Floats, azimuth_rad: Floats) -> Floats:
-    """Return Rz(-azimuth) Rx(pitch) Ry(roll), multiplied out: scipy takes ten times as long.
+    """Return Rz(-azimuth) Rx(pitch) Ry(roll), multiplied out because scipy takes ten times as long.
 
     The columns are the directions of starboard, bow and mast in east, north, up. Starboard goes down with roll, the bow
     up with pitch.
@@ -126,7 +129,7 @@ def R_level_from_body(roll_rad: Floats, pitch_rad: Floats, azimuth_rad: Floats) 
     Parameters
     ----------
     roll_rad, pitch_rad, azimuth_rad : (n,) arrays
-        Attitude.
+        Attitude of the body.
 
     Returns
     -------

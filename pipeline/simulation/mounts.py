@@ -20,7 +20,7 @@ def lever_arm_m(mount: Mount) -> Floats:
 
 
 def coarse_error(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
-    """Return coarse minus true mount: the scenario's, or its sizes with random signs."""
+    """Return coarse minus true mount: the scenario's ``coarse_error``, or else its two sizes with random signs."""
     if scenario.coarse_error is not None:
         return scenario.coarse_error
     noise = "coarse" if isinstance(scenario, MbesScenario) else "coarse_laser"
@@ -31,6 +31,6 @@ def coarse_error(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
 
 
 def coarse_mount(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
-    """Return the mount in session.yaml: true mount and coarse error."""
+    """Return the mount in session.yaml: true mount plus coarse error."""
     true, error = scenario.mount.model_dump(), coarse_error(scenario, seed).model_dump()
     return Mount(**{name: round(true[name] + error[name], 12) for name in true})

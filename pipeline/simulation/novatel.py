@@ -53,7 +53,7 @@ def velocities(ins: Columns) -> Velocities:
 
 
 def inspva_bodies(ins: Columns) -> np.ndarray:
-    """Return INSPVA(S) message bodies, degrees, status good."""
+    """Return INSPVA(S) message bodies, angles in degrees, status INS_SOLUTION_GOOD."""
     body = np.zeros(len(ins["t_ns"]), _BODY)
     body["week"], body["seconds"] = ins["t_ns"] // WEEK_NS, ins["t_ns"] % WEEK_NS / NS
     speed = velocities(ins)

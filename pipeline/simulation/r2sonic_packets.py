@@ -47,9 +47,9 @@ def packet_dtype(scenario: MbesScenario) -> np.dtype[np.void]:
 
 
 def bth0_packets(mbes: Columns, pings: Columns, fan: FanAngles, scenario: MbesScenario) -> np.ndarray:
-    """Return the packets of some pings.
+    """Return one packet per ping.
 
-    Beams without detection have range 0. Ranges use all 16 bits of section R0.
+    Beams without a detection have range 0. Ranges use all 16 bits of section R0.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _fill_head(head: np.ndarray, pings: Columns, scenario: MbesScenario) -> None
 
 
 def _quality(angles_rad: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Return flag nibbles, beam 0 the topmost: amplitude detections near the middle of the fan, phase outside."""
+    """Return flags, a nibble per beam, beam 0 topmost: amplitude detection in the middle of the fan, phase outside."""
     nibbles = np.where(np.abs(angles_rad) < MAGNITUDE_BELOW_RAD, MAGNITUDE_DETECT, PHASE_DETECT).astype(np.uint32)
     nibbles = np.pad(nibbles, (0, -len(nibbles) % 8)).reshape(-1, 8)
     flags: NDArray[np.uint32] = np.bitwise_or.reduce(nibbles << np.arange(28, -1, -4, dtype=np.uint32), axis=1)

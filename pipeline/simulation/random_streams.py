@@ -1,4 +1,4 @@
-"""Random numbers: one generator for each purpose, so that without one noise source all others stay the same."""
+"""Random numbers: one generator for each purpose, so that without one noise source all others are unchanged."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ PURPOSES = (
 def generator(seed: int, purpose: str, index: int = 0) -> np.random.Generator:
     """Return the generator of one purpose in one pass.
 
-    Its numbers are the same however they are drawn in batches.
+    Its numbers do not depend on the batches in which they are drawn.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Ray casting: open3d finds the triangle (float32), its plane gives the range (float64)."""
+"""Ray casting: open3d finds the triangle (float32), and the range follows from the triangle's plane (float64)."""
 
 from dataclasses import dataclass
 
@@ -24,9 +24,9 @@ class RayCaster:
         self._no_triangle = self._scene.INVALID_ID
 
     def cast(self, origins_m: Floats, directions: Floats) -> tuple[Floats, NDArray[np.int64]]:
-        """Find where rays first meet the mesh.
+        """Return the range at which each ray first meets the mesh, and the plane that it meets.
 
-        range = (distance - normal · origin) / (normal · direction) in the plane of the triangle that is met first.
+        range = (distance - normal · origin) / (normal · direction) with the plane of the triangle that is met first.
 
         Parameters
         ----------
@@ -38,9 +38,9 @@ class RayCaster:
         Returns
         -------
         ranges : (n,) array
-            m; inf: nothing met.
+            m; inf: the ray meets nothing.
         surfaces : (n,) array
-            Number of the plane; -1: nothing met.
+            Number of the plane; -1: the ray meets nothing.
         """
         rays = np.concatenate([origins_m, directions], axis=1, dtype=np.float32)
         triangle = self._scene.cast_rays(self._tensor(rays))["primitive_ids"].numpy()
@@ -56,7 +56,7 @@ class RayCaster:
 
 @dataclass(frozen=True)
 class Pool:
-    """What the sensors' rays may meet, in the target frame."""
+    """Surfaces that the sensors' rays may meet, in the target frame."""
 
     caster: RayCaster
     water_level_m: float

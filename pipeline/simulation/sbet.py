@@ -10,7 +10,7 @@ WANDER_RAD = np.radians(-1.25)
 
 
 def sbet_bytes(ins: Columns) -> bytes:
-    """Return the file's bytes. Platform heading = true heading + wander; roll, pitch, heading are the same in NED."""
+    """Return the file's bytes. Platform heading = true heading + wander; NED has the same roll, pitch and heading."""
     record = np.zeros((len(ins["t_ns"]), 17), "<f8")
     record[:, 0] = ins["t_ns"] % WEEK_NS / NS
     record[:, 1], record[:, 2], record[:, 3] = ins["latitude_rad"], ins["longitude_rad"], ins["height_m"]

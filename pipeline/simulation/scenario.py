@@ -45,7 +45,7 @@ class Surroundings(Model):
 
     half_length_m: Annotated[float, Field(gt=0, le=200)] = 15.0  # back wall and floor reach this far along y
     floor_gap_m: NotNegative = 0.3  # the floor lies this much below the target's foot
-    back_wall: bool = True  # false: nothing stands behind the target
+    back_wall: bool = True  # false: no wall stands behind the target
     wall_above_m: NotNegative = 0.5  # the back wall ends this much above the target's top
     tilt_deg: tuple[Angle, Angle] = (0.0, 0.0)  # the target as built, turned about its x and y axes
     origin_error_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # configured minus true, target axes
@@ -77,12 +77,12 @@ class Motion(Model):
 class TrackScenario(Model):
     """Passes along the target, in the direction of its +y axis."""
 
-    distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # from wall
+    distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # to wall
     speed_m_s: Annotated[float, Field(gt=0.001, le=20)] = 0.4
-    half_length_m: Length | None = None  # from -y to +y of this; null: b/2 + c + 2
-    ins_height_m: Lever = 1.3  # INS above the water
-    margin_s: Annotated[float, Field(ge=0, le=3600)] = 3.0  # INS logged before and after each pass
-    gap_s: Annotated[float, Field(ge=0, le=86400)] = 60.0  # nothing logged between passes
+    half_length_m: Length | None = None  # from -y to +y of this; null: 2 m beyond the target
+    ins_height_m: Lever = 1.3  # height of the INS above the water
+    margin_s: Annotated[float, Field(ge=0, le=3600)] = 3.0  # time of the INS's log before and after each pass
+    gap_s: Annotated[float, Field(ge=0, le=86400)] = 60.0  # time between passes, without any log
     log_between_passes: bool = False  # all instruments run on while the vessel turns and comes back
 
 
@@ -92,8 +92,8 @@ class InsScenario(Model):
     rate_hz: Annotated[float, Field(ge=1, le=1000)] = 200.0
     white: White = White()
     drift: Drift = Drift(horizontal_m=0.0, vertical_m=0.0, roll_pitch_deg=0.0, heading_deg=0.0)
-    format: Literal["inspvas", "inspva", "inspvasa", "inspvaa", "sbet"] = "inspvas"  # ...a: ASCII
-    files: Literal["session", "pass"] = "session"  # one file for the session, or one a pass
+    format: Literal["inspvas", "inspva", "inspvasa", "inspvaa", "sbet"] = "inspvas"  # inspvasa, inspvaa: ASCII
+    files: Literal["session", "pass"] = "session"  # one file per session or per pass
     aligning_s: Annotated[float, Field(ge=0, le=3600)] = 5.0  # aligning before the first pass (novatel), 1 Hz
 
 
@@ -103,15 +103,15 @@ class LaserScenario(Model):
     mount: Mount = Mount(roll_deg=0.35, pitch_deg=-0.22, yaw_deg=0.41, x_m=0.21, y_m=0.48, z_m=1.10)  # the truth
     coarse_angle_deg: NotNegative = 0.0  # error of each angle in session.yaml, its sign random
     coarse_lever_m: NotNegative = 0.0  # the same of the lever arm
-    coarse_error: Mount | None = None  # instead: the six errors, session.yaml's minus true
+    coarse_error: Mount | None = None  # instead: each parameter's error, session.yaml's minus true
     point_rate_hz: Annotated[float, Field(ge=1, le=1e6)] = 20000.0
     line_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 50.0
     field_deg: tuple[Angle, Angle] = (30.0, 130.0)  # from the scanner's zenith
     max_range_m: Annotated[float, Field(ge=1, le=1000)] = 40.0
     range_sigma_m: NotNegative = 0.005
     angle_sigma_deg: NotNegative = 0.003
-    outlier_share: Share = 0.005  # a random range instead
-    water_return_share: Share = 0.02  # of the rays that meet the water: a point up to 0.3 m beyond its surface
+    outlier_share: Share = 0.005  # of the rays: they get a random range
+    water_return_share: Share = 0.02  # of the rays that meet the water: they give a point up to 0.3 m beyond it
     latency_s: Latency = 0.0  # recorded time = true time + latency
     latency_declared_s: Latency = 0.0
     frame: Literal["laser", "EPSG:4978"] = "laser"  # EPSG:4978: placed in ECEF with the recorded INS
@@ -126,7 +126,7 @@ class MbesScenario(Model):
     mount: Mount = Mount(roll_deg=-48.8, pitch_deg=1.2, yaw_deg=-2.0, x_m=0.30, y_m=0.20, z_m=-2.01)  # the truth
     coarse_angle_deg: NotNegative = 0.8  # error of each coarse angle, its sign random
     coarse_lever_m: NotNegative = 0.08  # the same of the coarse lever arm
-    coarse_error: Mount | None = None  # instead: the six errors, coarse minus true
+    coarse_error: Mount | None = None  # instead: each parameter's error, coarse minus true
     ping_rate_hz: Annotated[float, Field(gt=0, le=100)] = 20.0
     beams: Annotated[int, Field(ge=2, le=1024)] = 256
     sector_deg: Annotated[float, Field(gt=0, le=170)] = 130.0
@@ -138,16 +138,16 @@ class MbesScenario(Model):
     angle_sigma_deg: NotNegative = 0.06
     beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # across, along track
     point_beams: bool = False  # true: beams without width
-    sub_rays: tuple[Count, Count] = (5, 3)  # of a beam, across and along; odd
-    corner_share: Share = 0.3  # of the beams within corner_reach_m of an inner corner: the corner's range
+    sub_rays: tuple[Count, Count] = (5, 3)  # rays per beam, across and along; odd
+    corner_share: Share = 0.3  # of the beams within corner_reach_m of an inner corner: they get its range
     corner_reach_m: NotNegative = 0.1
-    outlier_share: Share = 0.02  # a random range instead
-    surface_share: Share = 0.04  # of the beams that look above 30 deg below the horizon: the water surface's range
+    outlier_share: Share = 0.02  # of the beams: they get a random range
+    surface_share: Share = 0.04  # of the beams above 30° below the horizon: they get the water surface's range
     dropped_ping_share: Share = 0.01
     sound_speed_true_m_s: SoundSpeed = 1500.0
     sound_speed_recorded_m_s: SoundSpeed = 1500.0
     sound_speed_gradient_1_s: Annotated[float, Field(ge=-2, le=2)] = 0.0  # (m/s)/m downward from the head's true speed
-    give_true_sound_speed: bool = False  # session.yaml carries the true one
+    give_true_sound_speed: bool = False  # true: session.yaml has the true one
     projector_offset_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # transmitter in the mbes frame
     give_projector_offset: bool = False
     latency_s: Latency = 0.0
@@ -182,7 +182,7 @@ class Scenario(Model):
 
     name: Annotated[str, Field(min_length=1, max_length=200)] = "default"
     start_utc: Annotated[str, AfterValidator(_utc)] = "2026-05-12T08:00:00"
-    declare_sigmas: bool = True  # false: session.yaml says nothing of noise, drift and beam width
+    declare_sigmas: bool = True  # false: session.yaml has no noise, drift and beam width
     target: Target = Letters(
         a=8.0, b=3.0, c=1.0, e=0.5, azimuth_deg=0.0,
         origin=Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0),
@@ -231,7 +231,7 @@ def load_scenario(path: Path | None) -> Scenario:
     Parameters
     ----------
     path : Path or None
-        The file; a single word that is no file names one of configs/scenarios; None: the default scenario.
+        The file; or, if no file has this name, the name of one in configs/scenarios; None: the default scenario.
 
     Raises
     ------
@@ -250,5 +250,5 @@ def load_scenario(path: Path | None) -> Scenario:
 
 
 def scenario_names() -> list[str]:
-    """Return the names of configs/scenarios."""
+    """Return the names of the scenarios in configs/scenarios."""
     return sorted(path.stem for path in SCENARIOS_FOLDER.glob("*.yaml"))

@@ -36,12 +36,12 @@ class SimulatedSession:
     """Records of the instruments as canonical raw columns, and the documents that go with them."""
 
     ins: Columns  # t_ns, latitude_rad, longitude_rad, height_m, roll_rad, pitch_rad, azimuth_rad
-    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF if the scenario says so
+    laser: Columns  # t_ns, x_m, y_m, z_m in the scanner's frame, or in ECEF by the scenario's laser.frame
     mbes: Columns  # t_ns, ping, beam, two_way_time_s, angle_rad, transmit_tilt_rad, sound_speed_m_s; detections only
     session: dict[str, Any]  # session.yaml
     pool: dict[str, Any]  # pool.yaml
     truth: dict[str, Any]  # OUT.truth.json
-    ins_rows: list[int]  # first row of each pass, and of the end
+    ins_rows: list[int]  # first row of each pass, and the number of rows
     laser_rows: list[int]
     pings: Columns  # every ping: t_ns, ping, pass
 
@@ -80,7 +80,7 @@ def simulate_session(scenario: Scenario, seed: int) -> SimulatedSession:
 
 
 def write_session(simulated: SimulatedSession, folder: Path, scenario: Scenario) -> None:
-    """Write the session folder, and the truth beside it. A folder under that name is complete or not there at all.
+    """Write the session folder, and the truth beside it. The folder appears complete or not at all.
 
     Parameters
     ----------
@@ -94,13 +94,13 @@ def write_session(simulated: SimulatedSession, folder: Path, scenario: Scenario)
     Raises
     ------
     ConfigError
-        The folder exists, or cannot be written.
+        The folder exists and is not empty, or it cannot be written.
     """
     _refuse_existing(folder)
     partial = folder.with_name(f".{folder.name}.partial")
     beside = folder.with_name(f".{folder.name}.truth.json.partial")
     try:
-        shutil.rmtree(partial, ignore_errors=True)  # of a run that was killed
+        shutil.rmtree(partial, ignore_errors=True)  # left by a run that was killed
         partial.mkdir(parents=True)
         _write_files(simulated, partial, scenario)
         beside.write_text(json.dumps(simulated.truth, indent=1) + "\n", encoding="utf-8")
@@ -134,7 +134,7 @@ def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> d
     Returns
     -------
     dict
-        Paths and numbers of records that were written, and the seconds it took.
+        Paths of the files, numbers of records in them, and the run time in seconds.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> d
     begin = time.perf_counter()
     folder = Path(os.path.abspath(folder))
     scenario = load_scenario(scenario_path)
-    _refuse_existing(folder)  # before the work, not after it
+    _refuse_existing(folder)  # checked before the simulation, which takes long
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

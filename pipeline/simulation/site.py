@@ -1,4 +1,4 @@
-"""Target frame <-> WGS 84. Positions by pyproj; the local level of the INS is not that of the target's origin."""
+"""Target frame <-> WGS 84, positions by pyproj. The local level at the INS differs from that at the target's origin."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,7 +24,7 @@ def R_ecef_from_level(latitude_rad: Floats, longitude_rad: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Site:
-    """Where the target stands: origin, and the direction of its +y axis, clockwise from true north."""
+    """Place of the target: its origin, and the direction of its +y axis, clockwise from true north."""
 
     origin: Origin
     azimuth_deg: float

@@ -1,4 +1,4 @@
-"""Print what a command says at its end: the answer, what could not be drawn, where to look next."""
+"""No command: this module prints a command's last lines, with the answer, failed drawings and paths of results."""
 
 import shlex
 import sys
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 def print_answer(text: str, is_yes: bool) -> int:
-    """Print an answer; return the exit status, 1 for a no."""
+    """Print an answer and return the exit status: 0 for yes, 1 for no."""
     say(text, sys.stdout)
     return 0 if is_yes else 1
 
 
 def print_result(run: Path) -> int:
-    """Print the result of a run; return the exit status, 1 if it was rejected."""
+    """Print the result of a run and return the exit status: 1 if it was rejected."""
     from pipeline.results.screen import summary
     from pipeline.run.results import calibration
 
@@ -28,18 +28,18 @@ def print_result(run: Path) -> int:
 
 
 def say_where(run: Path) -> None:
-    """Say where to look next: the page, and the command that shows the recordings."""
+    """Print the path of the report's page, and the command that shows the recordings."""
     page = run / "report" / "report.html"
     if page.is_file():
         say(f"Report: {page}", sys.stdout)
     if any(run.glob("*/*.rrd")):
-        program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as it was called
+        program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as the user called it
         place = str(run) if not str(run).startswith("-") else f"./{run}"
         say(f"Recordings: {program} view {shlex.quote(place)}", sys.stdout)
 
 
 def say_failures(failures: "Sequence[DrawingFailure]", but: str = "") -> None:
-    """Say what could not be drawn; ``but``: what holds all the same. Drawings are a help: the result stands."""
+    """Print which drawings failed, and why; ``but``: text at the end of each line. The result stays valid."""
     for failure in failures:
         if failure.trace:
             say(failure.trace, sys.stderr)

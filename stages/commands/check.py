@@ -1,4 +1,4 @@
-"""``poolcal check``: what a session's files are, and what is wrong with them, before it is calibrated."""
+"""``poolcal check``: the content and the faults of a session's files, before the session is calibrated."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -22,7 +22,7 @@ WITHOUT_CONFIG = "Target, mounts and soundings were not checked: give the pool's
 
 
 def command(session: Path, config: Path | None, as_json: bool) -> int:
-    """Print the findings; 1 if something is wrong.
+    """Print the findings; return 1 if something is wrong.
 
     Parameters
     ----------
@@ -31,27 +31,27 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     config
         The pool's YAML file; None: target, mounts and soundings are not checked.
     as_json
-        Print JSON, for programs.
+        True: print JSON, for programs.
     """
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
-    found = check_session(session, content, pool, _calibrated)
+    findings = check_session(session, content, pool, _calibrated)
     if as_json:
-        return print_answer(rendering.check_json(found), not found.faulty)
+        return print_answer(rendering.check_json(findings), not findings.faulty)
     used = None if content.mbes is None else content.mbes.svp_from
     cast = "" if used is None else f"mbes.svp: {describe_cast(used)}\n\n"
     unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"
-    return print_answer(f"{cast}{rendering.check_text(found)}{unasked}", not found.faulty)
+    return print_answer(f"{cast}{rendering.check_text(findings)}{unasked}", not findings.faulty)
 
 
 def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> TrialCalibration:
-    found: dict[str, Any] = {}
+    artefacts: dict[str, Any] = {}
 
-    def kept(key: str, value: Any) -> Any:
-        found[key] = value
+    def keep(key: str, value: Any) -> Any:
+        artefacts[key] = value
         return value
 
     with suppress(PoolcalError):
-        calibrate_in_memory(session, pool, raw, "adjust", kept)
-    tables = (found.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
-    return TrialCalibration(found.get("segment/soundings_labelled", EMPTY_STREAM), *tables)
+        calibrate_in_memory(session, pool, raw, "adjust", keep)
+    tables = (artefacts.get(name) for name in ("segment/target_pose", "segment/provisional_mount", "adjust/freed"))
+    return TrialCalibration(artefacts.get("segment/soundings_labelled", EMPTY_STREAM), *tables)

@@ -1,4 +1,4 @@
-"""``poolcal coarse``: mounts from a survey of marks, on the screen, as YAML, and into session.yaml."""
+"""``poolcal coarse``: mounts from a survey of marks, on the screen, in a YAML file, and in session.yaml."""
 
 from pathlib import Path
 
@@ -17,16 +17,16 @@ from stages.commands.answer import print_answer
 
 
 def command(file: Path, session: Path, out: Path | None, write: bool) -> int:
-    """Print the mounts, and write them into session.yaml; 1 if the marks do not agree.
+    """Print the mounts, and write them into session.yaml; return 1 if the marks do not agree.
 
     Parameters
     ----------
     file
-        The survey's marks.
+        The YAML file with the survey's marks.
     session
-        The session's folder.
+        The folder with session.yaml.
     out
-        A YAML file to write everything to; None: none.
+        The YAML file for all results; None: no file is written.
     write
         Whether to write the mounts into session.yaml if the marks agree.
     """

@@ -1,4 +1,4 @@
-"""``poolcal diff``: two runs compared, on the screen, as JSON, as a page and as a recording."""
+"""``poolcal diff``: the difference of two runs on the screen, as JSON, as a page and as a recording."""
 
 import json
 import sys
@@ -8,8 +8,8 @@ from typing import Any
 
 from pipeline.atomic_files import write_text, writing
 from pipeline.console import say
-from pipeline.results.compare import run_difference
-from pipeline.results.compare_text import comparison_text
+from pipeline.results.diff import run_difference
+from pipeline.results.diff_text import difference_text
 from pipeline.results.finished_run import FinishedRun
 from pipeline.results.mount_difference import Tolerances, is_moved
 from pipeline.run.output_files import refuse_output
@@ -18,9 +18,9 @@ from stages import ORDER
 
 @dataclass(frozen=True)
 class DiffOutputs:
-    """In which forms the comparison is wanted, beside lines on the screen."""
+    """The forms of the output: JSON or text on the screen, a page and a recording in files; None: no file."""
 
-    as_json: bool  # in their place
+    as_json: bool  # else text
     html: Path | None
     rrd: Path | None
 
@@ -33,38 +33,38 @@ def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutp
     first, second
         Run folders.
     tolerances
-        A larger difference of the mount is a no, significant or not.
+        A larger difference of the mount gives status 1, even if it is not significant.
     outputs
-        Forms of the comparison.
+        The forms of the output.
 
     Returns
     -------
     int
-        1: the mounts differ, or cannot be compared.
+        0: the mount has not moved; 1: it has moved, or the mounts cannot be compared.
     """
     difference = compare_runs(first, second, tolerances)
     for option, file in (("--html", outputs.html), ("--rrd", outputs.rrd)):
         refuse_output(option, file, first, second)
     if outputs.html is not None:
-        from pipeline.results.pages.comparison import comparison_page
+        from pipeline.results.pages.diff import difference_page
 
-        write_text(outputs.html, comparison_page(difference))
+        write_text(outputs.html, difference_page(difference))
     if outputs.rrd is not None:
         write_two_runs(first, second, difference, outputs.rrd)
-    text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else comparison_text(difference)
+    text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else difference_text(difference)
     say(text, sys.stdout)
     return 1 if is_moved(difference) else 0
 
 
 def compare_runs(first: Path, second: Path, tolerances: Tolerances) -> dict[str, Any]:
-    """Return the difference of two run folders, of :func:`pipeline.results.compare.run_difference`.
+    """Return the difference of two run folders, of :func:`pipeline.results.diff.run_difference`.
 
     Parameters
     ----------
     first, second
         The run folders.
     tolerances
-        Larger differences of the mount are listed.
+        A mount parameter with a larger difference is listed by name.
     """
     return run_difference(FinishedRun.read(first, ORDER), FinishedRun.read(second, ORDER), tolerances)
 

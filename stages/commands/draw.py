@@ -1,7 +1,7 @@
-"""Draw what people look at, from a run's files: the report's page, and a recording of each stage.
+"""No command: this module draws the report's page and a recording of each stage, from a run's files.
 
-Drawing begins when the answer is on the screen. Processes of their own draw (:mod:`stages.commands.draw_worker`): a
-crash in a library that draws, or a lack of memory, ends one of them and not the run.
+Drawing begins when the answer is on the screen. With two jobs or more, separate processes draw
+(:mod:`stages.commands.draw_worker`): if a library crashes or memory is short, one of these ends, and not the run.
 """
 
 import contextlib
@@ -20,45 +20,45 @@ from pipeline.run.settings import read_settings
 from stages import ORDER, names_in
 from stages.commands.one_drawing import RECORDINGS, DrawingFailure, draw_one, kind_of_drawing
 
-DECIDES = "angle_iterate"  # on which tabs there are
-WORKER = [sys.executable, "-P", "-m", "stages.commands.draw_worker"]  # -P: no code of the working folder is run
+DECIDES = "angle_iterate"  # its result decides which tabs there are
+WORKER = [sys.executable, "-P", "-m", "stages.commands.draw_worker"]  # -P: nothing is imported from the working folder
 
 
 @dataclass(frozen=True)
 class Drawings:
-    """What is wanted: the report's page, the stages' recordings."""
+    """What to draw: the report's page, and the recordings of the stages."""
 
     report: bool
     recordings: bool
 
     @property
     def kinds(self) -> list[str]:
-        """Return the names of what is wanted, as messages name them."""
+        """The kinds of drawings to make, by their names in messages."""
         return [kind for kind, wanted in ((PAGE, self.report), (RECORDINGS, self.recordings)) if wanted]
 
 
 def draw_missing(run: Path, wanted: Drawings, jobs: int = 1) -> list[DrawingFailure]:
-    """Draw what is not drawn yet, or not as the run is now.
+    """Draw the page and the recordings that are missing or out of date.
 
     Parameters
     ----------
     run
         A run folder; its results are only read.
     wanted
-        What is to be drawn.
+        What to draw.
     jobs
-        With one, this process draws; with two or three, one worker process; with more two, one of which draws the page,
-        which takes longer than all recordings. Each loads the libraries anew.
+        1: this process draws. 2 or 3: one worker process draws. 4 or more: two worker processes draw, one of them the
+        page, which takes longer than all recordings. Each worker process must load the libraries again.
 
     Returns
     -------
     list
-        What could not be drawn, at most one entry a kind.
+        The failures, at most one for each kind of drawing.
     """
     if not wanted.kinds:
         return []
     try:
-        read_settings(run)  # never lock, and so make, a folder that is no run's
+        read_settings(run)  # fails for a folder that is no run folder, before it is locked
         if not missing_drawings(run, wanted):
             return []
         with folder.locked(run, ORDER):
@@ -68,24 +68,24 @@ def draw_missing(run: Path, wanted: Drawings, jobs: int = 1) -> list[DrawingFail
 
 
 def missing_drawings(run: Path, wanted: Drawings) -> list[str]:
-    """Return what is not drawn yet: the page's name, and names of stages, of those alone that agree with each other."""
+    """Return the names of the drawings to make: PAGE, and stages without a recording; their results must agree."""
     stages = names_in(run)
     page = [PAGE] if wanted.report and is_page_outdated(run, stages) else []
     if not wanted.recordings:
         return page
     done = agreeing(run, stages)
     if DECIDES in done and not recording_path(run, DECIDES).is_file():
-        return page + list(done)  # with its result the tabs may come or go, and every recording names them
+        return page + list(done)  # its new result can change the tabs, and every recording contains them
     return page + [stage for stage in done if not recording_path(run, stage).is_file()]
 
 
 def _draw_all(run: Path, names: Sequence[str], processes: int) -> list[DrawingFailure]:
-    """Draw page and recordings side by side where there may be two processes, and else one after the other."""
+    """Draw with 0 worker processes (in this one), with 1, or page and recordings with 2; return the failures."""
     failures = None
     if processes and names:
         by_kind = [[name for name in names if kind_of_drawing(name) == kind] for kind in (PAGE, RECORDINGS)]
         shares = [share for share in by_kind if share] if processes > 1 else [list(names)]
-        with contextlib.suppress(OSError):  # where no process can be started, this one draws
+        with contextlib.suppress(OSError):  # if no process can be started, this one draws
             failures = _drawn_by_workers(run.absolute(), shares)
     if failures is None:
         failures = [failure for name in names if (failure := draw_one(run, name)) is not None]
@@ -93,15 +93,15 @@ def _draw_all(run: Path, names: Sequence[str], processes: int) -> list[DrawingFa
 
 
 def _drawn_by_workers(run: Path, shares: Sequence[Sequence[str]]) -> list[DrawingFailure]:
-    """Draw each share in a process of its own; return the failures.
+    """Draw each share in a separate process, and return the failures.
 
-    Ctrl-C reaches this process alone, which then kills the others. A file is written whole or not at all.
+    Ctrl-C reaches only this process, which then kills the workers. A file is written whole or not at all.
     """
     with contextlib.ExitStack() as stack:
         workers = []
         for share in shares:
             workers.append(stack.enter_context(_started([*WORKER, str(run), *share])))
-            stack.callback(workers[-1].kill)  # before it is waited for; once it has answered, its work is done
+            stack.callback(workers[-1].kill)  # runs before the wait for its end; after its answer, it has no work left
         return [failure for worker, share in zip(workers, shares, strict=True) for failure in _answer(worker, share)]
 
 
@@ -121,7 +121,7 @@ def _answer(worker: "subprocess.Popen[str]", share: Sequence[str]) -> list[Drawi
 
 
 def _environment() -> dict[str, str]:
-    """Return this process's environment, with the program's own root first, for where it was not installed."""
+    """Return this process's environment, with the program's root first in PYTHONPATH in case it is not installed."""
     root = str(Path(__file__).parents[2])
     path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     return os.environ | {"PYTHONPATH": path}

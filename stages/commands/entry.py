@@ -1,4 +1,4 @@
-"""How the command line ends: from exceptions to exit status, interrupts, and streams that cannot be written."""
+"""No command: this module turns exceptions into exit statuses, and handles interrupts and closed output streams."""
 
 import os
 import signal
@@ -13,11 +13,11 @@ import typer
 from pipeline.console import say
 from pipeline.errors import PoolcalError
 
-INTERRUPTED = 130  # what typer makes of Ctrl-C
+INTERRUPTED = 130  # the exit status that typer returns after Ctrl-C
 STOPPED = "poolcal: interrupted; what was complete is kept"
-SPEAKERS = ("typer", "click", "rich")  # print the help by themselves
+SPEAKERS = ("typer", "click", "rich")  # packages that print the help
 interrupts: list[int] = []
-WANTED = {  # what an option that is left out must name
+WANTED = {  # by required option: the words for the message if it is missing
     "--config": "--config FILE: the pool's YAML file, which says where the target is; begin with configs/defaults.yaml",
     "--run": "--run RUN: the folder for the results, outside the session folder",
     "--session": "--session SESSION: the folder with session.yaml",
@@ -25,7 +25,7 @@ WANTED = {  # what an option that is left out must name
 
 
 def _usage(error: typer.TyperException) -> str:
-    """Say what is wrong with a command line, and where its help is."""
+    """Return the message for a wrong command line, with the command that shows the help."""
     command = getattr(getattr(error, "ctx", None), "command_path", "poolcal")
     option = next(iter(getattr(getattr(error, "param", None), "opts", ())), "")
     words = " ".join(error.format_message().split()).rstrip(".")
@@ -35,7 +35,7 @@ def _usage(error: typer.TyperException) -> str:
 
 
 def status_of(command: Callable[[], Any], debug: bool) -> int:
-    """Return the exit status of a command; nothing is raised. ``debug``: show the traceback of bad input as well."""
+    """Call a command and return its exit status. Exceptions end here. ``debug``: show tracebacks of bad input too."""
     try:
         status = int(command() or 0)
         if status == INTERRUPTED:
@@ -50,7 +50,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
         say(f"poolcal: {_usage(error)}", sys.stderr)
         return 2
     except Exception as error:
-        if interrupts:  # a library that was being loaded has made another error of it
+        if interrupts:  # a library that was being loaded has raised another error instead
             say(STOPPED, sys.stderr)
             return INTERRUPTED
         if isinstance(error, OSError) and _raised_in(error).startswith(SPEAKERS):
@@ -62,7 +62,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
 
 
 def _raised_in(error: BaseException) -> str:
-    """Return the name of the module that raised it."""
+    """Return the name of the module that raised ``error``."""
     frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
     return str(frames[-1].f_globals.get("__name__", "")) if frames else ""
 
@@ -72,7 +72,7 @@ def _refusal(error: OSError) -> str:
 
 
 def raise_if_interrupted() -> None:
-    """Raise KeyboardInterrupt after a Ctrl-C that came where Python ignores it (in a clean-up, say)."""
+    """Raise KeyboardInterrupt after a Ctrl-C that Python ignored, for example in a destructor."""
     if interrupts:
         raise KeyboardInterrupt
 
@@ -83,11 +83,11 @@ def _interrupted(number: int, _: object) -> None:
 
 
 def prepare_process() -> None:
-    """Before anything is printed: note Ctrl-C, let closed streams lead nowhere, and have every letter written."""
+    """Prepare for output: record Ctrl-C, replace closed streams, and escape letters that cannot be encoded."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupted)
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the shell; open to the end
+        if getattr(sys, name) is None:  # closed by the shell; the new one stays open
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         reconfigure: Any = getattr(stream, "reconfigure", None)
@@ -96,12 +96,12 @@ def prepare_process() -> None:
 
 
 def end_process(status: int) -> None:
-    """End the process; give up what cannot be written any more, without Python's own complaint."""
+    """End the process. Output that can no longer be written is dropped, without a message from Python."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
         except OSError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     if status == INTERRUPTED:
-        os._exit(status)  # a library left in the middle of its work would end with a status of its own
+        os._exit(status)  # a library that was interrupted could set another status
     sys.exit(status)

@@ -15,13 +15,13 @@ def command(folder: Path, out: Path | None, name: str, since: date | None, until
     Parameters
     ----------
     folder
-        Folder that holds run folders.
+        The folder that contains run folders.
     out
-        Where the files go; None: ``folder/history``.
+        The folder for the files; None: ``folder/history``.
     name
-        Pattern of the sessions' names.
+        Pattern of the names of sessions to show.
     since, until
-        First and last day, UTC; None: any.
+        First and last day of sessions to show, UTC; None: no limit.
     """
     session_filter = SessionFilter(name, since, until)
     history = read_history(folder, session_filter)

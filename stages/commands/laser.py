@@ -1,4 +1,4 @@
-"""``poolcal laser``: the laser itself calibrated, and its mount written into session.yaml."""
+"""``poolcal laser``: calibrate the laser itself, and write its mount into session.yaml."""
 
 import sys
 from pathlib import Path
@@ -20,9 +20,9 @@ def command(session: Path, config: Path, run_folder: Path, write: bool, options:
     run_folder
         Folder for the results.
     write
-        Put an accepted mount into session.yaml.
+        True: write an accepted mount into session.yaml.
     options
-        How the run is worked on.
+        Workers, drawings and overwriting.
 
     Returns
     -------

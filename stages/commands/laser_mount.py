@@ -1,4 +1,4 @@
-"""Writes the laser's own calibration into session.yaml, with the covariance that the sonar's total sigmas need."""
+"""No command: this writes the laser's mount into session.yaml, with the covariance for the sonar's total sigmas."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from pipeline.run.results import calibration
 
 
 def write(session: Path, run: Path) -> str:
-    """Write an accepted result into SESSION/session.yaml; return what was done, in words."""
+    """Write an accepted result into SESSION/session.yaml; return a text that says what was written."""
     result = calibration(run)
     block = result["laser"]
     origin = mount_origin("fine", run / "report" / "calibration.json", held=list(result["held"]))

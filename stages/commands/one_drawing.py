@@ -1,4 +1,4 @@
-"""Draw one thing, the report's page or a stage's recording, and say why that failed."""
+"""No command: this module makes one drawing, the report's page or a stage's recording, and returns a failure."""
 
 import traceback
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ RECORDINGS = "recordings"
 
 @dataclass(frozen=True)
 class DrawingFailure:
-    """What could not be drawn, and why; ``trace``: of a bug."""
+    """A drawing that failed, and the reason; ``trace``: the traceback if the cause is a bug."""
 
     kind: str
     reason: str
@@ -23,7 +23,7 @@ class DrawingFailure:
 
     @classmethod
     def of(cls, kind: str, error: Exception) -> "DrawingFailure":
-        """Return the failure that an error is: one line of it, and the traceback of one that nobody expects."""
+        """Return the failure with the first line of an error, and with the traceback of an unexpected error."""
         expected = isinstance(error, (PoolcalError, OSError))
         trace = "" if expected else "".join(traceback.format_exception(error)).rstrip()
         first = str(error).partition("\n")[0]
@@ -31,7 +31,7 @@ class DrawingFailure:
 
 
 def draw_one(run: Path, name: str) -> DrawingFailure | None:
-    """Draw the page, or a stage's recording; return what went wrong, if anything did."""
+    """Draw the page or a stage's recording; return the failure, or None."""
     try:
         if name == PAGE:
             _draw_page(run)
@@ -43,7 +43,7 @@ def draw_one(run: Path, name: str) -> DrawingFailure | None:
 
 
 def kind_of_drawing(name: str) -> str:
-    """Return what a name is called in messages: the page by its name, a stage's recording by RECORDINGS."""
+    """Return the kind of a drawing for messages: PAGE, or RECORDINGS for the recording of any stage."""
     return PAGE if name == PAGE else RECORDINGS
 
 

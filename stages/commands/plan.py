@@ -1,4 +1,4 @@
-"""``poolcal plan``: passes judged before they are sailed, on the screen, as YAML and as a recording."""
+"""``poolcal plan``: an assessment of passes before they are sailed, on the screen, as YAML and as a recording."""
 
 from pathlib import Path
 
@@ -20,22 +20,22 @@ from pipeline.run.settings import load_settings
 from pipeline.text_table import text_table
 from stages.commands.answer import print_answer
 
-WORSE = 1.05  # a sigma that grows by less is the same
+WORSE = 1.05  # a sigma that grows by a smaller factor counts as unchanged
 
 
 def command(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: Path | None) -> int:
-    """Print a plan's assessment; 1 if the passes will not do.
+    """Print a plan's assessment; return 1 if the passes are not good enough.
 
     Parameters
     ----------
     file
-        The plan.
+        The YAML file with the plan.
     session
         Folder with session.yaml.
     pool_file
         The pool's YAML file.
     out, rrd
-        Files for the prediction as YAML and for a recording of it; None: none.
+        Files for the prediction as YAML and as a recording; None: no file is written.
     """
     refuse_output("--yaml", out, session, begins=b"given:")
     refuse_output("--rrd", rrd, session)
@@ -54,7 +54,7 @@ def command(file: Path, session: Path, pool_file: Path, out: Path | None, rrd: P
 
 
 def table(answer: PlanAssessment, limits: VerdictLimits) -> str:
-    """Return a plan's assessment for the screen."""
+    """Return a plan's assessment as text for the screen."""
     setting, plan = answer.setting, answer.setting.plan
     rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
     lines = ["As given:", *_passes(setting, rows), *_sigmas(setting, answer.given, limits)]
@@ -75,7 +75,7 @@ def table(answer: PlanAssessment, limits: VerdictLimits) -> str:
 
 
 def _chosen(answer: PlanAssessment, better: Accuracy, limits: VerdictLimits) -> list[str]:
-    """Return the list chosen, like passes together, and what it does to the sigmas: some of them may grow."""
+    """Return text lines on the chosen passes (one line for equal passes) and on the sigmas, some of which may grow."""
     alike: dict[Pass, tuple[int, float, dict[str, assessment.Array]]] = {}
     for one, seconds, points in better.each():
         number, longest, sums = alike.get(one, (0, 0.0, dict.fromkeys(points, np.zeros(1))))
@@ -101,7 +101,7 @@ def _chosen(answer: PlanAssessment, better: Accuracy, limits: VerdictLimits) -> 
 
 
 def _passes(setting: PredictionSetting, rows: list[tuple[int, Pass, float, dict[str, assessment.Array]]]) -> list[str]:
-    """Return one line for each kind of pass: how many, the time of one, and the points of all of them."""
+    """Return one text line for each kind of pass: number of passes, time of one pass, and points of all passes."""
     families = list(dict.fromkeys(face.family for face in setting.model.faces))
     cells = []
     for number, one, seconds, points in rows:

@@ -1,4 +1,4 @@
-"""``poolcal run``: all stages, the answer, the drawings."""
+"""``poolcal run``: run all stages, print the answer, make the drawings."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,12 +15,12 @@ from stages.commands.entry import raise_if_interrupted
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a run is worked on: in this process and its threads, or on a cluster; what is drawn; what may be replaced."""
+    """Options of a run: the number of workers, the cluster if any, the drawings, and what may be overwritten."""
 
     jobs: int | None
     executor: str | None  # address of a dask scheduler
     drawings: Drawings
-    overwrite: bool  # also another session's run
+    overwrite: bool  # True: replace another session's run
 
 
 def command(session: Path, config: Path, run: Path, calibrated: Calibrated, options: RunOptions) -> int:
@@ -37,7 +37,7 @@ def command(session: Path, config: Path, run: Path, calibrated: Calibrated, opti
     calibrated
         The sensor that is calibrated.
     options
-        How the run is worked on.
+        Workers, drawings and overwriting.
 
     Returns
     -------

@@ -10,14 +10,14 @@ from pipeline.simulation.session import simulate_to_folder
 
 
 def command(out: Path, scenario: Path | None, seed: int) -> int:
-    """Simulate a session into a folder.
+    """Write a simulated session to a folder.
 
     Parameters
     ----------
     out
         The session's folder; the truth is written beside it.
     scenario
-        A YAML file, or the name of one of ours; None: the demo's pool.
+        A YAML file, or the name of one in configs/scenarios; None: the demo's pool.
     seed
         The seed of all random numbers.
     """

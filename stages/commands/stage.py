@@ -1,4 +1,4 @@
-"""``poolcal stage``: one stage of a run."""
+"""``poolcal stage``: run one stage of a run."""
 
 from pathlib import Path
 
@@ -23,14 +23,14 @@ def command(name: str, run: Path, session: Path | None, config: Path | None, opt
     run
         The run folder.
     session, config
-        Both, or neither: those in run.yaml.
+        The session's folder and the pool's YAML file; both None: the settings in run.yaml.
     options
-        How it is worked on; another session's results are never replaced.
+        Workers and drawings. Another session's results are never replaced.
 
     Returns
     -------
     int
-        0; after the last stage 1, if the result was rejected.
+        0; after the last stage 1 if the result was rejected.
     """
     names = names_in(run)
     if name not in names:

@@ -1,4 +1,4 @@
-"""``poolcal verify``: whether everything that a run read and wrote is as it was recorded."""
+"""``poolcal verify``: check that all files that a run read and wrote are as recorded."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ from stages import load
 
 
 def command(run: Path, jobs: int | None) -> int:
-    """Hash again what a run read and wrote, with ``jobs`` threads, and list what is not as recorded."""
+    """Hash a run's files again with ``jobs`` threads, and print all differences; return 1 if there are any."""
     with workers(jobs) as pool:
         problems = problems_of_run(load(calibrated_in(run)), run, pool)
     for problem in problems:

@@ -1,4 +1,4 @@
-"""``poolcal view``: a run's recordings, or two runs side by side, in the Rerun viewer."""
+"""``poolcal view``: show a run's recordings, or two runs side by side, in the Rerun viewer."""
 
 from pathlib import Path
 
@@ -15,16 +15,16 @@ from stages.views.viewer import show_recordings
 
 
 def command(first: Path, second: Path | None, stage: str | None) -> int:
-    """Open the viewer, until it is closed.
+    """Open the viewer, and wait until it is closed.
 
     Parameters
     ----------
     first
         A run folder.
     second
-        Another, to be shown beside it.
+        The run folder to show beside the first; None: no second run.
     stage
-        Show only that stage's recording; None: all. Not with two runs.
+        The stage to show; None: all stages. Not allowed with two runs.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""Recordings for the Rerun viewer, one module a stage: the only importers of rerun."""
+"""Recordings for the Rerun viewer, one module for each stage. In the program, only this package imports rerun."""

@@ -1,4 +1,4 @@
-"""Soundings before and after, residuals as colours and as maps, their course over time, fans, correlations."""
+"""Stage adjust: soundings before and after, residuals as colours, as maps and over time, fans, correlations."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 Shades = dict[str, tuple[int, int, int]]  # by family
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SENSORS = {"laser": LASER, "mbes": SONAR}
-RAYS = 60  # of a fan
-FAN_NS = NS // 50  # points of one fan lie within this time
+RAYS = 60  # most rays in a fan
+FAN_NS = NS // 50  # points of a fan lie within this time of its epoch
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class ResidualPoints:
     family
         The family of each row's face.
     span_m
-        By sensor the residual of the strongest colour.
+        By sensor, the residual (m) that has the strongest colour.
     steps
-        By sensor, to one in how many the points are thinned.
+        By sensor, n if one in n points is in the table.
     """
 
     residuals: pd.DataFrame
@@ -64,7 +64,7 @@ class ResidualPoints:
 
 
 def log(recording: Any, tables: Tables) -> None:
-    """Log soundings before and after, residuals as colours and maps, fans, and the course over time."""
+    """Log soundings before and after, residuals as colours, as maps and over time, fans, and a text."""
     faces, residuals = tables.table(FACES), tables.table(RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span, steps = _span(residuals), _steps(tables, residuals)
@@ -77,7 +77,7 @@ def log(recording: Any, tables: Tables) -> None:
 
 
 def _span(residuals: pd.DataFrame) -> dict[str, float]:
-    """Return by sensor the residual (m) of the strongest colour: three times the RMS of all points with a weight."""
+    """Return by sensor the residual (m) with the strongest colour: three times the RMS of points with a weight > 0."""
     spans_m = {}
     for sensor in SENSORS:
         rows = residuals[(residuals["sensor"] == sensor) & (residuals["weight"] > 0)]
@@ -87,7 +87,7 @@ def _span(residuals: pd.DataFrame) -> dict[str, float]:
 
 
 def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
-    """Return by sensor how many observations stand behind one row of the table ``residuals``."""
+    """Return by sensor the number of observations for one row of table ``residuals``, which is thinned."""
     total = dict.fromkeys(SENSORS, 0)
     for row in tables.table(GROUPS).to_dict("records"):
         sensor = str(row["group"]).partition("_")[0]
@@ -97,7 +97,7 @@ def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
 
 
 def residual_colours(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
-    """Return colours (n, 3): blue is negative, grey zero, orange positive; the strongest from ``span_m`` on."""
+    """Return colours (n, 3): blue is negative, grey is zero, orange is positive; strongest from ``span_m`` on."""
     share = np.clip(np.asarray(residual_m, dtype=np.float64) / span_m, -1, 1)[:, None]
     end = np.where(share < 0, LASER, SONAR)
     return np.asarray(np.round((1 - abs(share)) * np.array((205, 205, 205)) + abs(share) * end), dtype=np.uint8)
@@ -108,7 +108,7 @@ def _clouds(recording: Any, tables: Tables, points: ResidualPoints, shades: Shad
     import rerun as rr
 
     surfaces: Any = tables.table(SURFACES).to_dict("records")
-    # shown on its surface: in front of it a point would hide those behind, and all would look as if they stood before
+    # each point is shown on its surface: points in front of it would hide the others, and all would seem to be in front
     normals = {row["family"]: normal_of(row) for row in surfaces}
     solved = bool(np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all())
     for sensor in SENSORS:
@@ -129,7 +129,7 @@ def _clouds(recording: Any, tables: Tables, points: ResidualPoints, shades: Shad
 
 
 def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[str, float]) -> None:
-    """Log the squares of the residual map as coloured quads a centimetre before their face."""
+    """Log the squares of the residual map as coloured quads, one centimetre in front of their face."""
     import rerun as rr
 
     cells = cells[np.isfinite(cells["mean_m"]) & (cells["count"] >= FEWEST)]
@@ -161,7 +161,7 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
 
 
 def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
-    """Log rays from the sensor to its points of one epoch, in the middle of each pass."""
+    """Log the rays from each sensor to its points of one epoch in the middle of each pass."""
     import rerun as rr
 
     session = read_settings(tables.run).session
@@ -183,7 +183,7 @@ def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
 
 
 def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
-    """Return the mount of the adjustment's estimate; the coarse one where there is no estimate."""
+    """Return the mount of the adjustment's estimate; the coarse mount if there is no estimate."""
     values = tables.table(ESTIMATE)["value"].to_numpy()[:6]
     if not np.all(np.isfinite(values)):
         return coarse

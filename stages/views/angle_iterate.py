@@ -22,8 +22,8 @@ from pipeline.run.settings import read_settings
 from stages.views.fit_planes import faces_on_plane
 from stages.views.recording import COLOURS, GREY, SONAR, log_curve, text_document
 
-SOUNDINGS = 20_000  # for all the family's points of one step
-STEPS = 60  # that are replayed
+SOUNDINGS = 20_000  # most soundings in one step, all families together
+STEPS = 60  # most steps that are shown
 FAMILIES = ("P1", "P2", "P3")
 ANGLE_COLOURS = dict(zip((*FAMILIES, "P4"), COLOURS.values(), strict=False))
 
@@ -84,16 +84,16 @@ def _curves(recording: Any, iterations: pd.DataFrame) -> None:
 
 
 def log_reasons(recording: Any, quantity: str, result: pd.DataFrame) -> None:
-    """Log in words why the patent's step has no result; the viewer calls a recording without anything broken.
+    """Log as text why the patent's step has no result. The viewer reports an empty recording as broken.
 
     Parameters
     ----------
     recording
         The rerun recording stream.
     quantity
-        What the step would give: angles or offsets.
+        The result of the step: angles or offsets.
     result
-        Its table, with a column ``reason``.
+        The step's table, with a column ``reason``.
     """
     reasons = [reason for reason in dict.fromkeys(result["reason"]) if reason]
     if reasons:
@@ -102,7 +102,7 @@ def log_reasons(recording: Any, quantity: str, result: pd.DataFrame) -> None:
 
 
 def iteration_column(rows: pd.DataFrame) -> Any:
-    """Return the steps on the timeline ``iteration``."""
+    """Return the numbers of the steps as a column of the timeline ``iteration``."""
     import rerun as rr
 
     return rr.TimeColumn("iteration", sequence=rows["iteration"].to_numpy())

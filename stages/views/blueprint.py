@@ -15,15 +15,15 @@ from pipeline.target.design import target_of
 
 PAPER = (255, 255, 255)
 FROM = (-1.0, -0.55, 0.45)  # the eye is in this direction from the target's middle
-DISTANCE = 2.0  # and so far, in halves of its diagonal
+DISTANCE = 2.0  # from the target's middle to the eye, in halves of the target's diagonal
 TABS = ("Overview", "Before and after", "Iteration", "Residuals", "Quality")
 
 
 def tabs_of(run: Path) -> tuple[str, ...]:
-    """Return those of TABS that have something to show.
+    """Return the names in TABS for which the run has entities.
 
-    A run that calibrates a laser has no soundings before and after. The patent's iteration needs a target with roles,
-    and a result; until its stage has run a result is assumed.
+    A run that calibrates a laser has no soundings before and after, and no iteration. The patent's iteration needs a
+    target with all roles, and at least one step. Before the stage has run, steps are expected.
     """
     overview, change, _, left, quality = TABS
     settings = read_settings(run)
@@ -37,12 +37,12 @@ def tabs_of(run: Path) -> tuple[str, ...]:
 
 
 def run_blueprint(tabs: Sequence[str], model: TargetModel) -> Any:
-    """Return the layout of a run's recordings; all views of the target have one viewpoint, from which all of it shows.
+    """Return the layout of a run's recordings. Scenes after the overview share one viewpoint on the whole target.
 
     Parameters
     ----------
     tabs
-        Those of TABS to show.
+        The names in TABS to show.
     model
         The target.
     """
@@ -95,7 +95,7 @@ def run_blueprint(tabs: Sequence[str], model: TargetModel) -> Any:
 
 
 def two_runs_blueprint() -> Any:
-    """Return the layout for two runs, a and b: each on its own target, both on one, and their differences in words."""
+    """Return the layout for two runs, a and b: each on its own target, both on one, and their difference as text."""
     import rerun.blueprint as rrb
 
     return _blueprint(
@@ -132,7 +132,7 @@ def _scene_of(name: str, *contents: str, eye: Any = None) -> Any:
 
 
 def _eye(model: TargetModel) -> Any:
-    """Return a viewpoint before the target, from the south and above, as far off as a view as high as wide needs."""
+    """Return a viewpoint in front of the target, to the south and above; its distance suits a view as high as wide."""
     import rerun.blueprint as rrb
 
     corners = np.concatenate([face.vertices_m for face in model.faces])

@@ -1,4 +1,4 @@
-"""The fitted planes of laser and sonar (with the coarse mount), cut out where the faces are; with their normals."""
+"""Stage fit_planes: the planes of laser and sonar (with the coarse mount), cut to the faces, and their normals."""
 
 from typing import Any
 
@@ -34,13 +34,13 @@ def log(recording: Any, tables: Tables) -> None:
             recording.log(f"planes/{sensor}/{family}", patch, static=True)
             arrow = rr.Arrows3D(origins=[plane.centroid_m], vectors=[plane.normal], radii=0.02, colors=colour)
             recording.log(f"planes/{sensor}/{family}/normal", arrow, static=True)
-            tip = plane.centroid_m + plane.normal  # a label has its point's colour, on grey: white can be read
+            tip = plane.centroid_m + plane.normal  # a label has the colour of its point, and a grey ground
             name = rr.Points3D([tip], radii=0.001, colors=(255, 255, 255), labels=family)
             recording.log(f"planes/{sensor}/{family}/normal/name", name, static=True)
 
 
 def faces_on_plane(faces: pd.DataFrame, family: str, plane: Plane) -> list[np.ndarray]:
-    """Return the corners of a family's faces by design, moved along a plane's normal onto it, (n, 3) each.
+    """Return the corners (n, 3) of each of a family's faces by design, moved along a plane's normal onto this plane.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The track of each pass, and the points near the target, in the pool frame."""
+"""Stage georeference: the track of each pass, and the points near the target, in the pool frame."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from pipeline.maths.geometry.passes import pass_of
 from pipeline.run.results import Tables
 from stages.views.recording import DOT_M, GREY, MOST_POINTS, SONAR
 
-TRACK_POINTS = 2000  # a pass
+TRACK_POINTS = 2000  # a long pass has one to two times this number
 
 
 def log(recording: Any, tables: Tables) -> None:

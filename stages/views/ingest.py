@@ -1,4 +1,4 @@
-"""Attitude over time, and the raw files' quality in words."""
+"""Stage ingest: attitude over time, and a table of the raw files."""
 
 from functools import partial
 from typing import Any
@@ -11,7 +11,7 @@ from pipeline.run.results import Tables
 from pipeline.text_table import text_table
 from stages.views.recording import log_curve, text_document
 
-RECORDS = 20_000  # of a curve
+RECORDS = 20_000  # most records in a curve
 HOLE_NS = 2 * NS
 AXES = {"roll": (0, 114, 178), "pitch": (230, 159, 0), "heading": (0, 158, 115)}
 HOW_TO_READ = """\
@@ -66,7 +66,7 @@ def log(recording: Any, tables: Tables) -> None:
 
 
 def time_column(t_ns: Any) -> Any:
-    """Return instants (ns since the GPS epoch) on the timeline ``time``."""
+    """Return instants (ns since the GPS epoch) as a column of the timeline ``time``."""
     import rerun as rr
 
     return rr.TimeColumn("time", timestamp=unix_ns_from_gps(t_ns).astype("datetime64[ns]"))

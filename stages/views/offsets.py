@@ -1,4 +1,4 @@
-"""Angles and offsets in turn: how much each turn still changes."""
+"""Stage offsets: the change of angles and offsets in each turn of the alternation."""
 
 from functools import partial
 from typing import Any
@@ -11,11 +11,11 @@ from stages.views.angle_iterate import iteration_column, log_reasons
 from stages.views.recording import LASER, SONAR, log_curve
 
 CURVES = (("angles", "step_deg", 1.0, SONAR, "angles, °"), ("offsets", "step_m", 1000.0, LASER, "offsets, mm"))
-SMALLEST = 1e-9  # the curve is the power of ten
+SMALLEST = 1e-9  # smallest change that is shown; the curve is its logarithm
 
 
 def log(recording: Any, tables: Tables) -> None:
-    """Log how much each turn of angles and offsets changes."""
+    """Log the change of angles and offsets in each turn."""
     import rerun as rr
 
     log_reasons(recording, "offsets", tables.table(CORRECTIONS))

@@ -11,11 +11,11 @@ from pipeline.planning.prediction import planned_track
 from pipeline.results.pages.families import styles_of_families
 from stages.views.recording import COLOURS, GREY, LASER, SONAR, recording_content, text_document
 
-PLENTY = 1000  # soundings on a face, from which on it is coloured in full
+PLENTY = 1000  # from this number of soundings on, a face has the full colour
 
 
 def save_plan(answer: PlanAssessment, said: str, path: Path) -> None:
-    """Write a recording of a plan to ``path``; ``said``: the text of the screen."""
+    """Write a recording of a plan to ``path``; ``said``: the text that is printed on the screen."""
     import rerun.blueprint as rrb
 
     def draw(recording: Any) -> None:
@@ -40,7 +40,7 @@ def _target(recording: Any, answer: PlanAssessment) -> None:
 
 
 def _list(recording: Any, answer: PlanAssessment, name: str, outlook: Accuracy) -> None:
-    """Log faces coloured by their soundings over all passes, and the track of each pass."""
+    """Log the faces, coloured by their number of soundings in all passes, and the track of each pass."""
     import rerun as rr
 
     total = np.sum([points["mbes"] for points in outlook.predicted.points], axis=0)

@@ -1,28 +1,28 @@
-"""Recordings for the Rerun viewer: RUN/<stage>/<stage>.rrd, drawn from Parquet alone, after the stage.
+"""Recordings for the Rerun viewer: RUN/<stage>/<stage>.rrd, drawn from the run's files after the stage.
 
-Each stage has a module here with a function ``log(recording, tables)``. All recordings of a run share the application's
-and the recording's id, so that opened together they are one scene. Entities (in the frame ``target`` unless another is
-named; * where points are thinned: ``one_in`` says to one in how many):
+Each stage has a module in this package with a function ``log(recording, tables)``. All recordings of a run have the
+same application id and recording id. Opened together, they are therefore one scene. These are the entities, in the
+frame ``target`` unless another is named. Entities with * are thinned: one in ``one_in`` points is in the recording.
 
-    /pool                              what is in the pool frame; a transform, known from stage segment on, places it
+    /pool                              entities in the pool frame; segment: the transform from there to ``target``
     /pool/trajectory/pass_<n>          georeference: track of the INS
     /pool/laser *, /pool/soundings *   georeference: points near the target, soundings with the coarse mount
     /target/model/<family>             segment: outlines of the faces by design
     /target/laser/<family> *           segment: labelled laser points
-    /planes/<sensor>/<family>          fit_planes: the planes found, cut out at the faces; arrows: their normals
+    /planes/<sensor>/<family>          fit_planes: the fitted planes, cut to the faces; arrows: their normals
     /before/<family> *, /after/<family> *   adjust: soundings with the coarse and with the calibrated mount
     /residuals/<sensor>/<family> *     adjust: points by distance from the adjusted surface
     /maps/<sensor>/<family>            adjust: mean residual of each cell of the faces
     /fans/<sensor>/pass_<n>            adjust: rays of one epoch in the middle of the pass
     /tables/<name>                     text and numbers
 
-over the steps of the timeline ``iteration``:
+Entities over the steps of the timeline ``iteration``:
 
     /iteration/soundings/<family> *, /iteration/planes/<family>, /iteration/normals/<sensor>   angle_iterate
     /curves/deviation/<axis>, /curves/planes/<family>              angle_iterate: degrees
     /curves/turns/<angles or offsets>                              offsets: change in each turn of the alternation
 
-over the timeline ``time`` (UTC):
+Entities over the timeline ``time`` (UTC):
 
     /quality/attitude/<axis>                                       ingest: degrees
     /quality/points/<sensor>, /quality/residual/<sensor>/<family>  adjust: points in a second, their mean residual, mm
@@ -43,8 +43,8 @@ from stages import ORDER, names_in
 
 APPLICATION = "poolcal"
 DRAWN = ORDER  # stages that have a recording
-MOST_POINTS = 300_000  # of a cloud: dense enough to see, few enough for any laptop
-COLOURS = {  # for all eyes
+MOST_POINTS = 300_000  # most points in a cloud: dense enough to see, few enough for any laptop
+COLOURS = {  # that colour-blind readers can tell apart
     "P1": (0, 114, 178), "P2": (230, 159, 0), "P3": (0, 158, 115), "H": (204, 121, 167),
     "other": (122, 92, 0), "more": (60, 60, 60),
 }
@@ -72,7 +72,7 @@ def record(run: Path, stage: str, tabs: Sequence[str]) -> bytes:
 
 
 def log_stage(recording: Any, stage: str, tables: Tables) -> None:
-    """Log what a stage has to show into a recording.
+    """Log the entities of a stage into a recording.
 
     Parameters
     ----------
@@ -87,9 +87,9 @@ def log_stage(recording: Any, stage: str, tables: Tables) -> None:
 
 
 def log_curve(recording: Any, path: str, style: Any, times: Callable[[], Any], values: Any) -> None:
-    """Log a curve over a timeline, or nothing where there are no values.
+    """Log a curve over a timeline. Without values nothing is logged.
 
-    The viewer turns columns without rows into a timeline from the beginning to the end of time, and crashes.
+    From columns without rows the viewer makes a timeline of infinite length, and crashes.
 
     Parameters
     ----------
@@ -98,11 +98,11 @@ def log_curve(recording: Any, path: str, style: Any, times: Callable[[], Any], v
     path
         The curve's entity.
     style
-        Its rerun archetype: lines or points.
+        The curve's rerun archetype: lines or points.
     times
-        Makes its rerun.TimeColumn.
+        Returns the curve's rerun.TimeColumn.
     values
-        Its values, (n,).
+        The curve's values, (n,).
     """
     import rerun as rr
 
@@ -112,7 +112,7 @@ def log_curve(recording: Any, path: str, style: Any, times: Callable[[], Any], v
 
 
 def text_document(text: str) -> Any:
-    """Return text as it is, in letters of one width: a code block whose fence is longer than any run of ` inside."""
+    """Return text as a document in fixed-width letters: a code block with a fence longer than any run of ` in it."""
     import rerun
 
     longest = max((len(run) for run in re.findall("`+", text)), default=0)
@@ -121,7 +121,9 @@ def text_document(text: str) -> Any:
 
 
 def recording_content(identity: str, blueprint: Any, draw: Callable[[Any], None]) -> bytes:
-    """Return the content of a recording's file; the SDK's own writing hangs or leaves a stump when a disk is full.
+    """Return the content of a recording's file.
+
+    The SDK itself does not write the file: on a full disk it hangs or leaves an incomplete file.
 
     Parameters
     ----------
@@ -143,7 +145,7 @@ def recording_content(identity: str, blueprint: Any, draw: Callable[[Any], None]
 
 
 def recordings_of(run: Path, stage: str | None = None) -> list[Path]:
-    """Return the recordings of a run in the stages' order, of stages that agree; or of one ``stage`` alone."""
+    """Return the files of a run's recordings, in order, from all stages that agree; or the file of one ``stage``."""
     wanted = agreeing(run, names_in(run)) if stage is None else (stage,)
     paths = [path for name in wanted if (path := recording_path(run, name)).is_file()]
     if not paths:

@@ -1,4 +1,4 @@
-"""The result in words, as on the screen."""
+"""Stage report: the result as text, the same as on the screen."""
 
 from typing import Any
 
@@ -8,5 +8,5 @@ from stages.views.recording import text_document
 
 
 def log(recording: Any, tables: Tables) -> None:
-    """Log the result in words."""
+    """Log the result as text."""
     recording.log("tables/summary", text_document(summary(calibration(tables.run))), static=True)

@@ -1,4 +1,4 @@
-"""The target by design, where the laser found it, and the labelled points by family of faces."""
+"""Stage segment: the pool frame's transform, the target by design, and the labelled laser points by family."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from stages.views.recording import COLOURS, DOT_M, MOST_POINTS
 
 
 def log(recording: Any, tables: Tables) -> None:
-    """Log the pool's place, the target by design, and the labelled laser points."""
+    """Log the transform of the pool frame, the target by design, and the labelled laser points."""
     import rerun as rr
 
     frame = target_frame(tables.table(TARGET_POSE))

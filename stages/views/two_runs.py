@@ -1,4 +1,4 @@
-"""Two runs in one recording: the first under /a, the second under /b, and both with the mount of the first."""
+"""Two runs in one recording: the first under /a, the second under /b, and under /both with the mount of the first."""
 
 from pathlib import Path
 from typing import Any
@@ -10,13 +10,13 @@ from pipeline.artefacts.catalogue.target import SOUNDINGS_LABELLED, TARGET_POSE
 from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.artefacts.streams import point_array
 from pipeline.atomic_files import write_bytes
-from pipeline.results.compare_text import comparison_text
+from pipeline.results.diff_text import difference_text
 from pipeline.run.results import Tables, calibration
 from stages.views.blueprint import two_runs_blueprint
 from stages.views.recording import DOT_M, LASER, SONAR, log_stage, recording_content, recording_id, text_document
 
-SOUNDINGS = 200_000  # of a run, on one target
-STAGES = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # in the target's frame
+SOUNDINGS = 200_000  # most soundings of each run under /both
+STAGES = ("segment", "fit_planes", "angle_iterate", "offsets", "adjust", "report")  # with entities in the target frame
 
 
 class NestedRecording:
@@ -34,7 +34,7 @@ class NestedRecording:
         self._recording.send_columns(f"{self._name}/{path}", **columns)
 
     def set_time(self, timeline: str, **at: Any) -> None:
-        """Set the time of what is logged next, as rerun.RecordingStream.set_time does."""
+        """Set the time of the entities that are logged next, as rerun.RecordingStream.set_time does."""
         self._recording.set_time(timeline, **at)
 
 
@@ -46,7 +46,7 @@ def save_two_runs(first: Path, second: Path, difference: dict[str, Any], path: P
     first, second
         The run folders.
     difference
-        Their difference, of :func:`pipeline.results.compare.run_difference`.
+        Their difference, of :func:`pipeline.results.diff.run_difference`.
     path
         The recording's file.
     """
@@ -56,13 +56,13 @@ def save_two_runs(first: Path, second: Path, difference: dict[str, Any], path: P
             for stage in STAGES:
                 log_stage(NestedRecording(recording, name), stage, Tables(run))
         _on_one_target(recording, Tables(first), Tables(second))
-        recording.log("tables/comparison", text_document(comparison_text(difference)), static=True)
+        recording.log("tables/comparison", text_document(difference_text(difference)), static=True)
 
     write_bytes(path, recording_content(recording_id(first, second), two_runs_blueprint(), draw))
 
 
 def _on_one_target(recording: Any, first: Tables, second: Tables) -> None:
-    """Log the soundings of both runs with the first's mount: those of a sonar that has moved lie beside the faces."""
+    """Log the soundings of both runs with the first run's mount. If the sonar has moved, the second's lie off."""
     import rerun as rr
 
     block = calibration(first.run)["mbes"]

@@ -1,4 +1,4 @@
-"""The Rerun viewer on this machine's display: it listens to this machine alone and reports nothing."""
+"""The Rerun viewer on this machine's display. Only this machine can connect to it, and it sends no statistics."""
 
 import contextlib
 import json
@@ -13,7 +13,7 @@ from pipeline.console import say
 from pipeline.errors import ArtefactError
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
-NO_WINDOW = ("winit", "EventLoop", "DISPLAY")  # the viewer's message has one of these where no window can be opened
+NO_WINDOW = ("winit", "EventLoop", "DISPLAY")  # one of these is in the viewer's message if it cannot open a window
 
 
 def show_recordings(paths: Sequence[Path], instead: str) -> int:
@@ -24,7 +24,7 @@ def show_recordings(paths: Sequence[Path], instead: str) -> int:
     paths
         The recordings.
     instead
-        What the user can do on a machine without a display.
+        What the user can do on a machine without a display, for the error.
 
     Raises
     ------
@@ -57,10 +57,10 @@ def show_recordings(paths: Sequence[Path], instead: str) -> int:
 
 @contextlib.contextmanager
 def without_statistics() -> Iterator[Mapping[str, str]]:
-    """Give an environment in which the viewer sends no usage statistics, whatever the user has chosen elsewhere.
+    """Yield an environment in which the viewer sends no usage statistics, whatever the user's own settings are.
 
-    The viewer knows no option and no variable for that, only its file analytics.json: it is given one of its own, and
-    the user's is neither read nor written.
+    The viewer has no option and no variable for this, only the file analytics.json. It gets a temporary file, and the
+    user's file is neither read nor written.
     """
     with temporary_folder() as place:
         file = place / "rerun" / "analytics.json"

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run.settings import load_settings, write_settings
-from stages.commands.truth import compare_with_truth, errors_of, read_truth
+from stages.commands.compare import compare_with_truth, errors_of, read_truth
 from tests.support.toy_run import Pool
 
 EPSILON_DEG, LEVER_ERROR_M = np.array([0.01, -0.02, 0.03]), np.array([0.001, -0.002, 0.003])

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.results.compare_text import own_faces_counted
+from pipeline.results.diff_text import own_faces_counted
 from tests.support.places import Place, Told, poolcal, simulate
 
 

@@ -105,7 +105,7 @@ ADJUST = {"adjustment", "planning", "target"}  # the planner's geometry names wh
 REPORT = {"adjustment", "report", "results", "target"}
 ROOMS = {  # packages of pipeline/ of which a stage reaches some file, beside BASE
     "ingest": {"readers"},
-    "georeference": {"target"},
+    "georeference": {"georeference", "target"},
     "segment": {"target"},
     "fit_planes": set[str](),
     "angle_iterate": set[str](),

@@ -74,7 +74,7 @@ def test_only_named_sources_are_mapped() -> None:
         (
             "combine",
             lambda prepared, partials, config: toys.SiftOutputs(pd.DataFrame(), _points(1)),
-            "leave it EMPTY",
+            "leave it EMPTY_STREAM",
         ),
     ],
 )

@@ -1,1 +1,1 @@
-"""Pages for people: self-contained HTML, no script, printable. Every text is escaped by the template engine."""
+"""Pages for people: self-contained, printable HTML without scripts. The template engine escapes every text."""

@@ -1,4 +1,4 @@
-"""Whether RUN/report/report.html shows the run as it is now."""
+"""Whether RUN/report/report.html shows the present state of the run."""
 
 import hashlib
 import json
@@ -9,18 +9,18 @@ from pipeline.run import manifest
 from pipeline.run.results import PAGE, agreeing
 from pipeline.run.settings import read_settings
 
-HEAD = 2000  # bytes within which the page says what it was drawn from
+HEAD = 2000  # bytes at the start of the page that contain its digest
 
 
 def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
-    """Return a digest of all results, settings and raw files that the page shows; ``manifests``: of all stages."""
+    """Return a digest of the results, settings and raw files on the page; ``manifests``: one for each stage."""
     shown = [[stage, of_stage.outputs, of_stage.key.raw] for stage, of_stage in manifests.items()]
     settings = read_settings(run).as_json()
     return hashlib.sha256(json.dumps([shown, settings], sort_keys=True).encode()).hexdigest()
 
 
 def is_page_outdated(run: Path, stages: Sequence[str]) -> bool:
-    """Whether the page is missing or shows something else, and can be drawn: all stages agree."""
+    """Return whether the page is missing or out of date. False if the stages do not agree: it cannot be drawn then."""
     manifests = agreeing(run, stages)
     if len(manifests) < len(stages):
         return False

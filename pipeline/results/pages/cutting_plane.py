@@ -20,7 +20,7 @@ class CuttingPlane:
 
     @property
     def along(self) -> int:
-        """The horizontal coordinate along the plane."""
+        """The index of the horizontal coordinate along the plane (0: x, 1: y)."""
         return 1 - self.axis
 
     def __str__(self) -> str:
@@ -28,10 +28,10 @@ class CuttingPlane:
 
 
 def plane_through(corners: Sequence[Array], visible: NDArray[np.bool_]) -> CuttingPlane | None:
-    """Return the plane that cuts most of the ``visible`` faces; None where there is none.
+    """Return the plane that cuts the largest number of ``visible`` faces; None if no plane cuts any.
 
-    It cuts the patent's target at half the depth of its blocks, and a wall across it. ``corners``: of each face (n, 3),
-    target frame, m.
+    This plane cuts the patent's target at half the depth of its blocks, and a plain wall crosswise. ``corners``: the
+    corners of each face, (n, 3), target frame, m.
     """
     best: tuple[int, CuttingPlane] | None = None
     for axis in (0, 1):
@@ -47,10 +47,10 @@ def plane_through(corners: Sequence[Array], visible: NDArray[np.bool_]) -> Cutti
 
 
 def slopes_in(faces: pd.DataFrame, plane: CuttingPlane) -> Array:
-    """Return how the coordinate along the plane changes with the one across it on each face, (n,).
+    """Return the slope of each face, (n,): the change of the coordinate along the plane by the coordinate across it.
 
-    Points near the plane are moved into it along their faces by this: ±1 for a face at 45° to the plane, 0 for level
-    faces and for those that the plane does not cut.
+    With this slope points near the plane are moved along their face into the plane. It is ±1 for a face at 45° to the
+    plane, and set to 0 for horizontal faces and for faces nearly parallel to the plane.
     """
     across, along = (faces[f"normal_{'xy'[axis]}_target_1"].to_numpy() for axis in (plane.axis, plane.along))
     aslant = np.abs(along) > 0.1
@@ -58,7 +58,7 @@ def slopes_in(faces: pd.DataFrame, plane: CuttingPlane) -> Array:
 
 
 def cut_line(corners: Array, plane: CuttingPlane) -> list[Array]:
-    """Return the line (2, 3) on which a face crosses the plane, or none."""
+    """Return a list with the line (2, 3) in which the plane cuts a face; an empty list if the plane does not cut it."""
     closed = np.vstack([corners, corners[:1]])
     ends = []
     for first, second in pairwise(closed):

@@ -1,4 +1,4 @@
-"""Maps of mean residuals over the faces, and of the passes' tracks before the target."""
+"""Maps of the mean residuals over the faces, and a plan of the passes' tracks before the target."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,7 +22,7 @@ MAP_HEIGHT_IN = 2.9
 
 
 def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
-    """Draw the mean residuals over each family of faces as seen from the boat; level faces from above.
+    """Draw the mean residuals over each family of faces, seen from the boat; horizontal faces from above.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) 
 
 
 def _few_ticks(axis: Axes) -> None:
-    """Set as many ticks on a panel to scale as there is room for numbers beside each other."""
+    """Set the ticks of a panel that is drawn to scale: no more than there is room for their numbers."""
     spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
     box = axis.get_position(original=True)
     room = box.width * WIDTH_IN, box.height * MAP_HEIGHT_IN
@@ -79,7 +79,7 @@ def _few_ticks(axis: Axes) -> None:
 
 
 def _from_the_boat(faces: pd.DataFrame) -> list[str]:
-    """Return the families from left to right as seen from the boat, y growing to the left; level ones last."""
+    """Return the families from left to right as seen from the boat (decreasing y), and the horizontal ones last."""
     middle = {
         name: np.mean([np.reshape(corners, (-1, 3))[:, 1].mean() for corners in of_family["vertices_target_m"]])
         for name, of_family in faces.groupby("family", sort=False)
@@ -89,14 +89,14 @@ def _from_the_boat(faces: pd.DataFrame) -> list[str]:
 
 
 def _panel_width(faces: pd.DataFrame, name: str) -> float:
-    """Return a panel's share of the picture's width, by how wide the family's faces are."""
+    """Return a panel's relative width, which follows from the width of the family's faces."""
     outlines = faces.loc[faces["family"] == name, "vertices_target_m"]
     x, y = np.ptp(np.concatenate([np.reshape(outline, (-1, 3)) for outline in outlines]), axis=0)[:2]
     return float(np.clip((x if name in horizontal_families(faces) else np.hypot(x, y)) / 1.5, 0.8, 2.0))
 
 
 def _grid(axis: Axes, centres: Array, values: Array, size: float, span: float) -> Any:
-    """Draw squares with these centres; where several lie over each other (block over block), their mean."""
+    """Draw a square at each centre; for several squares at one place (horizontal faces of blocks), draw their mean."""
     x, y = centres[:, 0], centres[:, 1]
     if not len(x):
         axis.text(0.5, 0.5, "no points", transform=axis.transAxes, ha="center", color=QUIET)
@@ -117,11 +117,11 @@ def pass_tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_d
     Parameters
     ----------
     positions_m
-        By pass, positions of the INS in the target frame, (n, 3).
+        The positions of the INS by pass, target frame, (n, 3).
     faces
         The artefact ``faces``.
     azimuth_deg
-        Azimuth of the target.
+        The azimuth of the target.
     """
     figure = Figure(figsize=(WIDTH_IN, 3.6))
     axis = figure.add_axes((0.08, 0.14, 0.78, 0.77))
@@ -135,11 +135,11 @@ def pass_tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_d
     rose = figure.add_axes((0.87, 0.4, 0.12, 0.24))
     rose.axis("off")
     rose.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
-    along, down = np.cos(np.radians(azimuth_deg)), -np.sin(np.radians(azimuth_deg))  # of north, along y and x
+    along, down = np.cos(np.radians(azimuth_deg)), -np.sin(np.radians(azimuth_deg))  # components of north along y and x
     rose.arrow(-along, down, 1.6 * along, -1.6 * down, color=QUIET, width=0.02, head_width=0.25)
     rose.annotate("N", (1.25 * along, -1.25 * down), ha="center", va="center")
     axis.set(xlabel="y, along the target, m", ylabel="x, into it, m", aspect="equal")
     axis.set_title("tracks of the passes (dot: start) and the target, from above")
-    axis.invert_yaxis()  # from above, with y to the right x runs down
+    axis.invert_yaxis()  # seen from above with y to the right, x runs down
     axis.margins(0.08)
     return picture(figure, "plan of the passes before the target")

@@ -8,9 +8,9 @@ T = TypeVar("T")
 
 
 def styles_of_families(names: Sequence[str], standard: Mapping[str, T]) -> dict[str, T]:
-    """Assign a colour or marker to each family.
+    """Return a colour or marker for each family.
 
-    P1, P2, P3 and H have the standard one; others get the unused ones, in turn.
+    A family in ``standard`` (P1, P2, P3, H) gets its standard style. The other families get the unused styles in turn.
     """
     unused = [style for name, style in standard.items() if name not in names] or list(standard.values())
     others = [name for name in names if name not in standard]

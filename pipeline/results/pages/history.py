@@ -1,4 +1,4 @@
-"""The page of a boat's history: a control chart of each mount parameter, and the table behind it."""
+"""The page of a boat's history: a control chart of each mount parameter, and the table of sessions."""
 
 import io
 from collections import Counter
@@ -19,11 +19,11 @@ from pipeline.mount import WITHIN_95
 from pipeline.results.history import TEXT_COLUMNS, History, SessionFilter
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
 
-UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # in the chart
+UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # by unit of the setting: unit and factor in the chart
 
 
 def history_page(history: History, filters: str) -> str:
-    """Return the page; ``filters``: which sessions it shows, in words."""
+    """Return the page as HTML; ``filters``: the filter of the sessions, in words."""
     table = history.table
     parameters = [{"name": name, "unit": "°" if unit == "deg" else unit} for name, *_, unit in PARAMETERS]
     rows = [
@@ -55,9 +55,9 @@ def history_page(history: History, filters: str) -> str:
 
 
 def _time_labels(dates: Sequence[str]) -> list[str]:
-    """Return labels of sessions for the chart: the day, and for a day with several sessions hour and minute as well.
+    """Return the chart's label of each session: its day, with hour and minute if the day has several sessions.
 
-    Where even these are the same, a label begins with the session's number in the table.
+    If these are the same too, the label begins with the session's number in the table.
 
     >>> _time_labels(["2026-05-12T08:00:00Z", "2026-05-12T14:30:00Z", "2026-05-13T08:00:00Z"])
     ['2026-05-12 08:00', '2026-05-12 14:30', '2026-05-13']
@@ -77,7 +77,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def _control_charts(table: pd.DataFrame) -> Markup:
-    """Return six charts over the sessions in order of time."""
+    """Draw six charts, one for each mount parameter, over the sessions in order of time."""
     with drawing_style():
         figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
         axes = figure.subplots(3, 2, sharex=True).T.ravel()
@@ -89,7 +89,7 @@ def _control_charts(table: pd.DataFrame) -> Markup:
 
 
 def _control_chart(axis: Axes, table: pd.DataFrame, parameter: tuple[str, int, str, str]) -> None:
-    """Draw one mount parameter of each session, less the median of the accepted ones, with 95 % intervals."""
+    """Draw a mount parameter of each session, minus the median of the accepted sessions, with 95 % intervals."""
     name, index, key, unit = parameter
     word, scale = UNITS[unit]
     place = np.arange(len(table))
@@ -100,7 +100,7 @@ def _control_chart(axis: Axes, table: pd.DataFrame, parameter: tuple[str, int, s
     if good.any():
         values = values - np.median(values[good])
     if unit == "deg":
-        values = values - 360.0 * np.round(values / 360.0)  # a head turned round lies near ±180°
+        values = values - 360.0 * np.round(values / 360.0)  # the yaw of a sonar head mounted backwards is near ±180°
     values = values * scale
     axis.axhline(0.0, color=QUIET, linewidth=0.6)
     for use, colour in ((~accepted & np.isfinite(values), QUIET), (good, INK)):
@@ -111,7 +111,7 @@ def _control_chart(axis: Axes, table: pd.DataFrame, parameter: tuple[str, int, s
     axis.plot(place[moved], values[moved], "o", **ring)
     axis.set_title(f"{name}, {word}")
     axis.margins(x=0.05, y=0.15)
-    if good.any():  # a rejected session far off must not hide the others: it goes to the edge
+    if good.any():  # else a rejected session far away would hide the others: it is drawn at the edge
         reach = 1.15 * float(np.max(np.abs(values[good]) + WITHIN_95 * np.nan_to_num(sigma[good]))) + 1e-9
         axis.set_ylim(-reach, reach)
         beyond = np.isfinite(values) & (np.abs(values) > reach)
@@ -121,7 +121,7 @@ def _control_chart(axis: Axes, table: pd.DataFrame, parameter: tuple[str, int, s
 
 
 def _no_formula(text: str) -> str:
-    """Return text that a spreadsheet does not take for a formula, which it would run.
+    """Return the text, changed if a spreadsheet would execute it as a formula.
 
     >>> _no_formula("=1+1"), _no_formula("2026-05-12")
     ("'=1+1", '2026-05-12')
@@ -139,7 +139,7 @@ def write_history(history: History, out: Path, chosen: SessionFilter) -> None:
     out
         The folder to write to; it is made if it is missing.
     chosen
-        Which sessions they are, as the page says it.
+        The filter of the sessions, which the page shows in words.
     """
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The report's table of instruments: the figures that weigh the observations, and where each comes from."""
+"""The report's table of instruments: the figures that weight the observations, and the origin of each."""
 
 from collections.abc import Mapping
 from functools import reduce
@@ -13,9 +13,9 @@ Row = Mapping[str, Any]
 
 
 def instrument_rows(session: SessionConfig) -> list[Row]:
-    """Return a row for each figure, with sensor and instrument in the first row of each sensor.
+    """Return one row for each figure. The first row of a sensor has the names of the sensor and of its instrument.
 
-    Where no preset is named, a value that equals the default counts as the default.
+    Without a preset, the origin of a value that equals the default is the default.
     """
     rows: list[Row] = []
     for sensor, model in SENSORS.items():
@@ -40,7 +40,7 @@ def instrument_rows(session: SessionConfig) -> list[Row]:
 
 
 def _at(start: Any, key: str) -> Any:
-    """Return the value at a dotted key of a model, or the default at that key of a model's fields."""
+    """Return the value of a model at a dotted key, or, if ``start`` holds a model's fields, the default at this key."""
 
     def step(block: Any, name: str) -> Any:
         return getattr(block, name) if isinstance(block, BaseModel) else block[name].get_default()

@@ -12,7 +12,7 @@ from pipeline.maths.adjustment.solution import CORRELATION_LIMIT
 from pipeline.maths.mount_parameters import PARAMETERS
 
 Row = Mapping[str, Any]
-STRONG = CORRELATION_LIMIT  # correlation that is set in bold
+STRONG = CORRELATION_LIMIT  # correlations of this size and above are in bold
 POSITIVE = {
     "roll": "starboard down", "pitch": "bow up", "yaw": "to port",
     "x": "to starboard", "y": "forward", "z": "up",
@@ -27,7 +27,7 @@ METHODS = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number with its unit, ``deg`` or ``m``, as people read it; NaN is shown as a dash."""
+    """A number with its unit, ``deg`` or ``m``, for display; NaN is shown as a dash."""
 
     number: float
     unit: str
@@ -37,17 +37,17 @@ class Quantity:
 
     @property
     def known(self) -> bool:
-        """Whether there is a number."""
+        """Whether the number is finite."""
         return bool(np.isfinite(self.number))
 
     def text(self, sign: str = "") -> str:
-        """Return the number with four decimals; ``sign`` is ``+`` to show the sign of a positive one, too."""
+        """Return the number with four decimals; ``sign`` is ``+`` to show the sign of a positive number too."""
         if not np.isfinite(self.number):
             return "–"
         return f"{round(self.number, 4) + 0.0:{sign}.4f} {'°' if self.unit == 'deg' else self.unit}"
 
     def entered(self) -> str:
-        """Return the number as one enters it: to 0.001°, or in metres to 0.1 mm."""
+        """Return the number with the digits in which it is entered elsewhere: 0.001°, or in metres 0.1 mm."""
         return f"{round(self.number, 3) + 0.0:.3f} °" if self.known and self.unit == "deg" else self.text()
 
     def small(self, sign: str = "") -> str:
@@ -61,14 +61,14 @@ class Quantity:
 def parameter_rows(
     table: pd.DataFrame, method: str, limits: VerdictLimits, fixed: Collection[str]
 ) -> list[dict[str, Any]]:
-    """Return a row for each mount parameter: values, sigmas, limits and 95 % interval.
+    """Return one row for each mount parameter: values, sigmas, limit of the sigma, and 95 % interval.
 
     Parameters
     ----------
     table
         The artefact ``calibration``.
     method
-        The method that the result is of.
+        The method of the result.
     limits
         The verdict's limits of the sigmas.
     fixed
@@ -87,7 +87,7 @@ def parameter_rows(
 
 
 def method_rows(table: pd.DataFrame) -> Iterator[Row]:
-    """Yield for each mount parameter every method's total, and its difference from the adjustment's."""
+    """Yield for each mount parameter the total of every method, and its difference from the adjustment's total."""
     for name, _, _, unit in PARAMETERS:
         rows = table[table["parameter"] == name].set_index("method")
         totals = {method: float(rows["total"][method]) for method in METHODS if method != "coarse"}
@@ -102,7 +102,7 @@ def method_rows(table: pd.DataFrame) -> Iterator[Row]:
 
 
 def correlation_rows(result: Row) -> list[dict[str, Any]] | None:
-    """Return the correlations of the mount parameters in the order people list them; None without a solution."""
+    """Return the mount parameters' correlations in the order roll, pitch, yaw, x, y, z; None without a solution."""
     matrix = result["geometry"]["correlation"]
     if matrix is None:
         return None

@@ -1,4 +1,4 @@
-"""Tables of the report about the target's planes: how the sensors agree, and the target as the laser measures it."""
+"""Tables of the report about the target's planes: the plane agreement, and the target as the laser measures it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,10 +18,10 @@ SENSORS = ("laser", "mbes")
 
 
 def plane_agreement_rows(tables: Tables) -> list[dict[str, Any]]:
-    """Return how the sonar's planes agree with the laser's, a row for each plane and mount.
+    """Return the plane agreement of sonar and laser: one row for each plane and mount.
 
-    A family of faces at several distances has no one plane. Its row has instead the mean distance of its points from
-    the adjusted surface, sonar minus laser.
+    A family with faces at several distances has no single plane. Its row has NaN for the angle. The distance is the
+    mean distance of its points from the adjusted surface, sonar minus laser.
     """
     rows: list[Any] = tables.table(CLOSING).to_dict("records")
     faces = tables.table(FACES)
@@ -54,7 +54,7 @@ def plane_agreement_rows(tables: Tables) -> list[dict[str, Any]]:
 
 
 def as_built_rows(measured: Row, design: Row) -> list[Row]:
-    """Return the target's dimensions and angles as the laser measures them, beside its design."""
+    """Return one row for each dimension and angle of the target: the value by design, and the laser's measurement."""
     rows = [(letter, design[f"{letter}_m"], measured[f"{letter}_m"], "m") for letter in ("b", "e")]
     angle_between = f"angle between {family_title(reference_family(design['lean_deg']))} and"
     for words, kind in ((angle_between, "corner_deg"), ("leaning of", "lean_deg")):

@@ -1,4 +1,4 @@
-"""The report's pictures. Each is drawn by itself from a run's tables, so that several processes can share them."""
+"""The report's pictures. Each is drawn from a run's tables alone, so that several processes can share the work."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from pipeline.results.pages.rendering import drawing_style
 from pipeline.run.results import Tables, calibration
 from pipeline.run.settings import read_settings
 
-TRACK_POINTS = 300  # of a pass on the plan
+TRACK_POINTS = 300  # a long pass has one to two times this number in the plan
 
 
 def draw_picture(run: Path, name: str) -> Markup:
@@ -58,7 +58,7 @@ def _convergence(tables: Tables) -> Markup:
 
 
 def _tracks(tables: Tables) -> Markup:
-    """Draw the INS's track of each pass in the target frame."""
+    """Draw the track of the INS in each pass, target frame."""
     poses, passes, pose = (tables.table(artefact) for artefact in (POSES, PASSES, TARGET_POSE))
     trajectory = trajectory_in_target(poses, pose)
     number = pass_of(*(column.to_numpy() for column in (poses["t_ns"], passes["start_ns"], passes["end_ns"])))
@@ -82,14 +82,14 @@ def _solved(tables: Tables) -> bool:
 
 
 def picture_names(run: Path) -> list[str]:
-    """Return the names of the pictures that the run's report has."""
+    """Return the names of the pictures in the run's report, in the order of PICTURES."""
     laser = read_settings(run).session.calibrated == "laser"
     iterated = not laser and len(Tables(run).table(ITERATIONS)) > 0
     without = (("map_mbes",) if laser else ()) + (() if iterated else ("convergence",))
     return [name for name in PICTURES if name not in without]
 
 
-PICTURES = {  # those that take longest first
+PICTURES = {  # the pictures that take longest come first
     "residuals": _residuals,
     "distances": _distances,
     "sections": _sections,

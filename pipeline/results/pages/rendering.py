@@ -1,7 +1,7 @@
-"""Pages for people: self-contained HTML, no script, printable. Every text is escaped by the template engine.
+"""Pages for people: self-contained, printable HTML without scripts. The template engine escapes every text.
 
-Pictures are SVG made by matplotlib, each an image of its own in the page; they carry numbers and our own words alone,
-never a name from a file or a config.
+Pictures are SVG by matplotlib. Each is a separate image in the page, with all letters drawn as paths. It shows numbers,
+words of this program, and names of families, which have only letters, digits, hyphens, underscores and dots.
 """
 
 import base64
@@ -16,16 +16,16 @@ import matplotlib
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-# Colours after Okabe and Ito, told apart by all eyes and in grey print.
+# Colours after Okabe and Ito, which colour-blind readers can tell apart, also in grey print.
 INK, QUIET, ALARM = "#1a1a1a", "#8a8f98", "#b00020"
 LASER, COARSE, SONAR = "#3aa0dc", "#b9bcc1", "#d55e00"
 FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a", "other": "#7a5c00", "more": "#1a1a1a"}
 AXIS = {"roll": "#0072b2", "pitch": "#e6a000", "yaw": "#009e73"}
 MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s", "other": "D", "more": "X"}
-WIDTH_IN = 7.2  # of every picture
-SMALLEST_PT = 7  # letters in a picture
-DPI = 200  # of what is drawn as dots in a vector picture
-HEAD_LETTERS = 70  # of the running head of a printed page
+WIDTH_IN = 7.2  # width of every picture
+SMALLEST_PT = 7  # size of the smallest letters in a picture
+DPI = 200  # resolution of point clouds, which are drawn as pixels in the vector picture
+HEAD_LETTERS = 70  # length of the running head of a printed page
 MARGIN_TEXT = "font-size: 8pt; color: #50555d;"
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
@@ -37,7 +37,7 @@ STYLE: dict[Any, Any] = {
     "axes.linewidth": 0.8,
     "axes.titlesize": 9,
     "axes.titlelocation": "left",
-    "axes.titley": 1.0,  # where it stands anyway; looking for ticks in its way takes time
+    "axes.titley": 1.0,  # the usual place; set, it saves a slow search for ticks in the way
     "xtick.color": INK,
     "ytick.color": INK,
 }
@@ -45,7 +45,7 @@ STYLE: dict[Any, Any] = {
 
 @contextlib.contextmanager
 def drawing_style() -> Iterator[None]:
-    """Set the style of all pictures on matplotlib's own defaults, whatever settings the machine has."""
+    """Set the style of all pictures on top of matplotlib's defaults; the machine's own settings have no effect."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)
@@ -67,7 +67,7 @@ def render_page(template: str, **values: Any) -> str:
 
 
 def css_text(text: str) -> Markup:
-    r"""Return untrusted text, cut to a line, for the quotes of a CSS string: all but plain letters as numbers.
+    r"""Return untrusted text, cut in length, for a quoted CSS string. Only ASCII letters, digits and spaces stay.
 
     >>> css_text('a "} </style>')
     Markup('a \\22 \\7d  \\3c \\2f style\\3e ')
@@ -78,7 +78,7 @@ def css_text(text: str) -> Markup:
 
 
 def breakable(text: str) -> Markup:
-    """Return a name that a browser may break into lines after _ and -, and not within a word.
+    """Return a name in which a browser may break the line after _ and -, but not within a word.
 
     >>> breakable("harbour_<b>")
     Markup('harbour_<wbr>&lt;b&gt;')
@@ -87,7 +87,7 @@ def breakable(text: str) -> Markup:
 
 
 def picture(figure: Figure, label: str) -> Markup:
-    """Return the figure as an element of the page; ``label`` describes it to those who cannot see it."""
+    """Return the figure as an HTML image; ``label``: its description for readers who cannot see it."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
     data = base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -1,7 +1,8 @@
 """RUN/report/report.html: the result, its evidence and its provenance on one page.
 
-Every number on it is in calibration.json, run.yaml, a manifest or a Parquet of the run, or the difference of two of
-them; nothing else is computed here but the pictures' scales, means of residuals and the intervals of means.
+Every number on it stands in calibration.json, run.yaml, a manifest or a Parquet file of the run, or is the difference
+of two such numbers. The modules of the page compute only the scales of pictures, means and scatter of residuals,
+intervals of means, and the sums of squares in the table of contributions to the sigmas.
 """
 
 import json
@@ -36,7 +37,7 @@ from pipeline.target.design import target_of
 
 Row = Mapping[str, Any]
 MOST_GAPS = 12
-SORTED_BY = {  # variables along which residuals are averaged, as the report calls them
+SORTED_BY = {  # names in the report of the variables along which residuals are averaged
     "face": "face",
     "angle": "angle",
     "step": "step at a receive angle",
@@ -150,7 +151,7 @@ def _data_values(tables: Tables, manifests: Mapping[str, manifest.Manifest], set
 
 
 def _largest(cells: pd.DataFrame) -> Row:
-    """Return the bin mean that is largest in size."""
+    """Return the row of ``cells`` with the largest mean residual, whatever its sign."""
     if not len(cells):
         return {"mean_m": np.nan, "sensor": "no points", "family": "", "pass": ""}
     rows: list[Any] = cells.to_dict("records")
@@ -158,7 +159,7 @@ def _largest(cells: pd.DataFrame) -> Row:
 
 
 def _speeds(files: pd.DataFrame) -> str:
-    """Return the lowest and the highest recorded sound speed in words; nothing where there is none."""
+    """Return the lowest and the highest recorded sound speed as text; empty if none is recorded."""
     low, high = files["sound_speed_low_m_s"].min(), files["sound_speed_high_m_s"].max()
     if not np.isfinite(low):
         return ""
@@ -166,7 +167,7 @@ def _speeds(files: pd.DataFrame) -> str:
 
 
 def _changed(settings: Settings) -> list[dict[str, str]]:
-    """Return the settings that differ from their defaults, then those that have none."""
+    """Return one row for each setting that differs from its default, then one for each setting without a default."""
 
     def shown(value: Any) -> str:
         return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
@@ -175,6 +176,6 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
         {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
         for where, model in (("pool", settings.pool), ("session", settings.session))
         for key, default, value in changed_settings(model)
-        if ".instrument." not in key  # these have a table of their own
+        if ".instrument." not in key  # the table of instruments has these
     ]
     return sorted(rows, key=lambda row: not row["default"])

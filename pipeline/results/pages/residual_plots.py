@@ -1,4 +1,4 @@
-"""Charts of the report: residuals along angle, distance and time, means by pass, convergence."""
+"""Charts of the report: residuals by angle, distance and time, their means by pass, and convergence."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,14 +20,14 @@ LABELS = {"angle": "angle across track in the {}'s frame, degrees", "range": "di
 
 
 def residual_charts(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, families: Sequence[str]) -> Markup:
-    """Draw mean residuals of the calibrated sensor by angle and distance, and of both sensors by face and over time.
+    """Draw mean residuals of the calibrated sensor by angle and distance, of both sensors by family and over time.
 
     Parameters
     ----------
     bins
         The artefact ``residual_bins``.
     cells
-        Mean residuals by sensor, family and pass.
+        The artefact ``cells``: mean residuals by sensor, family and pass.
     passes
         The artefact ``passes``.
     families
@@ -64,7 +64,7 @@ def residual_charts(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFram
 
 
 def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
-    """Draw mean residuals by family and pass: one mark a pass, sonar and laser side by side."""
+    """Draw the mean residuals by family, with one mark for each pass: the laser on the left, the sonar on the right."""
     for sensor, side, colour in (("laser", -0.18, LASER), ("mbes", 0.18, SONAR)):
         for place, name in enumerate(marks):
             rows = cells[(cells["sensor"] == sensor) & (cells["family"] == name)]
@@ -76,14 +76,14 @@ def _by_face(axis: Axes, cells: pd.DataFrame, marks: Mapping[str, str]) -> None:
                 beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALLEST_PT, "color": colour}
                 axis.annotate(f"{number}", (x, y), (2, 2), **beside)
     if len(cells):
-        inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # one mean far off must not hide the others
+        inner = 3000 * float(cells["mean_m"].abs().quantile(0.9)) + 1  # else one mean far away would hide the others
         axis.set_ylim(-inner, inner)
     axis.set_xticks(range(len(marks)), list(marks))
     axis.set(title="by family and pass (laser blue, sonar orange)", ylabel="mean residual, mm")
 
 
 def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
-    """Draw the mean of each second, the passes one after another without the time between them."""
+    """Draw the mean residual of each second. The passes follow each other, without the time between them."""
     start, gap = 0.0, 5.0
     middles, names = [], []
     for row in passes.to_dict("records"):
@@ -103,7 +103,7 @@ def _over_time(axis: Axes, rows: pd.DataFrame, passes: pd.DataFrame) -> None:
 
 
 def convergence_charts(iterations: pd.DataFrame, alternation: pd.DataFrame) -> Markup:
-    """Draw the steps of the patent's angle iteration, and the turns of its angles and offsets."""
+    """Draw the deviations in the patent's angle iteration, and the changes in each turn of its angles and offsets."""
     figure = Figure(figsize=(WIDTH_IN, 2.5))
     where = {"left": 0.1, "right": 0.99, "bottom": 0.18, "top": 0.9, "wspace": 0.22}
     angles, turns = figure.subplots(1, 2, gridspec_kw=where)

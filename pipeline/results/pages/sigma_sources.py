@@ -1,4 +1,4 @@
-"""The report's table of what the total sigmas are made of."""
+"""The report's table of the contributions to the total sigmas."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -11,7 +11,7 @@ from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 
 Row = Mapping[str, Any]
 OF_MOUNT = ("the laser's angles", "the laser's lever arm")
-SOURCES = (  # of an unknown: how its name begins, what it is called
+SOURCES = (  # the beginning of an unknown's name, and the words for it
     ("laser_rotation", OF_MOUNT[0]),
     ("laser_lever_arm", OF_MOUNT[1]),
     ("laser_range", "the laser's ranges"),
@@ -21,17 +21,18 @@ SOURCES = (  # of an unknown: how its name begins, what it is called
     ("sound_speed_gradient", "change of the sound speed with depth"),
     ("sound_speed", "sound speed"),
     ("wet", "wet faces against dry ones"),
-    ("rotation", "angles that are held"),  # of a laser that is calibrated
+    ("rotation", "angles that are held"),  # where the laser is calibrated
     ("lever_arm", "lever arm that is held"),
 )
 
 
 def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) -> Iterator[Row]:
-    """Yield what each source of errors contributes to the mount parameters' total sigmas, noise first.
+    """Yield the contribution of each source of errors to the mount parameters' total sigmas; noise comes first.
 
-    A contribution is the root of the sum of squares of its parameters' effects; for angles it is that of the rotation
-    about the body's axis. The squares of all contributions sum up to that of the total sigma. Where the laser's mount
-    has a covariance, its parameters correlate: they are one source, with what the others leave of the total.
+    A contribution is the root of the sum of squares of the effects of the source's parameters. For an angle, it is the
+    contribution to the rotation about the body's axis. The squares of all contributions add up to the square of the
+    total sigma. If the laser's mount has a covariance, its parameters correlate. They are then one source, and its
+    square is the square of the total sigma minus the squares of all other contributions.
 
     Parameters
     ----------

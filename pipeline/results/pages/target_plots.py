@@ -17,15 +17,15 @@ from pipeline.results.pages.cutting_plane import CuttingPlane, cut_line, plane_t
 from pipeline.results.pages.rendering import COARSE, INK, LASER, SONAR, WIDTH_IN, picture
 
 Array = NDArray[np.float64]
-MOST_PANELS = 7  # families in one picture
+MOST_PANELS = 7  # most families in one picture
 HALF_SLICE_M = 0.04  # half the thickness of a section
-ASIDE_M = 0.3  # a point so far from a face is another's
-DOTS = 6000  # a cloud in one panel, at most
+ASIDE_M = 0.3  # a point farther than this from a face belongs to another face
+DOTS = 6000  # most points of a cloud in one panel
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
-SECTIONS = ("sensor", "face", *XYZ, *(f"coarse_{name}" for name in XYZ))  # columns of residuals
+SECTIONS = ("sensor", "face", *XYZ, *(f"coarse_{name}" for name in XYZ))  # columns of table residuals
 DISTANCES = ("sensor", "face", "residual_m", "coarse_residual_m", "z_target_m", "coarse_z_target_m")
 Cloud = tuple[str, str, str, str]  # sensor, prefix of the columns, words, colour
-CLOUDS: Mapping[str, tuple[Cloud, ...]] = {  # by what is calibrated, in the order in which they are drawn
+CLOUDS: Mapping[str, tuple[Cloud, ...]] = {  # by the calibrated sensor, in the order of drawing
     "mbes": (
         ("mbes", "coarse_", "sonar, coarse mount", COARSE),
         ("laser", "", "laser", LASER),
@@ -36,7 +36,9 @@ CLOUDS: Mapping[str, tuple[Cloud, ...]] = {  # by what is calibrated, in the ord
 
 
 def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Markup:
-    """Draw the target from above, a section through it to scale, and a part of that enlarged; no panel is empty.
+    """Draw the target from above, a section through it to scale, and an enlarged part of the section.
+
+    If no vertical plane cuts a face with points, only the view from above is drawn.
 
     Parameters
     ----------
@@ -61,7 +63,7 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
     widths = [1.0, 2.6, 2.6] if plane is not None else [1.0]
     above, *others = figure.subplots(1, len(widths), width_ratios=widths, gridspec_kw=where, squeeze=False)[0]
     nearest: list[Array] = []
-    for sensor, prefix, label, colour in CLOUDS[calibrated][: None if solved else -1]:  # else nothing is calibrated
+    for sensor, prefix, label, colour in CLOUDS[calibrated][: None if solved else -1]:  # the last is the calibrated one
         columns = [prefix + name for name in XYZ]
         cloud = residuals.loc[of_sensor[sensor] & ~level[face], columns].to_numpy()
         _dots(above, cloud[:, :2], colour, label)
@@ -82,7 +84,7 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
             for axis in others:
                 axis.plot(line[:, 1 - plane.axis if plane else 0], line[:, 2], color=INK, linewidth=0.7)
     above.set(title="from above", xlabel="x, m", ylabel="y, along the target, m")
-    above.set_aspect("equal", adjustable="datalim")  # a plain wall has no depth: its panel has
+    above.set_aspect("equal", adjustable="datalim")  # a plain wall has no depth, but its panel must have a width
     if plane is not None:
         _section(others, plane, corners, residuals[of_sensor[calibrated] & (cut & ~level)[face]], nearest)
     for axis in (above, *others):
@@ -94,10 +96,10 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
 def _section(
     axes: Sequence[Axes], plane: CuttingPlane, corners: Sequence[Array], seen: pd.DataFrame, drawn: Sequence[Array]
 ) -> None:
-    """Draw the section's panel, and the one that enlarges a part of it: a face, or the thickness of a wall."""
-    ahead, near = axes
-    ahead.set(title=f"section at {plane}", ylabel="z, height, m")
-    ahead.set_aspect("equal", adjustable="datalim")
+    """Draw the panel of the section, and the panel that enlarges a part of it: one face, or the thickness of a wall."""
+    whole, near = axes
+    whole.set(title=f"section at {plane}", ylabel="z, height, m")
+    whole.set_aspect("equal", adjustable="datalim")
     for axis in axes:
         axis.set_xlabel(f"{'xy'[plane.along]}, m")
     if len(seen) < FEWEST:
@@ -116,7 +118,7 @@ def _calibrated(residuals: pd.DataFrame) -> str:
 
 
 def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: CuttingPlane) -> None:
-    """Set the panel to the face with the most points."""
+    """Set the limits of the panel to the face with the most points."""
     (cut,) = cut_line(corners[int(points["face"].mode().iloc[0])], plane)
     ends = cut[:, [plane.along, 2]]
     low, high = ends.min(axis=0), ends.max(axis=0)
@@ -128,7 +130,7 @@ def _near(axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: Cut
 def _across(
     axis: Axes, points: pd.DataFrame, corners: Sequence[Array], plane: CuttingPlane, drawn: Sequence[Array]
 ) -> None:
-    """Show the highest face with points in its whole height, its thickness stretched to where the points lie."""
+    """Set the panel to the whole height of the tallest face with points; its thickness is stretched to fit them."""
     there = [cut_line(corners[number], plane)[0][:, [plane.along, 2]] for number in points["face"].astype(int).unique()]
     ends = max(there, key=lambda cut: float(np.ptp(cut[:, 1])))
     slant = np.ptp(ends[:, 0]) / 2
@@ -158,7 +160,7 @@ def distance_charts(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArra
     names = [name for name in family_names(faces) if (family == name).any()][:MOST_PANELS]
     level = horizontal_families(faces)
     names = names or family_names(faces)[:1]
-    clouds = CLOUDS[_calibrated(residuals)][: None if solved else -1]  # without a result nothing is calibrated
+    clouds = CLOUDS[_calibrated(residuals)][: None if solved else -1]  # the last is the calibrated one
     figure = Figure(figsize=(WIDTH_IN, 3.2))
     where = {"left": 0.07, "right": 0.97, "bottom": 0.23, "top": 0.92, "wspace": 0.16}
     panels = figure.subplots(1, len(names), sharey=True, gridspec_kw=where, squeeze=False)[0]

@@ -1,4 +1,4 @@
-"""The comparison of two runs as text for the screen."""
+"""The difference of two runs as text for the screen."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,8 +11,8 @@ from pipeline.text_table import text_table
 FACE_KEYS = "target.faces."
 
 
-def comparison_text(difference: Mapping[str, Any]) -> str:
-    """Return the comparison for the screen; values that do not differ are not listed."""
+def difference_text(difference: Mapping[str, Any]) -> str:
+    """Return the difference as text for the screen. Values that are equal in both runs are not listed."""
     lines = [
         f"{key}: {difference[key]['session']} ({difference[key]['verdict']}), {difference[key]['run']}"
         for key in ("a", "b")
@@ -67,7 +67,7 @@ def _parameter_table(parameters: Sequence[Row]) -> list[str]:
 
 
 def own_faces_counted(changes: Sequence[Row]) -> Iterator[Row]:
-    """Yield the changes of settings, with faces that one run alone has counted in place of their keys."""
+    """Yield the changes of settings; one row has the numbers of faces that only one run has, in place of their keys."""
     faces = [row for row in changes if row["key"].startswith(FACE_KEYS) and row["key"].endswith(".corners")]
     own = {
         key: [row["key"].removesuffix("corners") for row in faces if row[other] is None] for key, other in ("ab", "ba")

@@ -1,6 +1,6 @@
-"""Two runs side by side: the differences of their inputs, and whether the sonar's mount has moved.
+"""The difference of two runs: of their settings, inputs and results, and whether the sonar's mount has moved.
 
-Nothing is recomputed: both runs are read as they are. What cannot be compared is named.
+Both runs are read as they were written; none of their results is recomputed. Results that cannot be compared are named.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,19 +16,19 @@ from pipeline.results.mount_difference import Row, Tolerances, answer_sentence, 
 from pipeline.run import manifest
 from pipeline.run.results import Tables
 
-PLACE = ("origin", "azimuth_deg", "water_level_m")  # of a target, not its shape
+PLACE = ("origin", "azimuth_deg", "water_level_m")  # settings of a target that do not concern its shape
 NO_TOLERANCES = Tolerances()
 
 
 def run_difference(first: FinishedRun, second: FinishedRun, tolerances: Tolerances = NO_TOLERANCES) -> dict[str, Any]:
-    """Return everything that differs as plain values, ``second`` (b) minus ``first`` (a).
+    """Return all differences of two runs as plain values; numbers are ``second`` (b) minus ``first`` (a).
 
     Parameters
     ----------
     first, second
         The runs.
     tolerances
-        Differences of the mount beyond these are listed by name.
+        A mount parameter with a larger difference is listed by name.
     """
     heads = [
         {"run": str(run.path), "session": run.result["session"], "verdict": run.result["verdict"]}
@@ -42,7 +42,7 @@ def run_difference(first: FinishedRun, second: FinishedRun, tolerances: Toleranc
     difference["not_compared"] = []
     difference |= mount_difference(first, second, tolerances, difference["not_compared"])
     rejected = [key for key in ("a", "b") if difference[key]["verdict"] == "rejected"]
-    # values that must not be used answer nothing, unless they are the same
+    # a rejected run answers nothing, unless both runs have the same values
     difference["answered"] = difference["comparable"] and (not rejected or is_same_result(difference))
     difference["planes"] = list(_plane_changes(first, second, difference["not_compared"]))
     difference["sentence"] = answer_sentence(difference)
@@ -69,9 +69,10 @@ def _count_changes(first: FinishedRun, second: FinishedRun) -> Iterator[Row]:
 
 
 def _plane_changes(first: FinishedRun, second: FinishedRun, not_compared: list[str]) -> Iterator[Row]:
-    """Yield how each family's plane differs, over all passes and in each run's own target frame.
+    """Yield the differences of each family's planes, over all passes, each run in its own target frame.
 
-    The sonar's planes are those with the coarse mount. What cannot be compared is added to ``not_compared``.
+    The sonar's planes are placed with the coarse mount. Sentences on planes that cannot be compared are added to
+    ``not_compared``.
     """
     designs = [run.settings.pool.target.model_dump(mode="json") for run in (first, second)]
     shape = [name for name in (designs[0] | designs[1]) if name not in PLACE]

@@ -1,4 +1,4 @@
-"""The page of a comparison of two runs, which says what ``poolcal diff`` prints."""
+"""The page of the difference of two runs, with the content that ``poolcal diff`` prints."""
 
 import json
 from collections.abc import Mapping
@@ -9,16 +9,16 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pipeline.mount import WITHIN_95
-from pipeline.results.compare_text import own_faces_counted
+from pipeline.results.diff_text import own_faces_counted
 from pipeline.results.mount_difference import quantity_text
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
 
 
-def comparison_page(difference: Mapping[str, Any]) -> str:
-    """Return the page of the difference of two runs, of :func:`pipeline.results.compare.run_difference`."""
+def difference_page(difference: Mapping[str, Any]) -> str:
+    """Return the page as HTML; ``difference``: the result of :func:`pipeline.results.diff.run_difference`."""
     rows = difference["parameters"]
     return render_page(
-        "comparison.html",
+        "diff.html",
         difference=difference,
         rows=rows,
         config=list(own_faces_counted(difference["config"])),
@@ -29,7 +29,7 @@ def comparison_page(difference: Mapping[str, Any]) -> str:
 
 
 def _difference_chart(rows: list[dict[str, Any]]) -> Markup:
-    """Return a chart of each difference in its own sigmas, with its 95 % interval; red: moved."""
+    """Draw each difference in units of its sigma, with its 95 % interval; in red if the parameter has moved."""
     with drawing_style():
         figure = Figure(figsize=(WIDTH_IN, 2.0))
         axis = figure.add_axes((0.13, 0.24, 0.85, 0.72))

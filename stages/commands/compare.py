@@ -1,8 +1,8 @@
 """``poolcal compare``: a simulated session's result beside its truth.
 
-The rotation's error is the vector ε in R_true = Exp(ε) · R_body_from_mbes, about the body's axes, which is also what
-the covariance is of. The answer is yes if the calibration was accepted and each of the result's six errors is within
-LIMIT sigmas; for a method without sigmas the largest that the verdict allows stand in their place.
+The error of the rotation is the vector ε in R_true = Exp(ε) · R_body_from_mbes, about the body's axes. The covariance
+is that of the same vector. The answer is yes if the calibration was accepted and each of the result's six errors is
+within LIMIT sigmas. A method without sigmas is judged by the largest sigmas that the verdict allows.
 """
 
 from pathlib import Path
@@ -29,12 +29,12 @@ Array = NDArray[np.float64]
 
 
 def command(run: Path, truth_path: Path) -> int:
-    """Print a run's result beside the truth in a file; 1 if it was rejected, or does not stand up to the truth."""
+    """Print a run's result beside the truth in a file; return 1 if it was rejected, or an error exceeds its limit."""
     return print_answer(*compare_with_truth(run, truth_path))
 
 
 def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
-    """Return the table for people, and whether the result was accepted and stands up to the truth."""
+    """Return the comparison as text, and whether the result was accepted and all errors are within their limits."""
     result, settings = calibration(run), read_settings(run)
     R_true, lever_arm_true_m = read_truth(truth_path)
     chosen = settings.pool.result
@@ -54,15 +54,15 @@ def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
     limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
     within = error is not None and bool(np.all(np.abs(error) <= limit))
     accepted = result["verdict"] == "accepted"
-    what = "sigma" if sigma is not None else "the largest sigma allowed"
+    bound = "sigma" if sigma is not None else "the largest sigma allowed"
     lines += ["", "error: what is still wrong; of angles the rotation from found to true about the body's axes"]
-    how = f"{'every error is' if within else 'an error is not'} within {LIMIT:g} {what}"
+    how = f"{'every error is' if within else 'an error is not'} within {LIMIT:g} {bound}"
     lines.append(f"{chosen}: {how if accepted else 'the calibration was rejected'}")
     return "\n".join(lines), accepted and within
 
 
 def _refuse_damaged(result: dict[str, Any], chosen: str) -> None:
-    """Raise one of the errors in which damaged values end, before anything is computed from them."""
+    """Convert all values once, so that damaged values raise an error before anything is computed from them."""
     for values in (result["methods"][chosen], *result["methods"].values()):
         if values["R_body_from_mbes"] is not None and values["lever_arm_m"] is not None:
             R = np.array(values["R_body_from_mbes"], dtype=np.float64).reshape(3, 3)
@@ -82,7 +82,7 @@ def _error_cells(error: Array | None) -> list[str]:
 
 
 def read_truth(path: Path) -> tuple[Array, Array]:
-    """Return rotation R_body_from_mbes (3, 3) and lever arm (3,), m, body, from the simulator's file."""
+    """Return the true rotation R_body_from_mbes (3, 3) and lever arm (3,), m, body axes, from the simulator's file."""
     try:
         content: Any = read_json(path)
         mbes = content["mbes"]
@@ -95,14 +95,14 @@ def read_truth(path: Path) -> tuple[Array, Array]:
 
 
 def errors_of(values: dict[str, Any], R_true: Array, lever_arm_true_m: Array) -> Array | None:
-    """Return what is still wrong, true minus calibrated; None if there is no result.
+    """Return the errors of a method's mount, true minus calibrated; None if the method has no mount.
 
     Parameters
     ----------
     values
         A method's block of calibration.json.
     R_true, lever_arm_true_m
-        R_body_from_mbes (3, 3) and lever arm (3,), m, body.
+        The true R_body_from_mbes (3, 3) and lever arm (3,), m, body axes.
 
     Returns
     -------

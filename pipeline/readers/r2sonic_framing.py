@@ -1,15 +1,18 @@
-"""Find R2Sonic's BTH0 packets in files: one after another, in HYPACK .R2S files, in XTF.
+"""Find R2Sonic's BTH0 packets in a file of bare packets, a HYPACK .R2S file or an XTF file.
 
-Bare packets: each begins with its name and its size (u32, big-endian). HYPACK .R2S puts the size before it once more
-(u32, little-endian). Other packets of the sonar (snippets, water column, ...) have the same header and are skipped.
+:mod:`pipeline.readers.r2sonic` decodes the packets.
 
-XTF (Triton, "XTF File Format", rev. 40; little-endian): a file header of 1024 bytes (or a multiple), then records:
-u16 0xFACE, u8 type, u8, u16, 2 x u16, u32 length of the whole record. R2Sonic's packets are in records of type 65
-(QINSy) and 68 (Triton), behind a ping header. The length of that header is not relied on: the packet is found by its
-name. XTF's records are so simple that they are read here. The library for them unpickles an index file that it finds
-beside the data, and never ends on a record of length 0: it is not for files from elsewhere.
+Bare packets follow one another. Each begins with its name and its size (u32, big-endian). In HYPACK .R2S the size also
+stands before each packet (u32, little-endian). Other packets of the sonar (snippets, water column, ...) have the same
+header, and are skipped.
 
-Both readers search for the next mark where it is not at its place, and count the gap.
+XTF (Triton, "XTF File Format", rev. 40; little-endian) begins with a file header of 1024 bytes (or a multiple). Then
+come records: u16 0xFACE, u8 type, u8, u16, 2 x u16, u32 length of the whole record. R2Sonic's packets are in records of
+type 65 (QINSy) and 68 (Triton), after a ping header. The functions do not rely on the length of the ping header, but
+search for the packet's name. They use no library for XTF: the existing one unpickles an index file that lies beside the
+data, and never returns from a record of length 0. It is not safe for files of unknown origin.
+
+If the next packet or record does not begin at its place, the functions search for its mark, and count the gap.
 """
 
 import struct
@@ -30,13 +33,13 @@ Sections = dict[bytes, bytes]
 
 
 def packet_size(head: bytes) -> int | None:
-    """Return the size that a packet's first eight bytes promise; None where they are no packet's."""
+    """Return the packet size in a packet's first eight bytes; None if they are not the beginning of a packet."""
     size = int.from_bytes(head[4:8], "big")
     return size if len(head) >= 8 and head[:4] in (BTH0, *OTHER_PACKETS) and MIN_PACKET <= size <= MAX_PACKET else None
 
 
 def sections_of(packet: bytes) -> Sections | None:
-    """Return a packet's sections by name, their heads included; None where their sizes contradict the packet's."""
+    """Return a packet's sections by name, with their heads; None if a section's size does not fit the packet."""
     sections: Sections = {}
     offset = MIN_PACKET
     while offset + SECTION.size <= len(packet):
@@ -49,7 +52,7 @@ def sections_of(packet: bytes) -> Sections | None:
 
 
 def bare_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
-    """Yield the sections of BTH0 packets that follow one another, with or without HYPACK's length before each."""
+    """Yield the sections of each BTH0 packet in a file of bare packets, with or without HYPACK's size before each."""
     size, position = size_of(file), 0
     while position < size:
         head = read_at(file, position, 12)
@@ -76,7 +79,7 @@ def _prefixed(head: bytes) -> bool:
 
 
 def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
-    """Yield the sections of BTH0 packets in an XTF file; in a file without any, count the other records."""
+    """Yield the sections of each BTH0 packet in an XTF file; count the other records if the file has no packet."""
     size = size_of(file)
     position = find(file, XTF_MAGIC, XTF_HEADER)
     packets = other_records = 0
@@ -103,7 +106,7 @@ def xtf_packets(file: BinaryIO, dropped: Counter[str]) -> Iterator[Sections]:
 
 
 def _sections_in(record: bytes) -> Sections | None:
-    """Return the sections of the first whole BTH0 packet in a record."""
+    """Return the sections of the first whole BTH0 packet in a record; None without one."""
     start = record.find(BTH0)
     while start >= 0:
         length = packet_size(record[start : start + 8])
