@@ -174,7 +174,7 @@ def _how_they_differ(base: Path, here: Path) -> str:
         if list(old) != list(new) or len(old) != len(new):
             return f"columns or rows: {old.shape} {list(old)} and {new.shape} {list(new)}"
         names = [str(name) for name in old if not old[name].equals(new[name])]
-        return f"columns {', '.join(names)}" if names else "only what is said of its columns"
+        return f"columns {', '.join(names)}" if names else "only the metadata of its columns"
     lines = [path.read_text(encoding="utf-8", errors="replace").splitlines() for path in (base, here)]
     pairs = [pair for pair in zip(*lines, strict=False) if pair[0] != pair[1]]
     first = f", first {pairs[0][0]!r} and {pairs[0][1]!r}" if pairs else ""
