@@ -28,7 +28,11 @@ Change = Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None]  # cha
 
 
 def _scenario(**blocks: Any) -> Change:
-    """Return a change of the scenario that session.yaml and pool.yaml do not mention."""
+    """Return a function that changes the scenario alone.
+
+    The simulator writes session.yaml and pool.yaml from the changed scenario. Of its errors they have the INS's drift,
+    and no others.
+    """
 
     def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
         for name, values in blocks.items():

@@ -226,7 +226,7 @@ def _path_of(part: Part) -> Path | None:
 
 
 def _over(part: Part, path: Path) -> Part:
-    """Return a copy of a part that reads another file."""
+    """Return a copy of ``part`` that reads the file at ``path`` in place of its own."""
     moved: Part = replace(part, path=path)  # type: ignore[type-var]  # each raw file's part is a dataclass with a path
     return moved
 

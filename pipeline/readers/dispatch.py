@@ -10,7 +10,8 @@ A new format needs four steps:
 
 1. **Read it.** Write ``readers/<format>.py`` with a frozen dataclass that fulfils the protocol
    :class:`pipeline.artefacts.streams.Part`: a ``name``, and ``chunks()``, which yields one
-   :class:`~pipeline.artefacts.streams.Chunk` of canonical columns after another. Check the rows with
+   :class:`~pipeline.artefacts.streams.Chunk` of canonical columns after another. It also has the field ``path``, which
+   ``poolcal check`` replaces to read an excerpt of the file. Check the rows with
    :mod:`pipeline.readers.row_checks`. Gather a sonar's pings with :mod:`pipeline.readers.sounding_chunks`.
    :class:`pipeline.readers.sbet.SbetPart` is the shortest example.
 2. **Recognise it.** Add a ``FileKind`` with session.yaml's word for the format to :mod:`pipeline.readers.file_kind`,

@@ -86,7 +86,11 @@ def names_and_units(names: str, units: str | None, file: str) -> HeaderColumns:
 
 # --- names -----------------------------------------------------------------------------------------------------------
 def _words(line: str) -> list[tuple[str, int]]:
-    """Return the words as printed, each with the place of its end; in a line with commas the texts between, with 0."""
+    """Return the words of a line as printed, each with the place of its end.
+
+    In a line with commas the words are the texts between the commas; their places are 0 and are not used. Two words
+    that are one name (TWO_WORDS) count as one.
+    """
     if "," in line:
         return [(word.strip(), 0) for word in line.split(",")]
     words: list[tuple[str, int]] = []

@@ -106,7 +106,11 @@ class KongsbergPart(ABC):
             yield ping
 
     def _refuse_unusable(self, ping: KongsbergPing, first: KongsbergPing) -> None:
-        """Raise RawDataError for a second receiver, a single beam, or a tilted sector of an unknown transmitter."""
+        """Raise RawDataError for a ping that has no use.
+
+        It comes from a second receiver; or it is the first ping and has a single beam; or a sector is tilted, and the
+        file does not say how its transmitter is mounted.
+        """
         if ping.receiver != first.receiver:
             raise RawDataError(
                 f"{self.name}: has soundings of several receivers (dual head), each with a mount of its own; "

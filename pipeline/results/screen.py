@@ -85,7 +85,10 @@ def _pass_lines(passes: Sequence[Mapping[str, Any]], sensor: str) -> list[str]:
 
 
 def _target_line(target: Mapping[str, Any]) -> str:
-    """Return the sentence on the target's pose. There an error of the laser's mount or of the origin shows first."""
+    """Return the sentence on the target's pose relative to target.origin.
+
+    A user sees an error of the laser's mount or of target.origin here, before it appears in any other figure.
+    """
     x, y, z = (signed(value, 3) for value in target["offset_m"])
     azimuth, first, second = (signed(angle, 2) for angle in (target["azimuth_correction_deg"], *target["tilt_deg"]))
     return f"Target found at x {x}, y {y}, z {z} m from target.origin, azimuth {azimuth}°, tilt {first}° {second}°."

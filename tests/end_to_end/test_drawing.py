@@ -21,7 +21,7 @@ from tests.support.recordings import points, read
 from tests.support.roots import ROOT
 
 TELLING = """import sys
-print("begun", file=sys.stderr, flush=True)
+sys.stderr.write("begun\\n")  # in one piece: two processes write here
 from pathlib import Path
 from stages.commands.draw_worker import main
 main(Path(sys.argv[1]), sys.argv[2:])

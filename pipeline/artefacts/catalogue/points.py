@@ -56,8 +56,8 @@ PASSES = Artefact(
     "ingest", "passes", "table", "maximal intervals without gap or along-track reversal",
     (
         PASS,
-        Column("start_ns", I64, "ns", "first moment, GPS"),
-        Column("end_ns", I64, "ns", "last moment, GPS"),
+        Column("start_ns", I64, "ns", "begin, GPS"),
+        Column("end_ns", I64, "ns", "end, GPS"),
         Column("duration_s", F64, "s", "length in time"),
         Column("length_m", F64, "m", "along-track length, + in the direction of the target's y axis"),
         Column("speed_m_s", F64, "m/s", "mean along-track speed"),

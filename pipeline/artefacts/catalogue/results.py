@@ -18,28 +18,28 @@ from pipeline.artefacts.schema import Artefact, Column, Document
 
 # --- adjust ----------------------------------------------------------------------------------------------------------
 ESTIMATE = Artefact(
-    "adjust", "estimate", "table", "every unknown of the adjustment",
+    "adjust", "estimate", "table", "every parameter that was estimated",
     (
-        Column("unknown", TEXT, "", "rotation_x … lever_arm_z, each surface's turn_1, turn_2, shift, what is freed"),
+        Column("unknown", TEXT, "", "rotation_x … lever_arm_z; turn_1, turn_2, shift of surfaces; of adjust.free"),
         Column("value", F64, "rad or m", "estimate (rotation: vector from coarse; surfaces: from the laser's planes)"),
         Column("sigma", F64, "rad or m", "standard deviation from the sensors' and the INS's noise"),
-        Column("sigma_total", F64, "rad or m", "the same with what is considered, not estimated"),
+        Column("sigma_total", F64, "rad or m", "the same with the consider parameters"),
     ),
 )
 COVARIANCE = Artefact(
-    "adjust", "covariance", "table", "covariance and correlation of the six",
+    "adjust", "covariance", "table", "covariance and correlation of the mount parameters",
     (
         Column("row", TEXT, "", "unknown"), Column("column", TEXT, "", "unknown"),
         Column("covariance", F64, "rad², rad m, m²", "from noise"), Column("correlation", F64, "1", "of noise alone"),
-        Column("covariance_total", F64, "rad², rad m, m²", "with what is considered, not estimated"),
+        Column("covariance_total", F64, "rad², rad m, m²", "with the consider parameters"),
     ),
 )
 GEOMETRY = Artefact(
-    "adjust", "geometry", "table", "what the passes cannot tell, and what would cure it",
+    "adjust", "geometry", "table", "weaknesses of the passes, and a remedy; a laser's fixed mount parameters",
     (
-        Column("kind", TEXT, "", "gap or remedy; of a laser that is calibrated: held"),
-        Column("words", TEXT, "", "in words; of what is held its name"),
-        Column("sigma", F64, "deg or m", "of what is held: its standard deviation, had it not been (else NaN)"),
+        Column("kind", TEXT, "", "gap or remedy; held: a fixed mount parameter of a laser that is calibrated"),
+        Column("words", TEXT, "", "the gap or the remedy in words; held: name of the parameter"),
+        Column("sigma", F64, "deg or m", "held: standard deviation that an estimate would have had; else NaN"),
     ),
 )
 DRIFT = Artefact(
@@ -50,15 +50,15 @@ DRIFT = Artefact(
     ),
 )
 FREED = Artefact(
-    "adjust", "freed", "table", "what is held: its value, were it freed alone, and what an error of it does",
+    "adjust", "freed", "table", "single-parameter test of each fixed parameter, and the effect of its error",
     (
         Column("unknown", TEXT, "", "parameter of a sensor, or of a family's wet faces"),
-        Column("estimated", BOOL, "", "named in adjust.free: not held; value and total sigma are the solution's"),
-        Column("considered", F64, "rad, m, s, 1 or 1/s", "sigma with which it may be wrong"),
-        Column("value", F64, "rad, m, s, 1 or 1/s", "its value, had it alone been freed (NaN: nothing tells it)"),
-        Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of that"),
+        Column("estimated", BOOL, "", "named in adjust.free: value and total sigma are those of the solution"),
+        Column("considered", F64, "rad, m, s, 1 or 1/s", "its a-priori sigma, as a consider parameter"),
+        Column("value", F64, "rad, m, s, 1 or 1/s", "its estimate, if it alone were estimated (NaN: not determined)"),
+        Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of this estimate"),
         *(
-            Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount for an error of one sigma considered")
+            Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount by an error of one a-priori sigma")
             for kind, unit in (("rotation", "rad"), ("lever_arm", "m")) for axis in "xyz"
         ),
     ),
@@ -76,9 +76,9 @@ GROUPS = Artefact(
     "adjust", "groups", "table", "variance factors by group of observations",
     (
         Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping"),
-        Column("count", I64, "1", "observations; of the last two: epochs"),
+        Column("count", I64, "1", "observations; ins_white, ping: epochs"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
-        Column("scale", F64, "1", "robust scale of residual / what is expected of it, INS's noise included"),
+        Column("scale", F64, "1", "robust scale of residual / its expected sigma, the INS's noise included"),
         Column("cut", I64, "1", "observations whose weight became zero"),
         Column("reduced", I64, "1", "observations whose weight was reduced"),
     ),
@@ -89,15 +89,15 @@ CELLS = Artefact(
         Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H"), PASS,
         Column("count", I64, "1", "observations"), Column("mean_m", F64, "m", "weighted mean residual"),
         Column("rms_m", F64, "m", "RMS residual"),
-        Column("sigma_mean_m", F64, "m", "standard deviation of the mean from the scatter of its moments"),
-        Column("normalised", F64, "1", "of what differs from all other passes: as in patterns (NaN: too few moments)"),
-        Column("largest", F64, "1", "largest |residual| / what is expected, of those with a weight"),
-        Column("redundancy", F64, "1", "observations, less a shift and turn of its own of each moment"),
-        Column("variance_factor", F64, "1", "of the scatter about these, against that of its group"),
+        Column("sigma_mean_m", F64, "m", "standard deviation of the mean, from the scatter of its time slots"),
+        Column("normalised", F64, "1", "of the difference from other passes, as in patterns (NaN: too few time slots)"),
+        Column("largest", F64, "1", "largest |residual| / its expected sigma, among those with a weight"),
+        Column("redundancy", F64, "1", "observations, less a shift and turn in each interval between INS records"),
+        Column("variance_factor", F64, "1", "of the scatter within these intervals, divided by that of its group"),
     ),
 )
 PATTERNS = Artefact(
-    "adjust", "patterns", "table", "mean residuals of all points along one variable at a time, bins of enough moments",
+    "adjust", "patterns", "table", "mean residuals by one variable at a time, in bins of enough time slots",
     (
         Column("by", TEXT, "",
                "face, angle (2 degrees), distance (1 m), time (10 s); differences: step, pass, ping_2 to 4, drift"),
@@ -110,11 +110,11 @@ PATTERNS = Artefact(
         Column("count", I64, "1", "observations (of two means the fewer); drift: knots"),
         Column("mean_m", F64, "m (drift: rad)",
                "weighted mean residual; step: of the 4 degrees from there on less that of the 4 before; pass, ping_n: "
-               "of these less that of all others; drift: the same of the drift found"),
+               "of these less that of all others; drift: the same of the estimated drift"),
         Column("sigma_mean_m", F64, "m (drift: rad)",
-               "standard deviation of that from the scatter of the moments; drift: as conceded to the INS"),
-        Column("dof", F64, "1", "degrees of freedom of that"),
-        Column("normalised", F64, "1", "normal deviate of what exceeds the tolerance (drift: zero), signed"),
+               "its standard deviation, from the scatter of time slots; drift: by the figures of ins.drift"),
+        Column("dof", F64, "1", "degrees of freedom of this standard deviation"),
+        Column("normalised", F64, "1", "normal deviate of the part beyond the tolerance (drift: of all of it), signed"),
     ),
 )
 RESIDUALS = Artefact(
@@ -164,19 +164,19 @@ ADJUST_SUMMARY = Artefact(
         Column("between", F64, "1", "variance between epochs / expected from all noise: 1 if epochs and sensors agree"),
         Column("between_dof", F64, "1", "its degrees of freedom"),
         Column("condition", F64, "1", "condition number of the scaled normal matrix"),
-        Column("rank_deficiency", I32, "1", "unknown directions that the data leave open"),
-        Column("weakest", TEXT, "", "the weakest direction in words"),
+        Column("rank_deficiency", I32, "1", "directions of the parameters that the data do not determine"),
+        Column("weakest", TEXT, "", "the two mount parameters with the strongest correlation, in words"),
         Column("test_statistic", F64, "1", "consistency of passes: largest |normalised| in patterns by pass or drift"),
-        Column("test_dof", I32, "1", "how many of them"),
+        Column("test_dof", I32, "1", "number of these rows"),
         Column("test_limit", F64, "1", "limit of it at the test's level, for all rows of patterns together"),
         Column("test_passed", BOOL, "", "statistic <= limit"),
-        Column("reason", TEXT, "", "why there is no result; empty when there is"),
+        Column("reason", TEXT, "", "why there is no result; empty if there is one"),
     ),
 )
 
 # --- report ----------------------------------------------------------------------------------------------------------
 CALIBRATION = Artefact(
-    "report", "calibration", "table", "each method's six values: totals that replace the coarse mount, and corrections",
+    "report", "calibration", "table", "mount by method: totals that replace the coarse mount, and corrections",
     (
         Column("method", TEXT, "", "patent_sequential, patent_alternating, adjustment"),
         Column("parameter", TEXT, "", "roll, pitch, yaw, x, y, z"),
@@ -186,13 +186,13 @@ CALIBRATION = Artefact(
         Column("correction", F64, "deg or m", "rotation vector (about the same body axis) or lever arm correction"),
         Column("sigma", F64, "deg or m", "standard deviation of the correction"),
         Column("sigma_random", F64, "deg or m", "standard deviation of the calibrated mount's setting, from noise"),
-        Column("sigma_total", F64, "deg or m", "the same with errors that do not average: considered, not estimated"),
+        Column("sigma_total", F64, "deg or m", "the same with the consider parameters"),
         Column("low_95", F64, "deg or m", "lower end of the 95 % interval by sigma_total"),
-        Column("high_95", F64, "deg or m", "upper end of it"),
+        Column("high_95", F64, "deg or m", "upper end of the 95 % interval"),
     ),
 )
 CLOSING = Artefact(
-    "report", "closing", "table", "how the sonar's planes lie on the laser's, over all passes, with each mount",
+    "report", "closing", "table", "agreement of the sonar's planes with the laser's, over all passes, with each mount",
     (
         Column("mount", TEXT, "", "coarse, patent_sequential, patent_alternating, adjustment"),
         Column("plane", TEXT, "", "P1, P2 or P3"),

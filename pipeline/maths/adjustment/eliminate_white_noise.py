@@ -171,9 +171,10 @@ class _RecordChain:
         ahead_line[place] += KT @ (swept - twice) @ K  # sums with (1 - s) s
 
     def eliminate(self, white: Array) -> float:
-        """Eliminate the records from ``normal``, and return log det of their blocks.
+        """Eliminate the white noise of the records from ``normal``, in place; return the sum of log det of its blocks.
 
-        With w = √W u, u ~ N(0, 1), the prior is the unit matrix, and W = 0 needs no exception.
+        The unknowns are the noise divided by its standard deviations ``white``. So their prior is the unit matrix, and
+        a standard deviation of zero is no special case.
         """
         both, log_determinant = white[:, None] * white, 0.0
         carried_own: Array | None = None

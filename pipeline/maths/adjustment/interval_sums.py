@@ -68,8 +68,8 @@ class IntervalSums:
     def shifted(self, change: Array) -> "IntervalSums":
         """Return the sums of the same observations after v has changed by q · ``change`` (g, F).
 
-        The points need not be read again. This is exact except for the turn of q itself, which is of second order: 1e-3
-        rad at 10 m are 5 µm.
+        The points need not be read again. This is exact while the features q stay the same. They change a little when
+        mount or surface turns. The error of v is then of second order: 5 µm for a turn of 1e-3 rad at 10 m.
         """
         shift = np.einsum("gij,gj->gi", self.normal, change)
         return replace(

@@ -72,14 +72,16 @@ class Plane:
 
 
 def fit_plane(moments: PlaneMoments, toward: Array) -> Plane:
-    """Fit the plane that minimises nᵀ S n / nᵀ N n: mean square of n · x - d, relative to expectation [0061-0088].
+    """Fit the plane that minimises nᵀ S n / nᵀ N n [0061-0088].
 
-    S is the centred scatter matrix of the points and d = n · mean. A point x = x0 + e of the plane n · x0 = d with an
-    error of covariance s C gives E[S] = S0 + s N, where N is the mean of C and S0 n = 0: the eigenvector n of
-    S n = λ N n with the smallest λ is the plane's normal in expectation, and λ = s. With equal errors in all
-    directions, N = 1, this is the patent's total least squares. With errors along oblique rays, that is biased: it
-    turns the normal by -s n · N t / λ_t towards each t in the face (hundredths of a degree for slanted faces in a
-    pass). ACROSS times the trace of N is added to the diagonal of N, so that N is definite.
+    This is the mean square of n · x - d, divided by its expectation from the errors of the points. S is the centred
+    scatter matrix of the points and d = n · mean. A point x = x0 + e of the plane n · x0 = d with an error of
+    covariance s C gives E[S] = S0 + s N, where N is the mean of C and S0 n = 0: the eigenvector n of S n = λ N n with
+    the smallest λ is the plane's normal in expectation, and λ = s. With equal errors in all directions, N ∝ 1, this is
+    the patent's total least squares. With errors along oblique rays the total least squares is biased: for each tangent
+    t of the plane, with the eigenvalue λ_t of S, it turns the normal towards t by -s n · N t / λ_t (hundredths of a
+    degree for slanted faces in a pass). The code scales N to the trace 1, and adds ACROSS to its diagonal, so that N is
+    definite.
 
     The normal points so that n · toward >= 0. The tangents t_k are the eigenvectors of S within the face, with the
     eigenvalues λ_k. First-order covariance (e.g. Kanatani 1996, ch. 10): a turn of n along t_k changes the residuals by

@@ -28,10 +28,17 @@ class CuttingPlane:
 
 
 def plane_through(corners: Sequence[Array], visible: NDArray[np.bool_]) -> CuttingPlane | None:
-    """Return the plane that cuts the largest number of ``visible`` faces; None if no plane cuts any.
+    """Return the vertical plane, x or y constant, that cuts most of the chosen faces; None if it would cut none.
 
-    This plane cuts the patent's target at half the depth of its blocks, and a plain wall crosswise. ``corners``: the
-    corners of each face, (n, 3), target frame, m.
+    Planes midway between neighbouring coordinates of corners are tried. The best cuts the patent's target at half the
+    depth of its blocks, and a plain wall at right angles to its face.
+
+    Parameters
+    ----------
+    corners
+        Corners (n, 3) m of each face, target frame.
+    visible
+        Mask of the chosen faces, one value for each face.
     """
     best: tuple[int, CuttingPlane] | None = None
     for axis in (0, 1):
