@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.checks import FINE, SBET, assert_only, checked
+from tests.support.checks import FINE, SBET, assert_only
 from tests.support.effort import often
 from tests.support.places import edit
 
@@ -31,8 +31,7 @@ def test_a_clock_is_told_from_the_target_where_all_ran_on(spoilt: Callable[..., 
     """With sensors that run without pause when they ran tells nothing."""
     session = spoilt("messy")
     edit(session / "session.yaml", "laser", latency_s=7.0)  # taken off: the laser is 7 s behind
-    assert_only(session, "clock", "laser: its points hit the target if its clock is", " s behind the INS's")
-    said = checked(session)[1][0]["words"]
+    said = assert_only(session, "clock", "laser: its points hit the target if its clock is", " s behind the INS's")
     assert abs(float(said.split("clock is ")[1].split(" s")[0]) - 7.0) < 1.0  # the origin is 0.2 m off along the track
 
 
@@ -69,8 +68,8 @@ def test_a_clock_off_by_milliseconds(spoilt: Callable[..., Path], sensor: str, l
     """Latency is taken off: a clock of which too much is taken off is behind."""
     session = spoilt(**FINE)
     edit(session / "session.yaml", sensor, latency_s=latency_ms / 1000)
-    assert_only(session, "latency", f"{sensor}: its clock is", "ahead of" if latency_ms < 0 else "behind", " ms ")
-    said = checked(session)[1][0]["words"]
+    side = "ahead of" if latency_ms < 0 else "behind"
+    said = assert_only(session, "latency", f"{sensor}: its clock is", side, " ms ")
     assert abs(float(said.split(" is ")[1].split(" ms")[0]) - abs(latency_ms)) < 8
     low, high = (float(number) for number in said.split(" (")[1].split(" ms, 95 %")[0].split(" to "))
     assert low - 8 < abs(latency_ms) < high + 8

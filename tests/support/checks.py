@@ -16,8 +16,8 @@ def checked(session: Path) -> tuple[int, list[dict[str, Any]]]:
     return told.status, json.loads(told.out)["findings"]
 
 
-def assert_only(session: Path, question: str, *words: str, severity: str = "fault") -> None:
-    """One kind of finding alone, in these words."""
+def assert_only(session: Path, question: str, *words: str, severity: str = "fault") -> str:
+    """One kind of finding alone, in these words; return the first finding."""
     status, found = checked(session)
     assert {one["question"] for one in found} == {question}, found
     assert {one["severity"] for one in found} == {severity}
@@ -26,3 +26,4 @@ def assert_only(session: Path, question: str, *words: str, severity: str = "faul
     for word in words:
         assert word in said, said
     assert all("\n" not in one["words"] for one in found)
+    return str(found[0]["words"])
