@@ -96,10 +96,10 @@ format: $(SETUP) ## what ruff can correct by itself
 	.venv/bin/ruff check --fix-only .
 
 test: lint ## lint, then every test
-	$(PY) -m pytest -n 2 -q
+	$(PY) -m pytest -n 2 --dist loadfile -q
 
 thorough: lint ## every test, with more draws, kills and damaged files than a usual run has
-	POOLCAL_THOROUGH=1 $(PY) -m pytest -n 2 -q
+	POOLCAL_THOROUGH=1 $(PY) -m pytest -n 2 --dist loadfile -q
 
 bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare decoding
 	$(PY) -m tools.bench
