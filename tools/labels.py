@@ -1,8 +1,8 @@
-"""Compare calibrations under drift with calibrations by the labels of a twin, whose INS has no error.
+"""Compare calibrations under drift with calibrations by the labels of a twin, whose INS does not drift.
 
 A drifting trajectory must not change the labels. Each session of the drift campaign is calibrated twice: with its own
 labels, and with those that the target's pose, the mount and the poses of its twin give. The twin has the same true
-motion and the same points. For each mount parameter the program prints the root mean square of the difference of both
+motion, the same points and the same white noise of the INS. For each mount parameter the program prints the root mean square of the difference of both
 results, in sigmas. Rows go to runs/montecarlo/labels.parquet.
 
     python -m tools.labels [--sessions 50] [--jobs 2]
@@ -24,11 +24,11 @@ from pipeline.run.stage_protocol import declared
 from pipeline.target.labelled_points import LabellingContext, label_batch
 from stages import segment
 from stages.in_memory import calibrate_in_memory
-from tools.campaigns import CAMPAIGNS, FOLDER, TASKS_OF_A_WORKER, WHITE
+from tools.campaigns import CAMPAIGNS, FOLDER, TASKS_OF_A_WORKER
 from tools.session_rows import NAMES, session_in_memory, simulated
 
 (UNDER_DRIFT,) = (campaign for campaign in CAMPAIGNS if campaign.name == "finite beams and INS drift")
-EXACT = replace(UNDER_DRIFT, name="no error of the INS", scenario={"ins": WHITE["ins"]})
+DRIFT_FREE = replace(UNDER_DRIFT, name="no drift", scenario={})
 SOURCES = {"segment/laser_labelled": "laser_pool", "segment/soundings_labelled": "soundings_pool"}
 
 
@@ -55,8 +55,8 @@ class TwinLabels:
 
 
 def context_of_twin(number: int) -> LabellingContext:
-    """Return target, mount and poses for labelling, from a session without errors of the INS."""
-    made, session, pool = simulated(EXACT, number)
+    """Return target, mount and poses for labelling, from a session without drift."""
+    made, session, pool = simulated(DRIFT_FREE, number)
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
     artefacts = calibrate_in_memory(session, pool, raw, until="georeference")
     inputs = {
