@@ -2,8 +2,8 @@
 
 A drifting trajectory must not change the labels. Each session of the drift campaign is calibrated twice: with its own
 labels, and with those that the target's pose, the mount and the poses of its twin give. The twin has the same true
-motion, the same points and the same white noise of the INS. For each mount parameter the program prints the root mean square of the difference of both
-results, in sigmas. Rows go to runs/montecarlo/labels.parquet.
+motion, the same points and the same white noise of the INS. For each mount parameter the program prints the root mean
+square of the difference of both results, in sigmas. Rows go to runs/montecarlo/labels.parquet.
 
     python -m tools.labels [--sessions 50] [--jobs 2]
 """
