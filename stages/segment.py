@@ -144,6 +144,7 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
         trajectory=trajectory,
         corrected=trajectory,
         laser=laser,
+        laser_beam_m=config.laser.beam_m,
         mbes=config.mbes,
         settings=config.segment,
     )
