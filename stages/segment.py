@@ -54,6 +54,7 @@ from pipeline.target.result_tables import provisional_mount_table, target_pose_t
 from pipeline.target.samples import laser_poses, laser_sample, sounding_sample
 from pipeline.target.surface import ClosestSurface
 
+COUNTED = {"laser_pool": "laser_points", "soundings_pool": "soundings"}  # names in table counts, by stream
 FEWEST_VOXELS = 50  # fewest voxels with laser points above the water
 
 
@@ -103,12 +104,12 @@ def prepare(inputs: Inputs, config: Config) -> LabellingContext:
 
     # Adjust a sample of the points: labels need the trajectory without its drift.
     streams = {"laser_pool": inputs.laser_pool, "soundings_pool": inputs.soundings_pool}
-    counts = {"laser_pool": "laser_points", "soundings_pool": "soundings"}
-    sample = {
-        name: sample_near_target(stream, name, used(inputs.counts, counts[name]), context)
-        for name, stream in streams.items()
-        if stream.parts
-    }
+    counts = {name: used(inputs.counts, kind) for name, kind in COUNTED.items()}
+    if config.mbes is None:
+        del counts["soundings_pool"]
+    if not all(counts.values()):
+        return context
+    sample = {name: sample_near_target(streams[name], name, count, context) for name, count in counts.items()}
     drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     problem_at = partial(provisional_problem, noise=pose_noise(drift, config.ins.white), config=config)
     return with_adjusted_sample(context, sample, problem_at, config.adjust, config.ingest.max_gap_s)

@@ -127,7 +127,7 @@ def test_a_grazed_face_needs_its_margin_along_the_ray(target):
 def test_the_spot_of_a_round_beam_is_long_where_the_face_is_grazed(target):
     """A beam of 1 cm at 5.7 degrees is 10 cm long: 4 cm from an edge of a top is too near, 6 cm is not."""
     points = np.array([[0.75, -1.75, -3.5], [0.96, -1.75, -3.5], [0.94, -1.75, -3.5]])
-    steep, flat = points + [-3.0, 0.0, 3.0], points + [-6.0, 0.0, 0.6]
+    steep, flat = points + np.array([-3.0, 0.0, 3.0]), points + np.array([-6.0, 0.0, 0.6])
     for origins, good in ((steep, [True, True, True]), (flat, [True, False, True])):
         rays = points - origins
         ranges = np.linalg.norm(rays, axis=1)
