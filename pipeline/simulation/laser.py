@@ -1,6 +1,7 @@
 """Records of the laser scanner: lines athwart to starboard, in the scanner's own frame."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.gps_time import NS
 from pipeline.simulation.echoes import range_bias
@@ -94,39 +95,39 @@ class _LaserPass:
         direction_body = self.R_body_from_laser.apply(direction_laser)
         directions = np.einsum("nij,nj->ni", pose.R_target_from_body, direction_body)
         origins = pose.position_target_m + pose.R_target_from_body @ lever_arm_m(self.scenario.mount)
-        ranges = self._ranges_to_faces(origins, directions)
+        ranges, surfaces = self.pool.caster.cast(origins, directions)
         height = self.pool.water_level_m - origins[:, 2]
         down = directions[:, 2] < -1e-9
         to_water = np.divide(height, directions[:, 2], out=np.full(len(height), np.inf), where=down)
         dice = self.random["water"].random((len(t_ns), 2))
         echo = np.where(dice[:, 0] < self.scenario.water_return_share, to_water + BELOW_WATER_M * dice[:, 1], np.inf)
-        return np.where(ranges < to_water, ranges - self._splash_m(origins, directions, ranges), echo)
+        measured = self._mixed(ranges, surfaces, origins, directions)
+        if self.scenario.incidence_bias_m or self.scenario.level_bias_m:
+            normals = self.pool.caster.normals(origins, directions)
+            measured = measured + range_bias(self.scenario, normals, directions, "tangent_squared")
+        return np.where(ranges < to_water, measured - self._splash_m(origins, directions, ranges), echo)
 
-    def _ranges_to_faces(self, origins: Floats, directions: Floats) -> Floats:
-        """Return the ranges (n,) that the scanner measures to the faces; inf: none.
+    def _mixed(self, ranges: Floats, surfaces: NDArray[np.int64], origins: Floats, directions: Floats) -> Floats:
+        """Return the ranges (n,) of beams with a width, from those of their axes and the surfaces that these meet.
 
-        A beam with a width that meets more than one plane is four rays round its axis beside the axis itself, which
-        counts twice. Their mean is measured, without those whose echoes can be told apart from the axis's.
+        A beam that meets more than one plane is four rays round its axis beside the axis itself, which counts twice.
+        Their mean is measured, without those that end in water or whose echoes can be told apart from the axis's.
         """
         scenario = self.scenario
-        ranges, surfaces = self.pool.caster.cast(origins, directions)
-        measured = ranges
-        if scenario.spot_m or scenario.spot_divergence_deg:
-            side = np.cross(directions, [0.0, 0.0, 1.0])
-            side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
-            total, count, mixed = 2 * ranges, np.full(len(ranges), 2.0), np.zeros(len(ranges), dtype=bool)
-            widening = np.tan(np.radians(scenario.spot_divergence_deg) / 2)
-            for way in (side, -side, np.cross(side, directions), -np.cross(side, directions)):
-                leaning = (directions + widening * way) / np.hypot(1.0, widening)
-                found, surface = self.pool.caster.cast(origins + scenario.spot_m / 2 * way, leaning)
-                near = np.abs(np.where(np.isfinite(found), found, -np.inf) - ranges) < _PULSE_M
-                total, count = np.where(near, total + found, total), count + near
-                mixed |= near & (surface != surfaces)
-            measured = np.where(mixed, total / count, ranges)
-        if scenario.incidence_bias_m or scenario.level_bias_m:
-            normals = self.pool.caster.normals(origins, directions)
-            measured = measured + range_bias(scenario, normals, directions, "tangent_squared")
-        return measured
+        if not (scenario.spot_m or scenario.spot_divergence_deg):
+            return ranges
+        side = np.cross(directions, [0.0, 0.0, 1.0])
+        side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
+        total, count, mixed = 2 * ranges, np.full(len(ranges), 2.0), np.zeros(len(ranges), dtype=bool)
+        widening = np.tan(np.radians(scenario.spot_divergence_deg) / 2)
+        for way in (side, -side, np.cross(side, directions), -np.cross(side, directions)):
+            leaning = (directions + widening * way) / np.hypot(1.0, widening)
+            found, surface = self.pool.caster.cast(origins + scenario.spot_m / 2 * way, leaning)
+            near = np.abs(found - np.where(np.isfinite(ranges), ranges, 0.0)) < _PULSE_M
+            near &= origins[:, 2] + np.where(near, found, 0.0) * leaning[:, 2] > self.pool.water_level_m
+            total, count = np.where(near, total + found, total), count + near
+            mixed |= near & (surface != surfaces)
+        return np.where(mixed, total / count, ranges)
 
     def _splash_m(self, origins: Floats, directions: Floats, ranges: Floats) -> Floats:
         """Return how much before the face each ray (n,) ends in drops; zero for most, and all that end higher up."""

@@ -64,7 +64,7 @@ class RayCaster:
         return np.where(hit[:, None], self.mesh.normals[triangles], 0.0)
 
     def _meet(self, origins_m: Floats, directions: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.bool_]]:
-        """Return each ray's range to the plane of the triangle that it meets first, the triangle, and if it meets one."""
+        """Return ranges to the planes of the triangles that rays meet first, the triangles, and which rays meet one."""
         rays = np.concatenate([origins_m, directions], axis=1, dtype=np.float32)
         triangle = self._scene.cast_rays(self._tensor(rays))["primitive_ids"].numpy()
         hit = triangle != self._no_triangle

@@ -84,8 +84,8 @@ class Relief:
             heights[rows] += fault.heights_m(triangles[rows], points_m[rows])
         if self._sigma_m:
             rows = np.flatnonzero(self.faces[triangles] != "")
-            waves = np.cos(points_m[rows] @ self._waves_1_m.T + self._phases).sum(axis=1)
-            heights[rows] += self._sigma_m * np.sqrt(2 / _WAVES) * waves
+            for wave, phase in zip(self._waves_1_m, self._phases, strict=True):
+                heights[rows] += self._sigma_m * np.sqrt(2 / _WAVES) * np.cos(points_m[rows] @ wave + phase)
         return heights
 
     def _placed(self, fault: FaceFault, number: int) -> "_PlacedFault":

@@ -12,6 +12,7 @@ from pipeline.simulation.site import Floats
 
 _STEPS = 64  # of the integration along a ray: 0.1 m
 _ROUNDS = 3  # of chord, range, chord
+_LEVEL_M = 1e-9  # a ray that falls less in a step is level
 
 
 class WaterColumn:
@@ -80,8 +81,8 @@ class WaterColumn:
     def _chords(self, depths_m: Floats, start: Floats, lengths_m: Floats) -> tuple[Floats, Floats]:
         """Return unit vectors (p, b, 3) of the chords of rays that begin with ``start``, and the times along the rays.
 
-        The ray is integrated by the midpoint rule. With c(depth) and v, the downward component of its direction,
-        dv/ds = -(1 - v²) c' / c, as Snell's law has it. The horizontal direction stays.
+        The ray is integrated in steps, by the midpoint rule. With c(depth) and v, the downward component of its
+        direction, dv/ds = -(1 - v²) c' / c, as Snell's law has it. The horizontal direction stays.
 
         Parameters
         ----------
@@ -95,15 +96,23 @@ class WaterColumn:
         table, speeds = self.profile.T
         slopes = np.concatenate([[0.0], np.diff(speeds) / np.diff(table), [0.0]])
 
-        def bend(depth: Floats) -> Floats:
-            return np.asarray(slopes[np.searchsorted(table, depth)] / np.interp(depth, table, speeds))
+        def bend(depth: Floats, down: Floats, step: Floats) -> Floats:
+            """Return c' / c on the way from a depth: of both ends, so that borders of layers count in full."""
+            fall, speed = down * step, np.interp(depth, table, speeds)
+            slope = np.divide(
+                np.interp(depth + fall, table, speeds) - speed,
+                fall,
+                out=slopes[np.searchsorted(table, depth)],
+                where=np.abs(fall) > _LEVEL_M,
+            )
+            return np.asarray(slope / speed)
 
         step = lengths_m / _STEPS
         down, depth, across, time = -start[..., 2], depths_m, np.zeros_like(step), np.zeros_like(step)
         for _ in range(_STEPS):
-            half_down = down - step / 2 * (1 - down**2) * bend(depth)
+            half_down = down - step / 2 * (1 - down**2) * bend(depth, down, step / 2)
             half_depth = depth + step / 2 * down
-            down = down - step * (1 - half_down**2) * bend(half_depth)
+            down = down - step * (1 - half_down**2) * bend(depth, half_down, step)
             depth = depth + step * half_down
             across = across + step * np.sqrt(1 - half_down**2)
             time = time + step / np.interp(half_depth, table, speeds)
