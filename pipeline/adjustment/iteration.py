@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,6 @@ from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighte
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
-from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
 from pipeline.maths.adjustment.parameters import State
@@ -29,6 +29,30 @@ from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+
+class IterationSettings(Protocol):
+    """Settings of the iteration."""
+
+    @property
+    def free(self) -> Sequence[str]:
+        """Names of the additional parameters to estimate."""
+        ...
+
+    @property
+    def max_iterations(self) -> int:
+        """Largest number of readings of the points."""
+        ...
+
+    @property
+    def robust_k0(self) -> float:
+        """Largest normalised residual with full weight."""
+        ...
+
+    @property
+    def robust_k1(self) -> float:
+        """Largest normalised residual with any weight."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -101,7 +125,7 @@ def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]
 
 
 def adjust_mount(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> MountAdjustment:
     """Return the result of the iteration from the coarse mount to the solution.
 
@@ -111,7 +135,7 @@ def adjust_mount(
         Model, prior information and consider errors of the calibration.
     streams : mapping of Stream
         Labelled points by sensor.
-    settings : Adjust
+    settings : IterationSettings
         Limits of the iteration, robust weights, additional parameters to estimate.
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
@@ -198,7 +222,7 @@ class _WeightedIteration:
 
 
 def _weighted_iteration(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> _WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior
