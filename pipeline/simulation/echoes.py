@@ -72,6 +72,8 @@ class Echoes:
             normals = self._normals(paths, origins, directions)
             factors = self._noise_factors(normals, directions, R_target_from_mbes)
             paths = paths + range_bias(scenario, normals, directions, scenario.incidence_law)
+        if scenario.range_bias_m:
+            paths = paths + scenario.range_bias_m
         if scenario.image_share:
             paths = self._image(paths, origins, directions)
         paths = self._corners(paths, origins, directions)

@@ -88,6 +88,7 @@ class MbesScenario(Model):
     ping_tilts_deg: Annotated[tuple[_Tilt, ...], Field(max_length=16)] = ()  # added to all sectors', in turn by ping
     max_range_m: Annotated[float, Field(ge=1, le=500)] = 15.0
     range_sigma_m: NotNegative = 0.008
+    range_bias_m: Bias = 0.0  # added to all ranges of faces
     incidence_noise: Factor = 1.0  # at 45° of incidence i: variance × (1 + (f² - 1) tan² i), as at 80° beyond
     slanted_noise: Factor = 1.0  # the same factor with the incidence along track alone
     incidence_bias_m: Bias = 0.0  # added to ranges at 45° of incidence; beyond 80° as at 80°

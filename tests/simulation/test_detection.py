@@ -58,6 +58,12 @@ def test_a_bias_of_level_faces_leaves_the_others(one_pass: Pass) -> None:
         assert range_m(biased, angle_deg, y_m) - range_m(plain, angle_deg, y_m) == pytest.approx(longer, abs=1e-9)
 
 
+def test_a_bias_of_all_ranges(one_pass: Pass) -> None:
+    plain, biased = one_pass(), one_pass(range_bias_m=0.01)
+    for angle_deg, y_m in ((0.0, 0.0), (60.0, 0.0), (74.0, -2.0)):
+        assert range_m(biased, angle_deg, y_m) - range_m(plain, angle_deg, y_m) == pytest.approx(0.01, abs=1e-9)
+
+
 def noise_m(noisy: SimulatedSession, clean: SimulatedSession, angle_deg: float, y_m: tuple[float, float]) -> np.ndarray:
     """Noise of the ranges of a beam while y is between two values."""
     found = []
