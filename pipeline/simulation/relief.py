@@ -17,8 +17,8 @@ from pipeline.simulation.scenario_surroundings import FaceFault, Surroundings
 from pipeline.simulation.site import Floats
 
 Bools = NDArray[np.bool_]
-_STEPS = 4  # each leaves of the error the slope of the relief times the tangent of the incidence, a tenth at most
-_WAVES = 64  # that make up the unevenness
+_STEPS = 3  # each leaves of the error the slope of the relief times the tangent of the incidence, some hundredths
+_WAVES = 32  # that make up the unevenness
 _LEVEL = 0.99  # vertical component of the normal of a level face
 _SIDES = {"south": "P1", "north": "P3"}
 
@@ -58,8 +58,9 @@ class Relief:
         self._faults = [self._placed(fault, k) for k, fault in enumerate(surroundings.face_faults)]
         self._sigma_m = surroundings.unevenness_m
         random = generator(seed, "unevenness")
-        self._waves_1_m = random.standard_normal((_WAVES, 3)) / surroundings.unevenness_length_m
-        self._phases = random.uniform(0, 2 * np.pi, _WAVES)
+        waves = random.standard_normal((_WAVES, 3)) / surroundings.unevenness_length_m
+        self._waves_1_m = waves.astype(np.float32)  # four times as fast; wrong by some 1e-5 of the unevenness
+        self._phases = random.uniform(0, 2 * np.pi, _WAVES).astype(np.float32)
 
     def __bool__(self) -> bool:
         """Return whether any face stands off its plane."""
@@ -84,8 +85,10 @@ class Relief:
             heights[rows] += fault.heights_m(triangles[rows], points_m[rows])
         if self._sigma_m:
             rows = np.flatnonzero(self.faces[triangles] != "")
+            points, total = points_m[rows].astype(np.float32), np.zeros(len(rows), dtype=np.float32)
             for wave, phase in zip(self._waves_1_m, self._phases, strict=True):
-                heights[rows] += self._sigma_m * np.sqrt(2 / _WAVES) * np.cos(points_m[rows] @ wave + phase)
+                total += np.cos(points @ wave + phase)
+            heights[rows] += self._sigma_m * np.sqrt(2 / _WAVES) * total
         return heights
 
     def _placed(self, fault: FaceFault, number: int) -> "_PlacedFault":

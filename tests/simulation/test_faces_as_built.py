@@ -107,7 +107,7 @@ def test_both_sensors_see_the_same_uneven_faces(
         assert np.std(on_wall[:, 0]) > 0.001
     many = np.random.default_rng(0).uniform(-20, 20, (5000, 3)) * [0, 1, 1]
     own, beside = [], []
-    for seed in range(12):  # one field has but 64 waves
+    for seed in range(12):  # one field has but 32 waves
         field = Relief(scenario.target, scenario.surroundings, mesh, seed)
         on_wall = np.full(len(many), wall)
         own.append(field.heights_m(on_wall, many))
