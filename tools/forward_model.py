@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 from pipeline.config.pool import Segment
 from pipeline.gps_time import NS
 from pipeline.simulation.beams import directions_in_mbes, fan_angles, swing_rad, transmit_tilts_rad
+from pipeline.simulation.echoes import UPWARD_RAD
 from pipeline.simulation.laser import scan_directions
-from pipeline.simulation.mbes import CLOCK_RATE_ERROR, UPWARD_RAD
+from pipeline.simulation.mbes import CLOCK_RATE_ERROR
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.motion import Movement, R_level_from_body
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m

@@ -1,9 +1,10 @@
-"""Plant mistakes in simulated sessions, and tabulate their effect on the result and on the verdict.
+"""Plant mistakes and real errors in simulated sessions, and tabulate their effect on the result and on the verdict.
 
-Each line of the table is the default scenario with one mistake, simulated with fixed seeds and calibrated in memory. It
-shows how many sessions were accepted and the adjustment's largest errors in angles and lever arm. For the accepted
-sessions it also shows the largest normalised squared error by the total covariance and the largest error in total
-sigmas. The README must name every mistake that the verdict does not notice. Each session is a row of
+Each line of the table is the default scenario with one kind of error (``tools.mistake_kinds``), simulated with fixed
+seeds and calibrated in memory. It shows how many sessions were accepted and the adjustment's largest errors in angles
+and lever arm. For the accepted sessions it also shows the largest normalised squared error by the total covariance and
+the largest error in total sigmas; for the rejected ones, in how many of them what is named first is what was planted.
+The README must name every mistake that the verdict does not notice. Each session is a row of
 runs/montecarlo/mistakes.parquet.
 
     python -m tools.mistakes [--jobs 2] [--seeds 27] [--only NAME ...]
@@ -12,7 +13,7 @@ runs/montecarlo/mistakes.parquet.
 import argparse
 import copy
 import json
-from collections.abc import Callable
+from collections.abc import Mapping
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -20,106 +21,52 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tools.campaigns import DRIFT, TASKS_OF_A_WORKER, THIN
+from tools.campaigns import TASKS_OF_A_WORKER, THIN
+from tools.mistake_kinds import MISTAKES
 from tools.session_rows import NAMES, UNITS, errors_of
 
 SEEDS = 3
-Change = Callable[[dict[str, Any], dict[str, Any], dict[str, Any]], None]  # changes scenario, session and pool in place
 
 
-def _scenario(**blocks: Any) -> Change:
-    """Return a function that changes the scenario alone.
+def named_first(reason_codes: list[str], artefacts: Mapping[str, Any]) -> frozenset[str]:
+    """Return the names of what the verdict of a rejected session names first.
 
-    The simulator writes session.yaml and pool.yaml from the changed scenario. Of its errors they have the INS's drift,
-    and no others.
+    This is the suspected cause, by its parameter and the face in the parameter's name, unless a part of the points is
+    named before it, which may be the cause instead. Otherwise it is the first reason, by its code, and by its face if
+    it names one.
+
+    Parameters
+    ----------
+    reason_codes : list of str
+        Of calibration.json, in its order.
+    artefacts : mapping
+        All tables of the session.
     """
+    from pipeline.adjustment.pattern_tests import OF_PASSES
+    from pipeline.report.reason_codes import ReasonCode
+    from pipeline.report.suspected_causes import SIGNIFICANT
 
-    def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
-        for name, values in blocks.items():
-            scenario[name] = scenario.get(name, {}) | values
-
-    return change
-
-
-def _laser(**values: float) -> Change:
-    """Return a change that adds errors to the laser's mount in session.yaml."""
-
-    def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
-        mount = session.get("laser", {}).get("mount", {})
-        for name, value in values.items():
-            if name in mount:
-                mount[name] += value
-
-    return change
-
-
-def _swapped(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
-    """Interchange x and y of the laser's mount in session.yaml."""
-    mount = session.get("laser", {}).get("mount", {})
-    if mount:
-        mount["x_m"], mount["y_m"] = mount["y_m"], mount["x_m"]
-
-
-def _target(**values: float) -> Change:
-    """Return a change that adds errors to the target's dimensions in the pool's config."""
-
-    def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
-        for name, value in values.items():
-            if "target" in pool:
-                pool["target"][name] += value
-
-    return change
-
-
-def _thrice(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
-    """Make the INS drift three times as far as session.yaml says."""
-    figures = dict(DRIFT["drift"])
-    scenario["ins"] = {"drift": figures | {key: 3 * value for key, value in figures.items() if "constant" not in key}}
-    if "ins" in session:
-        session["ins"]["drift"] = figures
-
-
-def _pool(**values: Any) -> Change:
-    """Return a change that gives other values to the target in the pool's config."""
-
-    def change(scenario: dict[str, Any], session: dict[str, Any], pool: dict[str, Any]) -> None:
-        if "target" in pool:
-            pool["target"].update(values)
-
-    return change
-
-
-MISTAKES: dict[str, Change] = {
-    "nothing wrong": _scenario(),
-    "nothing wrong, INS drifts": _scenario(ins=DRIFT),
-    "drift three times the figures": _thrice,
-    "sonar's clock 10 ms off": _scenario(mbes={"latency_s": 0.01}),
-    "sonar's clock 20 ms off": _scenario(mbes={"latency_s": 0.02}),
-    "sonar's clock 60 ms off": _scenario(mbes={"latency_s": 0.06}),
-    "laser's clock 50 ms off": _scenario(laser={"latency_s": 0.05}),
-    "sound speed 0.3 % wrong": _scenario(mbes={"sound_speed_recorded_m_s": 1504.5}),
-    "sound speed 1 % wrong": _scenario(mbes={"sound_speed_recorded_m_s": 1515.0}),
-    "sound speed changes by 0.05 °C/m": _scenario(mbes={"sound_speed_gradient_1_s": 0.15}),
-    "target.e 2 cm too large": _target(e=0.02),
-    "target leans by 0.3°": _scenario(surroundings={"tilt_deg": [0.0, 0.3]}),
-    "one row of blocks missing": _pool(blocks_per_side=9),
-    "wrong low_side": _pool(low_side="north"),
-    "15 % outliers": _scenario(mbes={"outlier_share": 0.15}, laser={"outlier_share": 0.15}),
-    "two passes, both at 6 m": _scenario(track={"distances_m": [6.0, 6.0]}),
-    "four passes, all at 6 m": _scenario(track={"distances_m": [6.0, 6.0, 6.0, 6.0]}),
-    "INS drifts, one pass alone": _scenario(ins=DRIFT, track={"distances_m": [5.0]}),
-    "laser.mount: roll 0.1° wrong": _laser(roll_deg=0.1),
-    "laser.mount: pitch 0.44° wrong (sign)": _laser(pitch_deg=0.44),
-    "laser.mount: yaw 0.2° wrong": _laser(yaw_deg=0.2),
-    "laser.mount: x and y interchanged": _swapped,
-    "laser.mount: z 0.1 m wrong": _laser(z_m=0.1),
-    "target.b 5 cm too large": _target(b=0.05),
-    "target.c 20 cm too large": _target(c=0.2),
-}
+    local = {
+        ReasonCode.RESIDUALS_BY_FACE, ReasonCode.RESIDUALS_STEP, ReasonCode.RESIDUALS_BY_PING,
+        ReasonCode.PASSES_DISAGREE,
+    }  # fmt: skip
+    first = next(iter(reason_codes), "")
+    if ReasonCode.SUSPECTED_CAUSE in reason_codes and not local & set(reason_codes):
+        freed = artefacts["adjust/freed"]
+        beyond = freed["value"].abs() > SIGNIFICANT * np.hypot(freed["sigma"], freed["considered"])
+        causes = freed[~freed["estimated"] & beyond]
+        parameter = str(causes.loc[(causes["value"].abs() / causes["sigma"]).idxmax(), "unknown"])
+        return frozenset({parameter, *parameter.split("_")})
+    if first == ReasonCode.RESIDUALS_BY_FACE:
+        patterns = artefacts["adjust/patterns"]
+        patterns = patterns[~patterns["by"].isin(OF_PASSES)]
+        number = int(patterns.loc[patterns["normalised"].abs().idxmax(), "low"])
+        return frozenset({first, str(artefacts["segment/faces"]["name"].iloc[number])})
+    return frozenset({first})
 
 
 def session_row(task: tuple[str, int]) -> dict[str, Any]:
-    """Return the row of a session, given its mistake and seed: verdict, errors and sigmas."""
+    """Return the row of a session, given its mistake and seed: verdict, what it names, errors and sigmas."""
     from pipeline.config.pool import PoolConfig
     from pipeline.config.session import SessionConfig
     from pipeline.config.yaml_models import parse
@@ -130,20 +77,25 @@ def session_row(task: tuple[str, int]) -> dict[str, Any]:
 
     name, seed = task
     scenario: dict[str, Any] = {"name": "mistake", **copy.deepcopy(THIN)}
-    MISTAKES[name](scenario, {}, {})
+    kind = MISTAKES[name]
+    kind.change(scenario, {}, {})
     made = simulate_session(parse(Scenario, scenario, name), seed)
     session, pool = copy.deepcopy(made.session), copy.deepcopy(made.pool)
-    MISTAKES[name]({}, session, pool)
+    kind.change({}, session, pool)
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
     empty = {f"{kind}_{axis}": np.nan for kind in ("error", "sigma") for axis in NAMES}
     row: dict[str, Any] = {"mistake": name, "seed": seed, "accepted": False, "nse": np.nan, "sigmas": np.nan} | empty
+    row |= {"named": "", "has_right": bool(kind.right), "named_right": False}
     try:
         artefacts = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
     except PoolcalError as error:
-        return row | {"reasons": f"refused: {error}"}
+        return row | {"reasons": f"refused: {error}", "named": "refused"}
     result = json.loads(artefacts["report/calibration.json"])
     block = result["methods"]["adjustment"]
     row |= {"accepted": result["verdict"] == "accepted", "reasons": " | ".join(result["reasons"])}
+    if not row["accepted"]:
+        names = named_first(result["reason_codes"], artefacts)
+        row |= {"named": " ".join(sorted(names)), "named_right": bool(names & kind.right)}
     if block["covariance_total"] is None:
         return row
     errors = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), made.truth)
@@ -158,16 +110,19 @@ def session_row(task: tuple[str, int]) -> dict[str, Any]:
 
 def table_of(rows: pd.DataFrame) -> str:
     """Return a Markdown table with a line for each mistake."""
-    lines = ["| what is wrong | accepted | largest error ° | mm | NSE if accepted | in sigmas |"]
-    lines.append("|---|---:|---:|---:|---:|---:|")
+    lines = ["| what is wrong | accepted | largest error ° | mm | NSE if accepted | in sigmas | named first |"]
+    lines.append("|---|---:|---:|---:|---:|---:|---:|")
     for name, group in rows.groupby("mistake", sort=False):
         accepted = group[group["accepted"]]
         errors = group[[f"error_{axis}" for axis in NAMES]].abs().to_numpy()
-        cells = ["", "", "", ""]
+        rejected = group[~group["accepted"]]
+        cells = ["", "", "", "", ""]
         if np.isfinite(errors).any():
             cells[:2] = [f"{np.nanmax(errors[:, :3]):.3f}", f"{np.nanmax(errors[:, 3:]):.1f}"]
         if len(accepted):
-            cells[2:] = [f"{accepted['nse'].max():.0f}", f"{accepted['sigmas'].max():.1f}"]
+            cells[2:4] = [f"{accepted['nse'].max():.0f}", f"{accepted['sigmas'].max():.1f}"]
+        if len(rejected) and group["has_right"].all():
+            cells[4] = f"{int(rejected['named_right'].sum())} of {len(rejected)}"
         lines.append(f"| {name} | {len(accepted)} of {len(group)} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

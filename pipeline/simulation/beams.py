@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.simulation.raycast import RayCaster
-from pipeline.simulation.scenario import MbesScenario
+from pipeline.simulation.scenario_sensors import MbesScenario
 from pipeline.simulation.site import Floats
 
 LEAST_WEIGHT = 0.3  # least weight of the rays that meet a surface; with less there is no detection
@@ -101,11 +101,16 @@ def directions_in_mbes(swing: Floats, tilt_rad: Floats) -> Floats:
 
 
 class BeamBundles:
-    """Beams as bundles of rays over their -3 dB width, weighted with a Gaussian pattern."""
+    """Beams as bundles of rays over their -3 dB width, weighted with a Gaussian pattern.
+
+    In the array's near field a beam is no narrower than the aperture: at the range r to what its axis meets, its width
+    is at least aperture / r. The rays still leave one point.
+    """
 
     def __init__(self, scenario: MbesScenario, caster: RayCaster, water_level_m: float) -> None:
         self.caster, self.water_level_m, self.max_range_m = caster, water_level_m, scenario.max_range_m
         self.projector_m = np.array(scenario.projector_offset_m)
+        self.beam_rad, self.aperture_m = np.radians(scenario.beam_deg), np.array(scenario.aperture_m)
         counts = (1, 1) if scenario.point_beams else scenario.sub_rays
         across, along = (np.arange(n) - n // 2 for n in counts)
         parts = [offsets / max(n - 1, 1) for offsets, n in zip((across, along), counts, strict=True)]  # in widths
@@ -144,8 +149,12 @@ class BeamBundles:
         """
         pings, beams = swing.shape
         lean = (np.tan(tilt_rad) / np.cos(swing))[..., None]
-        turned = np.hypot(1.0, lean) * self.across_rad + lean * np.sin(swing)[..., None] * self.along_rad
-        direction_mbes = directions_in_mbes(swing[..., None] + turned, tilt_rad[..., None] + self.along_rad)
+        across, along = self.across_rad, self.along_rad
+        if self.aperture_m.any():
+            wider = self._wider(origins_m, R_target_from_mbes, directions_in_mbes(swing, tilt_rad))
+            across, along = across * wider[..., :1], along * wider[..., 1:]
+        turned = np.hypot(1.0, lean) * across + lean * np.sin(swing)[..., None] * along
+        direction_mbes = directions_in_mbes(swing[..., None] + turned, tilt_rad[..., None] + along)
         directions = direction_mbes.reshape(pings, beams * self.rays, 3) @ R_target_from_mbes.transpose(0, 2, 1)
         origins = np.repeat(origins_m, beams * self.rays, axis=0)
         flat = directions.reshape(-1, 3)
@@ -159,6 +168,16 @@ class BeamBundles:
         shape = (pings, beams, self.rays)
         detected = self._detect(paths.reshape(shape), wet.reshape(shape), surfaces.reshape(shape))
         return detected, directions.reshape(*shape, 3)[:, :, self.axis]
+
+    def widths_rad(self, ranges_m: Floats) -> Floats:
+        """Return the widths (..., 2) of beams, across and along, at ranges (...)."""
+        return np.maximum(self.beam_rad, self.aperture_m / np.maximum(ranges_m, 0.1)[..., None])
+
+    def _wider(self, origins_m: Floats, R_target_from_mbes: Floats, axes_mbes: Floats) -> Floats:
+        """Return by how much beams (p, b) are wider than in the far field, across and along, (p, b, 2)."""
+        axes = axes_mbes @ R_target_from_mbes.transpose(0, 2, 1)
+        ranges, _ = self.caster.cast(np.repeat(origins_m, axes.shape[1], axis=0), axes.reshape(-1, 3))
+        return self.widths_rad(ranges.reshape(axes.shape[:2])) / self.beam_rad
 
     def _detect(self, paths: Floats, wet: NDArray[np.bool_], surfaces: NDArray[np.int64]) -> Floats:
         """Return the detected path (p, b) of each beam from the paths of its rays (p, b, rays); inf: no detection."""

@@ -36,7 +36,7 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     if ins.format == "sbet":
         ins_block["gps_week"] = first_ns // WEEK_NS
     if scenario.declare_sigmas:
-        ins_block |= {"drift": ins.drift.model_dump(), "white": ins.white.model_dump()}
+        ins_block |= {"drift": (ins.drift_declared or ins.drift).model_dump(), "white": ins.white.model_dump()}
     laser_block: _Text = {"files": [f"laser/*.{laser.format}"], "format": "las"}
     if laser.time == "week_seconds":
         laser_block["gps_week"] = movement.starts_ns[0] // WEEK_NS
@@ -48,6 +48,8 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
         "mount": coarse_mount(mbes, seed).model_dump(),
         "sound_speed_m_s": mbes.sound_speed_true_m_s if mbes.give_true_sound_speed else None,
     }
+    if mbes.svp_declared:
+        mbes_block["svp"] = [list(row) for row in mbes.svp_declared]
     if mbes.give_projector_offset:
         mbes_block["projector_offset_m"] = list(mbes.projector_offset_m)
     mbes_block["latency_s"] = mbes.latency_declared_s

@@ -1,4 +1,4 @@
-"""Records of the INS: the true poses, Gauss-Markov drift through the whole session, and white noise."""
+"""Records of the INS: the true poses, Gauss-Markov drift through the whole session, GNSS steps and white noise."""
 
 from itertools import pairwise
 
@@ -9,7 +9,7 @@ from pipeline.config.session import Drift
 from pipeline.gps_time import NS
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.random_streams import generator
-from pipeline.simulation.scenario import InsScenario
+from pipeline.simulation.scenario_sensors import NO_DRIFT, InsScenario
 from pipeline.simulation.site import Floats
 
 Columns = dict[str, np.ndarray]
@@ -39,6 +39,10 @@ def record_ins(scenario: InsScenario, movement: Movement, seed: int) -> tuple[Co
     t_ns = np.concatenate(times)
     errors = gauss_markov_drift(scenario.drift, t_ns, generator(seed, "ins_drift"))
     errors = errors + white_noise(scenario, len(t_ns), seed)
+    if scenario.second_drift != NO_DRIFT:
+        errors = errors + gauss_markov_drift(scenario.second_drift, t_ns, generator(seed, "ins_second_drift"))
+    if scenario.gnss_step_m:
+        errors[:3] += gnss_steps(scenario.gnss_step_m, t_ns, generator(seed, "ins_gnss"))
     rows = np.concatenate([[0], np.cumsum([len(t) for t in times])])
     columns: Columns = {"t_ns": t_ns} | {name: np.empty(len(t_ns)) for name in _POSE_COLUMNS}
     for k in movement.passes:
@@ -86,6 +90,23 @@ def white_noise(scenario: InsScenario, count: int, seed: int) -> Floats:
     position, attitude = scenario.white.position_m, scenario.white.attitude_deg
     noise = generator(seed, "ins_white").standard_normal((6, count))
     return pose_sigmas((position,) * 3, (attitude,) * 3) * noise
+
+
+def gnss_steps(step_m: float, t_ns: Times, random: np.random.Generator) -> Floats:
+    """Return position errors (3, n) that stay for a second of GPS time and are independent of those of the next.
+
+    Parameters
+    ----------
+    step_m : float
+        RMS of the step from one second to the next, √2 times that of the error.
+    t_ns : (n,) array
+        Times of the records, GPS ns, in order.
+    random : Generator
+        Generator of the random numbers.
+    """
+    _, second = np.unique(t_ns // NS, return_inverse=True)
+    errors: Floats = step_m / np.sqrt(2) * random.standard_normal((int(second.max(initial=-1)) + 1, 3))
+    return errors[second].T
 
 
 def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator) -> Floats:

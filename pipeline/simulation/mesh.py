@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pipeline.config.target import Faces, Letters, Target
-from pipeline.simulation.scenario import Surroundings
+from pipeline.simulation.scenario_surroundings import Surroundings
 from pipeline.simulation.site import Floats
 
 _SIDES = {"south": -1.0, "north": 1.0}
 _BEHIND_M = 30.0  # the floor reaches this far toward the vessel
+POOL_NAMES = ("back_wall", "floor")  # polygons that are not the target's
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,8 @@ def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygo
     floor, top = low - surroundings.floor_gap_m, high + surroundings.wall_above_m
     wall = np.array([[c, -reach, floor], [c, -reach, top], [c, reach, top], [c, reach, floor]])
     ground = np.array([[-_BEHIND_M, -reach, floor], [c, -reach, floor], [c, reach, floor], [-_BEHIND_M, reach, floor]])
-    return [FacePolygon("back_wall", wall)] * surroundings.back_wall + [FacePolygon("floor", ground)]
+    back_wall, the_floor = POOL_NAMES
+    return [FacePolygon(back_wall, wall)] * surroundings.back_wall + [FacePolygon(the_floor, ground)]
 
 
 def corner_lines(target: Target) -> Floats:
@@ -104,6 +106,23 @@ def corner_lines(target: Target) -> Floats:
         lines += [(target.c, s * (target.b / 2 + target.c), base, base + target.e) for base in bases]
         lines += [(target.c, s * target.b / 2, base + target.e, base + 2 * target.e) for base in bases[:-1]]
     return np.array(lines)
+
+
+def corner_segments(target: Target) -> Floats:
+    """Return all inner corners of letters' target as ends of straight lines, (n, 2, 3); none without letters.
+
+    Beside the vertical ones, a block's top and bottom meet the back wall along y, and the wall's side along x. No other
+    wall is there where another block of the same side, or the floor, is: the blocks stand apart.
+    """
+    lines = [[(x, y, low), (x, y, high)] for x, y, low, high in corner_lines(target).tolist()]
+    if isinstance(target, Letters):
+        half, c = target.b / 2, target.c
+        for side, s in _SIDES.items():
+            for base in block_bases_m(target, side):
+                for z in (base, base + target.e):
+                    lines.append([(c, s * half, z), (c, s * (half + c), z)])
+                    lines.append([(0.0, s * half, z), (c, s * half, z)])
+    return np.array(lines).reshape(-1, 2, 3)
 
 
 @dataclass(frozen=True)

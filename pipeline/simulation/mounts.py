@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config.mount import Mount
 from pipeline.simulation.random_streams import generator
-from pipeline.simulation.scenario import LaserScenario, MbesScenario
+from pipeline.simulation.scenario_sensors import LaserScenario, MbesScenario
 from pipeline.simulation.site import Floats
 
 

@@ -6,16 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.simulation.mesh import Mesh
+from pipeline.simulation.relief import Relief
 from pipeline.simulation.site import Floats
 
 
 class RayCaster:
     """Intersection of rays with a mesh."""
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, relief: Relief | None = None) -> None:
         import open3d as o3d  # late: a second to import
 
-        self.mesh = mesh
+        self.mesh, self._relief = mesh, relief
         self._tensor = o3d.core.Tensor.from_numpy
         self._scene = o3d.t.geometry.RaycastingScene()
         self._scene.add_triangles(
@@ -42,6 +43,28 @@ class RayCaster:
         surfaces : (n,) array
             Number of the plane; -1: the ray meets nothing.
         """
+        ranges, triangles, hit = self._meet(origins_m, directions)
+        if self._relief:
+            rows = np.flatnonzero(hit)
+            parts = ranges[rows], triangles[rows], origins_m[rows], directions[rows]
+            ranges[rows] = self._relief.ranges(*parts)
+        return ranges, np.where(hit, self.mesh.surfaces[triangles], -1)
+
+    def normals(self, origins_m: Floats, directions: Floats) -> Floats:
+        """Return the outward normal (n, 3), as designed, of the face that each ray meets first; zero if it meets none.
+
+        Parameters
+        ----------
+        origins_m : (n, 3) array
+            Target frame, m.
+        directions : (n, 3) array
+            Unit vectors, target frame.
+        """
+        _, triangles, hit = self._meet(origins_m, directions)
+        return np.where(hit[:, None], self.mesh.normals[triangles], 0.0)
+
+    def _meet(self, origins_m: Floats, directions: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.bool_]]:
+        """Return ranges to the planes of the triangles that rays meet first, the triangles, and which rays meet one."""
         rays = np.concatenate([origins_m, directions], axis=1, dtype=np.float32)
         triangle = self._scene.cast_rays(self._tensor(rays))["primitive_ids"].numpy()
         hit = triangle != self._no_triangle
@@ -50,8 +73,7 @@ class RayCaster:
         approach = np.einsum("ij,ij->i", normals, directions)
         heights = self.mesh.distances_m[index] - np.einsum("ij,ij->i", normals, origins_m)
         hit &= np.abs(approach) > 1e-9
-        ranges = np.divide(heights, approach, out=np.full(len(rays), np.inf), where=hit)
-        return ranges, np.where(hit, self.mesh.surfaces[index], -1)
+        return np.divide(heights, approach, out=np.full(len(rays), np.inf), where=hit), index, hit
 
 
 @dataclass(frozen=True)
@@ -61,3 +83,4 @@ class Pool:
     caster: RayCaster
     water_level_m: float
     corner_lines: Floats  # (n, 4): x, y, lowest z, highest z of inner corners
+    corner_segments: Floats  # (n, 2, 3): ends of all inner corners

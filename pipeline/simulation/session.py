@@ -21,11 +21,12 @@ from pipeline.simulation.ins import Columns, record_ins
 from pipeline.simulation.las import write_las
 from pipeline.simulation.laser import record_laser
 from pipeline.simulation.mbes import record_mbes
-from pipeline.simulation.mesh import build_mesh, corner_lines
+from pipeline.simulation.mesh import build_mesh, corner_lines, corner_segments
 from pipeline.simulation.motion import Movement
 from pipeline.simulation.novatel import aligning_bodies, inspva_bodies, novatel_bytes
 from pipeline.simulation.r2sonic_packets import bth0_packets, xtf_bytes
 from pipeline.simulation.raycast import Pool, RayCaster
+from pipeline.simulation.relief import Relief
 from pipeline.simulation.sbet import sbet_bytes
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.tables import write_soundings
@@ -54,13 +55,15 @@ def simulate_session(scenario: Scenario, seed: int) -> SimulatedSession:
     Raises
     ------
     ConfigError
-        The seed is negative.
+        The seed is negative, or a face with a fault is none of the target's.
     """
     if seed < 0:
         raise ConfigError(f"seed = {seed}: must not be negative; choose another seed")
     movement = Movement(scenario, seed)
-    caster = RayCaster(build_mesh(scenario.target, scenario.surroundings))
-    pool = Pool(caster, scenario.target.water_level_m, corner_lines(scenario.target))
+    target = scenario.target
+    mesh = build_mesh(target, scenario.surroundings)
+    caster = RayCaster(mesh, Relief(target, scenario.surroundings, mesh, seed))
+    pool = Pool(caster, target.water_level_m, corner_lines(target), corner_segments(target))
     ins, ins_rows = record_ins(scenario.ins, movement, seed)
     laser, laser_rows = record_laser(scenario.laser, movement, pool, seed)
     if scenario.laser.frame != "laser":

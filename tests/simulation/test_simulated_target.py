@@ -6,7 +6,7 @@ import pytest
 from pipeline.config.target import Letters, Origin
 from pipeline.simulation.mesh import block_bases_m, build_mesh, corner_lines, target_polygons
 from pipeline.simulation.raycast import RayCaster
-from pipeline.simulation.scenario import Surroundings
+from pipeline.simulation.scenario_surroundings import Surroundings
 
 ORIGIN = Origin(latitude_deg=36.0, longitude_deg=120.1, height_m=12.0)
 
