@@ -4,6 +4,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from pipeline.config.session import Laser, Mbes
+
 FOLDER = Path("runs/montecarlo")
 TASKS_OF_A_WORKER = 20  # then a new process: hundreds of ray casting scenes make a process slow and large
 COARSE_DEG, COARSE_M = 2.5, 0.25
@@ -48,6 +52,7 @@ class Campaign:
     scenario: dict[str, Any] = field(default_factory=dict)
     through_files: bool = False
     pairs: bool = False  # also compare sessions in pairs: how often does the comparison report a move?
+    own_errors: bool = False  # sound speed, its gradient and both clocks are wrong by what session.yaml states of them
 
 
 def _target(**letters: Any) -> dict[str, Any]:
@@ -87,6 +92,7 @@ CAMPAIGNS = (
     Campaign("tilted sectors, border at 48", 24, 12300, _sectors(48.0)),
     Campaign("tilted from ping to ping", 24, 12400, {"mbes": TABLE | {"ping_tilts_deg": [0.0, 0.3]}}),
     Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
+    Campaign("300 pairs, own errors", 600, 13000, WHITE | HALF, pairs=True, own_errors=True),
 )
 
 
@@ -96,13 +102,27 @@ def path_of(campaign: Campaign) -> Path:
 
 
 def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
-    """Return the scenario of a session: the campaign's with thinned laser points and the session's coarse errors."""
+    """Return the scenario of a session: the campaign's with thinned laser points, the coarse errors, its own errors."""
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
     keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
     sizes = (COARSE_DEG,) * 3 + (COARSE_M,) * 3
     coarse = {key: sign * size for key, sign, size in zip(keys, signs, sizes, strict=True)}
     merged: dict[str, Any] = {"name": campaign.name}
-    for part in (campaign.scenario, THIN, {"mbes": {"coarse_error": coarse}}):
+    own = own_errors(campaign.first_seed + number) if campaign.own_errors else {}
+    for part in (campaign.scenario, THIN, {"mbes": {"coarse_error": coarse}}, own):
         for key, value in part.items():
             merged[key] = merged.get(key, {}) | value
     return merged
+
+
+def own_errors(seed: int) -> dict[str, Any]:
+    """Return the blocks of a scenario with errors drawn anew for a session, by the sigmas that session.yaml states.
+
+    The simulator states none of them, so that they are the defaults. The recorded sound speed is 1500 m/s.
+    """
+    rng = np.random.default_rng([seed, 1])  # not the numbers of the simulator, which takes the seed itself
+    fields = Mbes.model_fields | {f"laser_{name}": field for name, field in Laser.model_fields.items()}
+    keys = ("sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s", "latency_sigma_s", "laser_latency_sigma_s")
+    speed, gradient, mbes, laser = (float(fields[key].default * rng.normal()) for key in keys)
+    of_sonar = {"sound_speed_true_m_s": 1500.0 + speed, "sound_speed_gradient_1_s": gradient, "latency_s": mbes}
+    return {"mbes": of_sonar, "laser": {"latency_s": laser}}
