@@ -1,11 +1,10 @@
 """Has the sonar moved? The answer in a sentence, what could have been seen, and whose errors were counted how."""
 
 from collections.abc import Iterator, Mapping
-from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 from pipeline.maths.mount_parameters import MOUNT_WORDS
-from pipeline.results.mount_difference import SCALES, Row, is_same_result, quantity_text
+from pipeline.results.mount_difference import Row, is_same_result, least_text, quantity_text
 
 
 def answer_sentence(difference: Mapping[str, Any]) -> str:
@@ -41,7 +40,7 @@ def _answer(difference: Mapping[str, Any]) -> str:
     if difference["answer"] == "no_movement_shown":
         return f"no movement shown: {within}"
     rows = [row for row in difference["parameters"] if row["uncertain"]]
-    unseen = [f"{_up(row['detectable'], row['unit'])} in {row['parameter']}" for row in rows]
+    unseen = [f"{least_text(row['detectable'], row['unit'])} in {row['parameter']}" for row in rows]
     causes = [*dict.fromkeys(row["mostly"] for row in rows)]
     return (
         f"too uncertain to say: {within}, but a movement of up to {_listed(unseen)} may be hidden in them; most of "
@@ -53,14 +52,19 @@ def visible_sentence(difference: Mapping[str, Any]) -> str:
     """Return one sentence that says which movements would have been found; empty if the raw files are the same."""
     if not difference["answered"] or not difference["inputs"]:
         return ""
-    sizes = [f"{row['parameter']} {_up(row['detectable'], row['unit'])}" for row in difference["parameters"]]
+    sizes = [f"{row['parameter']} {least_text(row['detectable'], row['unit'])}" for row in difference["parameters"]]
     power = f"{100 * difference['joint']['power']:.0f} %"
     return f"found with a probability of {power}, whatever moves beside it: {', '.join(sizes)}, or more"
 
 
-def error_notes(difference: Mapping[str, Any]) -> Iterator[str]:
-    """Yield sentences on errors that were not counted as usual."""
-    errors = difference["errors"]
+def answer_lines(difference: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the answer, what could have been seen, and notes on errors that were not counted as usual, as sentences."""
+    for words in (difference["sentence"], difference["visible"], *_error_notes(difference["errors"])):
+        if words:
+            yield f"{words[0].upper()}{words[1:]}."
+
+
+def _error_notes(errors: Mapping[str, Any] | None) -> Iterator[str]:
     if errors is None:
         return
     if errors["cautious"]:
@@ -70,18 +74,6 @@ def error_notes(difference: Mapping[str, Any]) -> Iterator[str]:
         )
     for words in errors["differing"]:
         yield f"{words} is not the same in both: its errors were counted as each session's own"
-
-
-def _up(value: float, unit: str) -> str:
-    """Return a size with two digits, rounded up, as text for the screen.
-
-    >>> _up(0.1512, "deg"), _up(0.00831, "m"), _up(0.0123, "m")
-    ('0.16°', '8.4 mm', '13 mm')
-    """
-    suffix, scale, _ = SCALES[unit]
-    number = Decimal(f"{value * scale:.9g}")
-    digit = Decimal(1).scaleb(number.adjusted() - 1)
-    return f"{number.quantize(digit, ROUND_CEILING):f}{suffix}"
 
 
 def _with_sigma(row: Row) -> str:

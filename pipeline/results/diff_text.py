@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from pipeline.console import plural
-from pipeline.results.answer_text import error_notes
+from pipeline.results.answer_text import answer_lines
 from pipeline.results.mount_difference import Row, quantity_text
 from pipeline.text_table import text_table
 
@@ -14,10 +14,11 @@ FACE_KEYS = "target.faces."
 
 def difference_text(difference: Mapping[str, Any]) -> str:
     """Return the difference as text for the screen, the answer first. Values that are equal in both are not listed."""
-    answer = [difference["sentence"], difference["visible"], *error_notes(difference)]
-    lines = [f"{words[:1].upper()}{words[1:]}." for words in answer if words]
-    heads = [(key, difference[key]) for key in ("a", "b")]
-    lines += ["", *(f"{key}: {head['session']} ({head['verdict']}), {head['run']}" for key, head in heads)]
+    lines = [*answer_lines(difference), ""]
+    lines += [
+        f"{key}: {difference[key]['session']} ({difference[key]['verdict']}), {difference[key]['run']}"
+        for key in ("a", "b")
+    ]
     if any(row["difference"] for row in difference["parameters"]):
         lines += ["", *_parameter_table(difference["parameters"])]
     inputs = difference["inputs"]

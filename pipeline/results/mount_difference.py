@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
@@ -121,3 +122,15 @@ def quantity_text(value: float, unit: str, sign: str = "+") -> str:
     """
     suffix, scale, digits = SCALES[unit]
     return f"{value * scale:{sign}.{digits}f}{suffix}"
+
+
+def least_text(value: float, unit: str) -> str:
+    """Return a least size with two digits, rounded up, as text for the screen; ``unit``: deg or m, shown as mm.
+
+    >>> least_text(0.1512, "deg"), least_text(0.00831, "m"), least_text(0.0123, "m")
+    ('0.16°', '8.4 mm', '13 mm')
+    """
+    suffix, scale, _ = SCALES[unit]
+    number = Decimal(f"{value * scale:.9g}")
+    digit = Decimal(1).scaleb(number.adjusted() - 1)
+    return f"{number.quantize(digit, ROUND_CEILING):f}{suffix}"
