@@ -19,7 +19,7 @@ from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS, SETTINGS
-from pipeline.results.mount_difference import SCALE
+from pipeline.results.mount_difference import TO_UNITS
 from pipeline.results.movement import movement_between
 from pipeline.results.session_estimate import SessionEstimate, session_estimate
 from pipeline.run.results import calibration
@@ -175,7 +175,7 @@ def _with_jumps(sessions: list[tuple[dict[str, Any], SessionEstimate | None]]) -
 def _comparison(before: SessionEstimate, now: SessionEstimate) -> dict[str, Any]:
     """Return the columns of a row that compare its session with the one before."""
     movement = movement_between(before, now)
-    sizes = movement.detectable.surely * SCALE
+    sizes = movement.detectable.surely * TO_UNITS
     return {
         "probability": movement.difference.probability,
         "moved": ", ".join(MOUNT_WORDS[k] for k in movement.moved),

@@ -16,7 +16,7 @@ from pipeline.results.session_estimate import session_estimate
 
 Array = NDArray[np.float64]
 UNITS = ("deg",) * 3 + ("m",) * 3
-SCALE = np.repeat([np.degrees(1.0), 1.0], 3)  # of rad and m to the units
+TO_UNITS = np.repeat([np.degrees(1.0), 1.0], 3)  # of rad and m to the units
 SCALES = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}  # by unit: unit, factor and digits on the screen
 Row = dict[str, Any]
 
@@ -91,7 +91,7 @@ def _row(movement: Movement, k: int) -> Row:
         "limit": movement.limits,
     }
     row: Row = {"parameter": MOUNT_WORDS[k], "unit": UNITS[k], "moved": k in movement.moved}
-    row |= {name: float(values[k] * SCALE[k]) for name, values in sizes.items()}
+    row |= {name: float(values[k] * TO_UNITS[k]) for name, values in sizes.items()}
     return row | {"z": float(found.z[k]), "uncertain": k in movement.uncertain, "mostly": movement.mostly[k]}
 
 
