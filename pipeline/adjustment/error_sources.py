@@ -115,5 +115,7 @@ def stated_of(laser: Laser, mbes: Mbes, target: Target, as_built: AsBuilt) -> di
 
 
 def _device(sensor: Laser | Mbes) -> dict[str, Any]:
-    preset = None if sensor.instrument is None else sensor.instrument.name
-    return {"instrument": preset, "range_bias_sigma_m": sensor.range_bias_sigma_m}
+    """Return what is stated of a device: its preset, the sigmas of its biases, the place of its transmitter."""
+    stated = sensor.model_dump(mode="json")
+    kept = {name: stated[name] for name in stated if name.endswith("bias_sigma_m") or name.startswith("projector_")}
+    return {"instrument": None if sensor.instrument is None else sensor.instrument.name} | kept

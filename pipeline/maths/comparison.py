@@ -84,14 +84,16 @@ class MountDifference:
         """Return the indices of the parameters that have changed; none if the joint test shows no change.
 
         They are the parameters with |z| above a limit. With probability ``level`` at least one of six independent
-        values exceeds this limit by chance (Šidák). If none exceeds it, the parameter with the largest |z| is returned.
+        values exceeds this limit by chance (Šidák). If none exceeds it, the one is returned whose movement alone
+        explains most of T. Estimated from d, a movement δ of parameter k has δ = (C⁻¹ d)_k / (C⁻¹)_kk, and T without it
+        is less by w_k² = (C⁻¹ d)_k² / (C⁻¹)_kk (Baarda's w-test; d and C in pitch, roll, yaw and lever arm).
         """
         if self.probability >= level:
             return []
         limit = -float(ndtri((1 - (1 - level) ** (1 / 6)) / 2))
-        size = np.abs(self.z)
-        beyond = np.flatnonzero(size > limit).tolist()
-        return beyond or [int(np.argmax(size))]
+        beyond = np.flatnonzero(np.abs(self.z) > limit).tolist()
+        inverse = np.linalg.inv(self.covariance / np.outer(self.sigma, self.sigma))
+        return beyond or [int(np.argmax((inverse @ self.z) ** 2 / np.diag(inverse)))]
 
 
 def compare_estimates(first: MountEstimate, second: MountEstimate) -> MountDifference:

@@ -143,3 +143,16 @@ def test_effects_turn_with_a_head_that_looks_athwart():
     found = compare_estimates(still, MountEstimate(R, LEVER, np.eye(6) * 1e-12, own=effect))
     np.testing.assert_allclose(found.sigma[:3], [0, 1e-3, 0], atol=2e-6)
     np.testing.assert_allclose(np.abs(found.effects[:, 0]), [0, 1e-3, 0, 0, 0, 0], atol=1e-12)
+
+
+def test_a_movement_beside_a_large_error_that_resembles_it_is_named():
+    """Roll is uncertain, but together with z alone; a roll without a z is no such error, and no other movement."""
+    C, like_roll = np.eye(6) * 1e-10, np.zeros((6, 1))
+    like_roll[[1, 5], 0] = 1e-3
+    turned = Rotation.from_euler("ZXY", [0, 0, 3e-4]).as_matrix()
+    found = compare_estimates(
+        MountEstimate(np.eye(3), np.zeros(3), C, own=like_roll), MountEstimate(turned, np.zeros(3), C, own=like_roll)
+    )
+    assert found.probability < 1e-6
+    assert np.abs(found.z).max() < 1
+    assert found.significant(0.01) == [1]

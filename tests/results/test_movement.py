@@ -177,6 +177,7 @@ def test_what_must_be_the_same() -> None:
         ("laser_mount", (laser.model_copy(update={"mount": mount}), mbes, target, survey)),
         ("laser", (laser.model_copy(update={"range_bias_sigma_m": 0.003}), mbes, target, survey)),
         ("sonar", (laser, mbes.model_copy(update={"range_bias_sigma_m": 0.003}), target, survey)),
+        ("sonar", (laser, mbes.model_copy(update={"projector_offset_m": (0.0, 0.0, 0.1)}), target, survey)),
         ("target", (laser, mbes, target.model_copy(update={"a": 7.0}), survey)),
         ("target", (laser, mbes, target.model_copy(update={"origin": origin}), survey)),
         ("target", (laser, mbes, target, AsBuilt(faces={"P2": 0.001}))),
