@@ -6,10 +6,11 @@ from typing import Annotated, Any
 
 import pandas as pd
 
+from pipeline.adjustment.error_sources import stated_of
 from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.pool import Adjust, Method, Segment, VerdictLimits
+from pipeline.config.pool import Adjust, AsBuilt, Method, Segment, VerdictLimits
 from pipeline.config.session import Calibrated, Ins, Laser, Mbes
 from pipeline.config.target import Target
 from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
@@ -31,6 +32,7 @@ from pipeline.report.part_checks import parts_block
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sensor_report import SensorReport
 from pipeline.report.sonar_report import SonarSettings, sonar_report
+from pipeline.report.systematic_errors import systematic_block
 from pipeline.report.verdict import Criteria, rejections
 from pipeline.report.warnings import geometry_gaps, target_off_origin, unexpected_noise
 from pipeline.target.design import target_of
@@ -42,6 +44,7 @@ class Config:
 
     name: str
     target: Target
+    as_built: AsBuilt
     ins: Ins
     laser: Laser
     mbes: Mbes | None
@@ -104,6 +107,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "verdict_in_words": verdict_in_words(verdict, inputs.fixed),
         **statement_lists("reason", reasons),
         **statement_lists("warning", warnings),
+        "limits": config.verdict.model_dump(),
         "result": report.method,
         **report.result_keys,
         "coarse": {"mount": report.coarse.settings()},
@@ -113,6 +117,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "target": target,
         "passes": passes,
         **report.data_keys,
+        **_systematic(inputs.freed, config),
         "ins_drift": drift.model_dump() | {"from_files": list(drift_figures)},
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
@@ -136,6 +141,14 @@ def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str
         mbes=sensor, segment=config.segment, method=config.result, sides=config.target.sides
     )
     return sonar_report(settings, evidence, passes)
+
+
+def _systematic(freed: pd.DataFrame, config: Config) -> dict[str, Any]:
+    """Return the block ``systematic`` of calibration.json; empty if the laser is calibrated."""
+    if config.mbes is None:
+        return {}
+    stated = stated_of(config.laser, config.mbes, config.target, config.as_built)
+    return {"systematic": systematic_block(freed, config.laser.mount_covariance, stated)}
 
 
 def _criteria(config: Config, report: SensorReport) -> Criteria:

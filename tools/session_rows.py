@@ -59,7 +59,7 @@ def session_in_memory(
     made, session, pool = simulated(campaign, number)
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
     artefacts = calibrate_in_memory(session, pool, raw, changed=changed)
-    return _row(json.loads(artefacts["report/calibration.json"]), made.truth)
+    return _row(campaign, json.loads(artefacts["report/calibration.json"]), made.truth)
 
 
 def simulated(campaign: Campaign, number: int) -> tuple[SimulatedSession, SessionConfig, PoolConfig]:
@@ -92,10 +92,10 @@ def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
             if done.returncode not in (0, 1):
                 raise RuntimeError(done.stderr)
         calibration = json.loads((run / "report" / "calibration.json").read_text())
-        return _row(calibration, json.loads(Path(f"{session}.truth.json").read_text()))
+        return _row(campaign, calibration, json.loads(Path(f"{session}.truth.json").read_text()))
 
 
-def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:
+def _row(campaign: Campaign, calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:
     block = calibration["methods"]["adjustment"]
     covariance = np.array(block["covariance"])
     error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), truth)
@@ -108,6 +108,9 @@ def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, 
     for k, name in enumerate(NAMES):
         row |= {f"error_{name}": error[k] / UNITS[k], f"sigma_{name}": sigma[k] / UNITS[k]}
     row |= {f"covariance_{i}{k}": covariance[i, k] for i in range(6) for k in range(i + 1)}
+    if campaign.pairs:  # what poolcal diff reads
+        read = {"methods": {"adjustment": block}, "systematic": calibration["systematic"]}
+        row["calibration"] = json.dumps(read | {"limits": calibration["limits"]})
     return row
 
 

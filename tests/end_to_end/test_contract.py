@@ -81,6 +81,19 @@ def test_covariance_and_sigma_are_of_one_another(result: dict[str, Any]) -> None
     np.testing.assert_allclose(result["mbes"]["sigma"]["lever_arm_m"], sigma[3:], rtol=1e-12)
 
 
+def test_noise_and_systematic_errors_make_up_the_total(result: dict[str, Any]) -> None:
+    """E R Eᵀ of each block; every parameter once."""
+    total, names = np.array(result["mbes"]["covariance"]), []
+    for block in result["systematic"].values():
+        effects = np.array(list(block["effects"].values())).T
+        correlation = np.eye(effects.shape[1]) if block["correlation"] is None else np.array(block["correlation"])
+        total = total + effects @ correlation @ effects.T
+        names += list(block["effects"])
+    np.testing.assert_allclose(total, result["mbes"]["covariance_total"], rtol=1e-9, atol=1e-18)
+    assert len(names) == len(set(names)) > 20
+    assert result["limits"] == {"max_sigma_deg": 0.05, "max_sigma_m": 0.005}
+
+
 def test_matrix_mount_and_correction_say_the_same(result: dict[str, Any], coarse: dict[str, float]) -> None:
     """R_body_from_mbes = Exp(correction) · coarse, and the mount's angles are those of that matrix: all by scipy."""
     R_coarse = Rotation.from_euler("ZXY", [coarse[f"{axis}_deg"] for axis in ("yaw", "pitch", "roll")], degrees=True)

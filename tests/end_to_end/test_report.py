@@ -114,6 +114,9 @@ def test_a_laser_whose_six_correlate_is_one_part_of_the_total(place: Place) -> N
     effects = freed.loc[mine, [f"effect_{kind}_{axis}" for kind in ("rotation", "lever_arm") for axis in "xyz"]]
     E = effects.to_numpy()
     whole = np.sqrt(np.diag(E.T @ correlation @ E))
+    written = result_of(place.run)["systematic"]["laser_mount"]
+    np.testing.assert_allclose(np.array(list(written["effects"].values())), E, rtol=1e-12)
+    np.testing.assert_allclose(written["correlation"], correlation, atol=1e-12)
     shown = parts[1] * np.r_[np.full(3, np.pi / 180), np.full(3, 1e-3)]
     np.testing.assert_allclose(shown, whole[[1, 0, 2, 3, 4, 5]], rtol=0.03, atol=2e-6)
 
