@@ -55,14 +55,14 @@ def search_target_pose(
     label = dry_labeller(model, settings)
     points = TargetPose(dry.points_m, sigmas)
     pose = refine(points, coarse.parameters, label, surface.planes)
-    rival = best_rival(scan, pose.parameters, model, closest, settings.ambiguity_share)
+    frame = TargetFrame(rotation_z(pose.parameters[0]), pose.parameters[1:])
     tilted = TiltedTarget(points.points(pose.parameters), np.array(TILT_SIGMAS))
     return LocatedTarget(
-        frame=TargetFrame(rotation_z(pose.parameters[0]), pose.parameters[1:]),
+        frame=frame,
         azimuth_correction_rad=pose.parameters[0],
         pose=pose,
         tilt=refine(tilted, np.zeros(6), label, surface.planes, rounds=2),
-        rival=rival,
+        rival=best_rival(scan, frame, model, closest, settings.ambiguity_share),
         gate_m=gate_of(pose, settings),
         within=coarse.within,
         pose_sigmas=sigmas,

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.maths.geometry.rotations import rotation_z
 from pipeline.maths.target.coverage import Found, Hypothesis, Scan
@@ -14,8 +13,8 @@ from pipeline.maths.target.registration import TargetSurface, converge
 from pipeline.target.matching import planes_of_faces
 from pipeline.target.surface import ClosestSurface
 
-Array = NDArray[np.float64]
 REACHES_M = (0.15, 0.1, 0.07, 0.05)
+LOOSE = 1.0  # rad and m: a single point that determines a direction outweighs this prior 400 times
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,9 @@ class BestRival:
     ambiguous: bool
 
 
-def best_rival(scan: Scan, pose: Array, model: TargetModel, surface: ClosestSurface, share: float) -> BestRival:
+def best_rival(
+    scan: Scan, frame: TargetFrame, model: TargetModel, surface: ClosestSurface, share: float
+) -> BestRival:
     """Return the rival whose margin is the smallest, compared with the least that it must be.
 
     With a rival half a period off, the two poses differ by a strip of the wall, as wide as the wall and half a period
@@ -51,22 +52,21 @@ def best_rival(scan: Scan, pose: Array, model: TargetModel, surface: ClosestSurf
     ----------
     scan
         What the laser saw and where it looked.
-    pose
-        Azimuth correction (rad) and origin (m) of the target, (4,), as found.
+    frame
+        The target's frame as found.
     model, surface
         The target by design, and its surface.
     share
         Least margin, as a share of the area in which the pose and a rival differ at least.
     """
-    found = Found(Hypothesis(model, _frame(pose), surface), scan)
-    free = TargetPose(scan.points_m, np.full(4, 1e3))  # without a prior, a rival converges to its best fit
+    found = Found(Hypothesis(model, frame, surface), scan)
     least_m2 = share * model.width_m * model.half_period_m
     best, most_behind_m2 = BestRival("none", found.agreement_m2, 0.0, False), -np.inf
     for rival, name, higher_m in _rivals(model):
         rival_surface = ClosestSurface(rival)
-        start = pose + np.array([0.0, 0.0, 0.0, higher_m])
-        fitted = converge(free, start, TargetSurface(rival_surface, planes_of_faces(rival)), REACHES_M)
-        compared = found.over(Hypothesis(rival, _frame(fitted), rival_surface))
+        start = TargetFrame(frame.R_target_from_pool, frame.origin_pool_m + np.array([0.0, 0.0, higher_m]))
+        fitted = _fitted(start, scan, TargetSurface(rival_surface, planes_of_faces(rival)))
+        compared = found.over(Hypothesis(rival, fitted, rival_surface))
         needed_m2 = least_m2 if higher_m else min(least_m2, share * compared.strip_m2)
         if not higher_m and not compared.strip_m2:
             continue
@@ -92,5 +92,13 @@ def _rivals(model: TargetModel) -> Iterator[tuple[TargetModel, str, float]]:
         yield mirrored, "left and right exchanged, half a period lower", -period_m / 2
 
 
-def _frame(pose: Array) -> TargetFrame:
-    return TargetFrame(rotation_z(pose[0]), pose[1:])
+def _fitted(start: TargetFrame, scan: Scan, surface: TargetSurface) -> TargetFrame:
+    """Return the frame (turned by β, moved by o) to which a rival converges from a start.
+
+    The start is the origin of the parameters, with a loose prior: directions that the points do not determine, such as
+    the height of a wall without edges, stay there. x = Rz(β) (x_start - o) and x_start = R (x_pool - p) give the rotation
+    Rz(β) R and the origin p + Rᵀ o.
+    """
+    placement = TargetPose(start.points_from_pool(scan.points_m), np.full(4, LOOSE))
+    turn_rad, *shift_m = converge(placement, np.zeros(4), surface, REACHES_M)
+    return TargetFrame(rotation_z(turn_rad) @ start.R_target_from_pool, start.points_to_pool(np.array([shift_m]))[0])

@@ -42,7 +42,7 @@ DIFFERENT_M = 0.1  # two surfaces farther apart than this differ
 ON_FACE_M = 0.06  # a point farther than this from the surface does not lie on it
 NEAR_M = 0.1  # a cell is seen if the foot of a point lies within this of its centre
 FEWEST_RAYS = 2  # fewer rays that meet a cell do not show that the scanner looks there
-STEEPEST_COSINE = np.sin(np.radians(15.0))  # a ray at less than 15° to a face need not come back
+FLATTEST = np.sin(np.radians(15.0))  # a ray that meets a face at less than 15° need not come back
 
 
 class Surface(Protocol):
@@ -141,7 +141,7 @@ class Hypothesis:
         distance, cell = cKDTree(cells.centres_m).query(met, distance_upper_bound=CELL_M)
         near = np.flatnonzero(np.isfinite(distance))
         cell = cell[near]
-        steep = -np.sum(cells.normals[cell] * directions[near], axis=1) > STEEPEST_COSINE
+        steep = -np.sum(cells.normals[cell] * directions[near], axis=1) > FLATTEST
         return np.bincount(cell[steep], minlength=len(cells.areas_m2))
 
     def stands_at(self, points_pool_m: Array) -> Flags:
