@@ -96,8 +96,8 @@ def _fitted(start: TargetFrame, scan: Scan, surface: TargetSurface) -> TargetFra
     """Return the frame (turned by β, moved by o) to which a rival converges from a start.
 
     The start is the origin of the parameters, with a loose prior: directions that the points do not determine, such as
-    the height of a wall without edges, stay there. x = Rz(β) (x_start - o) and x_start = R (x_pool - p) give the rotation
-    Rz(β) R and the origin p + Rᵀ o.
+    the height of a wall without edges, stay there. From x = Rz(β) (x_start - o) and x_start = R (x_pool - p) follow the
+    rotation Rz(β) R and the origin p + Rᵀ o.
     """
     placement = TargetPose(start.points_from_pool(scan.points_m), np.full(4, LOOSE))
     turn_rad, *shift_m = converge(placement, np.zeros(4), surface, REACHES_M)
