@@ -51,7 +51,7 @@ from pipeline.target.laser_search import refine_target_and_laser
 from pipeline.target.mount_search import search_mount
 from pipeline.target.pose_search import search_target_pose
 from pipeline.target.result_tables import provisional_mount_table, target_pose_table
-from pipeline.target.samples import laser_poses, laser_sample, sounding_sample
+from pipeline.target.samples import laser_poses, laser_sample, scan_of, sounding_sample
 from pipeline.target.surface import ClosestSurface
 
 COUNTED = {"laser_pool": "laser_points", "soundings_pool": "soundings"}  # names in table counts, by stream
@@ -119,20 +119,17 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
     """Search for the target, and for the mount of the sensor that is calibrated."""
     model = target_of(config.target)
     lowest_m = config.target.water_level_m - model.half_period_m / 2
-    laser_count = used(inputs.counts, "laser_points")
-    dry = laser_sample(inputs.laser_pool, laser_count, lowest_m)
+    dry = laser_sample(inputs.laser_pool, used(inputs.counts, "laser_points"), lowest_m)
     if len(dry.voxel_means_m) < FEWEST_VOXELS:
         raise RawDataError(
             f"laser: {len(dry.voxel_means_m)} places seen above the water near the target, at least 50 are needed; "
             "check target.origin, target.water_level_m and laser.mount; poolcal check tells which of them"
         )
     azimuth_known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
-    target = search_target_pose(dry, model, config.segment, azimuth_known)
-    in_pool = trajectory_in_pool(inputs.poses)
-    laser = mount_of(config.laser.mount)
+    in_pool, laser = trajectory_in_pool(inputs.poses), mount_of(config.laser.mount)
+    target = search_target_pose(dry, scan_of(dry, in_pool, laser), model, config.segment, azimuth_known)
     if config.mbes is None:
-        poses = laser_poses(inputs.laser_pool, laser_count, lowest_m, in_pool)
-        target, mount = refine_target_and_laser(poses, target, model, laser, config.segment)
+        target, mount = refine_target_and_laser(laser_poses(dry, in_pool), target, model, laser, config.segment)
     trajectory = target.frame.trajectory_from_pool(in_pool)
     if config.mbes is not None:
         soundings = sounding_sample(inputs.soundings_pool, used(inputs.counts, "soundings"), trajectory)
