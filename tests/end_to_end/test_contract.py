@@ -16,7 +16,7 @@ from tests.support.tables import place_soundings, write_tables
 
 KEYS = {"schema", "session", "verdict", "reasons", "reason_codes", "mbes", "methods", "inputs", "software"}
 BLOCK = {"R_body_from_mbes", "lever_arm_m", "mount", "correction", "sigma", "covariance"}
-METHODS = ("patent_sequential", "patent_alternating", "adjustment")
+METHODS = ("patent_sequential", "patent_alternating", "patent_literal", "adjustment")
 MOUNT = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
 
 
@@ -66,7 +66,7 @@ def test_shapes(result: dict[str, Any]) -> None:
         assert list(block["correction"]) == ["rotation_vector_deg", "lever_arm_m"]
         assert np.shape(list(block["correction"].values())) == (2, 3)
     assert list(result["mbes"]["sigma"]) == ["rotation_vector_deg", "lever_arm_m"]
-    for method in METHODS[:2]:
+    for method in METHODS[:3]:
         assert result["methods"][method]["sigma"] is None
         assert result["methods"][method]["covariance"] is None
 
