@@ -17,7 +17,7 @@ from pipeline.mount import WITHIN_95, Mounted, parameters_of, setting_change
 Array = NDArray[np.float64]
 Block = dict[str, Any]
 WARNINGS = {
-    "patent_literal": "the patent's steps exactly as printed, faults included: for comparison, never to be entered"
+    "patent_literal": "as the patent prints it, faults included: to compare, never to be entered"
 }  # by method, for people; a method without one has an empty text
 
 

@@ -33,11 +33,12 @@ angles are
 
 with φ the turn of P2's normal about z, which no mount angle takes away (noise; a wrong lever arm where the heading
 swings; the stretch of I + Ω). A step takes β to β - sgn(β) θ2, γ to γ - sgn(γ) θ3 and α to α - sgn(α - β) θ4: pitch
-takes its sign from α - β, not from α. If φ = 0, roll is right after one step, pitch after two, and then each step halves
-the yaw's error: it converges. If not, β' = β - sgn(β) √(β² + φ²) does not settle: its cycle of two steps, β = ±φ/√3,
-attracts (slope -1/2). With it pitch changes between ∓φ/3, and yaw between ±φ (√3 - 1)/√67.5. The angle between the
-normals of P2 stays at 2φ/√3. A threshold below is never met, and the result depends on whether the last step was odd or
-even.
+takes its sign from α - β, not from α. If φ = 0, roll is right after one step, pitch after two, and then each step
+halves the yaw's error: it converges. If not, β' = β - sgn(β) √(β² + φ²) does not settle: its cycle of two steps, β =
+±φ/√3, attracts (slope -1/2). With it pitch changes between ∓φ/3, and yaw between ±φ (√3 - 1)/√67.5. The angle between
+the normals of P2 stays at 2φ/√3. A threshold below is not met, and the result depends on whether the last step was odd
+or even. (Below φ it is never met; between the two only by a mount that happens to be nearly right before the first
+step.)
 
 I + Ω = Exp(δ) + (t² I - δ δᵀ)/2 to second order, t the length of δ. So it stretches the soundings' cloud across δ by
 t²/2: 1.5e-4 at 1°, a millimetre at 6 m. On P3 in a straight pass the stretch S looks like the yaw S_xy - S_xx, at most
@@ -64,6 +65,7 @@ from pipeline.maths.target.model import ROLES
 
 Array = NDArray[np.float64]
 COMPARED = {"pitch": "P4", "roll": "P2", "yaw": "P3"}  # planes whose normals give the angle of each step
+LARGEST = np.pi / 2  # of a correction: [0023] has all cosines between normals positive
 SIGNS = {"pitch": -1.0, "roll": 1.0, "yaw": 1.0}  # of the deviation where the MBES's cosine is the larger [0113-0117]
 
 
@@ -141,8 +143,8 @@ def iterate_literally(
 ) -> LiteralAngles:
     """Take the printed steps until the angles between the normals of P2, P3 and P4 are below the threshold [0123].
 
-    Not converging is a result, with the corrections of the last step. If the iteration runs away until the soundings
-    span no plane, there is none.
+    Not converging is a result, with the corrections of the last step. There is none if the iteration runs away: if a
+    correction exceeds 90°, beyond what [0023] presupposes, or if the soundings no longer span a plane.
 
     Parameters
     ----------
@@ -159,7 +161,7 @@ def iterate_literally(
     rows: list[dict[str, float]] = []
     for iteration in range(max_iterations + 1):
         try:
-            mbes = planes.mbes_normals(angles_rad, lever_arm_m)
+            mbes = planes.mbes_normals(_not_ran_away(angles_rad), lever_arm_m)
         except DegenerateGeometryError as error:
             reason = f"the angles ran away: after step {iteration} {error}" if iteration else str(error)
             return LiteralAngles(np.full(3, np.nan), False, iteration, reason, rows)
@@ -177,3 +179,10 @@ def iterate_literally(
         if iteration < max_iterations:
             angles_rad = angles_rad - deviations
     return LiteralAngles(angles_rad, False, max_iterations, rows=rows)
+
+
+def _not_ran_away(angles_rad: Array) -> Array:
+    largest = float(np.max(np.abs(angles_rad)))
+    if largest > LARGEST:
+        raise DegenerateGeometryError(f"a correction is {np.degrees(largest):.0f}°")
+    return angles_rad
