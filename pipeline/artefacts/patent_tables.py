@@ -9,7 +9,7 @@ from pipeline.artefacts.from_tables import is_horizontal, laser_planes, moments_
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.patent.angles import PassPlanes
 from pipeline.maths.patent.lifted_moments import by_family
-from pipeline.maths.patent.literal_angles import SessionPlanes
+from pipeline.maths.patent.literal_planes import SessionPlanes
 from pipeline.maths.patent.offsets import DryFace, OffsetObservations, PassOffsets, WetFace
 from pipeline.maths.target.model import ROLES
 

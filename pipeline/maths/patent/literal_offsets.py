@@ -25,7 +25,7 @@ from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.planes import Plane
 from pipeline.maths.geometry.rotations import rotation_z
 from pipeline.maths.patent.lifted_moments import plane_moments
-from pipeline.maths.patent.literal_angles import SessionPlanes, literal_matrix
+from pipeline.maths.patent.literal_planes import SessionPlanes, literal_matrix
 from pipeline.maths.patent.offsets import DryFace, WetFace, height_pair
 
 Array = NDArray[np.float64]

@@ -7,13 +7,9 @@ from scipy.spatial.transform import Rotation
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.geometry.planes import PlaneMoments, fit_plane
 from pipeline.maths.patent.lifted_moments import lift
-from pipeline.maths.patent.literal_angles import (
-    SessionPlanes,
-    iterate_literally,
-    literal_deviations,
-    literal_matrix,
-)
+from pipeline.maths.patent.literal_angles import iterate_literally, literal_deviations
 from pipeline.maths.patent.literal_offsets import literal_offsets
+from pipeline.maths.patent.literal_planes import SessionPlanes, literal_matrix
 from tests.support.straight_passes import DRY, normals_of, straight_pass
 
 AXES = ("pitch", "roll", "yaw")
