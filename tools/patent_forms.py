@@ -1,8 +1,9 @@
 """Errors of the patent's three forms and of the adjustment on simulated sessions, as the table of docs/patent.md.
 
-Each session is simulated and calibrated in memory: the default one, one with drift of the INS, and sessions without
-noise: with the coarse mount of the default one, with the lever arm right before the calibration, and with the target
-turned away from north. The table replaces the one between the marks of the page, or is printed.
+Each session is simulated and calibrated in memory: the default one, one with drift of the INS, both with one pass
+alone, and sessions without noise: with the coarse mount of the default one, with the lever arm right before the
+calibration, and with the target turned away from north. The table replaces the one between the marks of the page, or is
+printed.
 
     python -m tools.patent_forms [docs/patent.md]
 """
@@ -43,17 +44,22 @@ class Case:
         Azimuth of the target's wall; None: the scenario's.
     true_lever_arm
         Whether the coarse lever arm is the true one.
+    distances_m
+        Distances of the passes from the wall; None: the scenario's, four passes from 4 to 8 m.
     """
 
     words: str
     scenario: str
     azimuth_deg: float | None = None
     true_lever_arm: bool = False
+    distances_m: tuple[float, ...] | None = None
 
 
 CASES = (
     Case("default session", "default"),
     Case("default session with drift of the INS", "drift"),
+    Case("one pass alone, as in the patent", "default", distances_m=(6.0,)),
+    Case("one pass alone, with drift of the INS", "drift", distances_m=(6.0,)),
     Case("without noise", "noise_free"),
     Case("without noise, lever arm right before", "noise_free", true_lever_arm=True),
     Case("without noise, wall at 90°", "noise_free", azimuth_deg=90.0),
@@ -67,6 +73,8 @@ def methods_of(case: Case) -> tuple[dict[str, Any], dict[str, Any]]:
     if case.azimuth_deg is not None:
         target = read_yaml(SCENARIOS_FOLDER / "default.yaml")["target"]
         content["target"] = target | {"azimuth_deg": case.azimuth_deg}
+    if case.distances_m is not None:
+        content["track"] = content.get("track", {}) | {"distances_m": list(case.distances_m)}
     made = simulate_session(parse(Scenario, content, case.scenario), SEED)
     if case.true_lever_arm:
         true = made.truth["mbes"]["mount"]
