@@ -6,7 +6,7 @@ and impossible values are errors that name file and key.
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pipeline.config.quantities import Model, NotNegative, Positive, SigmaDeg, SigmaM
 from pipeline.config.target import Origin, Target
@@ -80,6 +80,7 @@ class AngleIterate(Model):
     max_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
     step_tolerance_deg: Positive = 1e-6
     angle_tolerance_deg: Positive = 1e-6  # change of the angles between the normals in one step
+    literal_threshold_deg: Positive = 0.02  # patent_literal ends when the angles themselves are smaller
 
 
 class Offsets(Model):
@@ -132,7 +133,7 @@ class VerdictLimits(Model):
     max_sigma_m: Positive = 0.005
 
 
-Method = Literal["patent_sequential", "patent_alternating", "adjustment"]
+Method = Literal["patent_sequential", "patent_alternating", "adjustment"]  # patent_literal is never the result
 
 
 class PoolConfig(Model):
@@ -150,6 +151,13 @@ class PoolConfig(Model):
     laser_fit: LaserFit = LaserFit()
     verdict: VerdictLimits = VerdictLimits()
     result: Method = "adjustment"
+
+    @field_validator("result", mode="before")
+    @classmethod
+    def _not_literal(cls, value: object) -> object:
+        if value == "patent_literal":
+            raise ValueError("is shown beside the result, and is never the result itself; choose adjustment")
+        return value
 
     @property
     def target_place(self) -> TargetPlace:

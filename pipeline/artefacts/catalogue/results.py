@@ -193,7 +193,7 @@ ADJUST_SUMMARY = Artefact(
 CALIBRATION = Artefact(
     "report", "calibration", "table", "mount by method: totals that replace the coarse mount, and corrections",
     (
-        Column("method", TEXT, "", "patent_sequential, patent_alternating, adjustment"),
+        Column("method", TEXT, "", "patent_sequential, patent_alternating, patent_literal, adjustment"),
         Column("parameter", TEXT, "", "roll, pitch, yaw, x, y, z"),
         Column("unit", TEXT, "", "deg or m"),
         Column("coarse", F64, "deg or m", "mount as configured"), Column("total", F64, "deg or m", "calibrated mount"),
@@ -209,7 +209,7 @@ CALIBRATION = Artefact(
 CLOSING = Artefact(
     "report", "closing", "table", "agreement of the sonar's planes with the laser's, over all passes, with each mount",
     (
-        Column("mount", TEXT, "", "coarse, patent_sequential, patent_alternating, adjustment"),
+        Column("mount", TEXT, "", "coarse, patent_sequential, patent_alternating, patent_literal, adjustment"),
         Column("plane", TEXT, "", "P1, P2 or P3"),
         Column("angle_deg", F64, "deg", "between the two sensors' normals"),
         Column("distance_m", F64, "m", "of the soundings' centroid from the laser's plane, + toward the boat"),

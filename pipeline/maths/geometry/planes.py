@@ -39,6 +39,10 @@ class PlaneMoments:
         """Return the moments of points (n, 3) m with equal errors in all directions."""
         return cls(len(points_m), points_m.sum(axis=0), points_m.T @ points_m, len(points_m) * np.eye(3))
 
+    def with_equal_errors(self) -> "PlaneMoments":
+        """Return the moments with equal errors in all directions: the plane is then the plain total least squares."""
+        return PlaneMoments(self.count, self.total, self.products, self.count * np.eye(3))
+
     @classmethod
     def zero(cls) -> "PlaneMoments":
         """Return the moments of no points."""

@@ -20,6 +20,7 @@ POSITIVE = {
 }
 METHODS = {
     "coarse": "coarse mount",
+    "patent_literal": "(0) patent, word for word",
     "patent_sequential": "(1) patent, angles, then offsets",
     "patent_alternating": "(2) patent, in turn",
     "adjustment": "(3) adjustment",
@@ -115,7 +116,7 @@ def method_rows(table: pd.DataFrame) -> Iterator[Row]:
     """Yield for each mount parameter the total of every method, and its difference from the adjustment's total."""
     for name, _, _, unit in PARAMETERS:
         rows = table[table["parameter"] == name].set_index("method")
-        totals = {method: float(rows["total"][method]) for method in METHODS if method != "coarse"}
+        totals = {method: float(rows["total"][method]) for method in METHODS if method in rows.index}
         differences = {method: value - totals["adjustment"] for method, value in totals.items()}
         if unit == "deg":
             differences = {method: value - 360.0 * np.round(value / 360.0) for method, value in differences.items()}
