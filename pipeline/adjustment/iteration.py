@@ -76,12 +76,13 @@ class MountAdjustment:
 
     @property
     def redundancy(self) -> float:
-        """Sum of the robust weights, less the number of estimated parameters.
+        """Expectation of the sum of squares: the observations with a weight, less the number of estimated parameters.
 
-        Pose errors do not count: each has one pseudo-observation.
+        An observation counts as the part of its variance that robust weights leave. Pose errors do not count: each has
+        one pseudo-observation.
         """
-        observations = sum(group.weights for group in self.accumulation.groups.values())
-        return observations - len(self.solution.estimated)
+        observations = sum(group.count - group.cut for group in self.accumulation.groups.values())
+        return self.weighting.kept * observations - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
@@ -89,7 +90,8 @@ class MountAdjustment:
 
         They show how well intervals, passes and sensors agree.
         """
-        parts = [scatter(sums, np.ones(len(sums), dtype=bool)) for sums in self.accumulation.sums.values()]
+        kept = self.weighting.kept
+        parts = [scatter(sums, np.ones(len(sums), dtype=bool), kept) for sums in self.accumulation.sums.values()]
         within = sum(part.squares for part in parts), sum(part.dof for part in parts)
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
@@ -207,7 +209,7 @@ def _weighted_iteration(
     estimated = np.array(estimated_columns(state, settings.free))
     fixed: dict[int, float] = {}
     for iteration in range(1, settings.max_iterations + 1):
-        # read all points, and take the variance factors of the groups from their scatter
+        # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
         start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
@@ -223,7 +225,7 @@ def _weighted_iteration(
         if deficient or (settled and iteration >= LEAST_PASSES):
             break
         # from the next reading on reduce the weights of outliers; scales come from residuals without the drift
-        scales = {**weighting.scales, **(accumulation.robust_scales() if iteration > 1 else {})}
+        scales = accumulation.robust_scales(len(state.surfaces)) if iteration > 1 else weighting.scales
         weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
     return _WeightedIteration(

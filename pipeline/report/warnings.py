@@ -55,7 +55,7 @@ def _sigma_suffix(sigmas: Mapping[str, float]) -> str:
 
 def unexpected_noise(groups: pd.DataFrame) -> Iterator[Statement]:
     """Yield a warning for each group of observations (table ``groups``) with unexpected noise or many outliers."""
-    for row in groups.to_dict("records"):
+    for row in groups[groups["family"] == ""].to_dict("records"):
         factor, cut_share = row["variance_factor"], row["cut"] / max(row["count"], 1)
         if row["group"] in COMMON_NOISE:
             if factor > MAX_COMMON_VARIANCE_FACTOR:

@@ -73,14 +73,18 @@ SURFACES = Artefact(
     ),
 )
 GROUPS = Artefact(
-    "adjust", "groups", "table", "variance factors by group of observations",
+    "adjust", "groups", "table", "variance factors of the noise, by sensor and family and by several families together",
     (
-        Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping"),
+        Column("group", TEXT, "",
+               "families together: laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping; "
+               "one family: sensor:family"),
         Column("count", I64, "1", "observations; ins_white, ping: epochs"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
         Column("scale", F64, "1", "robust scale of residual / its expected sigma, the INS's noise included"),
         Column("cut", I64, "1", "observations whose weight became zero"),
         Column("reduced", I64, "1", "observations whose weight was reduced"),
+        Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H; else empty"),
+        Column("redundancy", F64, "1", "degrees of freedom of the variance factor"),
     ),
 )
 CELLS = Artefact(
@@ -93,7 +97,7 @@ CELLS = Artefact(
         Column("normalised", F64, "1", "of the difference from other passes, as in patterns (NaN: too few time slots)"),
         Column("largest", F64, "1", "largest |residual| / its expected sigma, among those with a weight"),
         Column("redundancy", F64, "1", "observations, less a shift and turn in each interval between INS records"),
-        Column("variance_factor", F64, "1", "of the scatter within these intervals, divided by that of its group"),
+        Column("variance_factor", F64, "1", "of the scatter within these intervals, divided by that of sensor and family"),
     ),
 )
 PATTERNS = Artefact(

@@ -1,0 +1,65 @@
+"""What the adjustment found of the noise, as a table: variance factors by sensor and family, and of common errors."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.adjustment.accumulation import GroupStatistics
+from pipeline.adjustment.iteration import MountAdjustment
+from pipeline.artefacts.catalogue.results import GROUPS
+from pipeline.maths.adjustment.robust_weights import robust_scale
+from pipeline.maths.adjustment.weighting import Scatter, scatter
+
+COMMON_ERROR = {"laser": "ins_white", "mbes": "ping"}  # name of the error that an interval's points have in common
+OF_KIND = {"laser": ("laser", "laser"), "mbes": ("mbes_vertical", "mbes_horizontal")}  # groups: other faces, horizontal
+Member = tuple[GroupStatistics, Scatter]
+
+
+def groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
+    """Return table ``groups``: rows of several families together, of common errors, and of each sensor and family.
+
+    Programs read the first rows by their names; :func:`family_rows` returns the last ones alone.
+    """
+    surfaces, weighting, sums = adjustment.state.surfaces, adjustment.weighting, adjustment.accumulation.sums
+    together: dict[tuple[str, str], list[Member]] = {}
+    by_family = []
+    for (sensor, number), group in sorted(adjustment.accumulation.groups.items()):
+        within = scatter(sums[sensor], sums[sensor].surface == number, weighting.kept)
+        factor = float(weighting.factors[sensor][number])
+        member = group, Scatter(factor * within.dof, within.dof)
+        family = surfaces[number].family
+        by_family.append(_row(f"{sensor}:{family}", sensor, [member]) | {"family": family, "variance_factor": factor})
+        together.setdefault((sensor, OF_KIND[sensor][surfaces[number].level]), []).append(member)
+    common = [
+        {"group": COMMON_ERROR[sensor], "sensor": sensor, "family": ""}
+        | {"count": len(sums[sensor]), "variance_factor": found.factor, "scale": np.nan, "cut": 0, "reduced": 0}
+        | {"redundancy": 2 / found.sigma**2}
+        for sensor, found in adjustment.epoch_factors.items()
+    ]
+    rows = [_row(name, sensor, members) for (sensor, name), members in together.items()]
+    rows.sort(key=lambda row: (row["sensor"], row["group"] == OF_KIND[row["sensor"]][1]))
+    return pd.DataFrame([*rows, *common, *by_family], columns=[column.name for column in GROUPS.columns])
+
+
+def _row(name: str, sensor: str, members: Sequence[Member]) -> dict[str, Any]:
+    groups = [group for group, _ in members]
+    within = Scatter(sum(part.squares for _, part in members), sum(part.dof for _, part in members))
+    total = sum(groups[1:], start=groups[0])
+    return {
+        "group": name,
+        "count": total.count,
+        "variance_factor": within.factor,
+        "scale": robust_scale(total.histogram),
+        "cut": total.cut,
+        "reduced": total.reduced,
+        "sensor": sensor,
+        "family": "",
+        "redundancy": within.dof,
+    }
+
+
+def family_rows(groups: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of table ``groups`` of one sensor and family each."""
+    return groups[groups["family"] != ""]
