@@ -14,6 +14,7 @@ from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
 from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
 from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
@@ -54,7 +55,7 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
+    white noise of the solution); ping: noise of the sonar's pings, None without a sonar or a solution; equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
     the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
     """
 
@@ -63,6 +64,7 @@ class MountAdjustment:
     weighting: Weighting
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
+    ping: PingNoise | None
     equations: NormalEquations
     solution: Solution
     fixed_mount: Mapping[int, float]
@@ -119,6 +121,7 @@ def adjust_mount(
         A longer time (s) without observations interrupts the knots of the drift.
     """
     noise = problem.prior.noise
+    ping: PingNoise | None = None
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
     last, estimated = weighted.last, weighted.estimated
     factors: dict[str, EpochVarianceFactor] = {}
@@ -127,6 +130,11 @@ def adjust_mount(
         # take the INS's white noise from the laser's points; further steps have the last weights
         surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
         factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
+        if "mbes" in sums_by_sensor:
+            soundings = sums_by_sensor["mbes"]
+            ping = ping_noise(soundings, surfaces, noise.white, factors["laser"])
+            with_ping = {**sums_by_sensor, "mbes": with_ping_noise(soundings, ping, surfaces, noise.white)}
+            last, factors["mbes"] = replace(last, linearisation=replace(last.linearisation, sums=with_ping)), ping.epoch
         noise = noise_seen_by_laser(noise, factors["laser"])
         for _ in range(CLOSING_STEPS):
             last, solution = last.stepped(noise, estimated)
@@ -142,6 +150,7 @@ def adjust_mount(
         weighting=weighted.weighting,
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
+        ping=ping,
         equations=equations,
         solution=solution,
         fixed_mount=weighted.fixed_mount,
