@@ -11,12 +11,14 @@ from pipeline.adjustment.observation_model import CurrentValues, ObservationMode
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
-from pipeline.maths.adjustment.eliminate_drift import NormalEquations
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
+from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
+from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
+from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, reduced_intervals, updated_sums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
-from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
+from pipeline.maths.adjustment.pseudo_observations import PseudoObservations, SurfacePrior
+from pipeline.maths.adjustment.score_check import ScoreCheck, score_check
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
@@ -55,8 +57,9 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); ping: noise of the sonar's pings, None without a sonar or a solution; equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
-    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
+    white noise of the solution); ping: noise of the sonar's pings, None without a sonar or a solution; equations: normal equations of all parameters, also of the fixed ones; check: of the
+    sigmas of the estimated mount parameters, None without a solution; fixed_mount: the mount parameters that had to be
+    fixed, each with the sigma that it would have had (rad or m).
     """
 
     state: State
@@ -67,6 +70,7 @@ class MountAdjustment:
     ping: PingNoise | None
     equations: NormalEquations
     solution: Solution
+    check: ScoreCheck | None
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
@@ -142,8 +146,12 @@ def adjust_mount(
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
-    equations = last.equations(noise)
+    reduced = last.reduced(noise)
+    equations = last.equations(noise, reduced)
     solution = solve(equations.normal, equations.right, estimated.tolist())
+    check = None
+    if not weighted.deficient:
+        check = score_check(reduced, noise, last.drift, last.prior, estimated, estimated[estimated < N_MOUNT])
     return MountAdjustment(
         state=last.linearisation.state,
         drift=last.drift,
@@ -153,6 +161,7 @@ def adjust_mount(
         ping=ping,
         equations=equations,
         solution=solution,
+        check=check,
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
@@ -167,13 +176,23 @@ class _Iterate:
     drift: DriftEstimate
     surfaces: SurfacePrior | None
 
-    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
+    @property
+    def prior(self) -> PseudoObservations | None:
+        """Prior information about the surfaces at the current values."""
+        return None if self.surfaces is None else self.surfaces.pseudo_observations(self.linearisation.state)
+
+    def reduced(self, noise: PoseNoise, selected: Integers | None = None) -> ReducedIntervals:
+        """Return the normal equations by span between two knots, of all parameters or of the selected ones."""
+        return reduced_intervals(self.linearisation, self.drift, noise, selected)
+
+    def equations(
+        self, noise: PoseNoise, reduced: ReducedIntervals, selected: Integers | None = None
+    ) -> NormalEquations:
         """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
-        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
-        if self.surfaces is None:
+        equations, prior = eliminate_drift(reduced, noise, self.drift), self.prior
+        if prior is None:
             return equations
-        prior = self.surfaces.pseudo_observations(state)
-        places = np.arange(state.size) if selected is None else selected
+        places = np.arange(self.linearisation.state.size) if selected is None else selected
         return replace(
             equations,
             normal=equations.normal + prior.normal[np.ix_(places, places)],
@@ -184,7 +203,7 @@ class _Iterate:
     def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
         """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
         state = self.linearisation.state
-        equations = self.equations(noise, estimated)
+        equations = self.equations(noise, self.reduced(noise, estimated), estimated)
         solution = solve(equations.normal, equations.right, range(len(estimated)))
         step, drift_step = np.zeros(state.size), equations.knots(solution.step)
         step[estimated] = solution.step
@@ -224,7 +243,7 @@ def _weighted_iteration(
         start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
-            normal = start.equations(prior.noise).normal
+            normal = start.equations(prior.noise, start.reduced(prior.noise)).normal
             fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
             estimated = np.setdiff1d(estimated, np.array(list(fixed), dtype=np.int64))
         # solve and step

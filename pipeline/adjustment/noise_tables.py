@@ -10,7 +10,7 @@ from pipeline.adjustment.accumulation import GroupStatistics
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.artefacts.catalogue.results import GROUPS
 from pipeline.maths.adjustment.robust_weights import robust_scale
-from pipeline.maths.adjustment.weighting import Scatter, scatter
+from pipeline.maths.adjustment.weighting import PRIOR_DOF, Scatter, scatter
 
 COMMON_ERROR = {"laser": "ins_white", "mbes": "ping"}  # name of the error that an interval's points have in common
 OF_KIND = {"laser": ("laser", "laser"), "mbes": ("mbes_vertical", "mbes_horizontal")}  # groups: other faces, horizontal
@@ -20,7 +20,7 @@ Member = tuple[GroupStatistics, Scatter]
 def groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
     """Return table ``groups``: rows of several families together, of common errors, and of each sensor and family.
 
-    Programs read the first rows by their names; :func:`family_rows` returns the last ones alone.
+    Programs read the first rows by their names.
     """
     surfaces, weighting, sums = adjustment.state.surfaces, adjustment.weighting, adjustment.accumulation.sums
     together: dict[tuple[str, str], list[Member]] = {}
@@ -30,12 +30,16 @@ def groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
         factor = float(weighting.factors[sensor][number])
         member = group, Scatter(factor * within.dof, within.dof)
         family = surfaces[number].family
-        by_family.append(_row(f"{sensor}:{family}", sensor, [member]) | {"family": family, "variance_factor": factor})
+        row = _row(f"{sensor}:{family}", sensor, [member]) | {"family": family, "variance_factor": factor}
+        if sensor == "mbes" and adjustment.ping is not None:
+            effects = adjustment.ping.effects
+            row |= {"mean_effect": effects.of_mean[number], "slope_effect": effects.of_slope[number]}
+        by_family.append(row)
         together.setdefault((sensor, OF_KIND[sensor][surfaces[number].level]), []).append(member)
     common = [
         {"group": COMMON_ERROR[sensor], "sensor": sensor, "family": ""}
         | {"count": len(sums[sensor]), "variance_factor": found.factor, "scale": np.nan, "cut": 0, "reduced": 0}
-        | {"redundancy": 2 / found.sigma**2}
+        | {"sigma": found.sigma}
         for sensor, found in adjustment.epoch_factors.items()
     ]
     rows = [_row(name, sensor, members) for (sensor, name), members in together.items()]
@@ -56,10 +60,6 @@ def _row(name: str, sensor: str, members: Sequence[Member]) -> dict[str, Any]:
         "reduced": total.reduced,
         "sensor": sensor,
         "family": "",
-        "redundancy": within.dof,
+        "sigma": within.factor * np.sqrt(2 / (PRIOR_DOF + within.dof)),
     }
 
-
-def family_rows(groups: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of table ``groups`` of one sensor and family each."""
-    return groups[groups["family"] != ""]

@@ -85,8 +85,13 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
             "value": values,
             "sigma": np.sqrt(np.diag(random)),
             "sigma_total": np.sqrt(np.diag(total)),
+            "slots_ratio": np.nan,
+            "slots_dof": np.nan,
         }
     )
+    if adjustment.check is not None:
+        checked = np.flatnonzero(np.isin(numbers, solution.estimated[solution.estimated < N_MOUNT]))
+        table.loc[checked, ["slots_ratio", "slots_dof"]] = np.column_stack([adjustment.check.ratio, adjustment.check.dof])
     return table, random, total
 
 

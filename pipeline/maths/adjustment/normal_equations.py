@@ -28,7 +28,12 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
+from pipeline.maths.adjustment.eliminate_white_noise import (
+    LinearisedIntervals,
+    ReducedIntervals,
+    TimeAxis,
+    eliminate_white_noise,
+)
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
@@ -140,10 +145,10 @@ class SurfaceIntervals:
         return LinearisedIntervals(sums, design[:, :, kept], np.searchsorted(self.selected, columns[kept]), pose)
 
 
-def normal_equations(
+def reduced_intervals(
     linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise, selected: Integers | None = None
-) -> NormalEquations:
-    """Return the normal equations of all parameters, or of the selected ones.
+) -> ReducedIntervals:
+    """Return the normal equations by span between two knots, for all parameters or the selected ones.
 
     Parameters
     ----------
@@ -159,7 +164,12 @@ def normal_equations(
     sources = list(linearisation.by_surface(selected))
     n_parameters = linearisation.state.size if selected is None else len(selected)
     times = TimeAxis(linearisation.body.seconds, drift.knots)
-    return eliminate_drift(eliminate_white_noise(sources, n_parameters, times, noise.white), noise, drift)
+    return eliminate_white_noise(sources, n_parameters, times, noise.white)
+
+
+def normal_equations(linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise) -> NormalEquations:
+    """Return the normal equations of all parameters, all pose errors eliminated; see :func:`reduced_intervals`."""
+    return eliminate_drift(reduced_intervals(linearisation, drift, noise), noise, drift)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:

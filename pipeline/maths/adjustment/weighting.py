@@ -2,14 +2,14 @@
 
 **Sensors.** Each sensor has a variance factor f for each family of faces, because its noise depends on what it sees: a
 beam of 1° spreads over decimetres of slant range on a face at 45° along track, and over millimetres on a wall. f
-follows from the scatter of each interval's points about a plane of their own. When
-v is fitted by (1, α, β) within an interval, pose, mount and surface have no effect. Only the sensor's noise remains
-(pure error, Draper & Smith 1998, 2.1). The expectation of the remaining Σ w v² is f times n - rank. The rank is 3 if
-the points spread over the surface and 2 if they lie on a line, like those of one ping. (Noise moves the points of a
-line aside, and a fit to that direction would remove the noise: f came out a third too small.) Robust weights remove a
-part of the variance of good observations too, so the expectation is f (n - rank) times the part that they leave
-(:func:`~pipeline.maths.adjustment.robust_weights.variance_kept`). Where few intervals see a family, f is drawn to the sensor's other families:
-:func:`shrunk_factors`.
+follows from the scatter of each interval's points about a plane of their own. When v is fitted by (1, α, β) within an
+interval, pose, mount and surface have no effect. Only the sensor's noise remains (pure error, Draper & Smith 1998,
+2.1). The expectation of the remaining Σ w v² is f times n - rank. The rank is 3 if the points spread over the surface
+and 2 if they lie on a line, like those of one ping. (Noise moves the points of a line aside, and a fit to that
+direction would remove the noise: f came out a third too small.) Robust weights remove a part of the variance of good
+observations too, so the expectation is multiplied by the part that they leave
+(:func:`~pipeline.maths.adjustment.robust_weights.variance_kept`). Where few intervals see a family, f is drawn to the
+sensor's other families: :func:`shrunk_factors`.
 
 **In common.** The variance factor of the error that an interval's points share follows from the intervals' means
 m = Σ w v / Σ w. For an interval with q̄ = Σ w q / Σ w, K its design of pose errors and W the white noise of a record,
