@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +11,12 @@ from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighte
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
-from pipeline.config.pool import Adjust
-from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, reduced_intervals, updated_sums
+from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
-from pipeline.maths.adjustment.pseudo_observations import PseudoObservations, SurfacePrior
-from pipeline.maths.adjustment.score_check import ScoreCheck, score_check
+from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
@@ -32,6 +30,30 @@ from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+
+class IterationSettings(Protocol):
+    """Settings of the iteration."""
+
+    @property
+    def free(self) -> Sequence[str]:
+        """Names of the additional parameters to estimate."""
+        ...
+
+    @property
+    def max_iterations(self) -> int:
+        """Largest number of readings of the points."""
+        ...
+
+    @property
+    def robust_k0(self) -> float:
+        """Largest normalised residual with full weight."""
+        ...
+
+    @property
+    def robust_k1(self) -> float:
+        """Largest normalised residual with any weight."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -57,9 +79,9 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); ping: noise of the sonar's pings, None without a sonar or a solution; equations: normal equations of all parameters, also of the fixed ones; check: of the
-    sigmas of the estimated mount parameters, None without a solution; fixed_mount: the mount parameters that had to be
-    fixed, each with the sigma that it would have had (rad or m).
+    white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
+    sonar or a solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount: the mount
+    parameters that had to be fixed, each with the sigma that it would have had (rad or m).
     """
 
     state: State
@@ -70,7 +92,6 @@ class MountAdjustment:
     ping: PingNoise | None
     equations: NormalEquations
     solution: Solution
-    check: ScoreCheck | None
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
@@ -109,7 +130,7 @@ def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]
 
 
 def adjust_mount(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> MountAdjustment:
     """Return the result of the iteration from the coarse mount to the solution.
 
@@ -119,7 +140,7 @@ def adjust_mount(
         Model, prior information and consider errors of the calibration.
     streams : mapping of Stream
         Labelled points by sensor.
-    settings : Adjust
+    settings : IterationSettings
         Limits of the iteration, robust weights, additional parameters to estimate.
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
@@ -134,11 +155,11 @@ def adjust_mount(
         # take the INS's white noise from the laser's points; further steps have the last weights
         surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
         factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
-        if "mbes" in sums_by_sensor:
-            soundings = sums_by_sensor["mbes"]
-            ping = ping_noise(soundings, surfaces, noise.white, factors["laser"])
-            with_ping = {**sums_by_sensor, "mbes": with_ping_noise(soundings, ping, surfaces, noise.white)}
-            last, factors["mbes"] = replace(last, linearisation=replace(last.linearisation, sums=with_ping)), ping.epoch
+        if "mbes" in sums_by_sensor:  # a part of the sonar's noise is common to a ping
+            ping = ping_noise(sums_by_sensor["mbes"], surfaces, noise.white, factors["laser"])
+            soundings = with_ping_noise(sums_by_sensor["mbes"], ping, surfaces, noise.white)
+            last = replace(last, linearisation=last.linearisation.with_sums("mbes", soundings))
+            factors["mbes"] = ping.epoch
         noise = noise_seen_by_laser(noise, factors["laser"])
         for _ in range(CLOSING_STEPS):
             last, solution = last.stepped(noise, estimated)
@@ -146,12 +167,8 @@ def adjust_mount(
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
-    reduced = last.reduced(noise)
-    equations = last.equations(noise, reduced)
+    equations = last.equations(noise)
     solution = solve(equations.normal, equations.right, estimated.tolist())
-    check = None
-    if not weighted.deficient:
-        check = score_check(reduced, noise, last.drift, last.prior, estimated, estimated[estimated < N_MOUNT])
     return MountAdjustment(
         state=last.linearisation.state,
         drift=last.drift,
@@ -161,7 +178,6 @@ def adjust_mount(
         ping=ping,
         equations=equations,
         solution=solution,
-        check=check,
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
@@ -176,23 +192,13 @@ class _Iterate:
     drift: DriftEstimate
     surfaces: SurfacePrior | None
 
-    @property
-    def prior(self) -> PseudoObservations | None:
-        """Prior information about the surfaces at the current values."""
-        return None if self.surfaces is None else self.surfaces.pseudo_observations(self.linearisation.state)
-
-    def reduced(self, noise: PoseNoise, selected: Integers | None = None) -> ReducedIntervals:
-        """Return the normal equations by span between two knots, of all parameters or of the selected ones."""
-        return reduced_intervals(self.linearisation, self.drift, noise, selected)
-
-    def equations(
-        self, noise: PoseNoise, reduced: ReducedIntervals, selected: Integers | None = None
-    ) -> NormalEquations:
+    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
         """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
-        equations, prior = eliminate_drift(reduced, noise, self.drift), self.prior
-        if prior is None:
+        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
+        if self.surfaces is None:
             return equations
-        places = np.arange(self.linearisation.state.size) if selected is None else selected
+        prior = self.surfaces.pseudo_observations(state)
+        places = np.arange(state.size) if selected is None else selected
         return replace(
             equations,
             normal=equations.normal + prior.normal[np.ix_(places, places)],
@@ -203,7 +209,7 @@ class _Iterate:
     def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
         """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
         state = self.linearisation.state
-        equations = self.equations(noise, self.reduced(noise, estimated), estimated)
+        equations = self.equations(noise, estimated)
         solution = solve(equations.normal, equations.right, range(len(estimated)))
         step, drift_step = np.zeros(state.size), equations.knots(solution.step)
         step[estimated] = solution.step
@@ -228,7 +234,7 @@ class _WeightedIteration:
 
 
 def _weighted_iteration(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> _WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior
@@ -243,7 +249,7 @@ def _weighted_iteration(
         start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
-            normal = start.equations(prior.noise, start.reduced(prior.noise)).normal
+            normal = start.equations(prior.noise).normal
             fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
             estimated = np.setdiff1d(estimated, np.array(list(fixed), dtype=np.int64))
         # solve and step

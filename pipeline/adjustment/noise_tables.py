@@ -1,4 +1,4 @@
-"""What the adjustment found of the noise, as a table: variance factors by sensor and family, and of common errors."""
+"""What the adjustment found of the noise, as tables: variance factors, and a check of the sigmas."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,9 +8,13 @@ import pandas as pd
 
 from pipeline.adjustment.accumulation import GroupStatistics
 from pipeline.adjustment.iteration import MountAdjustment
+from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.catalogue.results import GROUPS
+from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.robust_weights import robust_scale
-from pipeline.maths.adjustment.weighting import PRIOR_DOF, Scatter, scatter
+from pipeline.maths.adjustment.score_check import score_check
+from pipeline.maths.adjustment.weighting import PRIOR_DOF, Scatter, noise_seen_by_laser, scatter
+from pipeline.maths.mount_parameters import N_MOUNT
 
 COMMON_ERROR = {"laser": "ins_white", "mbes": "ping"}  # name of the error that an interval's points have in common
 OF_KIND = {"laser": ("laser", "laser"), "mbes": ("mbes_vertical", "mbes_horizontal")}  # groups: other faces, horizontal
@@ -63,3 +67,16 @@ def _row(name: str, sensor: str, members: Sequence[Member]) -> dict[str, Any]:
         "sigma": within.factor * np.sqrt(2 / (PRIOR_DOF + within.dof)),
     }
 
+
+
+def sigma_check(problem: CalibrationProblem, adjustment: MountAdjustment) -> pd.DataFrame:
+    """Return columns of table ``estimate``, by unknown: the check of the sigmas by the scatter of slots of time."""
+    state, solution, columns = adjustment.state, adjustment.solution, ["slots_ratio", "slots_dof"]
+    if solution.deficiency or not adjustment.epoch_factors:
+        return pd.DataFrame(columns=columns, dtype=np.float64)
+    linearisation = Linearisation(adjustment.accumulation.sums, state, problem.model.body, adjustment.drift)
+    noise = noise_seen_by_laser(problem.prior.noise, adjustment.epoch_factors["laser"])
+    prior = None if problem.prior.surfaces is None else problem.prior.surfaces.pseudo_observations(state)
+    check = score_check(linearisation, adjustment.drift, noise, prior, solution.estimated)
+    names = [state.names[number] for number in solution.estimated if number < N_MOUNT]
+    return pd.DataFrame(np.column_stack([check.ratio, check.dof]), index=names, columns=columns)

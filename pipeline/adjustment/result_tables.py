@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.iteration import MountAdjustment
-from pipeline.adjustment.noise_tables import groups_table
+from pipeline.adjustment.noise_tables import groups_table, sigma_check
 from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_statistics import ResidualStatistics
@@ -56,7 +56,7 @@ def result_tables(
     t_ns = problem.model.body.trajectory.t_ns
     estimate, random, total = _estimate(problem, adjustment)
     return {
-        "estimate": estimate,
+        "estimate": estimate.join(sigma_check(problem, adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
         "freed": _single_parameter_table(adjustment, problem.consider.sigmas, estimate),
         "groups": groups_table(adjustment),
@@ -85,13 +85,8 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
             "value": values,
             "sigma": np.sqrt(np.diag(random)),
             "sigma_total": np.sqrt(np.diag(total)),
-            "slots_ratio": np.nan,
-            "slots_dof": np.nan,
         }
     )
-    if adjustment.check is not None:
-        checked = np.flatnonzero(np.isin(numbers, solution.estimated[solution.estimated < N_MOUNT]))
-        table.loc[checked, ["slots_ratio", "slots_dof"]] = np.column_stack([adjustment.check.ratio, adjustment.check.dof])
     return table, random, total
 
 

@@ -21,19 +21,14 @@ Order: points -> sums by interval (:mod:`~pipeline.maths.adjustment.interval_sum
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import (
-    LinearisedIntervals,
-    ReducedIntervals,
-    TimeAxis,
-    eliminate_white_noise,
-)
+from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
@@ -101,6 +96,10 @@ class Linearisation:
     body: BodyMotion
     drift: DriftEstimate | None = None
 
+    def with_sums(self, sensor: str, sums: IntervalSums) -> "Linearisation":
+        """Return this linearisation with other sums of one sensor."""
+        return replace(self, sums={**self.sums, sensor: sums})
+
     def by_surface(self, selected: Integers | None = None) -> Iterator["SurfaceIntervals"]:
         """Yield each sensor's intervals, surface by surface; ``selected``: the parameters (ascending) of the design."""
         for sensor, sums in self.sums.items():
@@ -145,10 +144,10 @@ class SurfaceIntervals:
         return LinearisedIntervals(sums, design[:, :, kept], np.searchsorted(self.selected, columns[kept]), pose)
 
 
-def reduced_intervals(
+def normal_equations(
     linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise, selected: Integers | None = None
-) -> ReducedIntervals:
-    """Return the normal equations by span between two knots, for all parameters or the selected ones.
+) -> NormalEquations:
+    """Return the normal equations of all parameters, or of the selected ones.
 
     Parameters
     ----------
@@ -164,12 +163,7 @@ def reduced_intervals(
     sources = list(linearisation.by_surface(selected))
     n_parameters = linearisation.state.size if selected is None else len(selected)
     times = TimeAxis(linearisation.body.seconds, drift.knots)
-    return eliminate_white_noise(sources, n_parameters, times, noise.white)
-
-
-def normal_equations(linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise) -> NormalEquations:
-    """Return the normal equations of all parameters, all pose errors eliminated; see :func:`reduced_intervals`."""
-    return eliminate_drift(reduced_intervals(linearisation, drift, noise), noise, drift)
+    return eliminate_drift(eliminate_white_noise(sources, n_parameters, times, noise.white), noise, drift)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:

@@ -23,15 +23,15 @@ than a slot do not show.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
+from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import PseudoObservations
+from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -48,61 +48,59 @@ class ScoreCheck:
 
 
 def score_check(
-    reduced: ReducedIntervals,
-    noise: PoseNoise,
+    linearisation: Linearisation,
     drift: DriftEstimate,
+    noise: PoseNoise,
     prior: PseudoObservations | None,
     estimated: Integers,
-    checked: Integers,
 ) -> ScoreCheck:
-    """Return the check of the sigmas.
+    """Return the check of the sigmas of the estimated mount parameters.
 
     Parameters
     ----------
-    reduced : ReducedIntervals
-        Normal equations by span between two knots, of all parameters, at the adjusted values.
-    noise : PoseNoise
-        Standard deviations of the pose errors.
+    linearisation : Linearisation
+        Interval sums, and the adjusted values at which they were taken.
     drift : DriftEstimate
         The drift with which the observations were taken.
+    noise : PoseNoise
+        Standard deviations of the pose errors.
     prior : PseudoObservations or None
         Prior information about the surfaces.
-    estimated, checked : (f,) and (k,) arrays
-        The estimated parameters, ascending; those of them whose sigmas are checked.
+    estimated : (f,) array
+        The estimated parameters, ascending.
     """
-    slots = [
-        (equations.normal[np.ix_(estimated, estimated)], equations.right[estimated])
-        for equations in _of_slots(reduced, noise, drift)
-    ]
-    normals, rights = np.array([normal for normal, _ in slots]), np.array([right for _, right in slots])
+    slots = [normal_equations(part, own, noise, estimated) for part, own in _slots(linearisation, drift)]
+    normals, rights = np.array([slot.normal for slot in slots]), np.array([slot.right for slot in slots])
     N, b = normals.sum(axis=0), rights.sum(axis=0)
     if prior is not None:
         N, b = N + prior.normal[np.ix_(estimated, estimated)], b + prior.right[estimated]
     inverse = np.linalg.pinv(N, hermitian=True)
     scores = rights - normals @ (inverse @ b)
-    influence = inverse[np.searchsorted(estimated, checked)]  # (k, f)
+    mount = np.flatnonzero(estimated < N_MOUNT)
+    influence = inverse[mount]  # (k, f)
     by_slot = np.einsum("kf,gfh->gkh", influence, normals)
     expected = np.einsum("gkh,kh->gk", by_slot, influence) - np.einsum("gkh,hi,gki->gk", by_slot, inverse, by_slot)
     found = (scores @ influence.T) ** 2
     total, squares = expected.sum(axis=0), np.sum(expected**2, axis=0)
-    seen = total > ROUNDING * np.diag(inverse)[np.searchsorted(estimated, checked)]
-    ratio, dof = np.zeros((2, len(checked)))
+    seen = total > ROUNDING * np.diag(inverse)[mount]
+    ratio, dof = np.zeros((2, len(mount)))
     np.divide(found.sum(axis=0), total, out=ratio, where=seen)
     np.divide(total**2, squares, out=dof, where=seen)
     return ScoreCheck(ratio, dof)
 
 
-def _of_slots(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEstimate) -> Iterator[NormalEquations]:
-    """Yield the normal equations of each slot that has observations."""
-    knots = drift.knots
-    first, last = 0, len(knots.inner)
-    for span in range(last):
-        ends = span + 1 == last or not knots.inner[span + 1]
-        if not knots.inner[span]:
+def _slots(linearisation: Linearisation, drift: DriftEstimate) -> Iterator[tuple[Linearisation, DriftEstimate]]:
+    """Yield the sums and the drift of each slot, from knot to knot. Slots end at gaps between observations."""
+    knots, first, last = drift.knots, 0, len(drift.knots.inner) - 1
+    for span in np.flatnonzero(knots.inner).tolist():
+        if span == last or not knots.inner[span + 1] or knots.seconds[span + 1] - knots.seconds[first] >= SLOT_S:
+            places = slice(first, span + 2)
+            own = Knots(knots.record[places], knots.seconds[places], knots.inner[first : span + 1])
+            sums = {
+                sensor: whole.selected(np.arange(*np.searchsorted(whole.record, own.record[[0, -1]])))
+                for sensor, whole in linearisation.sums.items()
+            }
+            yield replace(linearisation, sums=sums), DriftEstimate(own, drift.values[places])
             first = span + 1
-        elif ends or knots.seconds[span + 1] - knots.seconds[first] >= SLOT_S:
-            part, places = slice(first, span + 1), slice(first, span + 2)
-            own = Knots(knots.record[places], knots.seconds[places], knots.inner[part])
-            normal = ReducedIntervals(reduced.normal[part], 0.0)
-            yield eliminate_drift(normal, noise, DriftEstimate(own, drift.values[places]))
-            first = span + 1
+        if span < last and not knots.inner[span + 1]:
+            first = span + 2
