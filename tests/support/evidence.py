@@ -92,7 +92,7 @@ def codes(statements: Sequence[Statement]) -> list[ReasonCode]:
 
 def groups(**changes: Any) -> pd.DataFrame:
     """The table of variance factors, with one group."""
-    row = {"group": "mbes_horizontal", "count": 1000, "variance_factor": 1.0, "cut": 0}
+    row = {"group": "mbes_horizontal", "family": "", "count": 1000, "variance_factor": 1.0, "sigma": 0.1, "cut": 0}
     return pd.DataFrame([row | changes])
 
 

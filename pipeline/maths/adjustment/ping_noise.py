@@ -11,13 +11,18 @@ covariances 1 / Σ w and C⁻¹, C = Σ w t tᵀ, t = (α - ᾱ, β - β̄). The
 * A whole ping is displaced as by a wrong pose (an unsteady clock, beams stabilised by another attitude): the INS's
   factor f becomes f + x.
 
-With u = (1, ᾱ, β̄), t = D⁻¹ t', the eigenvalues λ and eigenvectors e of D C D (D scales, as in the scatter), and
-U = c K W Kᵀ, U' its part of (α, β),
+With ᾱ, β̄ the interval's centroid, U = c K W Kᵀ and a the direction in which the points spread most, the mean and the
+slope b along a have the variances
 
-    E m² Σ w = d + (f + x) uᵀ U u Σ w,            for each slope  E y² = d' + (f + x) λ (D⁻¹ e)ᵀ U' (D⁻¹ e),
+    d / Σ w + (f + x) uᵀ U u,  u = (1, ᾱ, β̄),              d' / Σ w τ² + (f + x) aᵀ U' a,  τ = aᵀ t,
 
-y = eᵀ D (Σ w t v) / √λ. So d, d' (by surface) and f + x (by the sensor) follow by regression, in turn, with the weights
-of maximum likelihood, (d + (f + x) g)⁻² for a variance d + (f + x) g.
+U' being the part of U for (α, β). They are estimated from the *differences* of successive pings on a surface (von
+Neumann 1941, "Distribution of the ratio of the mean square successive difference"). A mean itself contains what is
+wrong for longer: a face that is not where it should be, a drift. That is no noise, and must not make the tests of it
+blind. The first later interval that shares no INS record with an interval is its successor, so the variances add. With
+y² the squared difference over the sum of 1 / Σ w, its mean is d + (f + x) g. d and d' (by surface) and f + x (by the
+sensor) follow by regression, in turn, with the weights of maximum likelihood, (d + (f + x) g)⁻². Differences that
+overlap are correlated, so variances of these estimates are 3/2 of those of as many independent ones.
 
 All enter the interval sums. The scatter about the interval's own plane stays as it is. Of the sums M of products of the
 columns (q, s q, v), the part of the mean, M_q1 M_1q / Σ w, is divided by d, and the rest by d'. Then the error of the
@@ -37,13 +42,16 @@ from numpy.typing import NDArray
 from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
 from pipeline.maths.adjustment.parameters import ObservedSurface
-from pipeline.maths.adjustment.weighting import FEWEST, FLAT, EpochVarianceFactor, epoch_variance_factor
+from pipeline.maths.adjustment.weighting import FEWEST, FLAT, EpochVarianceFactor
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 CERTAIN = 3.0  # sigmas by which an error must exceed what is expected, to be taken into the model
 ROUNDS = 3  # of each estimation in turn
-LEAST_WEIGHT = 1e-300  # smallest divisor
+OVERLAP = 1.5  # variance of an estimate from overlapping differences over that from independent ones
+NEAR = 3.0  # an interval farther from its successor than this multiple of the usual distance is left out
+ALIKE = 0.9  # cosine of the directions of two lines whose slopes are compared
+LEAST_SPREAD = 1e-300  # smallest divisor
 
 
 @dataclass(frozen=True)
@@ -82,15 +90,13 @@ def ping_noise(
     laser : EpochVarianceFactor
         Variance factor f of this noise, from the laser's points.
     """
-    count, designs = len(surfaces), pose_design(surfaces, np.arange(len(surfaces)))
-    U = _common_covariance(sums, designs, white)
-    of_means, of_slopes = _means(sums, U), _slopes(sums, U)
-    effects = DesignEffects(np.ones(count), np.ones(count))
+    count, white_covariance = len(surfaces), _white_covariance(sums, surfaces, white)
+    means, slopes = _mean_differences(sums, white_covariance), _slope_differences(sums, white_covariance)
+    effects, epoch = DesignEffects(np.ones(count), np.ones(count)), laser
     for _ in range(ROUNDS):
-        epoch = epoch_variance_factor(with_design_effects(sums, effects), designs, white)
-        factor = max(epoch.factor, 0.0)
-        effects = DesignEffects(*(of.design_effects(factor, count) for of in (of_means, of_slopes)))
-    epoch = epoch_variance_factor(with_design_effects(sums, effects), designs, white)
+        epoch = means.epoch_factor(effects.of_mean, epoch.factor)
+        effects = DesignEffects(*(part.design_effects(epoch.factor, count) for part in (means, slopes)))
+    epoch = means.epoch_factor(effects.of_mean, epoch.factor)
     excess, sigma = epoch.factor - laser.factor, float(np.hypot(epoch.sigma, laser.sigma))
     return PingNoise(effects, epoch, excess if excess > CERTAIN * sigma else 0.0)
 
@@ -114,7 +120,7 @@ def with_ping_noise(
     sums = with_design_effects(sums, noise.effects)
     if noise.excess <= 0:
         return sums
-    U = noise.excess * _common_covariance(sums, pose_design(surfaces, np.arange(len(surfaces))), white)
+    U = noise.excess * _white_covariance(sums, surfaces, white)
     of_moved = sums.normal[:, :N_MOVED]
     inverse = np.linalg.solve(np.eye(N_MOVED) + U @ of_moved[:, :, :N_MOVED], U)
     by_moved, swept = np.swapaxes(of_moved, 1, 2) @ inverse, sums.swept[:, :, :N_MOVED]
@@ -135,8 +141,7 @@ def with_design_effects(sums: IntervalSums, effects: DesignEffects) -> IntervalS
     d_mean, d_slope = effects.of_mean[sums.surface], effects.of_slope[sums.surface]
     total, weighted, swept = sums.normal[:, 0, 0], sums.normal[:, 0], sums.swept[:, :, 0]
     mean = sums.right[:, 0] / total
-    slopes, _, _ = _whitened_slopes(sums)
-    fitted = np.sum(slopes**2, axis=1)
+    fitted = _squares_of_slopes(sums)
 
     def divided(whole: Array, of_mean: Array) -> Array:
         by = [d.reshape(-1, *[1] * (whole.ndim - 1)) for d in (d_mean, d_slope)]
@@ -158,8 +163,8 @@ def _outer(first: Array, second: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class _Components:
-    """Numbers y (n,) with E y² = d + f g: squared y², common g, number of their surface."""
+class _Differences:
+    """Differences of successive pings (n,) with E y² = d + (f + x) g: y², g, and the number of their surface."""
 
     squared: Array
     common: Array
@@ -170,53 +175,101 @@ class _Components:
         effects = np.ones(n_surfaces)
         for surface in range(n_surfaces):
             rows = self.surface == surface
-            common, squared = factor * self.common[rows], self.squared[rows]
-            certain = 1 + CERTAIN * np.sqrt(2 / max(float(np.sum((1 + common) ** -2)), LEAST_WEIGHT))
+            common, squared = max(factor, 0.0) * self.common[rows], self.squared[rows]
+            if not np.any(rows):
+                continue
+            certain = 1 + CERTAIN * np.sqrt(OVERLAP * 2 / np.sum((1 + common) ** -2))
             d = 1.0
             for _ in range(ROUNDS):
                 weight = (max(d, 1.0) + common) ** -2
-                d = float(weight @ (squared - common)) / max(float(weight.sum()), LEAST_WEIGHT)
+                d = float(weight @ (squared - common) / weight.sum())
             effects[surface] = d if d > certain else 1.0
         return effects
 
+    def epoch_factor(self, effects: Array, factor: float) -> EpochVarianceFactor:
+        """Return f + x, with the design effects (s,) and a first value of it."""
+        d = effects[self.surface]
+        sigma = np.inf
+        for _ in range(ROUNDS):
+            by_variance = self.common / (d + max(factor, 0.0) * self.common) ** 2
+            information = float(by_variance @ self.common)
+            if information <= 0:
+                return EpochVarianceFactor(1.0, np.inf)
+            factor = float(by_variance @ (self.squared - d)) / information
+            sigma = float(np.sqrt(OVERLAP * 2 / information))
+        return EpochVarianceFactor(factor, sigma)
 
-def _means(sums: IntervalSums, common: Array) -> _Components:
-    """Return the components of the intervals' means; ``common`` U (g, 3, 3)."""
-    total, u = sums.normal[:, 0, 0], sums.normal[:, 0, :N_MOVED]
-    return _Components(
-        sums.right[:, 0] ** 2 / total, np.einsum("gi,gij,gj->g", u, common, u) / total, sums.surface
+
+def _pairs(sums: IntervalSums, enough: NDArray[np.bool_]) -> tuple[Integers, Integers]:
+    """Return the intervals in the mask (g,) that have a successor, and this successor: their rows (n,) each."""
+    first, second = [], []
+    for surface in np.unique(sums.surface):
+        rows = np.flatnonzero((sums.surface == surface) & enough)
+        record = sums.record[rows]
+        place = np.searchsorted(record, record + 2)
+        found = np.flatnonzero(place < len(rows))
+        step = record[place[found]] - record[found]
+        near = step <= NEAR * np.median(step) if len(step) else np.zeros(0, dtype=bool)
+        first.append(rows[found[near]])
+        second.append(rows[place[found[near]]])
+    none = [np.empty(0, dtype=np.int64)]
+    return np.concatenate(first + none), np.concatenate(second + none)
+
+
+def _mean_differences(sums: IntervalSums, white_covariance: Array) -> _Differences:
+    """Return the differences of the means of successive intervals; ``white_covariance`` U (g, 3, 3)."""
+    total = sums.normal[:, 0, 0]
+    u = sums.normal[:, 0, :N_MOVED] / total[:, None]
+    common = np.einsum("gi,gij,gj->g", u, white_covariance, u)
+    first, second = _pairs(sums, np.ones(len(sums), dtype=bool))
+    own = 1 / total[first] + 1 / total[second]
+    mean = sums.right[:, 0] / total
+    return _Differences(
+        (mean[second] - mean[first]) ** 2 / own, (common[first] + common[second]) / own, sums.surface[first]
     )
 
 
-def _slopes(sums: IntervalSums, common: Array) -> _Components:
-    """Return the components of the slopes of intervals with enough points; ``common`` U (g, 3, 3)."""
-    y, back, determined = _whitened_slopes(sums)
-    by_pose = np.einsum("gik,gij,gjk->gk", back, common[:, 1:, 1:], back)
-    use = determined & (sums.count >= FEWEST)[:, None]
-    return _Components(y[use] ** 2, by_pose[use], np.broadcast_to(sums.surface[:, None], use.shape)[use])
+def _slope_differences(sums: IntervalSums, white_covariance: Array) -> _Differences:
+    """Return the differences of the slopes of successive intervals; ``white_covariance`` U (g, 3, 3)."""
+    C, right = _centred(sums)
+    values, vectors = np.linalg.eigh(C)
+    spread, along = np.maximum(values[:, 1], LEAST_SPREAD), vectors[:, :, 1]
+    along = along * np.where(along[:, :1] + along[:, 1:] < 0, -1.0, 1.0)
+    slope = np.einsum("gi,gi->g", along, right) / spread
+    common = np.einsum("gi,gij,gj->g", along, white_covariance[:, 1:, 1:], along)
+    first, second = _pairs(sums, (sums.count >= FEWEST) & (values[:, 1] > LEAST_SPREAD))
+    alike = np.einsum("ni,ni->n", along[first], along[second])
+    first, second = first[np.abs(alike) > ALIKE], second[np.abs(alike) > ALIKE]
+    sense = np.sign(alike[np.abs(alike) > ALIKE])
+    own = 1 / spread[first] + 1 / spread[second]
+    return _Differences(
+        (sense * slope[second] - slope[first]) ** 2 / own, (common[first] + common[second]) / own, sums.surface[first]
+    )
 
 
-def _whitened_slopes(sums: IntervalSums) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return y (g, 2), zero where undetermined; D⁻¹ e √λ (g, 2, 2), a column for each y; which are determined (g, 2).
+def _centred(sums: IntervalSums) -> tuple[Array, Array]:
+    """Return C = Σ w t tᵀ (g, 2, 2) and Σ w t v (g, 2), t from the interval's centroid."""
+    normal, right = sums.normal[:, :N_MOVED, :N_MOVED], sums.right[:, :N_MOVED]
+    centroid = normal[:, 1:, 0] / normal[:, :1, 0]
+    return normal[:, 1:, 1:] - _outer(centroid, normal[:, 0, 1:]), right[:, 1:] - centroid * right[:, :1]
 
-    The scales are those of Σ w α² and Σ w β², as for the scatter. The eigenvalue of a direction in which the points do
-    not spread is below FLAT.
+
+def _squares_of_slopes(sums: IntervalSums) -> Array:
+    """Return the part (g,) of Σ w v² that the slopes take; a direction in which the points do not spread takes none.
+
+    The scales are those of Σ w α² and Σ w β², as for the scatter.
     """
-    q = sums.normal[:, :N_MOVED, :N_MOVED]
-    beside = q[:, 1:, 0] / q[:, :1, 0]
-    C = q[:, 1:, 1:] - _outer(beside, q[:, 0, 1:])
-    right = sums.right[:, 1:N_MOVED] - beside * sums.right[:, :1]
-    scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", q)[:, 1:], 1e-300))
+    C, right = _centred(sums)
+    scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", sums.normal)[:, 1:N_MOVED], LEAST_SPREAD))
     values, vectors = np.linalg.eigh(C * _outer(scale, scale))
+    along = np.einsum("gik,gi->gk", vectors, right * scale)
     determined = values > FLAT
-    root = np.sqrt(np.where(determined, values, 1.0))
-    y = np.einsum("gik,gi->gk", vectors, right * scale) / root
-    back = vectors / scale[:, :, None] * root[:, None, :]
-    return np.where(determined, y, 0.0), np.where(determined[:, None, :], back, 0.0), determined
+    return np.asarray(np.sum(np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0), axis=1))
 
 
-def _common_covariance(sums: IntervalSums, designs: Array, white: Array) -> Array:
+def _white_covariance(sums: IntervalSums, surfaces: Sequence[ObservedSurface], white: Array) -> Array:
     """Return c K W Kᵀ (g, 3, 3): the covariance of the coefficients of (1, α, β) by white noise of the records."""
+    designs = pose_design(surfaces, np.arange(len(surfaces)))
     by_surface = (designs * white**2) @ np.swapaxes(designs, 1, 2)
     share = sums.share
     return np.asarray(((1 - share) ** 2 + share**2)[:, None, None] * by_surface[sums.surface])

@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise
@@ -87,6 +88,15 @@ def score_check(
     np.divide(found.sum(axis=0), total, out=ratio, where=seen)
     np.divide(total**2, squares, out=dof, where=seen)
     return ScoreCheck(ratio, dof)
+
+
+def largest_ratio(dof: float, level: float) -> float:
+    """Return the value that T with ν = ``dof`` exceeds with the chance ``level``, if the sigma is right.
+
+    >>> round(largest_ratio(10.0, 0.05), 3)  # χ²₁₀ exceeds 18.31 with 5 %
+    1.831
+    """
+    return float(chdtri(dof, level)) / dof
 
 
 def _slots(linearisation: Linearisation, drift: DriftEstimate) -> Iterator[tuple[Linearisation, DriftEstimate]]:
