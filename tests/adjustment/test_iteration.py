@@ -187,11 +187,16 @@ def test_errors_are_as_large_as_the_covariance_says(ins: Ins) -> None:
 
 
 def test_drift_taken_for_granted_would_be_seen() -> None:
-    """The same data with an INS said to be perfect: errors of many sigmas, and a sum of squares that is too large."""
+    """The same data with an INS said to be perfect: errors that chance does not make, too large a sum of squares.
+
+    The white noise that the INS is said not to have is found in the sonar's pings, and their sigmas allow for it.
+    """
     streams, model = made(7, NOISY)
     trusting = adjust_mount(problem(model, QUIET), streams, Adjust(), 5.0)
     e = error_of(trusting)
-    assert e @ np.linalg.solve(trusting.solution.covariance[:6, :6], e) > 100
+    assert e @ np.linalg.solve(trusting.solution.covariance[:6, :6], e) > chi2.isf(1e-12, 6)
+    assert trusting.ping is not None
+    assert np.all(trusting.ping.effects.of_mean > 1.5)
     assert trusting.equations.squares / trusting.redundancy > 1.2
 
 
