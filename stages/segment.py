@@ -1,6 +1,6 @@
 """Find the target in the laser's points, and label the points of both sensors by face."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated
 
@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline.adjustment.ins_drift import drift_model, pose_noise
 from pipeline.adjustment.laser_design import laser_problem, surveyed_displacement
 from pipeline.adjustment.problem import CalibrationProblem, SessionData, designed_surfaces, sonar_problem
-from pipeline.adjustment.provisional import sample_near_target, with_adjusted_sample
+from pipeline.adjustment.provisional import design_without_place, sample_near_target, with_adjusted_sample
 from pipeline.artefacts.catalogue.points import (
     GEOREFERENCE_COUNTS,
     INS_SIGMAS,
@@ -144,6 +144,7 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
         trajectory=trajectory,
         corrected=trajectory,
         laser=laser,
+        laser_beam_m=config.laser.beam_m,
         mbes=config.mbes,
         settings=config.segment,
     )
@@ -161,7 +162,8 @@ def provisional_problem(context: LabellingContext, noise: PoseNoise, config: Con
         as_built=config.as_built,
     )
     if config.mbes is not None:
-        return sonar_problem(session, mount, {"laser": laser, "mbes": config.mbes})
+        problem = sonar_problem(session, mount, {"laser": laser, "mbes": config.mbes})
+        return replace(problem, prior=replace(problem.prior, surfaces=design_without_place(context.model)))
     assert config.laser_fit is not None
     set_up = surveyed_displacement(context.target.frame, context.target.azimuth_correction_rad)
     return laser_problem(session, mount, laser, config.laser_fit, set_up)

@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
+from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
+from pipeline.maths.adjustment.interval_sums import IntervalSums
+from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
-from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
@@ -81,7 +82,8 @@ class MountAdjustment:
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
     sonar or a solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount: the mount
-    parameters that had to be fixed, each with the sigma that it would have had (rad or m).
+    parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the values and
+    the noise of the final solution.
     """
 
     state: State
@@ -95,6 +97,12 @@ class MountAdjustment:
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
+    last: Iterate
+    noise: PoseNoise
+
+    def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
+        """Return the normal equations of all parameters, with the prior information, from a part of the sums."""
+        return self.last.of(sums).equations(self.noise)
 
     @property
     def values(self) -> CurrentValues:
@@ -181,49 +189,16 @@ def adjust_mount(
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
+        last=last,
+        noise=noise,
     )
-
-
-@dataclass(frozen=True)
-class _Iterate:
-    """Current values, and the interval sums linearised at them."""
-
-    linearisation: Linearisation
-    drift: DriftEstimate
-    surfaces: SurfacePrior | None
-
-    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
-        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
-        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
-        if self.surfaces is None:
-            return equations
-        prior = self.surfaces.pseudo_observations(state)
-        places = np.arange(state.size) if selected is None else selected
-        return replace(
-            equations,
-            normal=equations.normal + prior.normal[np.ix_(places, places)],
-            right=equations.right + prior.right[places],
-            squares=equations.squares + prior.squares,
-        )
-
-    def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
-        """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
-        state = self.linearisation.state
-        equations = self.equations(noise, estimated)
-        solution = solve(equations.normal, equations.right, range(len(estimated)))
-        step, drift_step = np.zeros(state.size), equations.knots(solution.step)
-        step[estimated] = solution.step
-        sums = updated_sums(self.linearisation, step, DriftEstimate(self.drift.knots, drift_step))
-        drift = self.drift.updated(drift_step)
-        linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
-        return _Iterate(linearisation, drift, self.surfaces), solution
 
 
 @dataclass(frozen=True)
 class _WeightedIteration:
     """The iteration after its last reading of the points; ``deficient``: the data leave directions open."""
 
-    last: _Iterate
+    last: Iterate
     estimated: Integers
     fixed_mount: Mapping[int, float]
     weighting: Weighting
@@ -246,7 +221,7 @@ def _weighted_iteration(
         # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
-        start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
+        start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
             normal = start.equations(prior.noise).normal

@@ -8,12 +8,10 @@ import pandas as pd
 
 from pipeline.adjustment.accumulation import GroupStatistics
 from pipeline.adjustment.iteration import MountAdjustment
-from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.catalogue.results import GROUPS
-from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.robust_weights import robust_scale
 from pipeline.maths.adjustment.score_check import score_check
-from pipeline.maths.adjustment.weighting import PRIOR_DOF, Scatter, noise_seen_by_laser, scatter
+from pipeline.maths.adjustment.weighting import PRIOR_DOF, Scatter, scatter
 from pipeline.maths.mount_parameters import N_MOUNT
 
 COMMON_ERROR = {"laser": "ins_white", "mbes": "ping"}  # name of the error that an interval's points have in common
@@ -69,14 +67,13 @@ def _row(name: str, sensor: str, members: Sequence[Member]) -> dict[str, Any]:
 
 
 
-def sigma_check(problem: CalibrationProblem, adjustment: MountAdjustment) -> pd.DataFrame:
+def sigma_check(adjustment: MountAdjustment) -> pd.DataFrame:
     """Return columns of table ``estimate``, by unknown: the check of the sigmas by the scatter of slots of time."""
     state, solution, columns = adjustment.state, adjustment.solution, ["slots_ratio", "slots_dof"]
-    if solution.deficiency or not adjustment.epoch_factors:
+    if solution.deficiency:
         return pd.DataFrame(columns=columns, dtype=np.float64)
-    linearisation = Linearisation(adjustment.accumulation.sums, state, problem.model.body, adjustment.drift)
-    noise = noise_seen_by_laser(problem.prior.noise, adjustment.epoch_factors["laser"])
-    prior = None if problem.prior.surfaces is None else problem.prior.surfaces.pseudo_observations(state)
-    check = score_check(linearisation, adjustment.drift, noise, prior, solution.estimated)
+    last = adjustment.last
+    prior = None if last.surfaces is None else last.surfaces.pseudo_observations(state)
+    check = score_check(last.linearisation, last.drift, adjustment.noise, prior, solution.estimated)
     names = [state.names[number] for number in solution.estimated if number < N_MOUNT]
     return pd.DataFrame(np.column_stack([check.ratio, check.dof]), index=names, columns=columns)

@@ -56,7 +56,7 @@ def result_tables(
     t_ns = problem.model.body.trajectory.t_ns
     estimate, random, total = _estimate(problem, adjustment)
     return {
-        "estimate": estimate.join(sigma_check(problem, adjustment), on="unknown"),
+        "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
         "freed": _single_parameter_table(adjustment, problem.consider.sigmas, estimate),
         "groups": groups_table(adjustment),

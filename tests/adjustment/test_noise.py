@@ -39,9 +39,8 @@ def with_errors_of_ranges(seed: int, errors: Noise | None) -> tuple[MountAdjustm
         t_ns, face = part.columns["t_ns"], part.columns["face"]
         further = errors(np.random.default_rng(seed), t_ns, face) / np.linalg.norm(x, axis=1)
         streams["mbes"] = Stream((MemoryPart("m", columns(t_ns, face, x * (1 + further)[:, None], "mbes_m")),))
-    given = problem(model, QUIET)
-    found = adjust_mount(given, streams, Adjust(), 5.0)
-    return found, sigma_check(given, found)
+    found = adjust_mount(problem(model, QUIET), streams, Adjust(), 5.0)
+    return found, sigma_check(found)
 
 
 @pytest.fixture(scope="module")
@@ -104,5 +103,4 @@ def test_without_a_solution_there_is_no_check() -> None:
         (part,) = stream.parts
         wall = part.columns["face"] == 1
         streams[name] = Stream((MemoryPart(part.name, {k: v[wall] for k, v in part.columns.items()}),))
-    given = problem(model, QUIET)
-    assert sigma_check(given, adjust_mount(given, streams, Adjust(), 5.0)).empty
+    assert sigma_check(adjust_mount(problem(model, QUIET), streams, Adjust(), 5.0)).empty
