@@ -11,8 +11,8 @@ from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.noise_tables import groups_table, sigma_check
 from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.pool import Adjust
-from tests.adjustment.test_iteration import QUIET, columns, error_of, made, problem
 from tests.support.effort import often
+from tests.support.forward_points import QUIET, columns, error_of, made, problem
 
 REPEATS = often(8, 60)
 SLANTED = (0, 2)  # faces P1 and P3
