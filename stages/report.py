@@ -28,6 +28,7 @@ from pipeline.report.drift_check import NO_DRIFT, check_ins_drift
 from pipeline.report.evidence import Evidence
 from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
+from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.part_checks import parts_block
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sensor_report import SensorReport
@@ -93,6 +94,9 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     warnings = [
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
         *unexpected_noise(inputs.groups),
+        *uneven_noise(inputs.groups),
+        *correlated_beams(inputs.groups),
+        *sigmas_too_small(inputs.estimate, config.adjust.test_level),
         *target_off_origin(target),
         *(check for check in [drift_check] if check is not None and check not in (NO_DRIFT, *reasons)),
         *report.pass_warnings,

@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
+from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.interval_sums import IntervalSums
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
+from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step
 from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
-from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
@@ -79,9 +80,10 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
-    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the
-    values and the noise of the final solution.
+    white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
+    sonar or a solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount: the mount
+    parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the values and
+    the noise of the final solution.
     """
 
     state: State
@@ -89,12 +91,13 @@ class MountAdjustment:
     weighting: Weighting
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
+    ping: PingNoise | None
     equations: NormalEquations
     solution: Solution
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
-    last: "_Iterate"
+    last: Iterate
     noise: PoseNoise
 
     def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
@@ -108,12 +111,13 @@ class MountAdjustment:
 
     @property
     def redundancy(self) -> float:
-        """Sum of the robust weights, less the number of estimated parameters.
+        """Expectation of the sum of squares: the observations with a weight, less the number of estimated parameters.
 
-        Pose errors do not count: each has one pseudo-observation.
+        An observation counts as the part of its variance that robust weights leave. Pose errors do not count: each has
+        one pseudo-observation.
         """
-        observations = sum(group.weights for group in self.accumulation.groups.values())
-        return observations - len(self.solution.estimated)
+        observations = sum(group.count - group.cut for group in self.accumulation.groups.values())
+        return self.weighting.kept * observations - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
@@ -121,7 +125,8 @@ class MountAdjustment:
 
         They show how well intervals, passes and sensors agree.
         """
-        parts = [scatter(sums, np.ones(len(sums), dtype=bool)) for sums in self.accumulation.sums.values()]
+        kept = self.weighting.kept
+        parts = [scatter(sums, np.ones(len(sums), dtype=bool), kept) for sums in self.accumulation.sums.values()]
         within = sum(part.squares for part in parts), sum(part.dof for part in parts)
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
@@ -149,6 +154,7 @@ def adjust_mount(
         A longer time (s) without observations interrupts the knots of the drift.
     """
     noise = problem.prior.noise
+    ping: PingNoise | None = None
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
     last, estimated = weighted.last, weighted.estimated
     factors: dict[str, EpochVarianceFactor] = {}
@@ -157,6 +163,11 @@ def adjust_mount(
         # take the INS's white noise from the laser's points; further steps have the last weights
         surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
         factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
+        if "mbes" in sums_by_sensor:  # a part of the sonar's noise is common to a ping
+            ping = ping_noise(sums_by_sensor["mbes"], surfaces, noise.white, factors["laser"])
+            soundings = with_ping_noise(sums_by_sensor["mbes"], ping, surfaces, noise.white)
+            last = replace(last, linearisation=last.linearisation.with_sums("mbes", soundings))
+            factors["mbes"] = ping.epoch
         noise = noise_seen_by_laser(noise, factors["laser"])
         for _ in range(CLOSING_STEPS):
             last, solution = last.stepped(noise, estimated)
@@ -172,6 +183,7 @@ def adjust_mount(
         weighting=weighted.weighting,
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
+        ping=ping,
         equations=equations,
         solution=solution,
         fixed_mount=weighted.fixed_mount,
@@ -183,49 +195,10 @@ def adjust_mount(
 
 
 @dataclass(frozen=True)
-class _Iterate:
-    """Current values, and the interval sums linearised at them."""
-
-    linearisation: Linearisation
-    drift: DriftEstimate
-    surfaces: SurfacePrior | None
-
-    def of(self, sums: Mapping[str, IntervalSums]) -> "_Iterate":
-        """Return the same values for other sums, linearised at them."""
-        return replace(self, linearisation=replace(self.linearisation, sums=sums))
-
-    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
-        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
-        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
-        if self.surfaces is None:
-            return equations
-        prior = self.surfaces.pseudo_observations(state)
-        places = np.arange(state.size) if selected is None else selected
-        return replace(
-            equations,
-            normal=equations.normal + prior.normal[np.ix_(places, places)],
-            right=equations.right + prior.right[places],
-            squares=equations.squares + prior.squares,
-        )
-
-    def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
-        """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
-        state = self.linearisation.state
-        equations = self.equations(noise, estimated)
-        solution = solve(equations.normal, equations.right, range(len(estimated)))
-        step, drift_step = np.zeros(state.size), equations.knots(solution.step)
-        step[estimated] = solution.step
-        sums = updated_sums(self.linearisation, step, DriftEstimate(self.drift.knots, drift_step))
-        drift = self.drift.updated(drift_step)
-        linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
-        return _Iterate(linearisation, drift, self.surfaces), solution
-
-
-@dataclass(frozen=True)
 class _WeightedIteration:
     """The iteration after its last reading of the points; ``deficient``: the data leave directions open."""
 
-    last: _Iterate
+    last: Iterate
     estimated: Integers
     fixed_mount: Mapping[int, float]
     weighting: Weighting
@@ -245,10 +218,10 @@ def _weighted_iteration(
     estimated = np.array(estimated_columns(state, settings.free))
     fixed: dict[int, float] = {}
     for iteration in range(1, settings.max_iterations + 1):
-        # read all points, and take the variance factors of the groups from their scatter
+        # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
-        start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
+        start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
             normal = start.equations(prior.noise).normal
@@ -261,7 +234,7 @@ def _weighted_iteration(
         if deficient or (settled and iteration >= LEAST_PASSES):
             break
         # from the next reading on reduce the weights of outliers; scales come from residuals without the drift
-        scales = {**weighting.scales, **(accumulation.robust_scales() if iteration > 1 else {})}
+        scales = accumulation.robust_scales(len(state.surfaces)) if iteration > 1 else weighting.scales
         weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
     return _WeightedIteration(

@@ -20,7 +20,7 @@ from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
 from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
-from pipeline.maths.adjustment.weighting import Weighting, group_of
+from pipeline.maths.adjustment.weighting import Weighting
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -89,18 +89,18 @@ class LinearisedBatch:
 class Observations:
     """Observations of one batch (n,), ordered by surface and time, so that the points of an interval lie together.
 
-    points: columns of the points; record: INS record before each point; share: place of the point between this record
-    and the next, from 0 to 1; surface, group: number of its surface and of its group; v_m: distance from the surface
-    less mean_m, the mean of the noise; sigma_m: sigma of the sensor's noise in v; common_m: sigma of the INS's white
-    noise, common to the interval; features (F, n) and slopes (F - 1, n): see
+    sensor: the one that observed; points: columns of the points; record: INS record before each point; share: place of
+    the point between this record and the next, from 0 to 1; surface: number of its surface; v_m: distance from the
+    surface less mean_m, the mean of the noise; sigma_m: sigma of the sensor's noise in v; common_m: sigma of the INS's
+    white noise, common to the interval; features (F, n) and slopes (F - 1, n): see
     :mod:`pipeline.maths.adjustment.design_matrix`.
     """
 
+    sensor: str
     points: Batch
     record: Integers
     share: Array
     surface: Integers
-    group: Integers
     v_m: Array
     mean_m: Array
     sigma_m: Array
@@ -168,14 +168,13 @@ class ObservationModel:
             turn = on_surface.intervals.spread(on_surface.axes @ turns[:, place])
             features[1, rows] += turn[1] * r[2] - turn[2] * r[1]  # turn × r
             features[2, rows] += turn[2] * r[0] - turn[0] * r[2]
-        group = np.array([group_of(sensor, plane.level) for plane in state.surfaces])[surface]
-        mean *= values.weighting.factors_of(group)
+        mean *= values.weighting.factors_of(sensor, surface)
         return Observations(
+            sensor=sensor,
             points=points,
             record=record,
             share=share,
             surface=surface,
-            group=group,
             v_m=v - mean,
             mean_m=mean,
             sigma_m=sigma,

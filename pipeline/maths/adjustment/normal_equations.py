@@ -21,7 +21,7 @@ Order: points -> sums by interval (:mod:`~pipeline.maths.adjustment.interval_sum
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,10 @@ class Linearisation:
     state: State
     body: BodyMotion
     drift: DriftEstimate | None = None
+
+    def with_sums(self, sensor: str, sums: IntervalSums) -> "Linearisation":
+        """Return this linearisation with other sums of one sensor."""
+        return replace(self, sums={**self.sums, sensor: sums})
 
     def by_surface(self, selected: Integers | None = None) -> Iterator["SurfaceIntervals"]:
         """Yield each sensor's intervals, surface by surface; ``selected``: the parameters (ascending) of the design."""

@@ -29,7 +29,7 @@ from pipeline.results.pages.mount_tables import METHODS, correlation_rows, metho
 from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_rows
 from pipeline.results.pages.plots import picture_names
 from pipeline.results.pages.rendering import render_page
-from pipeline.results.pages.sigma_sources import sigma_source_rows
+from pipeline.results.pages.sigma_sources import sigma_source_rows, slot_checks
 from pipeline.run import manifest
 from pipeline.run.results import PAGE, Tables, agreeing, calibration
 from pipeline.run.settings import Settings, read_settings
@@ -116,6 +116,7 @@ def _result_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "planes": planes,
         "several_planes": list(dict.fromkeys(row["plane"] for row in planes if np.isnan(row["angle_deg"]))),
         "sigma_sources": list(sigma_source_rows(tables.table(FREED), tables.table(ESTIMATE), settings.session)),
+        "slot_checks": slot_checks(tables.table(ESTIMATE)),
         "as_built": as_built_rows(result["target"]["as_found"], design_shape(target_of(settings.pool.target))),
         "correlations": correlation_rows(result),
     }

@@ -83,17 +83,17 @@ def test_the_scatter_is_the_sensors_noise_alone(on_a_line: bool, aside: float) -
     v = np.einsum("ni,in->n", turns[record], q) + noise
     q[2] += aside * noise
     sums = sums_of(record, rng.uniform(size=n), np.zeros(n, dtype=int), q, sigma**-2, v)
-    found = scatter(sums, np.ones(len(sums), dtype=bool))
+    found = scatter(sums, np.ones(len(sums), dtype=bool), 1.0)
     assert found.dof == epochs * (each - (2 if on_a_line else 3))
     assert abs(found.factor / factor - 1) < 4 * np.sqrt(2 / found.dof)
-    again = scatter(rescaled(sums, {0: found.factor}), np.ones(len(sums), dtype=bool))
+    again = scatter(rescaled(sums, np.array([found.factor])), np.ones(len(sums), dtype=bool), 1.0)
     assert again.factor == pytest.approx(1.0)
 
 
 def test_epochs_of_few_points_tell_no_scatter() -> None:
     q = np.vstack([np.ones(10), np.arange(10.0), np.arange(10.0) ** 2])
     sums = sums_of(np.repeat([3, 4], 5), np.zeros(10), np.zeros(10, dtype=int), q, np.ones(10), np.arange(10.0))
-    found = scatter(sums, np.ones(2, dtype=bool))
+    found = scatter(sums, np.ones(2, dtype=bool), 1.0)
     assert (found.dof, found.factor) == (0.0, 1.0)
 
 
