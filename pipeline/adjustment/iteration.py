@@ -43,7 +43,7 @@ class StepLimits:
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
 SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step another reading would hardly change the weights
 NEAR_RAD_M = 1e-3  # rad and m: a smaller step ends the initial steps
-LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for the scale of the residuals
+LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for their scale and the white noise
 CLOSING_STEPS = 3  # largest number of steps after the last reading, with its weights
 INITIAL_STEPS = 10  # largest number of steps to bring the soundings near the surfaces
 
@@ -123,8 +123,7 @@ def adjust_mount(
     converged = False
     if not weighted.deficient:
         # take the INS's white noise from the laser's points; further steps have the last weights
-        surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
-        factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
+        factors = last.epoch_factors(noise)
         noise = noise_seen_by_laser(noise, factors["laser"])
         for _ in range(CLOSING_STEPS):
             last, solution = last.stepped(noise, estimated)
@@ -182,6 +181,11 @@ class _Iterate:
         linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
         return _Iterate(linearisation, drift, self.surfaces), solution
 
+    def epoch_factors(self, noise: PoseNoise) -> dict[str, EpochVarianceFactor]:
+        """Return the variance factor of the common error of an interval's points, by sensor."""
+        linearisation = self.linearisation
+        return epoch_variance_factors(linearisation.sums, linearisation.state.surfaces, noise.white)
+
 
 @dataclass(frozen=True)
 class _WeightedIteration:
@@ -203,7 +207,7 @@ def _weighted_iteration(
     """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior
     state = _initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
-    values = CurrentValues(state)
+    values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free))
     fixed: dict[int, float] = {}
     for iteration in range(1, settings.max_iterations + 1):
@@ -217,14 +221,17 @@ def _weighted_iteration(
             fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
             estimated = np.setdiff1d(estimated, np.array(list(fixed), dtype=np.int64))
         # solve and step
-        stepped, solution = start.stepped(prior.noise, estimated)
+        stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0
         settled = weighting.robust is not None and _is_small(solution, estimated, SETTLED)
         if deficient or (settled and iteration >= LEAST_PASSES):
             break
-        # from the next reading on reduce the weights of outliers; scales come from residuals without the drift
-        scales = {**weighting.scales, **(accumulation.robust_scales() if iteration > 1 else {})}
-        weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
+        # from the next reading on reduce the weights of outliers
+        weighting = replace(weighting, robust=(settings.robust_k0, settings.robust_k1))
+        if iteration > 1:  # scales and the INS's white noise come from residuals without the drift and outliers
+            scales, factors = accumulation.robust_scales(), stepped.epoch_factors(prior.noise)
+            white = noise_seen_by_laser(prior.noise, factors["laser"]).white
+            weighting = replace(weighting, scales={**weighting.scales, **scales}, white=white)
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
     return _WeightedIteration(
         last=start if deficient else stepped,

@@ -131,7 +131,6 @@ def observation_model(session: SessionData, state: State, sigmas: Mapping[str, S
         surface_of_face=np.array([number[face.family] for face in faces]),
         height_of_face=np.array([face.offset_m + face.sense * as_built.get(face.name, 0.0) for face in faces]),
         coarse=state,
-        white_m=session.ins.white.position_m,
         sigmas=sigmas,
     )
 
