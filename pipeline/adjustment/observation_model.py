@@ -168,7 +168,7 @@ class ObservationModel:
             turn = on_surface.intervals.spread(on_surface.axes @ turns[:, place])
             features[1, rows] += turn[1] * r[2] - turn[2] * r[1]  # turn × r
             features[2, rows] += turn[2] * r[0] - turn[0] * r[2]
-            derivatives = features[:N_MOVED, rows].T @ by_pose[number]
+            derivatives = by_pose[number].T @ features[:N_MOVED, rows]
             common[rows] = common_variance(derivatives, share[rows], values.weighting.white)
         group = np.array([group_of(sensor, plane.level) for plane in state.surfaces])[surface]
         mean *= values.weighting.factors_of(group)

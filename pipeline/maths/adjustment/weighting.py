@@ -133,14 +133,14 @@ def common_variance(by_pose: Array, share: Array, white: Array) -> Array:
 
     Parameters
     ----------
-    by_pose : (n, 6) array
+    by_pose : (6, n) array
         Derivatives q · K of v by the pose error.
     share : (n,) array
         Places s, from 0 to 1.
     white : (6,) array
         Standard deviations of a record's noise, m and rad.
     """
-    return np.asarray(((1 - share) ** 2 + share**2) * np.sum((by_pose * white) ** 2, axis=1))
+    return np.asarray(((1 - share) ** 2 + share**2) * (white**2 @ by_pose**2))
 
 
 def epoch_variance_factor(sums: IntervalSums, pose_designs: Array, white: Array) -> EpochVarianceFactor:
@@ -156,7 +156,7 @@ def epoch_variance_factor(sums: IntervalSums, pose_designs: Array, white: Array)
         Standard deviations of a record's white noise, m and rad.
     """
     information = sums.normal[:, 0, 0]
-    by_pose = np.einsum("gi,gij->gj", sums.normal[:, 0, :N_MOVED] / information[:, None], pose_designs[sums.surface])
+    by_pose = np.einsum("gi,gij->jg", sums.normal[:, 0, :N_MOVED] / information[:, None], pose_designs[sums.surface])
     c = common_variance(by_pose, sums.share, white)
     own, squared = 1 / information, (sums.right[:, 0] / information) ** 2
     factor, weight = 1.0, 0.0

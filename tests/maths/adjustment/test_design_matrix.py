@@ -86,7 +86,7 @@ def test_the_common_variance_is_the_scatter_of_points_under_noisy_records() -> N
     sooner, later = white * rng.normal(size=(2, 100_000, 6))
     for one, K in zip(SURFACES, pose_design(SURFACES, np.arange(4)), strict=True):
         q = np.vstack([np.ones(4), one.tangents @ r.T])
-        found = common_variance(q.T @ K, shares, white)
+        found = common_variance(K.T @ q, shares, white)
         for place, s, variance in zip(r, shares, found, strict=True):
             pose = (1 - s) * sooner + s * later
             moved = (pose[:, :3] + np.cross(pose[:, 3:], place)) @ one.normal
