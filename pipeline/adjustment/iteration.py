@@ -2,17 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
+from pipeline.adjustment.initial_mount import initial_mount
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
-from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
+from pipeline.maths.adjustment.interval_sums import IntervalSums
+from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations, updated_sums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
 from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
@@ -31,6 +33,30 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+class IterationSettings(Protocol):
+    """Settings of the iteration."""
+
+    @property
+    def free(self) -> Sequence[str]:
+        """Names of the additional parameters to estimate."""
+        ...
+
+    @property
+    def max_iterations(self) -> int:
+        """Largest number of readings of the points."""
+        ...
+
+    @property
+    def robust_k0(self) -> float:
+        """Largest normalised residual with full weight."""
+        ...
+
+    @property
+    def robust_k1(self) -> float:
+        """Largest normalised residual with any weight."""
+        ...
+
+
 @dataclass(frozen=True)
 class StepLimits:
     """Bounds of a small step of a mount parameter: a share of its sigma, or a value in rad or m if that is larger."""
@@ -42,10 +68,8 @@ class StepLimits:
 
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
 SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step another reading would hardly change the weights
-NEAR_RAD_M = 1e-3  # rad and m: a smaller step ends the initial steps
 LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for their scale and the white noise
 CLOSING_STEPS = 3  # largest number of steps after the last reading, with its weights
-INITIAL_STEPS = 10  # largest number of steps to bring the soundings near the surfaces
 
 
 @dataclass(frozen=True)
@@ -55,7 +79,8 @@ class MountAdjustment:
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
-    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
+    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the
+    values and the noise of the final solution.
     """
 
     state: State
@@ -68,6 +93,12 @@ class MountAdjustment:
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
+    last: "_Iterate"
+    noise: PoseNoise
+
+    def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
+        """Return the normal equations of all parameters, with the prior information, from a part of the sums."""
+        return self.last.of(sums).equations(self.noise)
 
     @property
     def values(self) -> CurrentValues:
@@ -101,7 +132,7 @@ def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]
 
 
 def adjust_mount(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> MountAdjustment:
     """Return the result of the iteration from the coarse mount to the solution.
 
@@ -111,7 +142,7 @@ def adjust_mount(
         Model, prior information and consider errors of the calibration.
     streams : mapping of Stream
         Labelled points by sensor.
-    settings : Adjust
+    settings : IterationSettings
         Limits of the iteration, robust weights, additional parameters to estimate.
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
@@ -144,6 +175,8 @@ def adjust_mount(
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
+        last=last,
+        noise=noise,
     )
 
 
@@ -154,6 +187,10 @@ class _Iterate:
     linearisation: Linearisation
     drift: DriftEstimate
     surfaces: SurfacePrior | None
+
+    def of(self, sums: Mapping[str, IntervalSums]) -> "_Iterate":
+        """Return the same values for other sums, linearised at them."""
+        return replace(self, linearisation=replace(self.linearisation, sums=sums))
 
     def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
         """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
@@ -202,11 +239,11 @@ class _WeightedIteration:
 
 
 def _weighted_iteration(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> _WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior
-    state = _initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
+    state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free))
     fixed: dict[int, float] = {}
@@ -243,18 +280,6 @@ def _weighted_iteration(
         deficient=deficient,
         iterations=iteration,
     )
-
-
-def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
-    """Return the state after steps of the coarse mount alone, which bring the soundings near the surfaces."""
-    state = model.coarse
-    for _ in range(INITIAL_STEPS):
-        sums = accumulate({"mbes": soundings}, model, CurrentValues(state)).sums
-        step = mount_step(Linearisation(sums, state, model.body))
-        state = state.updated(step)
-        if np.max(np.abs(step)) < NEAR_RAD_M:
-            break
-    return state
 
 
 def _zero_drift(accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float) -> DriftEstimate:
