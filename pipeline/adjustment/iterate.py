@@ -12,6 +12,7 @@ from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equ
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
 from pipeline.maths.adjustment.solution import Solution, solve
+from pipeline.maths.adjustment.weighting import EpochVarianceFactor, epoch_variance_factors
 
 Integers = NDArray[np.int64]
 
@@ -53,3 +54,8 @@ class Iterate:
         drift = self.drift.updated(drift_step)
         linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
         return Iterate(linearisation, drift, self.surfaces), solution
+
+    def epoch_factors(self, noise: PoseNoise) -> dict[str, EpochVarianceFactor]:
+        """Return the variance factor of the common error of an interval's points, by sensor."""
+        linearisation = self.linearisation
+        return epoch_variance_factors(linearisation.sums, linearisation.state.surfaces, noise.white)

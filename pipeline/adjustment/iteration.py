@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
+from pipeline.adjustment.initial_mount import initial_mount
 from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.interval_sums import IntervalSums
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step
+from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
@@ -23,7 +24,6 @@ from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
     Scatter,
     Weighting,
-    epoch_variance_factors,
     noise_seen_by_laser,
     scatter,
 )
@@ -68,10 +68,8 @@ class StepLimits:
 
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
 SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step another reading would hardly change the weights
-NEAR_RAD_M = 1e-3  # rad and m: a smaller step ends the initial steps
-LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for the scale of the residuals
+LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for their scale and the white noise
 CLOSING_STEPS = 3  # largest number of steps after the last reading, with its weights
-INITIAL_STEPS = 10  # largest number of steps to bring the soundings near the surfaces
 
 
 @dataclass(frozen=True)
@@ -161,12 +159,12 @@ def adjust_mount(
     converged = False
     if not weighted.deficient:
         # take the INS's white noise from the laser's points; further steps have the last weights
-        surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
-        factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
-        if "mbes" in sums_by_sensor:  # a part of the sonar's noise is common to a ping
-            ping = ping_noise(sums_by_sensor["mbes"], surfaces, noise.white, factors["laser"])
-            soundings = with_ping_noise(sums_by_sensor["mbes"], ping, surfaces, noise.white)
-            last = replace(last, linearisation=last.linearisation.with_sums("mbes", soundings))
+        factors = last.epoch_factors(noise)
+        if "mbes" in streams:  # a part of the sonar's noise is common to a ping
+            soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
+            ping = ping_noise(soundings, surfaces, noise.white, factors["laser"])
+            with_pings = with_ping_noise(soundings, ping, surfaces, noise.white)
+            last = replace(last, linearisation=last.linearisation.with_sums("mbes", with_pings))
             factors["mbes"] = ping.epoch
         noise = noise_seen_by_laser(noise, factors["laser"])
         for _ in range(CLOSING_STEPS):
@@ -213,8 +211,8 @@ def _weighted_iteration(
 ) -> _WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior
-    state = _initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
-    values = CurrentValues(state)
+    state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
+    values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free))
     fixed: dict[int, float] = {}
     for iteration in range(1, settings.max_iterations + 1):
@@ -228,14 +226,17 @@ def _weighted_iteration(
             fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
             estimated = np.setdiff1d(estimated, np.array(list(fixed), dtype=np.int64))
         # solve and step
-        stepped, solution = start.stepped(prior.noise, estimated)
+        stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0
         settled = weighting.robust is not None and _is_small(solution, estimated, SETTLED)
         if deficient or (settled and iteration >= LEAST_PASSES):
             break
-        # from the next reading on reduce the weights of outliers; scales come from residuals without the drift
-        scales = accumulation.robust_scales(len(state.surfaces)) if iteration > 1 else weighting.scales
-        weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
+        # from the next reading on reduce the weights of outliers
+        weighting = replace(weighting, robust=(settings.robust_k0, settings.robust_k1))
+        if iteration > 1:  # scales and the INS's white noise come from residuals without the drift and outliers
+            scales, factors = accumulation.robust_scales(len(state.surfaces)), stepped.epoch_factors(prior.noise)
+            white = noise_seen_by_laser(prior.noise, factors["laser"]).white
+            weighting = replace(weighting, scales=scales, white=white)
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
     return _WeightedIteration(
         last=start if deficient else stepped,
@@ -247,18 +248,6 @@ def _weighted_iteration(
         deficient=deficient,
         iterations=iteration,
     )
-
-
-def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
-    """Return the state after steps of the coarse mount alone, which bring the soundings near the surfaces."""
-    state = model.coarse
-    for _ in range(INITIAL_STEPS):
-        sums = accumulate({"mbes": soundings}, model, CurrentValues(state)).sums
-        step = mount_step(Linearisation(sums, state, model.body))
-        state = state.updated(step)
-        if np.max(np.abs(step)) < NEAR_RAD_M:
-            break
-    return state
 
 
 def _zero_drift(accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float) -> DriftEstimate:

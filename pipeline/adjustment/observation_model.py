@@ -13,6 +13,7 @@ from pipeline.maths.adjustment.design_matrix import (
     SensorSigmas,
     SoundingsOnSurface,
     laser_point_design,
+    pose_design,
     sensor_noise,
     sonar_point_design,
 )
@@ -20,7 +21,7 @@ from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
 from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
-from pipeline.maths.adjustment.weighting import Weighting
+from pipeline.maths.adjustment.weighting import Weighting, common_variance
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -120,15 +121,13 @@ class ObservationModel:
 
     body: motion of the body, target frame; surface_of_face (f,): number of each face's surface; height_of_face (f,) m:
     distance of each face from its surface, along the normal; coarse: the state from which the adjustment starts;
-    white_m: sigma of the white noise of the INS's positions, common to all points of an interval; sigmas: standard
-    deviations of each sensor that observes.
+    sigmas: standard deviations of each sensor that observes.
     """
 
     body: BodyMotion
     surface_of_face: Integers
     height_of_face: Array
     coarse: State
-    white_m: float
     sigmas: Mapping[str, SensorSigmas]
 
     def linearise(self, sensor: str, batch: Batch, values: CurrentValues) -> Observations:
@@ -147,8 +146,9 @@ class ObservationModel:
         points, surface = self._ordered(batch)
         record, share = self.body.trajectory.interval_of(points["t_ns"])
         n, n_features = len(surface), N_FEATURES[sensor]
-        v, mean, sigma = np.empty((3, n))
+        v, mean, sigma, common = np.empty((4, n))  # common: a variance
         features, slopes = np.empty((n_features, n)), np.empty((n_features - 1, n))
+        by_pose = pose_design(state.surfaces, np.arange(len(state.surfaces)))
         errors = self._pose_errors(values.drift, record)
         turns = errors.error[:, 3:].T
         shifts = residual_shift(state, sensor, self.body, errors, n_features)  # (r, s, F)
@@ -168,6 +168,8 @@ class ObservationModel:
             turn = on_surface.intervals.spread(on_surface.axes @ turns[:, place])
             features[1, rows] += turn[1] * r[2] - turn[2] * r[1]  # turn × r
             features[2, rows] += turn[2] * r[0] - turn[0] * r[2]
+            derivatives = by_pose[number].T @ features[:N_MOVED, rows]
+            common[rows] = common_variance(derivatives, share[rows], values.weighting.white)
         mean *= values.weighting.factors_of(sensor, surface)
         return Observations(
             sensor=sensor,
@@ -178,7 +180,7 @@ class ObservationModel:
             v_m=v - mean,
             mean_m=mean,
             sigma_m=sigma,
-            common_m=self.white_m * np.sqrt((1 - share) ** 2 + share**2),
+            common_m=np.sqrt(common),
             features=features,
             slopes=slopes,
         )

@@ -88,8 +88,8 @@ class SessionData:
     """Data of a session, as the functional model and the prior information need them.
 
     target: the design; surfaces: the surface of each family, at which the adjustment starts; trajectory: recorded
-    poses, target frame; laser_lever_arm_m (3,), body axes; noise, white_m: errors of the poses, and the sigma of the
-    white noise of a position; as_built: the target as surveyed.
+    poses, target frame; laser_lever_arm_m (3,), body axes; noise: errors of the poses; as_built: the target as
+    surveyed.
     """
 
     target: TargetModel
@@ -142,7 +142,6 @@ def problem_at(
         surface_of_face=np.array([number[face.family] for face in faces]),
         height_of_face=np.array([face.offset_m + face.sense * as_built.get(face.name, 0.0) for face in faces]),
         coarse=state,
-        white_m=float(session.noise.white[0]),
         sigmas={sensor: sensor_sigmas(settings) for sensor, settings in noise.items()},
     )
     return CalibrationProblem(model, prior, ConsiderErrors(np.zeros(state.size)))

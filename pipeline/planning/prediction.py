@@ -94,7 +94,6 @@ def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSu
         surface_of_face=np.array([families[face.family] for face in faces]),
         height_of_face=np.array([face.offset_m for face in faces]),
         coarse=setting.state,
-        white_m=setting.ins.white.position_m,
         sigmas={"laser": sensor_sigmas(setting.laser), "mbes": sensor_sigmas(setting.mbes)},
     )
     caster = ClosestSurface(setting.model)

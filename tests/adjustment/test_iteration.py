@@ -9,7 +9,7 @@ from pipeline.adjustment.iteration import adjust_mount, estimated_columns
 from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.mount import MountSigma
 from pipeline.config.pool import Adjust, AsBuilt
-from pipeline.config.session import Drift, Ins
+from pipeline.config.session import Drift, Ins, White
 from pipeline.maths.adjustment.solution import ConsiderErrors, single_parameter_tests, solve
 from tests.support.effort import often
 from tests.support.forward_points import (
@@ -86,6 +86,17 @@ def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str
     assert e @ np.linalg.solve(found.solution.covariance[:6, :6], e) < chi2.ppf(0.999, 6)
     wrong = error_of(held)
     assert wrong @ np.linalg.solve(held.solution.covariance[:6, :6], wrong) > 100
+
+
+@pytest.mark.parametrize(("true_m", "stated_m"), [(0.0, 0.002), (0.004, 0.001)])
+def test_a_wrong_figure_of_the_white_noise_changes_nothing(true_m: float, stated_m: float) -> None:
+    """The laser's points show how large it is; weights, design and covariance follow them. (The drift is free.)"""
+    true, stated = (NOISY.model_copy(update={"white": White(position_m=m, attitude_deg=0)}) for m in (true_m, stated_m))
+    streams, model = made(1, true)
+    expected, found = (adjust_mount(problem(model, ins), streams, Adjust(), 5.0) for ins in (true, stated))
+    sigma, sigma_found = (np.sqrt(np.diag(one.solution.covariance))[:6] for one in (expected, found))
+    np.testing.assert_array_less(np.abs(error_of(found) - error_of(expected)), 0.1 * sigma)  # it is known to 0.2 mm
+    np.testing.assert_allclose(sigma_found, sigma, rtol=0.02)
 
 
 def test_what_is_considered_adds_what_it_would_move() -> None:

@@ -93,8 +93,8 @@ def made(
         ranges = distance / slant
         return rays * np.where((ranges > 1.5) & (ranges < 14) & (np.abs(slant) > 0.09), ranges, np.nan)[:, None]
 
-    moment = moments(40, 250)
-    face = np.repeat(rng.choice([0, 1, 2, 4], 250, p=[0.2, 0.5, 0.2, 0.1]), 40)
+    moment = moments(25, 400)
+    face = np.repeat(rng.choice([0, 1, 2, 4], 400, p=[0.2, 0.5, 0.2, 0.1]), 25)
     away, up = np.radians([rng.uniform(-25, 25, len(moment)), rng.uniform(-25, 25, len(moment))])
     x = met(moment, face, Rotation.from_euler("ZY", np.column_stack([away, up])).apply([1, 0, 0]), LASER_LEVER, R_LASER)
     moment, face, x = (values[np.isfinite(x[:, 0])] for values in (moment, face, x))
@@ -128,7 +128,6 @@ def made(
         np.array([numbers[family] for family, *_ in FACES]),
         np.array([height for *_, height in FACES]),
         State.at(coarse @ R_TRUE, LEVER_TRUE + np.array([0.2, -0.25, 0.22]), surfaces),
-        ins.white.position_m,
         {"laser": sensor_sigmas(LASER), "mbes": sensor_sigmas(MBES)},
     )
     return {"laser": Stream((MemoryPart("l", laser),)), "mbes": Stream((MemoryPart("m", mbes),))}, model

@@ -17,7 +17,8 @@ m = Σ w v / Σ w. For an interval with q̄ = Σ w q / Σ w, K its design of pos
     E m² = 1 / Σ w + f c,     c = ((1 - s)² + s²) q̄ᵀ K W Kᵀ q̄,
 
 so that f follows by regression with the weights of maximum likelihood, c / (1 / Σ w + f c)². The regression is done
-twice, first with f = 1. The laser's f is the ratio of the INS's white noise to its value in the session. The sonar's f
+twice, first with f = 1. The laser's f is the ratio of the INS's white noise to its value in the session. It goes into
+the normal equations and into the design (:func:`pipeline.maths.adjustment.design_matrix.sensor_noise`). The sonar's f
 also contains the errors that all beams of a ping share: an unsteady clock, or beams stabilised by another attitude than
 the INS's.
 """
@@ -32,7 +33,7 @@ from numpy.typing import NDArray
 from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
 from pipeline.maths.adjustment.parameters import ObservedSurface
-from pipeline.maths.adjustment.pose_errors import PoseNoise
+from pipeline.maths.adjustment.pose_errors import N_POSE, PoseNoise
 from pipeline.maths.adjustment.robust_weights import igg3_weights, variance_kept
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ Integers = NDArray[np.int64]
 FEWEST = 6  # smallest number of points of an interval that is used
 FLAT = 1e-5  # an eigenvalue of the scaled sums below this counts as zero: 3 mm aside of a line, seen from a metre
 PRIOR_DOF = 8.0  # degrees of freedom that what is known of other families counts as, beside a family's own
-SURE, UNLIKELY = 0.1, 100.0  # sigma below which the white noise's factor is applied; largest factor, and its inverse
+SURE, UNLIKELY = 0.1, 100.0  # sigma, as a share of a factor above 1, below which the white noise's is applied; largest
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,24 @@ class EpochVarianceFactor:
     sigma: float
 
 
+def common_variance(by_pose: Array, share: Array, white: Array) -> Array:
+    """Return the variance (n,) m² of the records' white noise in v. Points of an interval have this noise in common.
+
+    At the place s between two records the pose error is e = (1 - s) w_k + s w_{k+1}, with covariance ((1 - s)² + s²) W.
+    It changes v by q · K e.
+
+    Parameters
+    ----------
+    by_pose : (6, n) array
+        Derivatives q · K of v by the pose error.
+    share : (n,) array
+        Places s, from 0 to 1.
+    white : (6,) array
+        Standard deviations of a record's noise, m and rad.
+    """
+    return np.asarray(((1 - share) ** 2 + share**2) * (white**2 @ by_pose**2))
+
+
 def epoch_variance_factor(sums: IntervalSums, pose_designs: Array, white: Array) -> EpochVarianceFactor:
     """Return the variance factor of the common error of an interval's points.
 
@@ -135,9 +154,8 @@ def epoch_variance_factor(sums: IntervalSums, pose_designs: Array, white: Array)
         Standard deviations of a record's white noise, m and rad.
     """
     information = sums.normal[:, 0, 0]
-    by_pose = np.einsum("gi,gij->gj", sums.normal[:, 0, :N_MOVED] / information[:, None], pose_designs[sums.surface])
-    share = sums.share
-    c = ((1 - share) ** 2 + share**2) * np.sum((by_pose * white) ** 2, axis=1)
+    by_pose = np.einsum("gi,gij->jg", sums.normal[:, 0, :N_MOVED] / information[:, None], pose_designs[sums.surface])
+    c = common_variance(by_pose, sums.share, white)
     own, squared = 1 / information, (sums.right[:, 0] / information) ** 2
     factor, weight = 1.0, 0.0
     for _ in range(2):
@@ -168,10 +186,12 @@ def epoch_variance_factors(
 
 
 def noise_seen_by_laser(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
-    """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE)."""
-    if laser.sigma < SURE:
-        return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY), 1.0)
-    return noise
+    """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE).
+
+    The factor may be zero. (Without any white noise its estimate is negative as often as not.)
+    """
+    is_sure = laser.sigma < SURE * max(laser.factor, 1.0)
+    return noise.scaled(min(max(laser.factor, 0.0), UNLIKELY), 1.0) if is_sure else noise
 
 
 class Residuals(Protocol):
@@ -207,15 +227,17 @@ class Residuals(Protocol):
 class Weighting:
     """Variance factors f and robust scales (s,) by sensor and surface, and the bounds of IGG III.
 
-    A sensor without factors or scales has 1 for all surfaces. Bounds None: no weight is reduced. Residuals are
-    normalised by sqrt(f σ² + c²), c being the INS's white noise common to the points of an interval. Without c, points
-    at grazing incidence (σ = 1 mm) would be rejected because of the INS's 2 mm. In a trial they were rejected, and the
-    sigmas of the result came out 3 % too small.
+    white (6,): standard deviations of the white noise of the INS's records, m and rad. A sensor without factors or
+    scales has 1 for all surfaces. Bounds None: no weight is reduced. Residuals are normalised by sqrt(f σ² + c²), c
+    being the INS's white noise common to the points of an interval. Without c, points at grazing incidence (σ = 1 mm)
+    would be rejected because of the INS's 2 mm. In a trial they were rejected, and the sigmas of the result came out
+    3 % too small.
     """
 
     factors: Mapping[str, Array] = field(default_factory=dict)
     scales: Mapping[str, Array] = field(default_factory=dict)
     robust: tuple[float, float] | None = None
+    white: Array = field(default_factory=lambda: np.zeros(N_POSE))
 
     @property
     def kept(self) -> float:

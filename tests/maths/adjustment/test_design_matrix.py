@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
 from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, ObservedSurface, State
+from pipeline.maths.adjustment.weighting import common_variance
 from pipeline.maths.geometry.rotations import exp_so3
 
 STEP = 1e-6
@@ -75,6 +76,21 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     for k in range(6):
         unit = np.eye(6)[k]
         np.testing.assert_allclose(q[:3].T @ K[:, k], slope(lambda h, unit=unit: (state, h * unit)), atol=2e-8)
+
+
+def test_the_common_variance_is_the_scatter_of_points_under_noisy_records() -> None:
+    """Poses in error by a mean of two records' noise, each component with a sigma of its own."""
+    rng = np.random.default_rng(4)
+    white = np.array([0.001, 0.003, 0.002, 4e-4, 2e-4, 6e-4])
+    r, shares = 5 * rng.normal(size=(4, 3)), np.array([0.0, 0.3, 0.5, 1.0])
+    sooner, later = white * rng.normal(size=(2, 100_000, 6))
+    for one, K in zip(SURFACES, pose_design(SURFACES, np.arange(4)), strict=True):
+        q = np.vstack([np.ones(4), one.tangents @ r.T])
+        found = common_variance(K.T @ q, shares, white)
+        for place, s, variance in zip(r, shares, found, strict=True):
+            pose = (1 - s) * sooner + s * later
+            moved = (pose[:, :3] + np.cross(pose[:, 3:], place)) @ one.normal
+            assert variance == pytest.approx(np.var(moved), rel=0.024)
 
 
 def test_a_state_moves_each_unknown_by_its_name() -> None:
