@@ -13,9 +13,56 @@ import numpy as np
 import pandas as pd
 
 SIGNIFICANT = 4.0  # sigmas: by chance one of 16 000 parameters, so one of 400 sessions with forty parameters each
-UNITS = {"mbes_latency": "s", "laser_latency": "s", "sound_speed": "1"}
+UNITS = {"sound_speed": "1"} | dict.fromkeys(("mbes_latency", "laser_latency"), "s")
+UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence"), "m")
 AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
 FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
+WORDS = {  # by parameter: scale and unit of its estimate, and the words round it
+    "mbes_latency": (1e3, "ms", "the sonar's clock: its latency is {} more than mbes.latency_s says"),
+    "laser_latency": (1e3, "ms", "the laser's clock: its latency is {} more than laser.latency_s says"),
+    "mbes_range": (1e3, "mm", "the sonar's ranges: they should be {} longer"),
+    "laser_range": (1e3, "mm", "the laser's ranges: they should be {} longer"),
+    "mbes_incidence": (
+        1e3,
+        "mm",
+        "the sonar's ranges go with the angle at which it sees a face: at 45° they should be {} longer, against a face "
+        "seen at right angles (at 75° seven times as much): its bottom detection, or what coats the faces",
+    ),
+    "laser_incidence": (
+        1e3,
+        "mm",
+        "the laser's ranges go with the angle at which it sees a face: at 45° they should be {} longer, against a face "
+        "seen at right angles (at 75° seven times as much): faces that are glazed, wet or dark",
+    ),
+    "mbes_level_range": (
+        1e3,
+        "mm",
+        "the sonar's ranges on horizontal faces: they should be {} longer; what it hears there may be the corner with "
+        "the wall behind, and not the face",
+    ),
+    "sound_speed": (
+        1e2,
+        "%",
+        "the sound speed: it is {} above that recorded, or given as mbes.sound_speed_m_s or mbes.svp; measure it at "
+        "the head",
+    ),
+    "steering_speed": (
+        1e2,
+        "%",
+        "the sound speed at the arrays, which steers the beams: it is {} above that of the water before them; measure "
+        "it at the head, and look for warm water there",
+    ),
+    "sound_speed_gradient": (
+        1.0,
+        "m/s",
+        "a sound speed that changes with depth, by {} per metre: take a (better) cast",
+    ),
+}
+PLACES = {  # of the transmitter by component: where it sits if the estimate is positive, and if it is negative
+    "projector_x": ("farther to starboard", "farther to port"),
+    "projector_y": ("farther forward", "farther aft"),
+    "projector_z": ("higher", "lower"),
+}
 
 
 @dataclass(frozen=True)
@@ -78,20 +125,17 @@ def _is_significant(row: Mapping[Any, Any]) -> bool:
 def _words(row: Mapping[Any, Any]) -> str:
     """Return in words the estimate of one parameter, and the setting or device to check."""
     name, value, sigma = str(row["unknown"]), float(row["value"]), float(row["sigma"])
-    sensor = "laser" if name.startswith("laser") else "mbes"
-    owner = {"laser": "the laser's", "mbes": "the sonar's"}[sensor]
-    if name.endswith("_latency"):
-        size = _size(1e3 * value, 1e3 * sigma, "ms")
-        return f"{owner} clock: its latency is {size} more than {sensor}.latency_s says"
-    if name == "sound_speed":
+    if name in WORDS:
+        scale, unit, words = WORDS[name]
+        return words.format(_size(scale * value, scale * sigma, unit))
+    if name in PLACES:
+        farther = PLACES[name][int(value < 0)]
+        size = _size(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
         return (
-            f"the sound speed: it is {_size(100 * value, 100 * sigma, '%')} above that recorded, or given as "
-            "mbes.sound_speed_m_s or mbes.svp; measure it at the head"
+            f"the transmitter's place: it sits {size} {farther} from the receiver than mbes.projector_offset_m says "
+            "(null: at the receiver; frame mbes): measure it at the head, or find out to which point the head reduces "
+            "its ranges"
         )
-    if name == "sound_speed_gradient":
-        return f"a sound speed that changes with depth, by {_size(value, sigma, 'm/s')} per metre: take a (better) cast"
-    if name.endswith("_range"):
-        return f"{owner} ranges: they should be {_size(1e3 * value, 1e3 * sigma, 'mm')} longer"
     if name.startswith("laser_rotation"):
         angle = _size(np.degrees(value), np.degrees(sigma), "°")
         return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
