@@ -1,8 +1,10 @@
 """Suspected causes (fixed parameters that the residuals contradict), and the parameters that adjust.free names.
 
-Table ``freed`` has the single-parameter test of each fixed parameter. A parameter is a suspected cause if its estimate
-is farther from zero than noise and its a-priori sigma explain. One error often moves the estimates of several
-parameters. The report names the cause that explains most, with the largest value over sigma.
+Table ``freed`` has the single-parameter test of each fixed parameter. The residuals contradict a parameter if its
+estimate is farther from zero than noise and its a-priori sigma explain. One error often moves the estimates of several
+parameters. The report names the cause that explains most, with the largest value over sigma. Where one parameter is
+contradicted, this may be another that is not: a parameter with a large a-priori sigma, which explains the residuals
+without being off its setting.
 """
 
 from collections.abc import Mapping
@@ -94,11 +96,17 @@ class EstimatedParameter:
 
 
 def suspected_causes(freed: pd.DataFrame) -> list[SuspectedCause]:
-    """Return the suspected causes from table ``freed``, the one with the largest value over sigma first."""
+    """Return the suspected causes from table ``freed``, the one with the largest value over sigma first.
+
+    There are none unless the residuals contradict at least one fixed parameter.
+    """
+    fixed = freed[~freed["estimated"]].to_dict("records")
+    if not any(_is_significant(row) for row in fixed):
+        return []
     causes = [
         SuspectedCause(_words(row), abs(row["value"]) / row["sigma"])
-        for row in freed[~freed["estimated"]].to_dict("records")
-        if _is_significant(row)
+        for row in fixed
+        if abs(row["value"]) > SIGNIFICANT * row["sigma"]
     ]
     return sorted(causes, key=lambda cause: -cause.normalised)
 
@@ -132,9 +140,8 @@ def _words(row: Mapping[Any, Any]) -> str:
         farther = PLACES[name][int(value < 0)]
         size = _size(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
         return (
-            f"the transmitter's place: it sits {size} {farther} from the receiver than mbes.projector_offset_m says "
-            "(null: at the receiver; frame mbes): measure it at the head, or find out to which point the head reduces "
-            "its ranges"
+            f"the transmitter sits {size} {farther} than mbes.projector_offset_m says (null: where the receiver is), "
+            "in the sonar's own axes: measure it at the head, or find out to which point the head reduces its ranges"
         )
     if name.startswith("laser_rotation"):
         angle = _size(np.degrees(value), np.degrees(sigma), "°")

@@ -120,12 +120,12 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"freed": {"unknown": "projector_z", "value": 0.119, "sigma": 0.0017}},
         ReasonCode.SUSPECTED_CAUSE,
-        "the transmitter's place: it sits 119 ± 2 mm higher from the receiver than mbes.projector_offset_m says",
+        "the transmitter sits 119 ± 2 mm higher than mbes.projector_offset_m says (null: where the receiver is), in",
     ),
     (
         {"freed": {"unknown": "projector_x", "value": -0.0204, "sigma": 0.0008}},
         ReasonCode.SUSPECTED_CAUSE,
-        "it sits 20.4 ± 0.8 mm farther to port from the receiver than",
+        "the transmitter sits 20.4 ± 0.8 mm farther to port than",
     ),
     (
         {"freed": {"unknown": "mbes_incidence", "value": -0.01, "sigma": 3e-4}},
