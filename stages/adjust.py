@@ -3,15 +3,23 @@
 The sonar is calibrated against the surfaces that the laser measures, or the laser against the target's design.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
+import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.ins_drift import drift_model
+from pipeline.adjustment.consider import sonar_errors
+from pipeline.adjustment.ins_drift import drift_model, pose_noise
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
-from pipeline.adjustment.laser_design import fixed_parameters_table, laser_problem
-from pipeline.adjustment.problem import SessionData, sonar_problem
+from pipeline.adjustment.laser_design import (
+    fixed_parameters_table,
+    laser_consider,
+    laser_problem,
+    surveyed_displacement,
+)
+from pipeline.adjustment.parts import parts_table
+from pipeline.adjustment.problem import CalibrationProblem, SessionData, sonar_problem, surfaces_of_laser
 from pipeline.adjustment.residual_statistics import ResidualStatistics, residual_statistics
 from pipeline.adjustment.residual_tables import bins_table, map_table
 from pipeline.adjustment.result_tables import result_tables
@@ -25,6 +33,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GEOMETRY,
     GROUPS,
+    PARTS,
     PATTERNS,
     RESIDUAL_BINS,
     RESIDUAL_MAP,
@@ -32,11 +41,13 @@ from pipeline.artefacts.catalogue.results import (
     SURFACES,
 )
 from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.artefacts.from_tables import target_frame, trajectory_in_target
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
-from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.config.session import Drift, Ins, Laser, Mbes
 from pipeline.config.stage_settings import LaserCalibration
 from pipeline.config.target import Target
+from pipeline.mount import mount_of
 from pipeline.planning.session_geometry import geometry_table, sailed_plan
 from pipeline.planning.setting import PredictionSetting
 from pipeline.target.design import target_of
@@ -91,6 +102,7 @@ class Outputs:
     groups: Annotated[pd.DataFrame, GROUPS]
     cells: Annotated[pd.DataFrame, CELLS]
     summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+    parts: Annotated[pd.DataFrame, PARTS]
     patterns: Annotated[pd.DataFrame, PATTERNS]
     residuals: Annotated[pd.DataFrame, RESIDUALS]
     residual_bins: Annotated[pd.DataFrame, RESIDUAL_BINS]
@@ -100,10 +112,8 @@ class Outputs:
 def run(inputs: Inputs, config: Config) -> Outputs:
     """Adjust the mount of the sensor that is calibrated."""
     # Set up the problem of the sensor that is calibrated.
-    calibration, session = config.calibration, session_data(inputs, config)
-    problem = (
-        sonar_problem(session, calibration) if isinstance(calibration, Mbes) else laser_problem(session, calibration)
-    )
+    drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
+    problem = calibration_problem(session_data(inputs, config, drift), inputs, config)
 
     # Adjust the mount to all labelled points of the sensors that take part.
     labelled = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
@@ -114,7 +124,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     statistics = residual_statistics(problem, adjustment, points, inputs.passes, config.adjust)
     return Outputs(
         **result_tables(problem, adjustment, statistics, inputs.passes, config.adjust.test_level),
-        geometry=weak_geometry(inputs, config, session, adjustment, statistics),
+        geometry=weak_geometry(inputs, config, drift, adjustment, statistics),
+        parts=parts_table(problem, adjustment, inputs.passes),
         patterns=statistics.patterns,
         residuals=statistics.residuals,
         residual_bins=bins_table(statistics.residuals, inputs.faces),
@@ -122,22 +133,36 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     )
 
 
-def session_data(inputs: Inputs, config: Config) -> SessionData:
-    """Return the results of earlier stages and the instruments, with the drift model for the adjustment."""
-    drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
+def session_data(inputs: Inputs, config: Config, drift: Drift) -> SessionData:
+    """Return the target, its surfaces as the laser sees them, the poses, and their errors with this drift."""
+    target = target_of(config.target)
     return SessionData(
-        target=target_of(config.target),
-        poses=inputs.poses,
-        target_pose=inputs.target_pose,
-        planes=inputs.planes,
-        ins=config.ins.model_copy(update={"drift": drift}),
-        laser=config.laser,
+        target=target,
+        surfaces=surfaces_of_laser(target, inputs.planes),
+        trajectory=trajectory_in_target(inputs.poses, inputs.target_pose),
+        laser_lever_arm_m=mount_of(config.laser.mount).lever_arm_body_m,
+        noise=pose_noise(drift, config.ins.white),
         as_built=config.as_built,
     )
 
 
+def calibration_problem(session: SessionData, inputs: Inputs, config: Config) -> CalibrationProblem:
+    """Return the problem of the sensor that is calibrated, from its coarse mount, with errors of fixed parameters."""
+    laser, as_built = config.laser, config.as_built
+    if config.mbes is not None:
+        problem = sonar_problem(session, mount_of(config.mbes.mount), {"laser": laser, "mbes": config.mbes})
+        names = problem.model.coarse.names
+        return replace(problem, consider=sonar_errors(names, laser, config.mbes, as_built, session.target.depth_m))
+    calibration = config.calibration
+    assert isinstance(calibration, LaserCalibration)
+    pose = target_frame(inputs.target_pose), float(np.radians(inputs.target_pose["azimuth_correction_deg"].iloc[0]))
+    problem = laser_problem(session, mount_of(laser.mount), laser, calibration, surveyed_displacement(*pose))
+    names = problem.model.coarse.names
+    return replace(problem, consider=laser_consider(names, laser, calibration, as_built))
+
+
 def weak_geometry(
-    inputs: Inputs, config: Config, session: SessionData, adjustment: MountAdjustment, statistics: ResidualStatistics
+    inputs: Inputs, config: Config, drift: Drift, adjustment: MountAdjustment, statistics: ResidualStatistics
 ) -> pd.DataFrame:
     """Return table ``geometry``: the laser's parameters that were fixed, or the weaknesses of the sonar's passes.
 
@@ -145,8 +170,8 @@ def weak_geometry(
     ----------
     inputs, config : Inputs, Config
         The inputs and settings of the stage.
-    session : SessionData
-        Target and instruments.
+    drift : Drift
+        The drift model of the adjustment.
     adjustment : MountAdjustment
         The adjusted values.
     statistics : ResidualStatistics
@@ -158,11 +183,11 @@ def weak_geometry(
     surfaces = enumerate(adjustment.state.surfaces)
     soundings = {surface.family: statistics.count("mbes", number) for number, surface in surfaces}
     setting = PredictionSetting(
-        model=session.target,
+        model=target_of(config.target),
         state=adjustment.state,
         plan=sailed_plan(inputs.files),
         segment=config.segment,
-        ins=session.ins,
+        ins=config.ins.model_copy(update={"drift": drift}),
         laser=config.laser,
         mbes=config.mbes,
     )

@@ -27,6 +27,7 @@ from pipeline.report.drift_check import NO_DRIFT, check_ins_drift
 from pipeline.report.evidence import Evidence
 from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
+from pipeline.report.part_checks import parts_block
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sensor_report import SensorReport
 from pipeline.report.sonar_report import SonarSettings, sonar_report
@@ -107,6 +108,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         **report.result_keys,
         "coarse": {"mount": report.coarse.settings()},
         "geometry": geometry_block(inputs, report.advice, config.adjust.test_level),
+        "parts": parts_block(inputs.parts, config.adjust.test_level),
         "free": free_block(inputs.freed),
         "target": target,
         "passes": passes,

@@ -1,11 +1,24 @@
 """Find the target in the laser's points, and label the points of both sensors by face."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 import pandas as pd
 
-from pipeline.artefacts.catalogue.points import GEOREFERENCE_COUNTS, LASER_POOL, POOL_FRAME, POSES, SOUNDINGS_POOL
+from pipeline.adjustment.ins_drift import drift_model, pose_noise
+from pipeline.adjustment.laser_design import laser_problem, surveyed_displacement
+from pipeline.adjustment.problem import CalibrationProblem, SessionData, designed_surfaces, sonar_problem
+from pipeline.adjustment.provisional import design_without_place, sample_near_target, with_adjusted_sample
+from pipeline.artefacts.catalogue.points import (
+    GEOREFERENCE_COUNTS,
+    INS_SIGMAS,
+    LASER_POOL,
+    PASSES,
+    POOL_FRAME,
+    POSES,
+    SOUNDINGS_POOL,
+)
 from pipeline.artefacts.catalogue.target import (
     FACES,
     LASER_LABELLED,
@@ -19,12 +32,21 @@ from pipeline.artefacts.from_tables import trajectory_in_pool
 from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream
 from pipeline.artefacts.to_tables import faces_table
 from pipeline.config.pool import Segment
-from pipeline.config.stage_settings import SensorMount, SonarBeams
+from pipeline.config.stage_settings import (
+    AdjustIteration,
+    FacesAsBuilt,
+    InsErrors,
+    LaserCalibration,
+    LaserPoints,
+    PassGaps,
+    SonarBeams,
+)
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
+from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.mount import mount_of
 from pipeline.target.design import target_of
-from pipeline.target.labelled_points import LabellingContext, label_calibrated_laser, label_laser, label_soundings
+from pipeline.target.labelled_points import LabellingContext, label_batch
 from pipeline.target.laser_search import refine_target_and_laser
 from pipeline.target.mount_search import search_mount
 from pipeline.target.pose_search import search_target_pose
@@ -37,18 +59,25 @@ FEWEST_VOXELS = 50  # fewest voxels with laser points above the water
 
 @dataclass(frozen=True)
 class Config:
-    """Settings that the stage uses."""
+    """Settings that the stage uses; ``mbes`` is None if the laser is calibrated, ``laser_fit`` if the sonar is."""
 
     target: Target
     segment: Segment
-    laser: SensorMount
-    mbes: SonarBeams | None  # None: the laser is calibrated
+    adjust: AdjustIteration
+    ingest: PassGaps
+    as_built: FacesAsBuilt
+    ins: InsErrors
+    laser: LaserPoints
+    mbes: SonarBeams | None
+    laser_fit: LaserCalibration | None
 
 
 @dataclass(frozen=True)
 class Inputs:
     """Tables and streams that the stage reads."""
 
+    passes: Annotated[pd.DataFrame, PASSES]
+    ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
     pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
     poses: Annotated[pd.DataFrame, POSES]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
@@ -70,6 +99,23 @@ class Outputs:
 
 def prepare(inputs: Inputs, config: Config) -> LabellingContext:
     """Find the target in the laser's points, and the provisional mount of the sensor that is calibrated."""
+    context = search(inputs, config)
+
+    # Adjust a sample of the points: labels need the trajectory without its drift.
+    streams = {"laser_pool": inputs.laser_pool, "soundings_pool": inputs.soundings_pool}
+    counts = {"laser_pool": "laser_points", "soundings_pool": "soundings"}
+    sample = {
+        name: sample_near_target(stream, name, used(inputs.counts, counts[name]), context)
+        for name, stream in streams.items()
+        if stream.parts
+    }
+    drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
+    problem_at = partial(provisional_problem, noise=pose_noise(drift, config.ins.white), config=config)
+    return with_adjusted_sample(context, sample, problem_at, config.adjust, config.ingest.max_gap_s)
+
+
+def search(inputs: Inputs, config: Config) -> LabellingContext:
+    """Search for the target, and for the mount of the sensor that is calibrated."""
     model = target_of(config.target)
     lowest_m = config.target.water_level_m - model.half_period_m / 2
     laser_count = used(inputs.counts, "laser_points")
@@ -82,9 +128,10 @@ def prepare(inputs: Inputs, config: Config) -> LabellingContext:
     azimuth_known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
     target = search_target_pose(dry, model, config.segment, azimuth_known)
     in_pool = trajectory_in_pool(inputs.poses)
+    laser = mount_of(config.laser.mount)
     if config.mbes is None:
         poses = laser_poses(inputs.laser_pool, laser_count, lowest_m, in_pool)
-        target, mount = refine_target_and_laser(poses, target, model, mount_of(config.laser.mount), config.segment)
+        target, mount = refine_target_and_laser(poses, target, model, laser, config.segment)
     trajectory = target.frame.trajectory_from_pool(in_pool)
     if config.mbes is not None:
         soundings = sounding_sample(inputs.soundings_pool, used(inputs.counts, "soundings"), trajectory)
@@ -95,18 +142,36 @@ def prepare(inputs: Inputs, config: Config) -> LabellingContext:
         target=target,
         mount=mount,
         trajectory=trajectory,
+        corrected=trajectory,
+        laser=laser,
+        laser_beam_m=config.laser.beam_m,
+        mbes=config.mbes,
         settings=config.segment,
     )
 
 
+def provisional_problem(context: LabellingContext, noise: PoseNoise, config: Config) -> CalibrationProblem:
+    """Return the calibration problem of the provisional adjustment, which starts from the designed surfaces."""
+    mount, laser = context.provisional_mount, config.laser
+    session = SessionData(
+        target=context.model,
+        surfaces=designed_surfaces(context.model),
+        trajectory=context.trajectory,
+        laser_lever_arm_m=context.laser.lever_arm_body_m,
+        noise=noise,
+        as_built=config.as_built,
+    )
+    if config.mbes is not None:
+        problem = sonar_problem(session, mount, {"laser": laser, "mbes": config.mbes})
+        return replace(problem, prior=replace(problem.prior, surfaces=design_without_place(context.model)))
+    assert config.laser_fit is not None
+    set_up = surveyed_displacement(context.target.frame, context.target.azimuth_correction_rad)
+    return laser_problem(session, mount, laser, config.laser_fit, set_up)
+
+
 def run_batch(source: str, chunk: Chunk, prepared: LabellingContext, config: Config) -> BatchResult:
     """Label the points of one chunk."""
-    if source == "laser_pool":
-        label = label_laser if config.mbes is not None else label_calibrated_laser
-        return label(chunk.columns, prepared, mount_of(config.laser.mount))
-    if config.mbes is None:
-        raise TypeError("soundings without a sonar")
-    return label_soundings(chunk.columns, prepared, mount_of(config.mbes.mount), config.mbes)
+    return label_batch(source, chunk.columns, prepared)
 
 
 def combine(

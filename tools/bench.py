@@ -68,20 +68,26 @@ import resource, sys, time
 from pathlib import Path
 from pipeline.adjustment.accumulation import accumulate
 from pipeline.adjustment.observation_model import CurrentValues
-from pipeline.adjustment.problem import SessionData, sonar_problem
+from pipeline.adjustment.ins_drift import pose_noise
+from pipeline.adjustment.problem import SessionData, sonar_problem, surfaces_of_laser
+from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.maths.adjustment.weighting import Weighting
 from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.target import LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.mount import mount_of
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
 from pipeline.target.design import target_of
 run = Path(sys.argv[1]); tables, settings = Tables(run), read_settings(run)
 pool, session = settings.pool, settings.session
+target, laser, mbes = target_of(pool.target), session.laser, session.mbes
 data = SessionData(
-    target=target_of(pool.target), poses=tables.table(POSES), target_pose=tables.table(TARGET_POSE),
-    planes=tables.table(PLANES), ins=session.ins, laser=session.laser, as_built=pool.as_built,
+    target=target, surfaces=surfaces_of_laser(target, tables.table(PLANES)),
+    trajectory=trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE)),
+    laser_lever_arm_m=mount_of(laser.mount).lever_arm_body_m,
+    noise=pose_noise(session.ins.drift, session.ins.white), as_built=pool.as_built,
 )
-model = sonar_problem(data, session.mbes).model
+model = sonar_problem(data, mount_of(mbes.mount), {"laser": laser, "mbes": mbes}).model
 streams = {"laser": tables.stream(LASER_LABELLED), "mbes": tables.stream(SOUNDINGS_LABELLED)}
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 start = time.perf_counter()

@@ -5,13 +5,13 @@ normal equations.
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.config.session import Drift, Ins
+from pipeline.config.session import Drift, White
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.geometry.passes import pass_of
 
@@ -23,14 +23,28 @@ AXES = {  # a figure of the drift is the root mean square of these columns of in
 }
 
 
-def sigmas_from_files(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:
+class InsErrors(Protocol):
+    """Settings of an INS: the figures of its drift, and whether those of its files take precedence."""
+
+    @property
+    def drift(self) -> Drift:
+        """The figures in session.yaml."""
+        ...
+
+    @property
+    def drift_from(self) -> str:
+        """What takes precedence: "settings" or "files"."""
+        ...
+
+
+def sigmas_from_files(ins: InsErrors, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> dict[str, float]:
     """Return the drift's sigmas from the INS files; empty if session.yaml takes precedence.
 
     They are medians over all records of ins_sigmas that lie in a pass.
 
     Parameters
     ----------
-    ins : Ins
+    ins : InsErrors
         The session's INS; ``drift_from`` decides which figures take precedence.
     ins_sigmas : DataFrame
         Table ins_sigmas.
@@ -51,14 +65,14 @@ def median_sigmas(sigmas: Mapping[str, NDArray[Any]]) -> dict[str, float]:
     return {name: float(np.sqrt(np.median(values))) for name, values in finite.items() if len(values)}
 
 
-def drift_model(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Drift:
+def drift_model(ins: InsErrors, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Drift:
     """Return the drift model: sigmas from the files if available, otherwise from session.yaml.
 
     The time constant is always that of session.yaml.
 
     Parameters
     ----------
-    ins : Ins
+    ins : InsErrors
         The session's INS.
     ins_sigmas : DataFrame
         Table ins_sigmas.
@@ -68,9 +82,8 @@ def drift_model(ins: Ins, ins_sigmas: pd.DataFrame, passes: pd.DataFrame) -> Dri
     return ins.drift.model_copy(update=sigmas_from_files(ins, ins_sigmas, passes))
 
 
-def pose_noise(ins: Ins) -> PoseNoise:
+def pose_noise(drift: Drift, white: White) -> PoseNoise:
     """Return the INS's white noise and drift in the target frame (z is up: a heading error is a turn about z)."""
-    drift, white = ins.drift, ins.white
     angles = np.radians([drift.roll_pitch_deg, drift.roll_pitch_deg, drift.heading_deg])
     return PoseNoise(
         white=np.r_[[white.position_m] * 3, [np.radians(white.attitude_deg)] * 3],

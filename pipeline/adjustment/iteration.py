@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,8 @@ from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighte
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
-from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
@@ -29,6 +30,30 @@ from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+
+class IterationSettings(Protocol):
+    """Settings of the iteration."""
+
+    @property
+    def free(self) -> Sequence[str]:
+        """Names of the additional parameters to estimate."""
+        ...
+
+    @property
+    def max_iterations(self) -> int:
+        """Largest number of readings of the points."""
+        ...
+
+    @property
+    def robust_k0(self) -> float:
+        """Largest normalised residual with full weight."""
+        ...
+
+    @property
+    def robust_k1(self) -> float:
+        """Largest normalised residual with any weight."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -55,7 +80,8 @@ class MountAdjustment:
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
-    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
+    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the
+    values and the noise of the final solution.
     """
 
     state: State
@@ -68,6 +94,12 @@ class MountAdjustment:
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
+    last: "_Iterate"
+    noise: PoseNoise
+
+    def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
+        """Return the normal equations of all parameters, with the prior information, from a part of the sums."""
+        return self.last.of(sums).equations(self.noise)
 
     @property
     def values(self) -> CurrentValues:
@@ -101,7 +133,7 @@ def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]
 
 
 def adjust_mount(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> MountAdjustment:
     """Return the result of the iteration from the coarse mount to the solution.
 
@@ -111,7 +143,7 @@ def adjust_mount(
         Model, prior information and consider errors of the calibration.
     streams : mapping of Stream
         Labelled points by sensor.
-    settings : Adjust
+    settings : IterationSettings
         Limits of the iteration, robust weights, additional parameters to estimate.
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
@@ -145,6 +177,8 @@ def adjust_mount(
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
+        last=last,
+        noise=noise,
     )
 
 
@@ -155,6 +189,10 @@ class _Iterate:
     linearisation: Linearisation
     drift: DriftEstimate
     surfaces: SurfacePrior | None
+
+    def of(self, sums: Mapping[str, IntervalSums]) -> "_Iterate":
+        """Return the same values for other sums, linearised at them."""
+        return replace(self, linearisation=replace(self.linearisation, sums=sums))
 
     def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
         """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
@@ -198,7 +236,7 @@ class _WeightedIteration:
 
 
 def _weighted_iteration(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> _WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior

@@ -1,78 +1,132 @@
 """The calibration of the laser: its points lie on the target's planes, as designed and, if known, as surveyed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import laser_errors
-from pipeline.adjustment.ins_drift import pose_noise
 from pipeline.adjustment.problem import (
     CalibrationProblem,
+    PointNoise,
     PriorInformation,
     SessionData,
-    mount_state,
-    observation_model,
-    sensor_sigmas,
+    designed_planes,
+    problem_at,
 )
-from pipeline.artefacts.from_tables import target_frame
-from pipeline.config.pool import LaserFit
+from pipeline.config.mount import Covariance, MountOrigin
+from pipeline.config.pool import AsBuilt, LaserFit
 from pipeline.config.session import Laser
 from pipeline.config.stage_settings import LaserCalibration
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pseudo_observations import DesignPrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
-from pipeline.maths.target.model import TargetModel
+from pipeline.maths.target.model import TargetFrame, TargetModel
+from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 
 
-def laser_problem(session: SessionData, calibration: LaserCalibration) -> CalibrationProblem:
-    """Return the problem of calibrating the laser against the target's design."""
-    model = observation_model(
-        session, mount_state(session, session.laser, "laser"), {"laser": sensor_sigmas(session.laser)}
-    )
-    coarse = coarse_covariance(session.laser, calibration)
-    design = design_prior(session.target, session.target_pose, calibration)
-    prior = PriorInformation(pose_noise(session.ins), design, required_sigmas(coarse, calibration))
-    # a fixed mount parameter has the error of the coarse mount
-    errors = laser_errors(model.coarse.names, session.laser, session.as_built)
+class CoarseLaser(PointNoise, Protocol):
+    """Settings of a laser that is calibrated: its noise, and what is known of its coarse mount."""
+
+    @property
+    def mount_covariance(self) -> Covariance | None:
+        """Covariance of the mount."""
+        ...
+
+    @property
+    def mount_origin(self) -> MountOrigin | None:
+        """Source of the mount."""
+        ...
+
+
+def laser_problem(
+    session: SessionData, mount: Mounted, laser: CoarseLaser, calibration: LaserCalibration, set_up: Array
+) -> CalibrationProblem:
+    """Return the problem of calibrating the laser against the target's design. No fixed parameter has an error yet.
+
+    Parameters
+    ----------
+    session : SessionData
+        Poses, target and surfaces.
+    mount : Mounted
+        The laser's mount, at which the adjustment starts.
+    laser : CoarseLaser
+        The session's laser.
+    calibration : LaserCalibration
+        Sigmas of the target and of the coarse mount.
+    set_up : (6,) array
+        The surveyed displacement of the target, from :func:`surveyed_displacement`.
+    """
+    state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, session.surfaces, "laser")
+    required = required_sigmas(coarse_covariance(laser, calibration), calibration)
+    prior = PriorInformation(session.noise, design_prior(session.target, set_up, calibration), required)
+    return problem_at(session, state, prior, {"laser": laser})
+
+
+def laser_consider(
+    names: Sequence[str], laser: Laser, calibration: LaserCalibration, as_built: AsBuilt
+) -> ConsiderErrors:
+    """Return the a-priori errors for a calibration of the laser. A fixed mount parameter has the coarse mount's error.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of all parameters.
+    laser : Laser
+        The session's laser.
+    calibration : LaserCalibration
+        Sigmas of the coarse mount.
+    as_built : AsBuilt
+        Sigmas of the wet faces against the dry ones.
+    """
+    coarse, errors = coarse_covariance(laser, calibration), laser_errors(names, laser, as_built)
     sigmas = np.concatenate([np.sqrt(np.diag(coarse)), errors.sigmas[N_MOUNT:]])
-    return CalibrationProblem(model, prior, ConsiderErrors(sigmas, [(np.arange(N_MOUNT), coarse)]))
+    return ConsiderErrors(sigmas, [(np.arange(N_MOUNT), coarse)])
 
 
-def design_prior(target: TargetModel, target_pose: pd.DataFrame, settings: LaserFit) -> DesignPrior:
+def surveyed_displacement(frame: TargetFrame, azimuth_correction_rad: float) -> Array:
+    """Return the displacement (6,) m and rad of the surveyed place from the one that the laser's points gave.
+
+    Parameters
+    ----------
+    frame : TargetFrame
+        Pose of the target in the pool frame.
+    azimuth_correction_rad : float
+        Azimuth of the target minus the surveyed one, clockwise.
+    """
+    return np.array([*frame.shift_m, 0.0, 0.0, azimuth_correction_rad])
+
+
+def design_prior(target: TargetModel, set_up: Array, settings: LaserFit) -> DesignPrior:
     """Return the prior information about the target, in its frame: the design, and the surveyed place if it is known.
 
     Parameters
     ----------
     target : TargetModel
         The design.
-    target_pose : DataFrame
-        Table target_pose: the pose of the target, relative to its configured place.
+    set_up : (6,) array
+        The surveyed displacement of the target.
     settings : LaserFit
         Sigmas of the target's faces and of the survey.
     """
-    planes = {}
-    for family in target.families:
-        corners = [target.faces[k].vertices_m - target.faces[k].offset_m * family.normal for k in family.faces]
-        planes[family.name] = family.normal, np.concatenate(corners).mean(axis=0)
-    pose = target_pose.iloc[0]
-    turned = np.radians(float(pose["azimuth_correction_deg"]))
     place = settings.origin_sigma_m
     heading, plumb = settings.azimuth_sigma_deg, np.radians(settings.plumb_sigma_deg)
     heading_rad = np.inf if heading is None else np.radians(heading)
     return DesignPrior(
-        planes=planes,
+        planes=designed_planes(target),
         turn_rad=float(np.radians(settings.face_sigma_deg)),
         shift_m=settings.face_sigma_m,
-        set_up=np.r_[target_frame(target_pose).shift_m, 0.0, 0.0, turned],
+        set_up=set_up,
         set_up_sigma=np.array([np.inf if place is None else place] * 3 + [plumb, plumb, heading_rad]),
     )
 
 
-def coarse_covariance(laser: Laser, settings: LaserFit) -> Array:
+def coarse_covariance(laser: CoarseLaser, settings: LaserFit) -> Array:
     """Return the covariance (6, 6) of the coarse mount, rad and m: the session's, or by sigmas of the pool's config.
 
     After an earlier calibration of the laser, the session's covariance counts only for the parameters that this

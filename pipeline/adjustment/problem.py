@@ -3,32 +3,58 @@
 This module makes the sonar's problem; :mod:`pipeline.adjustment.laser_design` makes the laser's.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.consider import sonar_errors
-from pipeline.adjustment.ins_drift import pose_noise
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.artefacts.columns import ALL_PASSES
-from pipeline.artefacts.from_tables import laser_planes, trajectory_in_target
-from pipeline.config.pool import AsBuilt
-from pipeline.config.session import Ins, Laser, Mbes
+from pipeline.artefacts.from_tables import laser_planes
 from pipeline.maths.adjustment.design_matrix import SensorSigmas
 from pipeline.maths.adjustment.normal_equations import BodyMotion
-from pipeline.maths.adjustment.parameters import ObservedSurface, Sensor, State
+from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, SurfacePrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
-from pipeline.maths.target.model import Family, TargetModel
-from pipeline.mount import mount_of
+from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.target.model import TargetModel
+from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 LEAST_PARALLEL_RAD = 1e-7  # smallest sigma of the angle between parallel families
+
+
+class PointNoise(Protocol):
+    """Settings of a sensor: standard deviations of its range and of its angle."""
+
+    @property
+    def range_sigma_m(self) -> float:
+        """Standard deviation of a range, m."""
+        ...
+
+    @property
+    def angle_sigma_deg(self) -> float:
+        """Standard deviation of an angle, degrees."""
+        ...
+
+
+class SurveyedFaces(Protocol):
+    """The target as surveyed: deviations of faces from the design, and how parallel its families are."""
+
+    @property
+    def faces(self) -> Mapping[str, float]:
+        """Deviation of a face from the design, m outward, by its name."""
+        ...
+
+    @property
+    def angle_sigma_deg(self) -> float:
+        """Standard deviation of the angle between two parallel families."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -59,97 +85,115 @@ class CalibrationProblem:
 
 @dataclass(frozen=True)
 class SessionData:
-    """Data of a session: the target's design and survey, three tables of earlier stages, and the instruments.
+    """Data of a session, as the functional model and the prior information need them.
 
-    ``ins`` has the drift model for the adjustment.
+    target: the design; surfaces: the surface of each family, at which the adjustment starts; trajectory: recorded
+    poses, target frame; laser_lever_arm_m (3,), body axes; noise, white_m: errors of the poses, and the sigma of the
+    white noise of a position; as_built: the target as surveyed.
     """
 
     target: TargetModel
-    poses: pd.DataFrame
-    target_pose: pd.DataFrame
-    planes: pd.DataFrame
-    ins: Ins
-    laser: Laser
-    as_built: AsBuilt
+    surfaces: Sequence[ObservedSurface]
+    trajectory: Trajectory
+    laser_lever_arm_m: Array
+    noise: PoseNoise
+    as_built: SurveyedFaces
 
 
-def sonar_problem(session: SessionData, mbes: Mbes) -> CalibrationProblem:
-    """Return the problem of calibrating the sonar against the surfaces that the laser sees from the same body."""
-    sigmas = {"laser": sensor_sigmas(session.laser), "mbes": sensor_sigmas(mbes)}
-    model = observation_model(session, mount_state(session, mbes, "mbes"), sigmas)
-    target, names = session.target, model.coarse.names
-    return CalibrationProblem(
-        model,
-        PriorInformation(pose_noise(session.ins), _parallel_families(target, session.as_built)),
-        sonar_errors(names, session.laser, mbes, session.as_built, target.depth_m),
-    )
+def sonar_problem(session: SessionData, mount: Mounted, noise: Mapping[str, PointNoise]) -> CalibrationProblem:
+    """Return the problem of calibrating the sonar against the surfaces that the laser sees from the same body.
 
-
-def mount_state(session: SessionData, sensor: Laser | Mbes, calibrated: Sensor) -> State:
-    """Return the state from which the adjustment starts: the sensor's coarse mount, the laser's planes.
-
-    A family starts as designed if it is horizontal, lies in several planes, or has no plane of the laser.
+    No fixed parameter has an error yet (:func:`pipeline.adjustment.consider.sonar_errors` returns these errors).
 
     Parameters
     ----------
     session : SessionData
-        The target and the laser's planes.
-    sensor : Laser or Mbes
-        Settings of the sensor that is calibrated.
-    calibrated : {"mbes", "laser"}
-        Name of this sensor.
+        Poses, target and surfaces.
+    mount : Mounted
+        The sonar's mount, at which the adjustment starts.
+    noise : mapping of PointNoise
+        Settings of laser and sonar.
     """
-    planes, surfaces = laser_planes(session.planes), []
-    for family in session.target.families:
-        plane = planes.get((ALL_PASSES, family.name)) if family.one_plane and not family.level else None
-        if plane is not None:
-            surfaces.append(ObservedSurface.at(family.name, plane.normal, plane.centroid_m, 0.0))
-        else:
-            surfaces.append(design_surface(session.target, family))
-    mount = mount_of(sensor.mount)
-    return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces, calibrated)
+    state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, session.surfaces, "mbes")
+    prior = PriorInformation(session.noise, _parallel_families(session.target, session.as_built))
+    return problem_at(session, state, prior, noise)
 
 
-def observation_model(session: SessionData, state: State, sigmas: Mapping[str, SensorSigmas]) -> ObservationModel:
-    """Return the observation model of a session.
+def problem_at(
+    session: SessionData, state: State, prior: PriorInformation, noise: Mapping[str, PointNoise]
+) -> CalibrationProblem:
+    """Return the problem that starts from a state, with certain fixed parameters.
 
     Parameters
     ----------
     session : SessionData
-        Poses, target and instruments. A face's height above its surface is the designed height plus the deviation as
-        built.
+        Poses and target. A face's height above its surface is the designed height plus the deviation as built.
     state : State
         The state from which the adjustment starts.
-    sigmas : mapping of SensorSigmas
-        Standard deviations of each sensor that observes.
+    prior : PriorInformation
+        Prior information.
+    noise : mapping of PointNoise
+        Settings of each sensor that observes.
     """
     number = {surface.family: k for k, surface in enumerate(state.surfaces)}
     faces, as_built = session.target.faces, session.as_built.faces
-    trajectory = trajectory_in_target(session.poses, session.target_pose)
-    return ObservationModel(
-        body=BodyMotion.of(trajectory, mount_of(session.laser.mount).lever_arm_body_m),
+    model = ObservationModel(
+        body=BodyMotion.of(session.trajectory, session.laser_lever_arm_m),
         surface_of_face=np.array([number[face.family] for face in faces]),
         height_of_face=np.array([face.offset_m + face.sense * as_built.get(face.name, 0.0) for face in faces]),
         coarse=state,
-        white_m=session.ins.white.position_m,
-        sigmas=sigmas,
+        white_m=float(session.noise.white[0]),
+        sigmas={sensor: sensor_sigmas(settings) for sensor, settings in noise.items()},
+    )
+    return CalibrationProblem(model, prior, ConsiderErrors(np.zeros(state.size)))
+
+
+def surfaces_of_laser(target: TargetModel, planes: pd.DataFrame) -> tuple[ObservedSurface, ...]:
+    """Return the surface of each family from the laser's planes.
+
+    A family is as designed if it is horizontal, lies in several planes, or has no plane of the laser.
+
+    Parameters
+    ----------
+    target : TargetModel
+        The design.
+    planes : DataFrame
+        Table planes.
+    """
+    found = laser_planes(planes)
+    measured = {
+        family.name: found[ALL_PASSES, family.name]
+        for family in target.families
+        if family.one_plane and not family.level and (ALL_PASSES, family.name) in found
+    }
+    return tuple(
+        ObservedSurface.at(surface.family, measured[surface.family].normal, measured[surface.family].centroid_m)
+        if surface.family in measured
+        else surface
+        for surface in designed_surfaces(target)
     )
 
 
-def sensor_sigmas(sensor: Laser | Mbes) -> SensorSigmas:
+def sensor_sigmas(sensor: PointNoise) -> SensorSigmas:
     """Return the standard deviations of a sensor's range and angle."""
     return SensorSigmas(sensor.range_sigma_m, float(np.radians(sensor.angle_sigma_deg)))
 
 
-def design_surface(target: TargetModel, family: Family) -> ObservedSurface:
-    """Return the family's plane as designed. Its centre is the mean of all corners, projected onto the plane."""
-    corners_m = np.concatenate([target.faces[number].vertices_m for number in family.faces])
-    centre = corners_m.mean(axis=0)
-    on_plane = centre - (centre @ family.normal - family.distance_m) * family.normal
-    return ObservedSurface.at(family.name, family.normal, on_plane)
+def designed_surfaces(target: TargetModel) -> tuple[ObservedSurface, ...]:
+    """Return the surface of each family as designed."""
+    return tuple(ObservedSurface.at(family, *plane) for family, plane in designed_planes(target).items())
 
 
-def _parallel_families(target: TargetModel, as_built: AsBuilt) -> ParallelPrior | None:
+def designed_planes(target: TargetModel) -> dict[str, tuple[Array, Array]]:
+    """Return for each family the normal (3,) of its plane, and a point (3,) m of the plane amid its faces."""
+    planes = {}
+    for family in target.families:
+        corners = [target.faces[k].vertices_m - target.faces[k].offset_m * family.normal for k in family.faces]
+        planes[family.name] = family.normal, np.concatenate(corners).mean(axis=0)
+    return planes
+
+
+def _parallel_families(target: TargetModel, as_built: SurveyedFaces) -> ParallelPrior | None:
     """Return the prior information that families are parallel, by the sigma of the angle as built; None if none are."""
     if not target.parallel:
         return None

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 
 from pydantic import BaseModel
 
-from pipeline.config.mount import Mount
+from pipeline.config.mount import Covariance, Mount, MountOrigin
 from pipeline.config.pool import LaserFit, PoolConfig
 from pipeline.config.quantities import Model
-from pipeline.config.session import SessionConfig
+from pipeline.config.session import Drift, SessionConfig, White
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -46,11 +46,53 @@ class SonarPlacement(Model):
 
 
 class SonarBeams(Model):
-    """Settings that determine footprints on the target: the mount, the beams' width, and the sigma of their angles."""
+    """Settings of footprints on the target and of the noise of soundings: the mount, the beams, the sigmas."""
 
     mount: Mount
     beam_deg: tuple[float, float]
     angle_sigma_deg: float
+    range_sigma_m: float
+
+
+class LaserPoints(Model):
+    """Settings of the laser's points: the mount, what is known of it, the sigmas of range and angle, the beam."""
+
+    mount: Mount
+    mount_covariance: Covariance | None
+    mount_origin: MountOrigin | None
+    range_sigma_m: float
+    angle_sigma_deg: float
+    beam_m: float
+
+
+class InsErrors(Model):
+    """The INS's errors: its drift, where the drift's figures come from, and its white noise."""
+
+    drift: Drift
+    drift_from: str
+    white: White
+
+
+class FacesAsBuilt(Model):
+    """The target as surveyed: deviations of its faces from the design, and the sigma of angles between families."""
+
+    faces: dict[str, float]
+    angle_sigma_deg: float
+
+
+class AdjustIteration(Model):
+    """Settings of the adjustment's iteration."""
+
+    free: tuple[str, ...]
+    max_iterations: int
+    robust_k0: float
+    robust_k1: float
+
+
+class PassGaps(Model):
+    """The longest time without observations within a pass."""
+
+    max_gap_s: float
 
 
 class LaserCalibration(LaserFit):

@@ -140,7 +140,7 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
     record = np.unique(np.concatenate([of_sensor.record for of_sensor in sums.values()]))
     if not len(record):
         return np.zeros((setting.state.size, setting.state.size))
-    noise = pose_noise(setting.ins)
+    noise = pose_noise(setting.ins.drift, setting.ins.white)
     drift = DriftEstimate.zero(place_knots(record, body.seconds, noise.spacing_s, PAUSE_S))
     return normal_equations(Linearisation(sums, setting.state, body, drift), drift, noise).normal
 

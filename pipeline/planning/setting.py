@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pipeline.adjustment.problem import design_surface
+from pipeline.adjustment.problem import designed_surfaces
 from pipeline.config.plan import Plan
 from pipeline.config.pool import PoolConfig, Segment
 from pipeline.config.session import Ins, Laser, Mbes, SessionConfig
@@ -49,6 +49,5 @@ def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Predicti
 
 def state_by_design(model: TargetModel, mbes: Mbes) -> State:
     """Return the state with the configured mount and the designed surfaces."""
-    surfaces = [design_surface(model, family) for family in model.families]
     mount = mount_of(mbes.mount)
-    return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, surfaces)
+    return State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, designed_surfaces(model))

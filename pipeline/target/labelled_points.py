@@ -12,10 +12,11 @@ from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.beams import TargetBeams
-from pipeline.maths.target.labelling import Labels, LabelSettings, hidden_in_part, label_points
+from pipeline.maths.target.labelling import Labels, hidden_in_part, label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.near_planes import near_planes
-from pipeline.mount import Mounted
+from pipeline.mount import Mounted, mount_of
+from pipeline.target.label_limits import laser_limits, sonar_limits
 from pipeline.target.search_results import LocatedTarget, ProvisionalMount
 from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
@@ -35,8 +36,12 @@ class LabellingContext:
         The pose of the target.
     mount
         Provisional mount of the sensor that is calibrated.
-    trajectory
-        Poses of the body in the target frame.
+    trajectory, corrected
+        Poses of the body in the target frame, as recorded, and without the drift of the INS as far as it is known.
+    laser, laser_beam_m
+        Coarse mount of the laser, and the diameter of its beam at the target.
+    mbes
+        The sonar's coarse mount and beams; None: the laser is calibrated.
     settings
         Settings of stage segment.
     """
@@ -46,95 +51,80 @@ class LabellingContext:
     target: LocatedTarget
     mount: ProvisionalMount
     trajectory: Trajectory
+    corrected: Trajectory
+    laser: Mounted
+    laser_beam_m: float
+    mbes: SonarBeams | None
     settings: Segment
 
-    def label_settings(self, sensor: str, gate_m: float) -> LabelSettings:
-        """Return the conditions for labelling a point of a sensor ("laser" or "mbes") with a face."""
-        dry = sensor == "laser"
-        level_m, margin_m = self.model.water_level_m, self.settings.water_margin_m
-        return LabelSettings(
-            gate_m=gate_m,
-            margin_m=self.settings.margin_m,
-            min_grazing_rad=np.radians(self.settings.min_grazing_deg),
-            lowest_m=level_m + margin_m if dry else -np.inf,
-            highest_m=np.inf if dry else level_m - margin_m,
-            seen="dry" if dry else "wet",
-        )
+    @property
+    def coarse_mount(self) -> Mounted:
+        """The coarse mount of the sensor that is calibrated."""
+        return self.laser if self.mbes is None else mount_of(self.mbes.mount)
+
+    @property
+    def provisional_mount(self) -> Mounted:
+        """The provisional mount of the sensor that is calibrated."""
+        return self.mount.total(self.coarse_mount)
 
 
-def label_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
-    """Label laser points that stage georeference placed in the pool frame.
+def label_batch(source: str, batch: Batch, context: LabellingContext) -> BatchResult:
+    """Label the points of one batch.
 
-    Parameters
-    ----------
-    batch
-        Laser points in the pool frame.
-    context
-        The target.
-    laser
-        Coarse mount of the laser.
-    """
-    points = context.target.frame.points_from_pool(point_array(batch, "pool_m"))
-    return _label_laser(batch, points, laser.lever_arm_body_m, context)
-
-
-def label_calibrated_laser(batch: Batch, context: LabellingContext, laser: Mounted) -> BatchResult:
-    """Place laser points with the provisional mount, and label them.
+    The corrected poses place the points and their rays for the labels. The stored points have the recorded poses,
+    because the adjustment estimates the drift itself.
 
     Parameters
     ----------
+    source
+        Stream of the points: "laser_pool" or "soundings_pool".
     batch
-        Laser points in the scanner's frame.
+        Points in the frame of their sensor, and in the pool frame.
     context
-        The target and the provisional mount.
-    laser
-        Coarse mount of the laser.
+        Target, mounts and poses.
+
+    Returns
+    -------
+    BatchResult
+        Rows of the stream of labelled points, and the number of points by reason.
     """
-    mount = context.mount.total(laser)
-    body = point_array(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
-    points = context.trajectory.points_from_body(batch["t_ns"], body)
-    return _label_laser(batch, points, mount.lever_arm_body_m, context)
+    if source == "laser_pool":
+        return _label_laser(batch, context)
+    if context.mbes is None:
+        raise TypeError("soundings without a sonar")
+    return _label_soundings(batch, context, context.mbes)
 
 
-def _label_laser(batch: Batch, points: Array, lever_arm_m: Array, context: LabellingContext) -> BatchResult:
+def _label_laser(batch: Batch, context: LabellingContext) -> BatchResult:
     model = context.model
-    settings = context.label_settings("laser", context.target.gate_m)
+    mount = context.laser if context.mbes is not None else context.provisional_mount
+    settings = laser_limits(context.settings, model.water_level_m, context.target.gate_m, context.laser_beam_m)
+    body = point_array(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
+    points = context.corrected.points_from_body(batch["t_ns"], body)
     dry = points[:, 2] > model.water_level_m + context.settings.water_margin_m / 2
     near, planes = near_planes(model, points, settings.gate_m, dry, settings.seen)
     points, t_ns = points[near], batch["t_ns"][near]
-    rays = points - context.trajectory.track_of_point(t_ns, lever_arm_m)
+    rays = points - context.corrected.track_of_point(t_ns, mount.lever_arm_body_m)
     ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
     rays /= ranges[:, None]
     labels = label_points(model, points, TargetBeams(rays, ranges), settings, planes)
     on = np.flatnonzero(labels.face >= 0)
     rows = near[on]
+    placed = context.trajectory.points_from_body(t_ns[on], body[rows])
     columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}
     columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
-    columns |= xyz_columns("{}_target_m", points[on].T)
+    columns |= xyz_columns("{}_target_m", placed.T)
     columns["cos_incidence"] = labels.cos_incidence[on]
     counts = _counts("below or near the water line", dry, "near an edge", near, labels)
     return BatchResult({"laser_labelled": columns}, counts)
 
 
-def label_soundings(batch: Batch, context: LabellingContext, coarse: Mounted, mbes: SonarBeams) -> BatchResult:
-    """Place soundings with the provisional mount, and label them.
-
-    Parameters
-    ----------
-    batch
-        Soundings in the mbes frame.
-    context
-        The target and the provisional mount.
-    coarse
-        Coarse mount of the sonar.
-    mbes
-        The sonar's settings, for its beams.
-    """
-    model, mount, trajectory = context.model, context.mount.total(coarse), context.trajectory
+def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) -> BatchResult:
+    model, mount, trajectory = context.model, context.provisional_mount, context.corrected
     lever_arm_m = mount.lever_arm_body_m
     sensor = point_array(batch, "mbes_m")
     points = trajectory.points_from_body(batch["t_ns"], sensor @ mount.R_body_from_sensor.T + lever_arm_m)
-    settings = context.label_settings("mbes", context.mount.gate_m)
+    settings = sonar_limits(context.settings, model.water_level_m, context.mount.gate_m)
     wet = points[:, 2] < model.water_level_m - context.settings.water_margin_m / 2
     near, planes = near_planes(model, points, settings.gate_m, wet, settings.seen)
     _, R_target_from_body = trajectory.poses_at(batch["t_ns"][near])

@@ -276,5 +276,5 @@ def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
         ["", "", "projector_offset_m", "–", "default"],
         ["", "", "projector_sigma_m", "0.003", "default"],
     ]
-    assert len(shown) == 19
+    assert len(shown) == 20
     assert "<b>\"O'Brien" not in html

@@ -14,16 +14,17 @@ FIRST_STAGE: dict[str, tuple[object, str]] = {  # by key: another value, and the
     "laser.mount": ({"x_m": 0.37}, "georeference"),
     "mbes.beam_deg": ([0.6, 1.1], "segment"),
     "mbes.angle_sigma_deg": (0.07, "segment"),
-    "mbes.range_sigma_m": (0.009, "adjust"),
+    "mbes.range_sigma_m": (0.009, "segment"),
     "mbes.range_bias_sigma_m": (0.003, "adjust"),
     "mbes.projector_sigma_m": (0.004, "adjust"),
     "mbes.sound_speed_sigma_m_s": (0.3, "adjust"),
     "mbes.sound_speed_gradient_sigma_1_s": (0.2, "adjust"),
     "mbes.latency_sigma_s": (0.0006, "adjust"),
-    "laser.range_sigma_m": (0.006, "adjust"),
-    "laser.angle_sigma_deg": (0.004, "adjust"),
+    "laser.range_sigma_m": (0.006, "segment"),
+    "laser.angle_sigma_deg": (0.004, "segment"),
+    "laser.beam_m": (0.02, "segment"),
     "laser.mount_sigma": ({"angle_deg": 0.006}, "adjust"),
-    "ins.white": ({"position_m": 0.003}, "adjust"),
+    "ins.white": ({"position_m": 0.003}, "segment"),
 }
 
 

@@ -42,6 +42,21 @@ GEOMETRY = Artefact(
         Column("sigma", F64, "deg or m", "held: standard deviation that an estimate would have had; else NaN"),
     ),
 )
+PARTS = Artefact(
+    "adjust", "parts", "table", "change of the mount if only a part of the session is used, against the whole",
+    (
+        Column("part", TEXT, "", "without pass n; first half, second half (of the passes); near passes, far passes"),
+        Column("passes", TEXT, "", "numbers of the passes that are used"),
+        Column("normalised", F64, "1", "normal deviate of all changes together"),
+        Column("dof", I64, "1", "number of directions in which the part can differ from the whole"),
+        *(
+            Column(f"{kind}_{name}", F64, "deg" if name in ("roll", "pitch", "yaw") else "m", words)
+            for name in ("roll", "pitch", "yaw", "x", "y", "z")
+            for kind, words in (("change", "value of the part less that of the whole; NaN: the parameter is fixed"),
+                                ("sigma", "standard deviation of the change, with the consider parameters"))
+        ),
+    ),
+)
 DRIFT = Artefact(
     "adjust", "drift", "table", "slow errors of the recorded poses, at knots: to be added to the recorded ones",
     (

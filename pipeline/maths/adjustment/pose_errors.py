@@ -30,6 +30,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.maths.geometry.trajectory import NS_PER_S, Trajectory
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_POSE = 6  # components of a pose error: position x, y, z, turn x, y, z
@@ -120,6 +123,12 @@ class DriftEstimate:
     def updated(self, step: Array) -> "DriftEstimate":
         """Return the drift after a step (k, 6)."""
         return DriftEstimate(self.knots, self.values + step)
+
+    def corrected(self, trajectory: Trajectory) -> Trajectory:
+        """Return a trajectory in the target frame, corrected by the drift: position p + δ, attitude Exp(ω) R."""
+        error = self.at((trajectory.t_ns - trajectory.t_ns[0]) / NS_PER_S)
+        R_target_from_body = exp_so3(error[:, 3:]) @ trajectory.R_frame_from_body
+        return Trajectory.build(trajectory.t_ns, trajectory.positions_m + error[:, :3], R_target_from_body)
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,8 @@ from pipeline.maths.adjustment.parameters import ObservedSurface, State
 
 Array = NDArray[np.float64]
 N_DISPLACEMENT = 6  # d and ω
+REACH_M = 2.0  # distance at which a turn of a surface counts as a shift
+UNDETERMINED = 1e-6  # a singular value below this share of the largest leaves a direction open
 OPEN = 1e-12  # an eigenvalue of the scaled normal matrix of g below this leaves a direction open
 
 
@@ -94,6 +96,26 @@ class DesignPrior:
         return PseudoObservations(
             N - N_xg @ inverse @ N_xg.T, b - N_xg @ inverse @ b_g, squares - float(b_g @ inverse @ b_g)
         )
+
+
+def displacement(surfaces: Sequence[ObservedSurface], planes: Mapping[str, tuple[Array, Array]]) -> Array:
+    """Return the displacement g (6,), m and rad, that brings the designed body onto surfaces, by least squares.
+
+    A turn of a surface counts as its shift at the distance REACH_M. A component that no surface determines is zero.
+
+    Parameters
+    ----------
+    surfaces : sequence of ObservedSurface
+        The surfaces to fit.
+    planes : mapping
+        For each family the normal n0 (3,) and a point q (3,) of its plane, as designed.
+    """
+    weight, rows, right = np.array([REACH_M, REACH_M, 1.0]), [], []
+    for surface in surfaces:
+        r, _, G = _misclosures(surface, *planes[surface.family])
+        rows.append(weight[:, None] * G)
+        right.append(weight * r)
+    return np.asarray(np.linalg.lstsq(np.concatenate(rows), -np.concatenate(right), rcond=UNDETERMINED)[0])
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Tables of the report about the mount parameters: their values, how the methods differ, and their correlations."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from pipeline.maths.mount_parameters import PARAMETERS
 
 Row = Mapping[str, Any]
 STRONG = CORRELATION_LIMIT  # correlations of this size and above are in bold
+STRONG_SIGMAS = 3.0  # changes beyond this many sigmas are in bold
 POSITIVE = {
     "roll": "starboard down", "pitch": "bow up", "yaw": "to port",
     "x": "to starboard", "y": "forward", "z": "up",
@@ -56,6 +57,30 @@ class Quantity:
             return "–"
         number, unit, digits = (self.number, "°", 3) if self.unit == "deg" else (1000 * self.number, "mm", 1)
         return f"{round(number, digits) + 0.0:{sign}.{digits}f} {unit}"
+
+
+def part_rows(parts: Sequence[Row]) -> list[Row]:
+    """Return one row for each part of the session: the change of each mount parameter with its sigma, and the test.
+
+    Parameters
+    ----------
+    parts
+        The block ``parts`` of calibration.json.
+    """
+    rows: list[Row] = []
+    for part in parts:
+        cells = []
+        for _, _, key, unit in PARAMETERS:
+            change, sigma = (np.nan if part[kind][key] is None else part[kind][key] for kind in ("change", "sigma"))
+            cells.append(
+                {
+                    "change": Quantity(change, unit),
+                    "sigma": Quantity(sigma, unit),
+                    "strong": abs(change) > STRONG_SIGMAS * sigma,
+                }
+            )
+        rows.append({"part": part["part"], "cells": cells, "test": part["test"]})
+    return rows
 
 
 def parameter_rows(

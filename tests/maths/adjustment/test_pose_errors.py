@@ -5,11 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.eliminate_drift import eliminate_drift
 from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise, place_knots
+from pipeline.maths.geometry.trajectory import Trajectory
 
 RATE_HZ = 10.0
 UNKNOWNS, SIX, FEATURES, POINTS = 7, 6, 4, 9
@@ -162,3 +164,18 @@ def test_scaled_noise_has_scaled_variances() -> None:
     assert replace(noise, time_constant_s=20.0).spacing_s == 0.05
     scaled = noise.scaled(4.0, 9.0)
     assert (scaled.white[0], scaled.drift[0]) == (4.0, 9.0)
+
+
+def test_a_corrected_trajectory_has_lost_the_drift() -> None:
+    """True poses with an error (δ, ω) of the recorded ones: X -> X + δ + ω × r with r from the body, target frame."""
+    rng = np.random.default_rng(3)
+    t_ns = np.arange(0, 1000, 5, dtype=np.int64) * 1_000_000 + 10**18
+    true_m, turns = rng.normal(size=(200, 3)), Rotation.from_rotvec(0.1 * rng.normal(size=(200, 3)))
+    error = np.array([0.01, -0.02, 0.03, 2e-4, -3e-4, 5e-4])
+    knots = Knots(np.array([0, 199]), np.array([0.0, 0.995]), np.array([True]))
+    growing = np.outer(np.linspace(0, 1, 200), error)  # linear in time, as between the two knots
+    recorded = (Rotation.from_rotvec(-growing[:, 3:]) * turns).as_matrix()
+    drift = DriftEstimate(knots, np.array([np.zeros(6), error]))
+    found = drift.corrected(Trajectory.build(t_ns, true_m - growing[:, :3], recorded))
+    np.testing.assert_allclose(found.positions_m, true_m, atol=1e-12)
+    np.testing.assert_allclose(found.R_frame_from_body, turns.as_matrix(), atol=1e-12)

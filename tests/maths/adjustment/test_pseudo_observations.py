@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
-from pipeline.maths.adjustment.pseudo_observations import DesignPrior, ParallelPrior
+from pipeline.maths.adjustment.pseudo_observations import DesignPrior, ParallelPrior, displacement
 
 RANDOM = np.random.default_rng(5)
 PLANES = {
@@ -65,6 +65,15 @@ def test_the_design_is_what_least_squares_over_its_displacement_leave(surveyed: 
         assert 2 * known.normal[k, k] == pytest.approx(curvature, rel=0.02, abs=1e-6 / design.turn_rad**2)
         step[k] = 0.0
     assert not known.normal[:8].any()  # of the laser's own unknowns it says nothing
+
+
+def test_the_displacement_of_surfaces_is_found_and_leaves_open_directions_alone() -> None:
+    shift, turn = np.array([0.03, -0.02, 0.05]), np.array([2e-4, -1e-4, 3e-4])
+    rotation = Rotation.from_rotvec(turn)
+    moved = [ObservedSurface.at(name, rotation.apply(n), rotation.apply(q) + shift) for name, (n, q) in PLANES.items()]
+    np.testing.assert_allclose(displacement(moved, PLANES), np.r_[shift, turn], atol=1e-6)  # first order in the turn
+    vertical = [ObservedSurface.at(name, n, q + shift) for name, (n, q) in PLANES.items() if name != "c"]
+    np.testing.assert_allclose(displacement(vertical, PLANES), np.r_[shift[:2], np.zeros(4)], atol=1e-9)
 
 
 def test_a_design_displaced_as_a_whole_is_no_misclosure() -> None:

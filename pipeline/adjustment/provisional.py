@@ -1,0 +1,131 @@
+"""The provisional adjustment: mount and trajectory for labelling, from a sample of the points.
+
+Labels made with the recorded trajectory are wrong where it drifts. The laser sees dry tops and bottoms at 3° to 12°.
+There an error of 2 cm in height moves the place where a ray meets the plane by 10 to 20 cm, and points of a slanted
+face are taken for points of the top above it. On such faces a point's sigma is 1 mm, so that a few wrong labels move
+the result by several sigmas. So a sample of the points is labelled and adjusted. Mount and drift then correct the
+provisional mount and the trajectory, and the sample is labelled again.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.adjustment.iteration import IterationSettings, MountAdjustment, adjust_mount
+from pipeline.adjustment.problem import CalibrationProblem, designed_planes
+from pipeline.artefacts.sampling import sample_rows
+from pipeline.artefacts.streams import Batch, MemoryPart, Stream, point_array
+from pipeline.maths.adjustment.pseudo_observations import N_DISPLACEMENT, DesignPrior, displacement
+from pipeline.maths.geometry.rotations import exp_so3, log_so3
+from pipeline.maths.target.model import TargetModel
+from pipeline.target.labelled_points import LabellingContext, label_batch
+
+ROUNDS = 2  # adjustments of the sample; a third changes less than 0.1 % of the labels
+READ = 1_000_000  # about this many points of a stream are looked at
+SAMPLE = {"laser_pool": 200_000, "soundings_pool": 60_000}  # about this many of them near the target are used
+BEYOND_M = 0.5  # a point farther outside the target's bounds is not near it
+BUILT_RAD, BUILT_M = float(np.radians(0.02)), 0.002  # sigmas of a family's direction and place against the design
+SENSOR = {"laser_labelled": "laser", "soundings_labelled": "mbes"}  # by the name of the labelled stream
+
+
+def design_without_place(target: TargetModel) -> DesignPrior:
+    """Return the design as prior information, with errors of an ordinary building site, at an unknown place.
+
+    Without it the adjustment knows P1 and P3 only as well as the drift lets it, because the boat sees them one after
+    the other: 2 mm, which move one label in a hundred.
+    """
+    open_place = np.full(N_DISPLACEMENT, np.inf)
+    return DesignPrior(designed_planes(target), BUILT_RAD, BUILT_M, np.zeros(N_DISPLACEMENT), open_place)
+
+
+def sample_near_target(stream: Stream, name: str, count: float, context: LabellingContext) -> Batch:
+    """Return a sample of a stream's points near the target.
+
+    Parameters
+    ----------
+    stream
+        Points in the pool frame.
+    name
+        Name of the stream, "laser_pool" or "soundings_pool".
+    count
+        Number of points in the stream.
+    context
+        The target's bounds and pose.
+    """
+    pieces = list(stream.fold(_near_target, count / READ, context))
+    columns = {column: np.concatenate([piece[column] for piece in pieces]) for column in pieces[0]}
+    return sample_rows(columns, len(columns["t_ns"]) / SAMPLE[name])
+
+
+def _near_target(batch: Batch, one_in: float, context: LabellingContext) -> Batch:
+    sample = sample_rows(batch, one_in)
+    points = context.target.frame.points_from_pool(point_array(sample, "pool_m"))
+    low, high = context.model.bounds()
+    near = np.all((points >= low - BEYOND_M) & (points <= high + BEYOND_M), axis=1)
+    return {name: column[near] for name, column in sample.items()}
+
+
+def with_adjusted_sample(
+    context: LabellingContext,
+    sample: Mapping[str, Batch],
+    problem_at: Callable[[LabellingContext], CalibrationProblem],
+    settings: IterationSettings,
+    gap_s: float,
+) -> LabellingContext:
+    """Return the context with mount and trajectory from the adjustment of a sample.
+
+    Where the adjustment has no solution, the context stays as it is; stage adjust then tells why.
+
+    Parameters
+    ----------
+    context
+        Mount and trajectory by search.
+    sample
+        Points by the name of their stream, from :func:`sample_near_target`.
+    problem_at
+        Function from the context to the calibration problem, which starts from the context's mount.
+    settings
+        Settings of the iteration.
+    gap_s
+        A longer time (s) without observations interrupts the knots of the drift.
+    """
+    for _ in range(ROUNDS):
+        labelled = labelled_sample(sample, context)
+        if not all(len(stream.parts) for stream in labelled.values()):
+            return context  # stage segment tells why no point has a label
+        adjustment = adjust_mount(problem_at(context), labelled, settings, gap_s)
+        if not adjustment.converged:
+            return context
+        context = corrected_context(context, adjustment)
+    return context
+
+
+def labelled_sample(sample: Mapping[str, Batch], context: LabellingContext) -> dict[str, Stream]:
+    """Return the labelled points of a sample, by sensor; a stream without points has no part."""
+    streams = {}
+    for source, batch in sample.items():
+        for name, columns in label_batch(source, batch, context).streams.items():
+            parts = (MemoryPart(name, columns),) if len(columns["t_ns"]) else ()
+            streams[SENSOR[name]] = Stream(parts)
+    return streams
+
+
+def corrected_context(context: LabellingContext, adjustment: MountAdjustment) -> LabellingContext:
+    """Return the context with the adjusted mount, and the trajectory without drift, relative to the adjusted target.
+
+    Labels are made with the faces as designed. So the adjusted surfaces are brought onto the design: with the
+    displacement g = (d, ω) of the surfaces from the design, a point X of the adjusted target is Exp(-ω) (X - d) of the
+    designed one.
+    """
+    state, coarse = adjustment.state, context.coarse_mount
+    g = displacement(state.surfaces, designed_planes(context.model))
+    R_design_from_adjusted = exp_so3(-g[3:])
+    trajectory = adjustment.drift.corrected(context.trajectory)
+    mount = replace(
+        context.mount,
+        rotation_vector_rad=log_so3(state.R_body_from_sensor @ coarse.R_body_from_sensor.T),
+        lever_arm_correction_m=state.lever_arm_m - coarse.lever_arm_body_m,
+    )
+    corrected = trajectory.transformed(R_design_from_adjusted, -R_design_from_adjusted @ g[:3])
+    return replace(context, mount=mount, corrected=corrected)
