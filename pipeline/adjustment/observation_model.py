@@ -19,13 +19,13 @@ from pipeline.maths.adjustment.design_matrix import (
 )
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
 from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.parameters import LASER_FEATURES, MBES_FEATURES, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
 from pipeline.maths.adjustment.weighting import Weighting, common_variance
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-N_FEATURES = {"laser": N_MOVED + 1, "mbes": N_MOVED + 3}
+N_FEATURES = {"laser": N_MOVED + len(LASER_FEATURES), "mbes": N_MOVED + len(MBES_FEATURES)}
 
 
 @dataclass(frozen=True)
