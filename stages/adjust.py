@@ -21,6 +21,7 @@ from pipeline.artefacts.catalogue.results import (
     CELLS,
     COVARIANCE,
     DRIFT,
+    DRIFT_FIGURES,
     ESTIMATE,
     FREED,
     GEOMETRY,
@@ -87,6 +88,7 @@ class Outputs:
     geometry: Annotated[pd.DataFrame, GEOMETRY]
     surfaces: Annotated[pd.DataFrame, SURFACES]
     drift: Annotated[pd.DataFrame, DRIFT]
+    drift_figures: Annotated[pd.DataFrame, DRIFT_FIGURES]
     freed: Annotated[pd.DataFrame, FREED]
     groups: Annotated[pd.DataFrame, GROUPS]
     cells: Annotated[pd.DataFrame, CELLS]

@@ -22,6 +22,7 @@ from pipeline.maths.adjustment.weighting import (
 )
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 LEAST_DOF = 30  # smallest number of degrees of freedom for a variance factor
 
 
@@ -51,6 +52,11 @@ class Accumulation:
 
     sums: Mapping[str, IntervalSums]
     groups: Mapping[str, GroupStatistics]
+
+    @property
+    def records(self) -> Integers:
+        """The INS records that begin an interval of any sensor, ascending, each once."""
+        return np.unique(np.concatenate([sums.record for sums in self.sums.values()]))
 
     def observations(self, sensor: str) -> int:
         """Return the number of a sensor's observations."""

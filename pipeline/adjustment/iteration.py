@@ -7,15 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
+from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
+from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
+from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
-from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
+from pipeline.maths.adjustment.pose_errors import DriftEstimate
+from pipeline.maths.adjustment.record_noise import record_noise_factor
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
@@ -54,7 +56,8 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
+    white noise of the solution); drift_figures: the figures of the drift, which the solution has; equations: normal
+    equations of all parameters, also of the fixed ones; fixed_mount:
     the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
     """
 
@@ -63,6 +66,7 @@ class MountAdjustment:
     weighting: Weighting
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
+    drift_figures: DriftFigures
     equations: NormalEquations
     solution: Solution
     fixed_mount: Mapping[int, float]
@@ -116,23 +120,27 @@ def adjust_mount(
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
     """
-    noise = problem.prior.noise
+    figures = DriftFigures.of_session(problem.prior.noise)
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
     last, estimated = weighted.last, weighted.estimated
     factors: dict[str, EpochVarianceFactor] = {}
     converged = False
     if not weighted.deficient:
-        # take the INS's white noise from the laser's points; further steps have the last weights
+        # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
-        factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
-        noise = noise_seen_by_laser(noise, factors["laser"])
-        for _ in range(CLOSING_STEPS):
-            last, solution = last.stepped(noise, estimated)
+        prior = problem.prior
+        factors = epoch_variance_factors(sums_by_sensor, surfaces, prior.noise.white)
+        factors["laser"] = record_noise_factor(sums_by_sensor["laser"], surfaces, prior.noise.white)
+        noise = noise_seen_by_laser(prior.noise, factors["laser"])
+        reduced = last.reduced(noise.white, estimated)
+        figures = last.drift_figures(noise, prior.drift, estimated, reduced)
+        for closing in range(CLOSING_STEPS):
+            last, solution = last.stepped(figures.noise, estimated, None if closing else reduced)
             converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
-    equations = last.equations(noise)
+    equations = last.equations(figures.noise)
     solution = solve(equations.normal, equations.right, estimated.tolist())
     return MountAdjustment(
         state=last.linearisation.state,
@@ -140,6 +148,7 @@ def adjust_mount(
         weighting=weighted.weighting,
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
+        drift_figures=figures,
         equations=equations,
         solution=solution,
         fixed_mount=weighted.fixed_mount,
@@ -149,45 +158,10 @@ def adjust_mount(
 
 
 @dataclass(frozen=True)
-class _Iterate:
-    """Current values, and the interval sums linearised at them."""
-
-    linearisation: Linearisation
-    drift: DriftEstimate
-    surfaces: SurfacePrior | None
-
-    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
-        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
-        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
-        if self.surfaces is None:
-            return equations
-        prior = self.surfaces.pseudo_observations(state)
-        places = np.arange(state.size) if selected is None else selected
-        return replace(
-            equations,
-            normal=equations.normal + prior.normal[np.ix_(places, places)],
-            right=equations.right + prior.right[places],
-            squares=equations.squares + prior.squares,
-        )
-
-    def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
-        """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
-        state = self.linearisation.state
-        equations = self.equations(noise, estimated)
-        solution = solve(equations.normal, equations.right, range(len(estimated)))
-        step, drift_step = np.zeros(state.size), equations.knots(solution.step)
-        step[estimated] = solution.step
-        sums = updated_sums(self.linearisation, step, DriftEstimate(self.drift.knots, drift_step))
-        drift = self.drift.updated(drift_step)
-        linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
-        return _Iterate(linearisation, drift, self.surfaces), solution
-
-
-@dataclass(frozen=True)
 class _WeightedIteration:
     """The iteration after its last reading of the points; ``deficient``: the data leave directions open."""
 
-    last: _Iterate
+    last: Iterate
     estimated: Integers
     fixed_mount: Mapping[int, float]
     weighting: Weighting
@@ -209,8 +183,8 @@ def _weighted_iteration(
     for iteration in range(1, settings.max_iterations + 1):
         # read all points, and take the variance factors of the groups from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
-        drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
-        start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
+        drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
+        start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
             normal = start.equations(prior.noise).normal
@@ -248,11 +222,6 @@ def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
         if np.max(np.abs(step)) < NEAR_RAD_M:
             break
     return state
-
-
-def _zero_drift(accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float) -> DriftEstimate:
-    record = np.unique(np.concatenate([sums.record for sums in accumulation.sums.values()]))
-    return DriftEstimate.zero(place_knots(record, model.body.seconds, noise.spacing_s, gap_s))
 
 
 def _is_small(solution: Solution, estimated: Integers, limits: StepLimits) -> bool:

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import laser_errors
-from pipeline.adjustment.ins_drift import pose_noise
+from pipeline.adjustment.ins_drift import drift_prior, pose_noise
 from pipeline.adjustment.problem import (
     CalibrationProblem,
     PriorInformation,
@@ -35,7 +35,9 @@ def laser_problem(session: SessionData, calibration: LaserCalibration) -> Calibr
     )
     coarse = coarse_covariance(session.laser, calibration)
     design = design_prior(session.target, session.target_pose, calibration)
-    prior = PriorInformation(pose_noise(session.ins), design, required_sigmas(coarse, calibration))
+    prior = PriorInformation(
+        pose_noise(session.ins), design, required_sigmas(coarse, calibration), drift_prior(session.ins)
+    )
     # a fixed mount parameter has the error of the coarse mount
     errors = laser_errors(model.coarse.names, session.laser, session.as_built)
     sigmas = np.concatenate([np.sqrt(np.diag(coarse)), errors.sigmas[N_MOUNT:]])

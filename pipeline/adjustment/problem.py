@@ -11,13 +11,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import sonar_errors
-from pipeline.adjustment.ins_drift import pose_noise
+from pipeline.adjustment.ins_drift import drift_prior, pose_noise
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import laser_planes, trajectory_in_target
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.maths.adjustment.design_matrix import SensorSigmas
+from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftPrior
 from pipeline.maths.adjustment.normal_equations import BodyMotion
 from pipeline.maths.adjustment.parameters import ObservedSurface, Sensor, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
@@ -36,12 +37,14 @@ class PriorInformation:
     """Prior information.
 
     noise: white noise and drift of the recorded poses; surfaces: pseudo-observations of the surfaces; required_sigmas
-    (6,) rad and m: a mount parameter that would have a larger sigma is fixed (None: all are estimated).
+    (6,) rad and m: a mount parameter that would have a larger sigma is fixed (None: all are estimated); drift: how well
+    the figures of the drift in ``noise`` are known.
     """
 
     noise: PoseNoise
     surfaces: SurfacePrior | None = None
     required_sigmas: Array | None = None
+    drift: DriftPrior = EXACT
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,9 @@ def sonar_problem(session: SessionData, mbes: Mbes) -> CalibrationProblem:
     target, names = session.target, model.coarse.names
     return CalibrationProblem(
         model,
-        PriorInformation(pose_noise(session.ins), _parallel_families(target, session.as_built)),
+        PriorInformation(
+            pose_noise(session.ins), _parallel_families(target, session.as_built), drift=drift_prior(session.ins)
+        ),
         sonar_errors(names, session.laser, mbes, session.as_built, target.depth_m),
     )
 

@@ -28,10 +28,22 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
+from pipeline.maths.adjustment.eliminate_white_noise import (
+    LinearisedIntervals,
+    ReducedIntervals,
+    TimeAxis,
+    eliminate_white_noise,
+)
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
+from pipeline.maths.adjustment.pose_errors import (
+    LARGEST_SPACING_S,
+    DriftEstimate,
+    Knots,
+    PoseNoise,
+    knot_spacing,
+    place_knots,
+)
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.geometry.trajectory import NS_PER_S, Trajectory
 from pipeline.maths.mount_parameters import N_MOUNT
@@ -39,6 +51,7 @@ from pipeline.maths.mount_parameters import N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 REACH_S = 0.2  # rates are means over this time on either side: between two records noise of 2 mm gives 0.5 m/s
+LEAST_TILT_RAD = 1e-6  # RMS of the tilt below which a boat lies still: no INS resolves less
 BLOCK = 50_000  # number of intervals whose designs are computed at a time
 
 
@@ -60,6 +73,33 @@ class BodyMotion:
         """Return the motion along a trajectory in the target frame."""
         seconds = (trajectory.t_ns - trajectory.t_ns[0]) / NS_PER_S
         return cls(trajectory, seconds, trajectory.rates(REACH_S), laser_lever_arm_m)
+
+    @property
+    def motion_hz(self) -> float:
+        """Return the mean frequency of roll and pitch: RMS of their rates over RMS of the tilt, divided by 2π.
+
+        The body's z axis, (0, 0, 1) for an even keel, tilts by its horizontal components (rad), at the rate of the
+        horizontal angular velocity. For a sinusoid this is its frequency. A boat that lies still has 0.
+        """
+        tilt = self.trajectory.R_frame_from_body[:, :2, 2]
+        size = float(np.sqrt(np.mean((tilt - tilt.mean(axis=0)) ** 2)))
+        rate = float(np.sqrt(np.mean(self.rates[:, 3:5] ** 2)))
+        return rate / (2 * np.pi * size) if size > LEAST_TILT_RAD else 0.0
+
+    def zero_drift(self, record: Integers, noise: PoseNoise, gap_s: float) -> DriftEstimate:
+        """Return a drift of zero at knots for these records.
+
+        Parameters
+        ----------
+        record : (m,) array
+            Last INS record before each observation, ascending, each once.
+        noise : PoseNoise
+            The pose errors; without drift the knots are as far apart as possible.
+        gap_s : float
+            A longer time (s) without observations interrupts the knots.
+        """
+        spacing_s = knot_spacing(self.motion_hz) if noise.drifts else LARGEST_SPACING_S
+        return DriftEstimate.zero(place_knots(record, self.seconds, spacing_s, gap_s))
 
     def times(self, record: Integers, share: Array) -> Array:
         """Return the times (g,) s at these shares of the interval from each record to the next."""
@@ -156,10 +196,28 @@ def normal_equations(
     selected : (s,) array, optional
         Parameters, ascending.
     """
+    return eliminate_drift(reduced_intervals(linearisation, drift.knots, noise.white, selected), noise, drift)
+
+
+def reduced_intervals(
+    linearisation: Linearisation, knots: Knots, white: Array, selected: Integers | None = None
+) -> ReducedIntervals:
+    """Return the normal equations of parameters and knots: they hold for any figures of the drift.
+
+    Parameters
+    ----------
+    linearisation : Linearisation
+        Interval sums, and the values at which they were taken.
+    knots : Knots
+        The knots of the drift.
+    white : (6,) array
+        Standard deviations of a record's white noise, m and rad.
+    selected : (s,) array, optional
+        Parameters, ascending; all by default.
+    """
     sources = list(linearisation.by_surface(selected))
     n_parameters = linearisation.state.size if selected is None else len(selected)
-    times = TimeAxis(linearisation.body.seconds, drift.knots)
-    return eliminate_drift(eliminate_white_noise(sources, n_parameters, times, noise.white), noise, drift)
+    return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:

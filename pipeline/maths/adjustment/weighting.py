@@ -172,7 +172,7 @@ def epoch_variance_factors(
 def noise_seen_by_laser(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
     """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE)."""
     if laser.sigma < SURE:
-        return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY), 1.0)
+        return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY))
     return noise
 
 
