@@ -12,6 +12,7 @@ from pipeline.adjustment.observation_model import CurrentValues, ObservationMode
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
+from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step
@@ -129,8 +130,10 @@ def adjust_mount(
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
         prior = problem.prior
-        factors = epoch_variance_factors(sums_by_sensor, surfaces, prior.noise.white)
-        factors["laser"] = record_noise_factor(sums_by_sensor["laser"], surfaces, prior.noise.white)
+        designs = pose_design(surfaces, np.arange(len(surfaces)))
+        factors["laser"] = record_noise_factor(sums_by_sensor["laser"], designs, prior.noise.white)
+        of_pings = {sensor: sums for sensor, sums in sums_by_sensor.items() if sensor != "laser"}
+        factors |= epoch_variance_factors(of_pings, surfaces, prior.noise.white)
         noise = noise_seen_by_laser(prior.noise, factors["laser"])
         reduced = last.reduced(noise.white, estimated)
         figures = last.drift_figures(noise, prior.drift, estimated, reduced)

@@ -12,9 +12,10 @@ m = Σ w v / Σ w. For an interval with q̄ = Σ w q / Σ w, K its design of pos
     E m² = 1 / Σ w + f c,     c = ((1 - s)² + s²) q̄ᵀ K W Kᵀ q̄,
 
 so that f follows by regression with the weights of maximum likelihood, c / (1 / Σ w + f c)². The regression is done
-twice, first with f = 1. The laser's f is the ratio of the INS's white noise to its value in the session. The sonar's f
-also contains the errors that all beams of a ping share: an unsteady clock, or beams stabilised by another attitude than
-the INS's.
+twice, first with f = 1. The laser's f, the ratio of the INS's white noise to its value in the session, follows from
+differences instead (:mod:`~pipeline.maths.adjustment.record_noise`), for the means lack what the drift took. The
+sonar's f also contains the errors that all beams of a ping share: an unsteady clock, or beams stabilised by another
+attitude than the INS's.
 """
 
 from collections.abc import Mapping, Sequence
