@@ -129,3 +129,11 @@ def drift(sigmas: float) -> pd.DataFrame:
     columns = {f"{axis}_target_m": value for axis, value in values[0].items()}
     columns |= {f"turn_{axis}_target_deg": value for axis, value in values[1].items()}
     return pd.DataFrame([{name: sign * sigmas * value for name, value in columns.items()} for sign in (1, -1, -1)])
+
+
+def drift_figures(**changes: tuple[float, float]) -> pd.DataFrame:
+    """The table drift_figures, as configured; changes by figure: estimated value, and deviation."""
+    configured = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
+    configured["time_constant_s"] = 200.0
+    rows = [(name, value, *changes.get(name, (value, 0.0)), 0.3) for name, value in configured.items()]
+    return pd.DataFrame(rows, columns=["figure", "configured", "estimated", "deviation", "sigma_log"])
