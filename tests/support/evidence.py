@@ -41,6 +41,7 @@ def evidence(
     alternating: Mapping[str, Any] | None = None,
     freed: Mapping[str, Any] | None = None,
     patterns: Sequence[Mapping[str, Any]] = ({},),
+    parts: Mapping[str, Any] | None = None,
     fixed: Sequence[str] = (),
     count: int = 500,
 ) -> Evidence:
@@ -68,7 +69,12 @@ def evidence(
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     geometry = [("remedy", "two more passes at 3 m would do", 0.0)] + [("held", name, 0.1) for name in fixed]
     tables: dict[str, Any] = {field.name: pd.DataFrame() for field in fields(Evidence)}
+    part: dict[str, Any] = {"part": "without pass 2", "passes": "0 1 3", "normalised": 1.0, "dof": 6}
+    for name in ("roll", "pitch", "yaw", "x", "y", "z"):
+        sigma = 0.01 if name in ("roll", "pitch", "yaw") else 0.001
+        part |= {f"change_{name}": 0.5 * sigma, f"sigma_{name}": sigma}
     tables |= {
+        "parts": pd.DataFrame([part | dict(parts or {}), part | {"part": "without pass 3"}]),
         "faces": pd.DataFrame({"name": ["P1-0", "P2"]}),
         "target_pose": pd.DataFrame([pose_row | dict(pose or {})]),
         "provisional_mount": pd.DataFrame([mount_row | dict(mount or {})]),

@@ -34,6 +34,7 @@ Integers = NDArray[np.int64]
 FEWEST = 6  # smallest number of points of an interval that is used
 FLAT = 1e-5  # an eigenvalue of the scaled sums below this counts as zero: 3 mm aside of a line, seen from a metre
 PRIOR_DOF = 8.0  # degrees of freedom that what is known of other families counts as, beside a family's own
+CERTAIN = 3.0  # sigmas by which a variance factor must differ from 1 to be applied, if it is not sure
 SURE, UNLIKELY = 0.1, 100.0  # sigma, as a share of a factor above 1, below which the white noise's is applied; largest
 
 
@@ -134,11 +135,12 @@ def common_variance(by_pose: Array, share: Array, white: Array) -> Array:
 
 
 def noise_seen_by_laser(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
-    """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE).
+    """Return the noise, its white part multiplied by the laser's variance factor if that is known well enough.
 
-    The factor may be zero. (Without any white noise its estimate is negative as often as not.)
+    It is, if its sigma is small (SURE), or if it differs from 1 by more than CERTAIN sigmas: then the stated noise is
+    the worse of both. The factor may be zero. (Without any white noise its estimate is negative as often as not.)
     """
-    is_sure = laser.sigma < SURE * max(laser.factor, 1.0)
+    is_sure = laser.sigma < SURE * max(laser.factor, 1.0) or abs(laser.factor - 1) > CERTAIN * laser.sigma
     return noise.scaled(min(max(laser.factor, 0.0), UNLIKELY)) if is_sure else noise
 
 
