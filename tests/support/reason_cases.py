@@ -96,7 +96,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"parts": {"normalised": 4.5, "change_x": 0.0031}},
         ReasonCode.PARTS_DISAGREE,
-        "without pass 2 x would be another by 3.1 mm ± 1.0 mm (4.5 sigma over all parameters): something changed during",
+        "without pass 2 x would be another by 3.1 mm ± 1.0 mm (4.5 sigma over all parameters): something changed",
     ),
     (
         {"parts": {"part": "near passes", "normalised": 4.5, "change_yaw": -0.05}},
