@@ -13,12 +13,13 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"pose": {"ambiguous": True}},
         ReasonCode.AMBIGUOUS_TARGET_POSE,
-        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m²); let the laser see the wall's",
+        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m² of its faces seen, those missed "
+        "deducted); let the laser see the wall's",
     ),
     (
         {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0}},
         ReasonCode.AMBIGUOUS_TARGET_POSE,
-        "better (11.00 against 10.00 m²); check target.origin",
+        "better (11.00 against 10.00 m² of its faces seen, those missed deducted); check target.origin",
     ),
     (
         {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0, "rival": "left and right exchanged"}},
