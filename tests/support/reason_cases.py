@@ -13,8 +13,8 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"pose": {"ambiguous": True}},
         ReasonCode.AMBIGUOUS_TARGET_POSE,
-        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m² of its faces seen, those missed "
-        "deducted); let the laser see the wall's",
+        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m² of its faces seen, those "
+        "missed deducted); let the laser see the wall's",
     ),
     (
         {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0}},
