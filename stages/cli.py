@@ -187,7 +187,7 @@ def _diff(
 
     Status 1 if the mounts differ significantly, or by more than a tolerance, or cannot be compared.
     """
-    from pipeline.results.mount_difference import Tolerances
+    from pipeline.results.units import Tolerances
     from stages.commands import diff
 
     tolerances = Tolerances(tolerance_deg, tolerance_mm)

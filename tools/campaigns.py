@@ -13,7 +13,7 @@ from pipeline.maths.mount_parameters import SETTINGS
 FOLDER = Path("runs/montecarlo")
 TASKS_OF_A_WORKER = 20  # then a new process: hundreds of ray casting scenes make a process slow and large
 COARSE_DEG, COARSE_M = 2.5, 0.25
-OWN_ERRORS = (("sound_speed", "m_s"), ("sound_speed_gradient", "1_s"), ("latency", "s"))  # of the sonar: name, unit
+SOUND_SPEED_M_S = 1500.0  # recorded
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points for the sonar's noise to dominate
 WHITE: dict[str, Any] = {
     "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
@@ -55,7 +55,7 @@ class Campaign:
     scenario: dict[str, Any] = field(default_factory=dict)
     through_files: bool = False
     pairs: bool = False  # also compare sessions in pairs: how often does the comparison report a move?
-    own_errors: bool = False  # systematic errors are drawn: those of a session's own, and the laser's mount of a pair
+    own_errors: bool = False  # systematic errors are drawn: a session's own, and those that a pair shares
 
 
 def _target(**letters: Any) -> dict[str, Any]:
@@ -120,23 +120,31 @@ def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
 def systematic_errors(seed: int) -> dict[str, Any]:
     """Return the blocks of a scenario with drawn errors, whose sigmas are the defaults that hold in session.yaml.
 
-    Sound speed, its gradient and both clocks are drawn for each session; the recorded sound speed is 1500 m/s. The
-    laser's mount is wrong by the same in both sessions of a pair, an even seed and the next.
+    Each session has its own errors of the sound speed (recorded as 1500 m/s), of the same at the arrays, of its
+    gradient, of both clocks, and of ranges by incidence and on level faces. The two sessions of a pair, an even seed
+    and the next, share those of the laser's mount, of the sonar's ranges and of the transmitter's place.
     """
     own, common = np.random.default_rng([seed, 1]), np.random.default_rng([seed // 2, 2])  # not the simulator's numbers
-    sonar, laser = Mbes.model_fields, Laser.model_fields
-    sigmas = [sonar[f"{name}_sigma_{unit}"].default for name, unit in OWN_ERRORS] + [laser["latency_sigma_s"].default]
-    speed, gradient, mbes_latency, laser_latency = (float(error) for error in sigmas * own.normal(size=len(sigmas)))
+
+    def drawn(rng: np.random.Generator, sensor: type[Laser | Mbes], name: str) -> float:
+        return float(sensor.model_fields[name].default * rng.normal())
+
     mount = MountSigma()
     of_mount = np.repeat([mount.angle_deg, mount.lever_arm_m], 3) * common.normal(size=len(SETTINGS))
     return {
         "mbes": {
-            "sound_speed_true_m_s": 1500.0 + speed,
-            "sound_speed_gradient_1_s": gradient,
-            "latency_s": mbes_latency,
+            "sound_speed_true_m_s": SOUND_SPEED_M_S + drawn(own, Mbes, "sound_speed_sigma_m_s"),
+            "head_speed_excess": drawn(own, Mbes, "sound_speed_sigma_m_s") / SOUND_SPEED_M_S,
+            "sound_speed_gradient_1_s": drawn(own, Mbes, "sound_speed_gradient_sigma_1_s"),
+            "latency_s": drawn(own, Mbes, "latency_sigma_s"),
+            "incidence_bias_m": drawn(own, Mbes, "incidence_bias_sigma_m"),
+            "level_bias_m": drawn(own, Mbes, "level_bias_sigma_m"),
+            "range_bias_m": drawn(common, Mbes, "range_bias_sigma_m"),
+            "projector_offset_m": [drawn(common, Mbes, "projector_sigma_m") for _ in range(3)],
         },
         "laser": {
-            "latency_s": laser_latency,
+            "latency_s": drawn(own, Laser, "latency_sigma_s"),
+            "incidence_bias_m": drawn(own, Laser, "incidence_bias_sigma_m"),
             "coarse_error": dict(zip(SETTINGS, of_mount.tolist(), strict=True)),
         },
     }

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pipeline.maths.mount_parameters import MOUNT_WORDS
-from pipeline.results.mount_difference import Row, is_same_result, least_text, quantity_text
+from pipeline.results.mount_difference import Row, is_same_result
+from pipeline.results.units import least_text, quantity_text
 
 
 def answer_sentence(difference: Mapping[str, Any]) -> str:

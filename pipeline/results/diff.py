@@ -13,7 +13,8 @@ from pipeline.artefacts.from_tables import family_names, horizontal_families, no
 from pipeline.maths.geometry.planes import angle_between
 from pipeline.results.answer_text import answer_sentence, visible_sentence
 from pipeline.results.finished_run import FinishedRun
-from pipeline.results.mount_difference import Row, Tolerances, is_same_result, mount_difference
+from pipeline.results.mount_difference import Row, is_same_result, mount_difference
+from pipeline.results.units import Tolerances
 from pipeline.run import manifest
 from pipeline.run.results import Tables
 

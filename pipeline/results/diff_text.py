@@ -6,7 +6,8 @@ from typing import Any
 
 from pipeline.console import plural
 from pipeline.results.answer_text import answer_lines
-from pipeline.results.mount_difference import Row, quantity_text
+from pipeline.results.mount_difference import Row
+from pipeline.results.units import quantity_text
 from pipeline.text_table import text_table
 
 FACE_KEYS = "target.faces."

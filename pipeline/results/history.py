@@ -19,9 +19,9 @@ from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS, SETTINGS
-from pipeline.results.mount_difference import TO_UNITS
 from pipeline.results.movement import movement_between
 from pipeline.results.session_estimate import SessionEstimate, session_estimate
+from pipeline.results.units import TO_UNITS
 from pipeline.run.results import calibration
 from pipeline.run.settings import RUN_YAML
 

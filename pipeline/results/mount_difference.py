@@ -1,37 +1,18 @@
 """The difference of the mounts of two runs and its tests, as plain values."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.maths.detectable_movement import POWER
 from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT, PARAMETERS
 from pipeline.results.finished_run import FinishedRun
 from pipeline.results.movement import SIGNIFICANCE, Movement, movement_between
 from pipeline.results.session_estimate import session_estimate
+from pipeline.results.units import TO_UNITS, UNITS, Tolerances
 
-Array = NDArray[np.float64]
-UNITS = ("deg",) * 3 + ("m",) * 3
-TO_UNITS = np.repeat([np.degrees(1.0), 1.0], 3)  # of rad and m to the units
-SCALES = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}  # by unit: unit, factor and digits on the screen
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """Largest tolerated differences of an angle (degrees) and of a lever-arm component (mm); None: no limit."""
-
-    angle_deg: float | None = None
-    lever_arm_mm: float | None = None
-
-    def limits(self) -> Array:
-        """Return the limits (6,) of the six parameters, rad and m; NaN: no limit."""
-        angle_rad = np.nan if self.angle_deg is None else np.radians(self.angle_deg)
-        return np.repeat([angle_rad, np.nan if self.lever_arm_mm is None else self.lever_arm_mm / 1000], 3)
 
 
 def mount_difference(
@@ -103,34 +84,3 @@ def is_moved(difference: Mapping[str, Any]) -> bool:
 def is_same_result(difference: Mapping[str, Any]) -> bool:
     """Return whether both runs have exactly the same mount."""
     return difference["comparable"] and not any(row["difference"] for row in difference["parameters"])
-
-
-def quantity_text(value: float, unit: str, sign: str = "+") -> str:
-    """Return a difference or a sigma as text for the screen.
-
-    Parameters
-    ----------
-    value
-        The quantity, in degrees or metres.
-    unit
-        ``deg`` or ``m``; metres are shown as mm.
-    sign
-        ``+`` to show the sign of a positive value too.
-
-    >>> quantity_text(0.0012, "m"), quantity_text(0.5, "deg", "")
-    ('+1.20 mm', '0.5000°')
-    """
-    suffix, scale, digits = SCALES[unit]
-    return f"{value * scale:{sign}.{digits}f}{suffix}"
-
-
-def least_text(value: float, unit: str) -> str:
-    """Return a least size with two digits, rounded up, as text for the screen; ``unit``: deg or m, shown as mm.
-
-    >>> least_text(0.1512, "deg"), least_text(0.00831, "m"), least_text(0.0123, "m")
-    ('0.16°', '8.4 mm', '13 mm')
-    """
-    suffix, scale, _ = SCALES[unit]
-    number = Decimal(f"{value * scale:.9g}")
-    digit = Decimal(1).scaleb(number.adjusted() - 1)
-    return f"{number.quantize(digit, ROUND_CEILING):f}{suffix}"

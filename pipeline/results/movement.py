@@ -1,18 +1,18 @@
 """Has the mount moved between two sessions? Their difference, tested, and the movements that the test could show."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.error_sources import OWNERS, Owner, source_of
 from pipeline.maths.comparison import MountDifference, MountEstimate, compare_estimates
 from pipeline.maths.detectable_movement import DetectableMovement, detectable_movement
 from pipeline.maths.mount_parameters import N_MOUNT
 from pipeline.mount import WITHIN_95
-from pipeline.results.session_estimate import NO_ERRORS, SessionEstimate, SharableErrors
+from pipeline.results.error_pairing import Pairing, paired
+from pipeline.results.session_estimate import SessionEstimate
 
 Array = NDArray[np.float64]
 Answer = Literal["moved", "no_movement_shown", "too_uncertain"]
@@ -88,9 +88,9 @@ def movement_between(first: SessionEstimate, second: SessionEstimate, tolerances
     estimates: tuple[MountEstimate, MountEstimate]
     if first.systematic is None or second.systematic is None:
         before, after = (replace(session.mount, covariance=session.covariance_total) for session in (first, second))
-        estimates, pairing = (before, after), _Pairing(cautious=True)
+        estimates, pairing = (before, after), Pairing(cautious=True)
     else:
-        estimates, pairing = _paired((first.mount, second.mount), (first.systematic, second.systematic))
+        estimates, pairing = paired((first.mount, second.mount), (first.systematic, second.systematic))
     difference = compare_estimates(*estimates)
     return Movement(
         difference=difference,
@@ -102,59 +102,6 @@ def movement_between(first: SessionEstimate, second: SessionEstimate, tolerances
         mostly=tuple(_largest_sources(difference, pairing.sources)),
         cautious=pairing.cautious,
     )
-
-
-@dataclass(frozen=True)
-class _Pairing:
-    """Fields of :class:`Movement`, and the source in words of each column of the difference's effects."""
-
-    common: tuple[str, ...] = ()
-    own: tuple[str, ...] = ()
-    differing: tuple[str, ...] = ()
-    sources: tuple[str, ...] = ()
-    cautious: bool = False
-
-
-def _paired(
-    mounts: tuple[MountEstimate, MountEstimate],
-    systematic: tuple[Mapping[str, SharableErrors], Mapping[str, SharableErrors]],
-) -> tuple[tuple[MountEstimate, MountEstimate], _Pairing]:
-    """Return both estimates with their own and their common errors."""
-    first, second = systematic
-    blocks = {owner: (first.get(owner, NO_ERRORS), second.get(owner, NO_ERRORS)) for owner in OWNERS}
-    common = [owner for owner, pair in blocks.items() if _is_common(*pair)]
-    own = [owner for owner in OWNERS if owner not in common]
-    parts = [[(owner, blocks[owner][place]) for owner in own] for place in (0, 1)]
-    shared = [[(owner, blocks[owner][place]) for owner in common] for place in (0, 1)]
-    before, after = (
-        replace(mounts[place], own=_columns(parts[place]), common=_columns(shared[place])) for place in (0, 1)
-    )
-    pairing = _Pairing(
-        common=_parameters(shared[0]),
-        own=_parameters([*parts[0], *parts[1]]),
-        differing=tuple(OWNERS[owner] for owner in own if owner != "session" and any(e.effects for e in blocks[owner])),
-        sources=tuple(word for side in (*parts, shared[0]) for block in side for word in _sources(*block)),
-    )
-    return (before, after), pairing
-
-
-def _parameters(blocks: Sequence[tuple[Owner, SharableErrors]]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name for _, errors in blocks for name in errors.effects))
-
-
-def _is_common(first: SharableErrors, second: SharableErrors) -> bool:
-    return first.stated is not None and first.stated == second.stated and list(first.effects) == list(second.effects)
-
-
-def _columns(blocks: Sequence[tuple[Owner, SharableErrors]]) -> Array:
-    return np.hstack([np.zeros((N_MOUNT, 0)), *(errors.independent() for _, errors in blocks)])
-
-
-def _sources(owner: Owner, errors: SharableErrors) -> list[str]:
-    """Return the source in words of each column; errors that correlate are one source."""
-    if errors.correlation is not None:
-        return [OWNERS[owner]] * len(errors.effects)
-    return [source_of(name).words for name in errors.effects]
 
 
 def _largest_sources(difference: MountDifference, sources: Sequence[str]) -> Iterator[str]:

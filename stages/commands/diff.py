@@ -11,7 +11,8 @@ from pipeline.console import say
 from pipeline.results.diff import run_difference
 from pipeline.results.diff_text import difference_text
 from pipeline.results.finished_run import FinishedRun
-from pipeline.results.mount_difference import Tolerances, is_moved
+from pipeline.results.mount_difference import is_moved
+from pipeline.results.units import Tolerances
 from pipeline.run.output_files import refuse_output
 from stages import ORDER
 

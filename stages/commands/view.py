@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pipeline.atomic_files import temporary_folder
 from pipeline.errors import ConfigError
-from pipeline.results.mount_difference import Tolerances
+from pipeline.results.units import Tolerances
 from pipeline.run.settings import read_settings
 from stages import ORDER
 from stages.commands.answer import say_failures

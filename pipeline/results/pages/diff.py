@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from pipeline.mount import WITHIN_95
 from pipeline.results.answer_text import answer_lines
 from pipeline.results.diff_text import own_faces_counted
-from pipeline.results.mount_difference import quantity_text
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
+from pipeline.results.units import quantity_text
 
 
 def difference_page(difference: Mapping[str, Any]) -> str:

@@ -18,8 +18,8 @@ from pipeline.maths.detectable_movement import POWER
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.mount import WITHIN_95
 from pipeline.results.history import TEXT_COLUMNS, History, SessionFilter
-from pipeline.results.mount_difference import least_text
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
+from pipeline.results.units import least_text
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # by unit of the setting: unit and factor in the chart
 
