@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.config.session import Drift
 from pipeline.errors import ConfigError
-from pipeline.simulation.ins import gauss_markov_drift
+from pipeline.simulation.ins_errors import gauss_markov_drift
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.session import SimulatedSession, simulate_session
 from tests.support.level_geometry import LEVEL, STILL, range_m

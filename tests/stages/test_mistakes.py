@@ -8,8 +8,8 @@ import pytest
 
 from pipeline.config.yaml_models import parse
 from pipeline.report.reason_codes import ReasonCode
+from pipeline.simulation.face_faults import face_of_polygon
 from pipeline.simulation.mesh import build_mesh
-from pipeline.simulation.relief import face_of_polygon
 from pipeline.simulation.scenario import Scenario
 from tools.campaigns import THIN
 from tools.mistake_kinds import EFFECTS, MISTAKES
