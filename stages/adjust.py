@@ -18,6 +18,7 @@ from pipeline.adjustment.laser_design import (
     laser_problem,
     surveyed_displacement,
 )
+from pipeline.adjustment.parts import parts_table
 from pipeline.adjustment.problem import CalibrationProblem, SessionData, sonar_problem, surfaces_of_laser
 from pipeline.adjustment.residual_statistics import ResidualStatistics, residual_statistics
 from pipeline.adjustment.residual_tables import bins_table, map_table
@@ -32,6 +33,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GEOMETRY,
     GROUPS,
+    PARTS,
     PATTERNS,
     RESIDUAL_BINS,
     RESIDUAL_MAP,
@@ -100,6 +102,7 @@ class Outputs:
     groups: Annotated[pd.DataFrame, GROUPS]
     cells: Annotated[pd.DataFrame, CELLS]
     summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+    parts: Annotated[pd.DataFrame, PARTS]
     patterns: Annotated[pd.DataFrame, PATTERNS]
     residuals: Annotated[pd.DataFrame, RESIDUALS]
     residual_bins: Annotated[pd.DataFrame, RESIDUAL_BINS]
@@ -122,6 +125,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     return Outputs(
         **result_tables(problem, adjustment, statistics, inputs.passes, config.adjust.test_level),
         geometry=weak_geometry(inputs, config, drift, adjustment, statistics),
+        parts=parts_table(problem, adjustment, inputs.passes),
         patterns=statistics.patterns,
         residuals=statistics.residuals,
         residual_bins=bins_table(statistics.residuals, inputs.faces),

@@ -1,4 +1,4 @@
-"""The patent's angle iteration, with the lever arm left at its coarse value."""
+"""The patent's angle iteration, with the lever arm left at its coarse value; and the same word for word."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -6,14 +6,15 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline.artefacts.catalogue.patent import ANGLES, ITERATIONS, PASS_ITERATIONS
+from pipeline.artefacts.catalogue.patent import ANGLES, ITERATIONS, LITERAL_ANGLES, LITERAL_ITERATIONS, PASS_ITERATIONS
 from pipeline.artefacts.catalogue.target import FACES, PLANES, SOUNDING_MOMENTS
-from pipeline.artefacts.patent_tables import angle_passes
+from pipeline.artefacts.patent_tables import angle_passes, session_planes
 from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.pool import AngleIterate, FitPlanes
 from pipeline.config.stage_settings import SensorMount
 from pipeline.errors import DegenerateGeometryError
 from pipeline.maths.patent.angles import AngleResult, AngleTolerances, iterate_angles
+from pipeline.maths.patent.literal_angles import LiteralAngles, iterate_literally
 from pipeline.mount import mount_of
 
 
@@ -42,6 +43,8 @@ class Outputs:
     iterations: Annotated[pd.DataFrame, ITERATIONS]
     pass_iterations: Annotated[pd.DataFrame, PASS_ITERATIONS]
     angles: Annotated[pd.DataFrame, ANGLES]
+    literal_iterations: Annotated[pd.DataFrame, LITERAL_ITERATIONS]
+    literal_angles: Annotated[pd.DataFrame, LITERAL_ANGLES]
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
@@ -59,10 +62,28 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         result = iterate_angles(passes, lever_arm_m, tolerances)
     except DegenerateGeometryError as error:
         result, reason = AngleResult(np.full(3, np.nan), False, 0, [], []), str(error)
-    angles = xyz_columns("rotation_{}_deg", np.degrees(result.rotation_vector_rad))
-    angles |= {"converged": result.converged, "iterations": result.iterations, "reason": reason}
+    literal = _literal(inputs, config, lever_arm_m)
     return Outputs(
         pd.DataFrame(result.rows, columns=[column.name for column in ITERATIONS.columns]),
         pd.DataFrame(result.pass_rows, columns=[column.name for column in PASS_ITERATIONS.columns]),
-        pd.DataFrame([angles]),
+        _angles(result.rotation_vector_rad, result, reason),
+        pd.DataFrame(literal.rows, columns=[column.name for column in LITERAL_ITERATIONS.columns]),
+        _angles(literal.angles_rad, literal, literal.reason),
     )
+
+
+def _literal(inputs: Inputs, config: Config, lever_arm_m: np.ndarray) -> LiteralAngles:
+    """Return the angles of the literal form; without a result they are NaN."""
+    settings = config.angle_iterate
+    min_points = config.fit_planes.min_points
+    try:
+        planes = session_planes(inputs.faces, inputs.planes, inputs.sounding_moments, min_points)
+    except DegenerateGeometryError as error:
+        return LiteralAngles(np.full(3, np.nan), False, 0, str(error))
+    return iterate_literally(planes, lever_arm_m, settings.max_iterations, np.radians(settings.literal_threshold_deg))
+
+
+def _angles(vector_rad: np.ndarray, result: AngleResult | LiteralAngles, reason: str) -> pd.DataFrame:
+    """Return the one row of an iteration's result."""
+    row = xyz_columns("rotation_{}_deg", np.degrees(vector_rad))
+    return pd.DataFrame([row | {"converged": result.converged, "iterations": result.iterations, "reason": reason}])

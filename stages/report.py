@@ -6,10 +6,11 @@ from typing import Annotated, Any
 
 import pandas as pd
 
+from pipeline.adjustment.error_sources import stated_of
 from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.pool import Adjust, Method, Segment, VerdictLimits
+from pipeline.config.pool import Adjust, AsBuilt, Method, Segment, VerdictLimits
 from pipeline.config.session import Calibrated, Ins, Laser, Mbes
 from pipeline.config.target import Target
 from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
@@ -27,9 +28,11 @@ from pipeline.report.drift_check import NO_DRIFT, check_ins_drift
 from pipeline.report.evidence import Evidence
 from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
+from pipeline.report.part_checks import parts_block
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sensor_report import SensorReport
 from pipeline.report.sonar_report import SonarSettings, sonar_report
+from pipeline.report.systematic_errors import systematic_block
 from pipeline.report.verdict import Criteria, rejections
 from pipeline.report.warnings import geometry_gaps, target_off_origin, unexpected_noise
 from pipeline.target.design import target_of
@@ -41,6 +44,7 @@ class Config:
 
     name: str
     target: Target
+    as_built: AsBuilt
     ins: Ins
     laser: Laser
     mbes: Mbes | None
@@ -103,14 +107,17 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "verdict_in_words": verdict_in_words(verdict, inputs.fixed),
         **statement_lists("reason", reasons),
         **statement_lists("warning", warnings),
+        "limits": config.verdict.model_dump(),
         "result": report.method,
         **report.result_keys,
         "coarse": {"mount": report.coarse.settings()},
         "geometry": geometry_block(inputs, report.advice, config.adjust.test_level),
+        "parts": parts_block(inputs.parts, config.adjust.test_level),
         "free": free_block(inputs.freed),
         "target": target,
         "passes": passes,
         **report.data_keys,
+        **_systematic(inputs.freed, config),
         "ins_drift": drift.model_dump() | {"from_files": list(drift_figures)},
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
@@ -134,6 +141,14 @@ def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str
         mbes=sensor, segment=config.segment, method=config.result, sides=config.target.sides
     )
     return sonar_report(settings, evidence, passes)
+
+
+def _systematic(freed: pd.DataFrame, config: Config) -> dict[str, Any]:
+    """Return the block ``systematic`` of calibration.json; empty if the laser is calibrated."""
+    if config.mbes is None:
+        return {}
+    stated = stated_of(config.laser, config.mbes, config.target, config.as_built)
+    return {"systematic": systematic_block(freed, config.laser.mount_covariance, stated)}
 
 
 def _criteria(config: Config, report: SensorReport) -> Criteria:

@@ -1,6 +1,6 @@
 """Find the target in the laser's points, and label the points of both sensors by face."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated
 
@@ -9,7 +9,7 @@ import pandas as pd
 from pipeline.adjustment.ins_drift import drift_model, pose_noise
 from pipeline.adjustment.laser_design import laser_problem, surveyed_displacement
 from pipeline.adjustment.problem import CalibrationProblem, SessionData, designed_surfaces, sonar_problem
-from pipeline.adjustment.provisional import sample_near_target, with_adjusted_sample
+from pipeline.adjustment.provisional import design_without_place, sample_near_target, with_adjusted_sample
 from pipeline.artefacts.catalogue.points import (
     GEOREFERENCE_COUNTS,
     INS_SIGMAS,
@@ -51,9 +51,10 @@ from pipeline.target.laser_search import refine_target_and_laser
 from pipeline.target.mount_search import search_mount
 from pipeline.target.pose_search import search_target_pose
 from pipeline.target.result_tables import provisional_mount_table, target_pose_table
-from pipeline.target.samples import laser_poses, laser_sample, sounding_sample
+from pipeline.target.samples import laser_poses, laser_sample, scan_of, sounding_sample
 from pipeline.target.surface import ClosestSurface
 
+COUNTED = {"laser_pool": "laser_points", "soundings_pool": "soundings"}  # names in table counts, by stream
 FEWEST_VOXELS = 50  # fewest voxels with laser points above the water
 
 
@@ -103,12 +104,12 @@ def prepare(inputs: Inputs, config: Config) -> LabellingContext:
 
     # Adjust a sample of the points: labels need the trajectory without its drift.
     streams = {"laser_pool": inputs.laser_pool, "soundings_pool": inputs.soundings_pool}
-    counts = {"laser_pool": "laser_points", "soundings_pool": "soundings"}
-    sample = {
-        name: sample_near_target(stream, name, used(inputs.counts, counts[name]), context)
-        for name, stream in streams.items()
-        if stream.parts
-    }
+    counts = {name: used(inputs.counts, kind) for name, kind in COUNTED.items()}
+    if config.mbes is None:
+        del counts["soundings_pool"]
+    if not all(counts.values()):
+        return context
+    sample = {name: sample_near_target(streams[name], name, count, context) for name, count in counts.items()}
     drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     problem_at = partial(provisional_problem, noise=pose_noise(drift, config.ins.white), config=config)
     return with_adjusted_sample(context, sample, problem_at, config.adjust, config.ingest.max_gap_s)
@@ -118,20 +119,17 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
     """Search for the target, and for the mount of the sensor that is calibrated."""
     model = target_of(config.target)
     lowest_m = config.target.water_level_m - model.half_period_m / 2
-    laser_count = used(inputs.counts, "laser_points")
-    dry = laser_sample(inputs.laser_pool, laser_count, lowest_m)
+    dry = laser_sample(inputs.laser_pool, used(inputs.counts, "laser_points"), lowest_m)
     if len(dry.voxel_means_m) < FEWEST_VOXELS:
         raise RawDataError(
             f"laser: {len(dry.voxel_means_m)} places seen above the water near the target, at least 50 are needed; "
             "check target.origin, target.water_level_m and laser.mount; poolcal check tells which of them"
         )
     azimuth_known = not bool(inputs.pool_frame["azimuth_estimated"].iloc[0])
-    target = search_target_pose(dry, model, config.segment, azimuth_known)
-    in_pool = trajectory_in_pool(inputs.poses)
-    laser = mount_of(config.laser.mount)
+    in_pool, laser = trajectory_in_pool(inputs.poses), mount_of(config.laser.mount)
+    target = search_target_pose(dry, scan_of(dry, in_pool, laser), model, config.segment, azimuth_known)
     if config.mbes is None:
-        poses = laser_poses(inputs.laser_pool, laser_count, lowest_m, in_pool)
-        target, mount = refine_target_and_laser(poses, target, model, laser, config.segment)
+        target, mount = refine_target_and_laser(laser_poses(dry, in_pool), target, model, laser, config.segment)
     trajectory = target.frame.trajectory_from_pool(in_pool)
     if config.mbes is not None:
         soundings = sounding_sample(inputs.soundings_pool, used(inputs.counts, "soundings"), trajectory)
@@ -144,6 +142,7 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
         trajectory=trajectory,
         corrected=trajectory,
         laser=laser,
+        laser_beam_m=config.laser.beam_m,
         mbes=config.mbes,
         settings=config.segment,
     )
@@ -161,7 +160,8 @@ def provisional_problem(context: LabellingContext, noise: PoseNoise, config: Con
         as_built=config.as_built,
     )
     if config.mbes is not None:
-        return sonar_problem(session, mount, {"laser": laser, "mbes": config.mbes})
+        problem = sonar_problem(session, mount, {"laser": laser, "mbes": config.mbes})
+        return replace(problem, prior=replace(problem.prior, surfaces=design_without_place(context.model)))
     assert config.laser_fit is not None
     set_up = surveyed_displacement(context.target.frame, context.target.azimuth_correction_rad)
     return laser_problem(session, mount, laser, config.laser_fit, set_up)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.roots import ROOT
 
-DOCUMENTS = ["README.md", "CONVENTIONS.md", "Makefile", "pyproject.toml", "configs/defaults.yaml"]
+DOCUMENTS = ["README.md", "CONVENTIONS.md", "Makefile", "pyproject.toml", "configs/defaults.yaml", "docs/patent.md"]
 FILE = re.compile(r"(?<![\w./-])((?:[\w-]+/)*[\w-]+\.py)\b")
 ROLE = re.compile(r":(mod|class|func|meth|data):`~?(?P<name>(?:pipeline|stages|tests|tools)[\w.]*)`")
 SOURCES = sorted(path for folder in ("pipeline", "stages", "tools", "tests") for path in (ROOT / folder).rglob("*.py"))

@@ -4,9 +4,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from pipeline.config.mount import MountSigma
+from pipeline.config.session import Laser, Mbes
+from pipeline.maths.mount_parameters import SETTINGS
+
 FOLDER = Path("runs/montecarlo")
 TASKS_OF_A_WORKER = 20  # then a new process: hundreds of ray casting scenes make a process slow and large
 COARSE_DEG, COARSE_M = 2.5, 0.25
+OWN_ERRORS = (("sound_speed", "m_s"), ("sound_speed_gradient", "1_s"), ("latency", "s"))  # of the sonar: name, unit
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points for the sonar's noise to dominate
 WHITE: dict[str, Any] = {
     "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
@@ -48,6 +55,7 @@ class Campaign:
     scenario: dict[str, Any] = field(default_factory=dict)
     through_files: bool = False
     pairs: bool = False  # also compare sessions in pairs: how often does the comparison report a move?
+    own_errors: bool = False  # systematic errors are drawn: those of a session's own, and the laser's mount of a pair
 
 
 def _target(**letters: Any) -> dict[str, Any]:
@@ -87,6 +95,7 @@ CAMPAIGNS = (
     Campaign("tilted sectors, border at 48", 24, 12300, _sectors(48.0)),
     Campaign("tilted from ping to ping", 24, 12400, {"mbes": TABLE | {"ping_tilts_deg": [0.0, 0.3]}}),
     Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
+    Campaign("300 pairs, own errors", 600, 13000, WHITE | HALF | {"ins": DRIFT}, pairs=True, own_errors=True),
 )
 
 
@@ -96,13 +105,38 @@ def path_of(campaign: Campaign) -> Path:
 
 
 def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
-    """Return the scenario of a session: the campaign's with thinned laser points and the session's coarse errors."""
+    """Return the scenario of a session: the campaign's with thinned laser points, coarse and systematic errors."""
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
-    keys = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
     sizes = (COARSE_DEG,) * 3 + (COARSE_M,) * 3
-    coarse = {key: sign * size for key, sign, size in zip(keys, signs, sizes, strict=True)}
+    coarse = {key: sign * size for key, sign, size in zip(SETTINGS, signs, sizes, strict=True)}
     merged: dict[str, Any] = {"name": campaign.name}
-    for part in (campaign.scenario, THIN, {"mbes": {"coarse_error": coarse}}):
+    drawn = systematic_errors(campaign.first_seed + number) if campaign.own_errors else {}
+    for part in (campaign.scenario, THIN, {"mbes": {"coarse_error": coarse}}, drawn):
         for key, value in part.items():
             merged[key] = merged.get(key, {}) | value
     return merged
+
+
+def systematic_errors(seed: int) -> dict[str, Any]:
+    """Return the blocks of a scenario with drawn errors, whose sigmas are the defaults that hold in session.yaml.
+
+    Sound speed, its gradient and both clocks are drawn for each session; the recorded sound speed is 1500 m/s. The
+    laser's mount is wrong by the same in both sessions of a pair, an even seed and the next.
+    """
+    own, common = np.random.default_rng([seed, 1]), np.random.default_rng([seed // 2, 2])  # not the simulator's numbers
+    sonar, laser = Mbes.model_fields, Laser.model_fields
+    sigmas = [sonar[f"{name}_sigma_{unit}"].default for name, unit in OWN_ERRORS] + [laser["latency_sigma_s"].default]
+    speed, gradient, mbes_latency, laser_latency = (float(error) for error in sigmas * own.normal(size=len(sigmas)))
+    mount = MountSigma()
+    of_mount = np.repeat([mount.angle_deg, mount.lever_arm_m], 3) * common.normal(size=len(SETTINGS))
+    return {
+        "mbes": {
+            "sound_speed_true_m_s": 1500.0 + speed,
+            "sound_speed_gradient_1_s": gradient,
+            "latency_s": mbes_latency,
+        },
+        "laser": {
+            "latency_s": laser_latency,
+            "coarse_error": dict(zip(SETTINGS, of_mount.tolist(), strict=True)),
+        },
+    }

@@ -12,16 +12,14 @@ campaign and Parquet at its end. ``tools.accuracy`` makes the README's table and
 import argparse
 import time
 from multiprocessing import get_context
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.stats import chi2
 
 from tools.campaigns import CAMPAIGNS, FOLDER, TASKS_OF_A_WORKER, Campaign, path_of
-from tools.session_rows import NAMES, UNITS, Array, session_row
-
-MOVED_DEG, MOVED_MM = 0.05, 2.0
+from tools.session_pairs import pairs_report
+from tools.session_rows import NAMES, session_row
 
 
 def report(campaign: Campaign, table: pd.DataFrame) -> str:
@@ -30,9 +28,11 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
     low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
     mean = table["nse"].mean()
     verdict = "inside" if low <= mean <= high else "OUTSIDE"
+    agreement = f"; mean normalised squared error {mean:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}"
+    if campaign.own_errors:  # which its covariance from noise does not have
+        agreement = ""
     lines = [
-        f"{campaign.name}: {n} sessions, {int(table['accepted'].sum())} accepted; mean normalised squared error "
-        f"{mean:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}",
+        f"{campaign.name}: {n} sessions, {int(table['accepted'].sum())} accepted{agreement}",
         f"  {'':16}" + "".join(f"{name:>10}" for name in NAMES) + "     (degrees, millimetres)",
     ]
     for word, values in (
@@ -43,42 +43,6 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
         lines.append(
             f"  {word:16}" + "".join(f"{value:10.4f}" if k < 3 else f"{value:10.3f}" for k, value in enumerate(values))
         )
-    return "\n".join(lines)
-
-
-def pairs(table: pd.DataFrame) -> str:
-    """Return the results of comparing sessions 0 and 1, 2 and 3, … as they are and with one mount parameter moved.
-
-    The comparison is that of ``poolcal diff``.
-    """
-    from pipeline.maths.comparison import MountEstimate, compare_estimates
-    from pipeline.maths.geometry.rotations import exp_so3
-    from pipeline.results.mount_difference import SIGNIFICANCE
-
-    def estimate(row: Any, moved: Array) -> MountEstimate:
-        """Return the estimate of a true mount of zero plus ``moved``: estimated = Exp(-error) · true."""
-        error = np.array([row[f"error_{name}"] for name in NAMES]) * UNITS
-        covariance = np.zeros((6, 6))
-        for i in range(6):
-            for k in range(i + 1):
-                covariance[i, k] = covariance[k, i] = row[f"covariance_{i}{k}"]
-        return MountEstimate(exp_so3(-error[:3]) @ exp_so3(moved[:3]), moved[3:] - error[3:], covariance)
-
-    rows = table.to_dict("records")
-    pairs_of_rows = list(zip(rows[::2], rows[1::2], strict=True))
-    count, still = len(pairs_of_rows), np.zeros(6)
-    comparisons = [compare_estimates(estimate(a, still), estimate(b, still)) for a, b in pairs_of_rows]
-    alarms = sum(comparison.probability < SIGNIFICANCE for comparison in comparisons)
-    lines = [f"  compared in {count} pairs: {alarms} false alarms, {100 * alarms / count:.1f} % (level 1 %)"]
-    for k, name in enumerate(NAMES):
-        move = np.zeros(6)
-        move[k] = np.radians(MOVED_DEG) if k < 3 else MOVED_MM / 1000
-        comparisons = [compare_estimates(estimate(a, still), estimate(b, move)) for a, b in pairs_of_rows]
-        significant = [comparison.significant(SIGNIFICANCE) for comparison in comparisons]
-        detected = 100 * np.mean([bool(parameters) for parameters in significant])
-        named = 100 * np.mean([k in parameters for parameters in significant])
-        size = f"{MOVED_DEG}°" if k < 3 else f"{MOVED_MM} mm"
-        lines.append(f"  {name} moved by {size}: found in {detected:.1f} % of the pairs, {name} named in {named:.1f} %")
     return "\n".join(lines)
 
 
@@ -108,7 +72,7 @@ def main() -> None:
                 pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
         table = pd.read_csv(path)
         table.to_parquet(path_of(campaign), index=False)
-        words = [report(campaign, table), *([pairs(table)] if campaign.pairs else [])]
+        words = [report(campaign, table), *([pairs_report(campaign, table)] if campaign.pairs else [])]
         print("\n".join(words), f"\n  ({time.monotonic() - started:.0f} s)\n", flush=True)
 
 

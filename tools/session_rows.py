@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,13 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from pipeline.config.pool import PoolConfig
+from pipeline.config.session import SessionConfig
+from pipeline.config.yaml_models import parse
 from pipeline.maths.comparison import mount_error
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.session import SimulatedSession, simulate_session
+from stages.in_memory import calibrate_in_memory
 from tools.campaigns import Campaign, scenario_of
 
 Array = NDArray[np.float64]
@@ -38,23 +44,30 @@ def errors_of(R_body_from_sensor: Array, lever_arm_m: Array, truth: Mapping[str,
     return mount_error(R_true, lever_arm_true_m, R_body_from_sensor, lever_arm_m)
 
 
-def session_in_memory(campaign: Campaign, number: int) -> dict[str, Any]:
-    """Simulate and calibrate a session in memory and return its row."""
-    from pipeline.config.pool import PoolConfig
-    from pipeline.config.session import SessionConfig
-    from pipeline.config.yaml_models import parse
-    from pipeline.simulation.scenario import Scenario
-    from pipeline.simulation.session import simulate_session
-    from stages.in_memory import calibrate_in_memory
+def session_in_memory(
+    campaign: Campaign, number: int, changed: Callable[[str, Any], Any] = lambda _, value: value
+) -> dict[str, Any]:
+    """Simulate and calibrate a session in memory and return its row.
 
-    scenario = parse(Scenario, scenario_of(campaign, number), campaign.name)
-    made = simulate_session(scenario, campaign.first_seed + number)
-    artefacts = calibrate_in_memory(
-        parse(SessionConfig, made.session, "session"),
-        parse(PoolConfig, made.pool, "pool"),
-        {"ins": made.ins, "laser": made.laser, "mbes": made.mbes},
+    Parameters
+    ----------
+    campaign, number
+        The session.
+    changed
+        Function of an artefact's key and value. Its result replaces the value for the following stages.
+    """
+    made, session, pool = simulated(campaign, number)
+    raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
+    artefacts = calibrate_in_memory(session, pool, raw, changed=changed)
+    return _row(campaign, json.loads(artefacts["report/calibration.json"]), made.truth)
+
+
+def simulated(campaign: Campaign, number: int) -> tuple[SimulatedSession, SessionConfig, PoolConfig]:
+    """Simulate a session and return it with its settings."""
+    made = simulate_session(
+        parse(Scenario, scenario_of(campaign, number), campaign.name), campaign.first_seed + number
     )
-    return _row(json.loads(artefacts["report/calibration.json"]), made.truth)
+    return made, parse(SessionConfig, made.session, "session"), parse(PoolConfig, made.pool, "pool")
 
 
 def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
@@ -79,10 +92,10 @@ def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
             if done.returncode not in (0, 1):
                 raise RuntimeError(done.stderr)
         calibration = json.loads((run / "report" / "calibration.json").read_text())
-        return _row(calibration, json.loads(Path(f"{session}.truth.json").read_text()))
+        return _row(campaign, calibration, json.loads(Path(f"{session}.truth.json").read_text()))
 
 
-def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:
+def _row(campaign: Campaign, calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:
     block = calibration["methods"]["adjustment"]
     covariance = np.array(block["covariance"])
     error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), truth)
@@ -95,6 +108,9 @@ def _row(calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, 
     for k, name in enumerate(NAMES):
         row |= {f"error_{name}": error[k] / UNITS[k], f"sigma_{name}": sigma[k] / UNITS[k]}
     row |= {f"covariance_{i}{k}": covariance[i, k] for i in range(6) for k in range(i + 1)}
+    if campaign.pairs:  # what poolcal diff reads
+        read = {"methods": {"adjustment": block}, "systematic": calibration["systematic"]}
+        row["calibration"] = json.dumps(read | {"limits": calibration["limits"]})
     return row
 
 

@@ -12,6 +12,7 @@ from pipeline.adjustment.observation_model import CurrentValues, ObservationMode
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
@@ -79,7 +80,8 @@ class MountAdjustment:
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
-    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m).
+    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the
+    values and the noise of the final solution.
     """
 
     state: State
@@ -92,6 +94,12 @@ class MountAdjustment:
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
+    last: "_Iterate"
+    noise: PoseNoise
+
+    def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
+        """Return the normal equations of all parameters, with the prior information, from a part of the sums."""
+        return self.last.of(sums).equations(self.noise)
 
     @property
     def values(self) -> CurrentValues:
@@ -169,6 +177,8 @@ def adjust_mount(
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
+        last=last,
+        noise=noise,
     )
 
 
@@ -179,6 +189,10 @@ class _Iterate:
     linearisation: Linearisation
     drift: DriftEstimate
     surfaces: SurfacePrior | None
+
+    def of(self, sums: Mapping[str, IntervalSums]) -> "_Iterate":
+        """Return the same values for other sums, linearised at them."""
+        return replace(self, linearisation=replace(self.linearisation, sums=sums))
 
     def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
         """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""

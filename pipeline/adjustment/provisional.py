@@ -16,15 +16,27 @@ from pipeline.adjustment.iteration import IterationSettings, MountAdjustment, ad
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Batch, MemoryPart, Stream, point_array
-from pipeline.maths.adjustment.pseudo_observations import displacement
+from pipeline.maths.adjustment.pseudo_observations import N_DISPLACEMENT, DesignPrior, displacement
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
+from pipeline.maths.target.model import TargetModel
 from pipeline.target.labelled_points import LabellingContext, label_batch
 
 ROUNDS = 2  # adjustments of the sample; a third changes less than 0.1 % of the labels
 READ = 1_000_000  # about this many points of a stream are looked at
 SAMPLE = {"laser_pool": 200_000, "soundings_pool": 60_000}  # about this many of them near the target are used
 BEYOND_M = 0.5  # a point farther outside the target's bounds is not near it
+BUILT_RAD, BUILT_M = float(np.radians(0.02)), 0.002  # sigmas of a family's direction and place against the design
 SENSOR = {"laser_labelled": "laser", "soundings_labelled": "mbes"}  # by the name of the labelled stream
+
+
+def design_without_place(target: TargetModel) -> DesignPrior:
+    """Return the design as prior information, with errors of an ordinary building site, at an unknown place.
+
+    Without it the adjustment knows P1 and P3 only as well as the drift lets it, because the boat sees them one after
+    the other: 2 mm, which move one label in a hundred.
+    """
+    open_place = np.full(N_DISPLACEMENT, np.inf)
+    return DesignPrior(designed_planes(target), BUILT_RAD, BUILT_M, np.zeros(N_DISPLACEMENT), open_place)
 
 
 def sample_near_target(stream: Stream, name: str, count: float, context: LabellingContext) -> Batch:

@@ -29,7 +29,7 @@ PRESETS = CONFIGS / "instruments"
 SENSORS: Mapping[Sensor, type[Model]] = {"ins": Ins, "laser": Laser, "mbes": Mbes}
 SETTINGS: Mapping[Sensor, tuple[str, ...]] = {  # keys that a preset may set and the report shows
     "ins": ("drift", "white"),
-    "laser": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg"),
+    "laser": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg", "beam_m"),
     "mbes": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg", "beam_deg", "projector_offset_m"),
 }
 MOST_PRESETS = 1000  # most files that are read for a message

@@ -6,7 +6,7 @@ and impossible values are errors that name file and key.
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pipeline.config.quantities import Model, NotNegative, Positive, SigmaDeg, SigmaM
 from pipeline.config.target import Origin, Target
@@ -54,7 +54,7 @@ class Segment(Model):
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
     search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # how wrong the laser's angles may be, if calibrated
-    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # least loss of wall half a period off, not ambiguous
+    ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # least margin over a rival pose, share of b times e
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
         0.02  # the mount is ambiguous if a rival's score is smaller by less than this share
     )
@@ -80,6 +80,7 @@ class AngleIterate(Model):
     max_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
     step_tolerance_deg: Positive = 1e-6
     angle_tolerance_deg: Positive = 1e-6  # change of the angles between the normals in one step
+    literal_threshold_deg: Positive = 0.02  # patent_literal ends when the angles themselves are smaller
 
 
 class Offsets(Model):
@@ -132,7 +133,7 @@ class VerdictLimits(Model):
     max_sigma_m: Positive = 0.005
 
 
-Method = Literal["patent_sequential", "patent_alternating", "adjustment"]
+Method = Literal["patent_sequential", "patent_alternating", "adjustment"]  # patent_literal is never the result
 
 
 class PoolConfig(Model):
@@ -150,6 +151,13 @@ class PoolConfig(Model):
     laser_fit: LaserFit = LaserFit()
     verdict: VerdictLimits = VerdictLimits()
     result: Method = "adjustment"
+
+    @field_validator("result", mode="before")
+    @classmethod
+    def _not_literal(cls, value: object) -> object:
+        if value == "patent_literal":
+            raise ValueError("is shown beside the result, and is never the result itself; choose adjustment")
+        return value
 
     @property
     def target_place(self) -> TargetPlace:

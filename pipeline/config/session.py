@@ -87,6 +87,7 @@ class Laser(Model):
     range_sigma_m: RangeSigma = 0.005
     range_bias_sigma_m: SigmaM = 0.002  # common to all ranges
     angle_sigma_deg: SigmaDeg = 0.003
+    beam_m: Annotated[float, Field(ge=0, le=0.1)] = 0.01  # diameter of the beam at the target
     latency_s: Latency = 0.0
     latency_sigma_s: SigmaS = 0.0002
 

@@ -55,13 +55,14 @@ class SonarBeams(Model):
 
 
 class LaserPoints(Model):
-    """Settings of the laser's points: the mount, what is known of it, and the sigmas of range and angle."""
+    """Settings of the laser's points: the mount, what is known of it, the sigmas of range and angle, the beam."""
 
     mount: Mount
     mount_covariance: Covariance | None
     mount_origin: MountOrigin | None
     range_sigma_m: float
     angle_sigma_deg: float
+    beam_m: float
 
 
 class InsErrors(Model):

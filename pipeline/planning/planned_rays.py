@@ -11,9 +11,10 @@ from pipeline.maths.adjustment.design_matrix import SPEED_M_S
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.sonar.soundings import points_in_mbes
 from pipeline.maths.target.beams import TargetBeams
-from pipeline.maths.target.labelling import LabelSettings, label_points
+from pipeline.maths.target.labelling import label_points
 from pipeline.mount import mount_of
 from pipeline.planning.setting import PredictionSetting
+from pipeline.target.label_limits import laser_limits, sonar_limits
 from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
 
@@ -94,17 +95,10 @@ def label_rays(
     if sensor == "mbes":
         _, R_target_from_body = trajectory.poses_at(t_ns[met])
         beams = beams_in_target(R_target_from_body, R, own, narrow(SonarBeams, setting.mbes))
-        heights = (-np.inf, level - segment.water_margin_m)
+        limits = sonar_limits(segment, level, segment.gate_m)
     else:
-        beams, heights = TargetBeams(directions, range_m), (level + segment.water_margin_m, np.inf)
-    limits = LabelSettings(
-        gate_m=segment.gate_m,
-        margin_m=segment.margin_m,
-        min_grazing_rad=float(np.radians(segment.min_grazing_deg)),
-        lowest_m=heights[0],
-        highest_m=heights[1],
-        seen="wet" if sensor == "mbes" else "dry",
-    )
+        beams = TargetBeams(directions, range_m)
+        limits = laser_limits(segment, level, segment.gate_m, setting.laser.beam_m)
     labels = label_points(setting.model, points, beams, limits)
     on = np.flatnonzero(labels.face >= 0)
     columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}

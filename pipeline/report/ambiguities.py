@@ -71,9 +71,9 @@ def _ambiguous_pose(pose: pd.Series, shape: str, sides: str) -> Statement:
     return Statement(
         ReasonCode.AMBIGUOUS_TARGET_POSE,
         f"the target's pose is ambiguous: '{pose['rival']}' fits the laser points {fit} "
-        f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m²); {remedy} target.origin (a "
-        f"height wrong by e or 2 e, half a period or a whole one, does this), azimuth_deg, and {shape}; poolcal "
-        "check tells which",
+        f"({pose['rival_agreement_m2']:.2f} against {pose['agreement_m2']:.2f} m² of its faces seen, those missed "
+        f"deducted); {remedy} target.origin (a height wrong by e or 2 e, half a period or a whole one, does this), "
+        f"azimuth_deg, and {shape}; poolcal check tells which",
     )
 
 

@@ -16,6 +16,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GEOMETRY,
     GROUPS,
+    PARTS,
     PATTERNS,
 )
 from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT, SOUNDING_MOMENTS, TARGET_POSE
@@ -39,6 +40,7 @@ class Evidence:
     drift: Annotated[pd.DataFrame, DRIFT]
     freed: Annotated[pd.DataFrame, FREED]
     patterns: Annotated[pd.DataFrame, PATTERNS]
+    parts: Annotated[pd.DataFrame, PARTS]
     cells: Annotated[pd.DataFrame, CELLS]
     groups: Annotated[pd.DataFrame, GROUPS]
     summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]

@@ -16,6 +16,9 @@ from pipeline.mount import WITHIN_95, Mounted, parameters_of, setting_change
 
 Array = NDArray[np.float64]
 Block = dict[str, Any]
+WARNINGS = {
+    "patent_literal": "as the patent prints it, faults included: to compare, never to be entered"
+}  # by method, for people; a method without one has an empty text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +48,7 @@ class MethodResult:
         return Mounted(R_body_from_sensor, coarse.lever_arm_body_m + self.lever_arm_m)
 
 
-def method_block(result: MethodResult, coarse: Mounted, sensor: Calibrated = "mbes") -> Block:
+def method_block(result: MethodResult, coarse: Mounted, sensor: Calibrated = "mbes", warning: str = "") -> Block:
     """Return a method's block of calibration.json. Its values are null if the method has no result.
 
     Parameters
@@ -53,6 +56,7 @@ def method_block(result: MethodResult, coarse: Mounted, sensor: Calibrated = "mb
     result : corrections and covariances
     coarse : the coarse mount
     sensor : the sensor that is calibrated
+    warning : why the values are not to be used; empty if they may be
     """
     mount = result.mounted(coarse)
     block: Block = {
@@ -73,6 +77,7 @@ def method_block(result: MethodResult, coarse: Mounted, sensor: Calibrated = "mb
         "converged": bool(result.outcome["converged"]),
         "iterations": int(result.outcome["iterations"]),
         "no_result": str(result.outcome["reason"]),
+        "warning": warning,
     }
 
 
@@ -120,7 +125,8 @@ def patent_blocks(corrections: pd.DataFrame, coarse: Mounted) -> dict[str, Block
             lever_arm_m=vector_of(row, "lever_arm_{}_m"),
             outcome=row,
         )
-        blocks[str(row["method"])] = method_block(result, coarse)
+        method = str(row["method"])
+        blocks[method] = method_block(result, coarse, warning=WARNINGS.get(method, ""))
     return blocks
 
 

@@ -40,6 +40,7 @@ class ReasonCode(StrEnum):
     # Mean residuals beyond the tolerance: these reject.
     PASSES_DISAGREE = "passes_disagree", "one pass lies off the others"
     INS_DRIFT_BETWEEN_PASSES = "ins_drift_between_passes", "the INS would have to drift too far in one pass"
+    PARTS_DISAGREE = "parts_disagree", "a part of the session gives another mount than the whole session"
     RESIDUALS_BY_FACE = "residuals_by_face", "mean residuals differ from face to face"
     RESIDUALS_BY_ANGLE = "residuals_by_angle", "mean residuals depend on the beam's angle or elevation"
     RESIDUALS_STEP = "residuals_step", "mean residuals step at a receive angle"

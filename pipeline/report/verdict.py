@@ -11,6 +11,8 @@ The limits are defined at these places (paths from ``pipeline/``):
 * number of soundings on a family: ``MIN_SOUNDINGS`` of this module;
 * mean residuals: ``test_level`` and ``test_tolerance_m`` of class ``Adjust`` of config/pool.py; ``FEWEST``,
   ``FEWEST_SLOTS`` and ``FEWEST_DOF`` of maths/adjustment/residual_means.py decide which means are tested;
+* the mount from parts of the session: ``test_level`` of class ``Adjust``, ``APART_M`` of adjustment/parts.py, and
+  ``SAME`` of maths/adjustment/parts.py;
 * drift of the INS, beside deviating residuals or a suspected cause: ``MAX_DRIFT_RATIO`` of drift_check.py;
 * suspected causes, and estimates off their settings: ``SIGNIFICANT`` of suspected_causes.py;
 * total sigmas, and difference of a patent's form from the adjustment: ``max_sigma_deg`` and ``max_sigma_m`` of class
@@ -36,6 +38,7 @@ from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.ambiguities import MountSearch, ambiguities
 from pipeline.report.evidence import Evidence
 from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit
+from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.residual_tests import deviations
 from pipeline.report.residual_words import ResidualTests
@@ -104,6 +107,7 @@ def rejections(
         reasons.append(Statement(ReasonCode.NOT_CONVERGED, words))
     reasons += _too_few_soundings(evidence.cells)
     reasons += _residual_reasons(evidence, criteria, drift_check)
+    reasons += disagreeing_parts(evidence.parts, criteria.test_level)
     reasons += _estimates_off_settings(evidence.freed)
     if len(evidence.fixed) == len(PARAMETERS):
         words = "no mount parameter can be estimated: this target and these passes determine none within its limit"

@@ -11,8 +11,9 @@ import numpy as np
 from pipeline.artefacts.catalogue.target import FACES, PLANES
 from pipeline.artefacts.from_tables import family_names, horizontal_families, normal_of
 from pipeline.maths.geometry.planes import angle_between
+from pipeline.results.answer_text import answer_sentence, visible_sentence
 from pipeline.results.finished_run import FinishedRun
-from pipeline.results.mount_difference import Row, Tolerances, answer_sentence, is_same_result, mount_difference
+from pipeline.results.mount_difference import Row, Tolerances, is_same_result, mount_difference
 from pipeline.run import manifest
 from pipeline.run.results import Tables
 
@@ -44,8 +45,13 @@ def run_difference(first: FinishedRun, second: FinishedRun, tolerances: Toleranc
     rejected = [key for key in ("a", "b") if difference[key]["verdict"] == "rejected"]
     # a rejected run answers nothing, unless both runs have the same values
     difference["answered"] = difference["comparable"] and (not rejected or is_same_result(difference))
+    if not difference["answered"]:
+        difference["answer"] = "none"
+    elif difference["answer"] == "too_uncertain" and not difference["inputs"]:
+        difference["answer"] = "no_movement_shown"  # within one session nothing moves
     difference["planes"] = list(_plane_changes(first, second, difference["not_compared"]))
     difference["sentence"] = answer_sentence(difference)
+    difference["visible"] = visible_sentence(difference)
     return difference
 
 

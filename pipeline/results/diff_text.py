@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from pipeline.console import plural
+from pipeline.results.answer_text import answer_lines
 from pipeline.results.mount_difference import Row, quantity_text
 from pipeline.text_table import text_table
 
@@ -12,11 +13,14 @@ FACE_KEYS = "target.faces."
 
 
 def difference_text(difference: Mapping[str, Any]) -> str:
-    """Return the difference as text for the screen. Values that are equal in both runs are not listed."""
-    lines = [
+    """Return the difference as text for the screen, the answer first. Values that are equal in both are not listed."""
+    lines = [*answer_lines(difference), ""]
+    lines += [
         f"{key}: {difference[key]['session']} ({difference[key]['verdict']}), {difference[key]['run']}"
         for key in ("a", "b")
     ]
+    if any(row["difference"] for row in difference["parameters"]):
+        lines += ["", *_parameter_table(difference["parameters"])]
     inputs = difference["inputs"]
     if inputs:
         new, gone = (sum(row[key] is None for row in inputs) for key in ("a", "b"))
@@ -33,10 +37,8 @@ def difference_text(difference: Mapping[str, Any]) -> str:
         ]
     if difference["planes"]:
         lines += ["", *_plane_table(difference["planes"])]
-    if any(row["difference"] for row in difference["parameters"]):
-        lines += ["", *_parameter_table(difference["parameters"])]
     lines += [f"not compared: {why}" for why in difference["not_compared"]]
-    return "\n".join([*lines, "", difference["sentence"] + "."])
+    return "\n".join(lines)
 
 
 def _plane_table(planes: Sequence[Row]) -> list[str]:
@@ -59,11 +61,13 @@ def _parameter_table(parameters: Sequence[Row]) -> list[str]:
             quantity_text(row["difference"], row["unit"]),
             quantity_text(row["sigma"], row["unit"], ""),
             f"{row['z']:.1f}",
+            quantity_text(row["detectable"], row["unit"], ""),
             "moved" if row["moved"] else "",
         )
         for row in parameters
     ]
-    return text_table("<16>14>14>12  <1", ("mount, b - a", "difference", "sigma", "in sigmas"), rows)
+    heads = ("mount, b - a", "difference", "sigma", "in sigmas", "found from")
+    return text_table("<16>14>14>12>14  <1", heads, rows)
 
 
 def own_faces_counted(changes: Sequence[Row]) -> Iterator[Row]:

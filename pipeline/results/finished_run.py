@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pipeline.errors import ArtefactError
-from pipeline.maths.comparison import MountEstimate
 from pipeline.results.screen import summary
+from pipeline.results.session_estimate import session_estimate
 from pipeline.run import manifest
 from pipeline.run.output_files import as_written
 from pipeline.run.results import agreeing, calibration
@@ -40,24 +38,8 @@ class FinishedRun:
                 raise ArtefactError(f"{path}: {stage} was made from other settings or results; run poolcal run again")
         result = calibration(path)
         with as_written(path):
-            estimate_of(result)
+            session_estimate(result)
             for name in ("inputs", "software"):
                 manifest.flattened(result[name])
             summary(result)  # --rrd shows it
         return cls(path, read_settings(path), result, manifests)
-
-
-def estimate_of(result: Mapping[str, Any]) -> MountEstimate | None:
-    """Return the adjustment's estimate of the mount, from the content of calibration.json; None if it has none.
-
-    The estimates of the patent's methods have no covariance, and cannot be tested.
-    """
-    block = result["methods"]["adjustment"]
-    if block["covariance"] is None or block["mount"] is None:
-        return None
-    shapes = {"R_body_from_mbes": (3, 3), "lever_arm_m": (3,), "covariance": (6, 6)}
-    arrays = (np.array(block[name], dtype=np.float64).reshape(shape) for name, shape in shapes.items())
-    estimate = MountEstimate(*arrays)
-    if not np.linalg.eigvalsh(estimate.covariance).min() > 0:
-        raise ValueError("the covariance is not positive")
-    return estimate

@@ -1,7 +1,7 @@
 """All sessions of one boat in one table, which shows whether and when the mount has moved.
 
-Each accepted session is compared with the accepted session before it, by the joint test of
-:mod:`pipeline.maths.comparison`. Rejected sessions are listed, but not compared.
+Each accepted session is compared with the accepted session before it, as ``poolcal diff`` does
+(:mod:`pipeline.results.movement`). Rejected sessions are listed, but not compared.
 """
 
 import fnmatch
@@ -18,14 +18,14 @@ import pandas as pd
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.console import plural
 from pipeline.errors import ConfigError, PoolcalError
-from pipeline.maths.comparison import MountEstimate, compare_estimates
-from pipeline.maths.mount_parameters import MOUNT_WORDS, SETTINGS
-from pipeline.results.finished_run import estimate_of
-from pipeline.results.mount_difference import SIGNIFICANCE
+from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS, SETTINGS
+from pipeline.results.mount_difference import TO_UNITS
+from pipeline.results.movement import movement_between
+from pipeline.results.session_estimate import SessionEstimate, session_estimate
 from pipeline.run.results import calibration
 from pipeline.run.settings import RUN_YAML
 
-TEXT_COLUMNS = ("date_utc", "session", "run", "verdict", "moved")
+TEXT_COLUMNS = ("date_utc", "session", "run", "verdict", "moved", "answer")
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def read_history(folder: Path, chosen: SessionFilter) -> History:
             if result.get("calibrated") == "laser":
                 lasers.append(run.relative_to(folder).as_posix())
                 continue
-            row, estimate = _row(run.relative_to(folder).as_posix(), result), estimate_of(result)
+            row, estimate = _row(run.relative_to(folder).as_posix(), result), session_estimate(result)
         except PoolcalError as error:
             unreadable.append(str(error))
             continue
@@ -129,7 +129,9 @@ def _columns() -> Iterator[str]:
     yield from ("date_utc", "session", "run", "verdict")
     for key in SETTINGS:
         yield from (key, f"sigma_{key}")
-    yield from ("probability", "moved")
+    yield from ("probability", "moved", "answer")
+    for key in SETTINGS:
+        yield f"detectable_{key}"
 
 
 def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
@@ -148,7 +150,8 @@ def _row(run: str, result: Mapping[str, Any]) -> dict[str, Any]:
         row |= {key: float(mount[key]), f"sigma_{key}": float(sigma[key])}
         if np.isinf(row[key]) or np.isinf(row[f"sigma_{key}"]):
             raise ValueError(f"{key} is not finite")
-    return row | {"probability": np.nan, "moved": ""}
+    row |= {f"detectable_{key}": np.nan for key in SETTINGS}
+    return row | {"probability": np.nan, "moved": "", "answer": ""}
 
 
 def _checked_time(text: str) -> str:
@@ -159,14 +162,23 @@ def _checked_time(text: str) -> str:
     return text
 
 
-def _with_jumps(sessions: list[tuple[dict[str, Any], MountEstimate | None]]) -> Iterator[dict[str, Any]]:
+def _with_jumps(sessions: list[tuple[dict[str, Any], SessionEstimate | None]]) -> Iterator[dict[str, Any]]:
     """Yield the rows. Each accepted session is tested against the accepted session before it."""
-    before: MountEstimate | None = None
+    before: SessionEstimate | None = None
     for row, now in sessions:
         if row["verdict"] == "accepted" and now is not None:
-            if before is not None:
-                comparison = compare_estimates(before, now)
-                moved = ", ".join(MOUNT_WORDS[k] for k in comparison.significant(SIGNIFICANCE))
-                row = row | {"probability": comparison.probability, "moved": moved}
+            row = row if before is None else row | _comparison(before, now)
             before = now
         yield row
+
+
+def _comparison(before: SessionEstimate, now: SessionEstimate) -> dict[str, Any]:
+    """Return the columns of a row that compare its session with the one before."""
+    movement = movement_between(before, now)
+    sizes = movement.detectable.surely * TO_UNITS
+    return {
+        "probability": movement.difference.probability,
+        "moved": ", ".join(MOUNT_WORDS[k] for k in movement.moved),
+        "answer": movement.answer.replace("_", " "),
+        **{f"detectable_{key}": float(sizes[k]) for _, k, key, _ in PARAMETERS},
+    }

@@ -1,17 +1,22 @@
-"""The difference of the mounts of two runs, its tests, and the answer in one sentence."""
+"""The difference of the mounts of two runs and its tests, as plain values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.maths.comparison import compare_estimates
-from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
-from pipeline.results.finished_run import FinishedRun, estimate_of
+from pipeline.maths.detectable_movement import POWER
+from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT, PARAMETERS
+from pipeline.results.finished_run import FinishedRun
+from pipeline.results.movement import SIGNIFICANCE, Movement, movement_between
+from pipeline.results.session_estimate import session_estimate
 
-SIGNIFICANCE = 0.01  # level of the joint test: the share of false alarms if no mount has moved
+Array = NDArray[np.float64]
 UNITS = ("deg",) * 3 + ("m",) * 3
+TO_UNITS = np.repeat([np.degrees(1.0), 1.0], 3)  # of rad and m to the units
 SCALES = {"deg": ("°", 1.0, 4), "m": (" mm", 1000.0, 2)}  # by unit: unit, factor and digits on the screen
 Row = dict[str, Any]
 
@@ -23,9 +28,10 @@ class Tolerances:
     angle_deg: float | None = None
     lever_arm_mm: float | None = None
 
-    def limits(self) -> list[float | None]:
-        """Return the limits of the six parameters, three in degrees and three in metres; None: no limit."""
-        return [self.angle_deg] * 3 + [None if self.lever_arm_mm is None else self.lever_arm_mm / 1000] * 3
+    def limits(self) -> Array:
+        """Return the limits (6,) of the six parameters, rad and m; NaN: no limit."""
+        angle_rad = np.nan if self.angle_deg is None else np.radians(self.angle_deg)
+        return np.repeat([angle_rad, np.nan if self.lever_arm_mm is None else self.lever_arm_mm / 1000], 3)
 
 
 def mount_difference(
@@ -42,41 +48,51 @@ def mount_difference(
     not_compared
         Sentences on results that cannot be compared; this function may add one.
     """
-    estimates = [estimate_of(run.result) for run in (first, second)]
-    before, after = estimates
+    before, after = estimates = [session_estimate(run.result) for run in (first, second)]
     if before is None or after is None:
         runs = zip((first, second), estimates, strict=True)
         without = [run.result["session"] for run, estimate in runs if estimate is None]
         not_compared.append(f"mount: {' and '.join(without)} has no result with a covariance")
-        return {"comparable": False, "parameters": [], "joint": None, "beyond_tolerance": []}
-    comparison = compare_estimates(before, after)
-    moved = comparison.significant(SIGNIFICANCE)
-    scale = [np.degrees(1.0)] * 3 + [1.0] * 3
-    limits = tolerances.limits()
-    rows: list[Row] = []
-    beyond = []
-    for _, k, *_ in PARAMETERS:
-        difference, limit = float(comparison.difference[k] * scale[k]), limits[k]
-        if limit is not None and abs(difference) > limit:
-            beyond.append(MOUNT_WORDS[k])
-        rows.append(
-            {
-                "parameter": MOUNT_WORDS[k],
-                "unit": UNITS[k],
-                "difference": difference,
-                "sigma": float(comparison.sigma[k] * scale[k]),
-                "z": float(comparison.z[k]),
-                "moved": k in moved,
-            }
-        )
-    joint = {
-        "statistic": comparison.statistic,
-        "dof": 6,
-        "probability": comparison.probability,
-        "level": SIGNIFICANCE,
-        "significant": comparison.probability < SIGNIFICANCE,
+        nothing: dict[str, Any] = {"joint": None, "errors": None, "parameters": [], "beyond_tolerance": []}
+        return {"comparable": False, "answer": "none", **nothing}
+    movement = movement_between(before, after, tolerances.limits())
+    comparison = movement.difference
+    beyond = np.abs(comparison.difference) > tolerances.limits()
+    return {
+        "comparable": True,
+        "answer": movement.answer,
+        "parameters": [_row(movement, k) for _, k, *_ in PARAMETERS],
+        "joint": {
+            "statistic": comparison.statistic,
+            "dof": N_MOUNT,
+            "probability": comparison.probability,
+            "level": SIGNIFICANCE,
+            "significant": comparison.probability < SIGNIFICANCE,
+            "power": POWER,
+        },
+        "errors": {
+            "common": list(movement.common),
+            "own": list(movement.own),
+            "differing": list(movement.differing),
+            "cautious": movement.cautious,
+        },
+        "beyond_tolerance": [MOUNT_WORDS[k] for _, k, *_ in PARAMETERS if beyond[k]],
     }
-    return {"comparable": True, "parameters": rows, "joint": joint, "beyond_tolerance": beyond}
+
+
+def _row(movement: Movement, k: int) -> Row:
+    """Return the values of a mount parameter, in degrees or metres."""
+    found, visible = movement.difference, movement.detectable
+    sizes = {
+        "difference": found.difference,
+        "sigma": found.sigma,
+        "detectable": visible.surely,
+        "detectable_alone": visible.alone,
+        "limit": movement.limits,
+    }
+    row: Row = {"parameter": MOUNT_WORDS[k], "unit": UNITS[k], "moved": k in movement.moved}
+    row |= {name: float(values[k] * TO_UNITS[k]) for name, values in sizes.items()}
+    return row | {"z": float(found.z[k]), "uncertain": k in movement.uncertain, "mostly": movement.mostly[k]}
 
 
 def is_moved(difference: Mapping[str, Any]) -> bool:
@@ -108,38 +124,13 @@ def quantity_text(value: float, unit: str, sign: str = "+") -> str:
     return f"{value * scale:{sign}.{digits}f}{suffix}"
 
 
-def answer_sentence(difference: Mapping[str, Any]) -> str:
-    """Return one sentence that says whether the mount has moved, or why there is no answer."""
-    rejected = [
-        f"{key} ({difference[key]['session']}) was rejected"
-        for key in ("a", "b")
-        if difference[key]["verdict"] == "rejected"
-    ]
-    if rejected and is_same_result(difference):
-        return f"the same result in both; {_listed(rejected)}"
-    if rejected:
-        return f"no answer: {_listed(rejected)}, and what must not be used cannot be compared"
-    if not difference["comparable"]:
-        return f"no answer: {difference['not_compared'][0]}"
-    moved = [row for row in difference["parameters"] if row["moved"]]
-    chance = f"p = {difference['joint']['probability']:.2g}"
-    if moved:
-        each = [_with_sigma(row) for row in moved]
-        rest = "" if len(moved) == len(MOUNT_WORDS) else "; the rest within noise"
-        sentence = f"the sonar has moved, {_listed(each)}: significant ({chance}){rest}"
-    elif is_same_result(difference):
-        sentence = "the same result in both"
-    else:
-        sentence = f"nothing has moved: all six differences are within their noise ({chance})"
-    if difference["beyond_tolerance"]:
-        sentence += f"; beyond the tolerance: {_listed(difference['beyond_tolerance'])}"
-    return sentence
+def least_text(value: float, unit: str) -> str:
+    """Return a least size with two digits, rounded up, as text for the screen; ``unit``: deg or m, shown as mm.
 
-
-def _with_sigma(row: Row) -> str:
-    difference, sigma = quantity_text(row["difference"], row["unit"]), quantity_text(row["sigma"], row["unit"], "")
-    return f"{row['parameter']} by {difference} ± {sigma}"
-
-
-def _listed(words: list[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+    >>> least_text(0.1512, "deg"), least_text(0.00831, "m"), least_text(0.0123, "m")
+    ('0.16°', '8.4 mm', '13 mm')
+    """
+    suffix, scale, _ = SCALES[unit]
+    number = Decimal(f"{value * scale:.9g}")
+    digit = Decimal(1).scaleb(number.adjusted() - 1)
+    return f"{number.quantize(digit, ROUND_CEILING):f}{suffix}"

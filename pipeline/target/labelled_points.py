@@ -12,10 +12,11 @@ from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.beams import TargetBeams
-from pipeline.maths.target.labelling import Labels, LabelSettings, hidden_in_part, label_points
+from pipeline.maths.target.labelling import Labels, hidden_in_part, label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.near_planes import near_planes
 from pipeline.mount import Mounted, mount_of
+from pipeline.target.label_limits import laser_limits, sonar_limits
 from pipeline.target.search_results import LocatedTarget, ProvisionalMount
 from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
@@ -37,8 +38,8 @@ class LabellingContext:
         Provisional mount of the sensor that is calibrated.
     trajectory, corrected
         Poses of the body in the target frame, as recorded, and without the drift of the INS as far as it is known.
-    laser
-        Coarse mount of the laser.
+    laser, laser_beam_m
+        Coarse mount of the laser, and the diameter of its beam at the target.
     mbes
         The sonar's coarse mount and beams; None: the laser is calibrated.
     settings
@@ -52,6 +53,7 @@ class LabellingContext:
     trajectory: Trajectory
     corrected: Trajectory
     laser: Mounted
+    laser_beam_m: float
     mbes: SonarBeams | None
     settings: Segment
 
@@ -64,19 +66,6 @@ class LabellingContext:
     def provisional_mount(self) -> Mounted:
         """The provisional mount of the sensor that is calibrated."""
         return self.mount.total(self.coarse_mount)
-
-    def label_settings(self, sensor: str, gate_m: float) -> LabelSettings:
-        """Return the conditions for labelling a point of a sensor ("laser" or "mbes") with a face."""
-        dry = sensor == "laser"
-        level_m, margin_m = self.model.water_level_m, self.settings.water_margin_m
-        return LabelSettings(
-            gate_m=gate_m,
-            margin_m=self.settings.margin_m,
-            min_grazing_rad=np.radians(self.settings.min_grazing_deg),
-            lowest_m=level_m + margin_m if dry else -np.inf,
-            highest_m=np.inf if dry else level_m - margin_m,
-            seen="dry" if dry else "wet",
-        )
 
 
 def label_batch(source: str, batch: Batch, context: LabellingContext) -> BatchResult:
@@ -109,7 +98,7 @@ def label_batch(source: str, batch: Batch, context: LabellingContext) -> BatchRe
 def _label_laser(batch: Batch, context: LabellingContext) -> BatchResult:
     model = context.model
     mount = context.laser if context.mbes is not None else context.provisional_mount
-    settings = context.label_settings("laser", context.target.gate_m)
+    settings = laser_limits(context.settings, model.water_level_m, context.target.gate_m, context.laser_beam_m)
     body = point_array(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
     points = context.corrected.points_from_body(batch["t_ns"], body)
     dry = points[:, 2] > model.water_level_m + context.settings.water_margin_m / 2
@@ -135,7 +124,7 @@ def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) 
     lever_arm_m = mount.lever_arm_body_m
     sensor = point_array(batch, "mbes_m")
     points = trajectory.points_from_body(batch["t_ns"], sensor @ mount.R_body_from_sensor.T + lever_arm_m)
-    settings = context.label_settings("mbes", context.mount.gate_m)
+    settings = sonar_limits(context.settings, model.water_level_m, context.mount.gate_m)
     wet = points[:, 2] < model.water_level_m - context.settings.water_margin_m / 2
     near, planes = near_planes(model, points, settings.gate_m, wet, settings.seen)
     _, R_target_from_body = trajectory.poses_at(batch["t_ns"][near])

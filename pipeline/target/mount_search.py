@@ -6,11 +6,12 @@ from numpy.typing import NDArray
 from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.target.labelling import LabelSettings, label_points
+from pipeline.maths.target.labelling import label_points
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.placements import MountCorrection
 from pipeline.maths.target.registration import Labeller, SearchCriteria, TargetSurface, refine, search, surface_score
 from pipeline.mount import Mounted
+from pipeline.target.label_limits import sonar_limits
 from pipeline.target.matching import REFINEMENT_GATE_M, SCORE_REACH_M, gate_of, planes_of_faces
 from pipeline.target.samples import SoundingSample
 from pipeline.target.search_results import ProvisionalMount
@@ -113,13 +114,7 @@ def _wet_labeller(
     sample: SoundingSample, model: TargetModel, coarse: Mounted, mbes: SonarBeams, settings: Segment
 ) -> Labeller:
     """Return a function that labels soundings below the water; the correction also turns their beams."""
-    limits = LabelSettings(
-        gate_m=REFINEMENT_GATE_M,
-        margin_m=settings.margin_m,
-        min_grazing_rad=np.radians(settings.min_grazing_deg),
-        highest_m=model.water_level_m - settings.water_margin_m,
-        seen="wet",
-    )
+    limits = sonar_limits(settings, model.water_level_m, REFINEMENT_GATE_M)
 
     def label(parameters: Array, points: Array) -> NDArray[np.int16]:
         R_body_from_mbes = exp_so3(parameters[:3]) @ coarse.R_body_from_sensor

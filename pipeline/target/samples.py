@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 from pipeline.artefacts.sampling import Voxels, points_above, sample_rows, voxel_means, voxel_sums
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.target.coverage import Scan
+from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
+Singles = tuple[NDArray[np.int64], Array, Array]  # times (k,), places in the pool frame and in the scanner's (k, 3) m
 VOXEL_M = 0.1  # laser points are averaged over cubes of this size
 SOUNDING_SAMPLE = 8_000  # about this many soundings
 LASER_SAMPLE = 2_000_000  # about this many laser points at most, which are averaged over voxels
+RAYS = 40_000  # of the scanner, by which a search knows where it looked
 RAW_SAMPLE = 50_000  # about this many of them at most, as single points
 
 
@@ -23,10 +27,15 @@ class LaserSample:
 
     The search uses the means, because their density is even. They are biased if a face lies along the sides of voxels:
     the points before and behind the face then have separate means. So the pose is estimated from the points.
+
+    ``t_ns`` (k,) and ``points_laser_m`` (k, 3) are the times of the single points, and their places in the scanner's
+    frame.
     """
 
     voxel_means_m: Array
     points_m: Array
+    t_ns: NDArray[np.int64]
+    points_laser_m: Array
 
 
 @dataclass(frozen=True)
@@ -59,46 +68,65 @@ def laser_sample(laser_pool: Stream, count: float, lowest_m: float) -> LaserSamp
     lowest_m
         Height in the pool frame below which points do not count.
     """
-    points: list[Array] = []
+    singles: list[Singles] = []
 
     def voxels() -> Iterator[Voxels]:
-        for sums, points_of_batch in laser_pool.fold(_voxels_and_points, count, lowest_m):
-            points.append(points_of_batch)
+        for sums, of_batch in laser_pool.fold(_voxels_and_points, count, lowest_m):
+            singles.append(of_batch)
             yield sums
 
-    return LaserSample(voxel_means(voxels()), np.concatenate(points))
+    means = voxel_means(voxels())
+    t_ns, points_m, points_laser_m = (np.concatenate(columns) for columns in zip(*singles, strict=True))
+    return LaserSample(means, points_m, t_ns, points_laser_m)
 
 
-def _voxels_and_points(batch: Batch, count: float, lowest_m: float) -> tuple[Voxels, Array]:
+def _voxels_and_points(batch: Batch, count: float, lowest_m: float) -> tuple[Voxels, Singles]:
     sample = sample_rows(batch, count / LASER_SAMPLE)
     singles = sample_rows(sample, count / RAW_SAMPLE)  # chosen by the same hash: a part of the sample
     voxels = voxel_sums(points_above(sample, "pool_m", lowest_m), VOXEL_M)
-    return voxels, points_above(singles, "pool_m", lowest_m)
+    dry = singles["z_pool_m"] >= lowest_m
+    return voxels, (singles["t_ns"][dry], point_array(singles, "pool_m", dry), point_array(singles, "laser_m", dry))
 
 
-def laser_poses(laser_pool: Stream, count: float, lowest_m: float, trajectory: Trajectory) -> LaserPoses:
-    """Return about fifty thousand laser points at most, in the scanner's frame, with the poses of the body.
+def laser_poses(sample: LaserSample, trajectory: Trajectory) -> LaserPoses:
+    """Return the single points in the scanner's frame, with the poses of the body.
 
     Parameters
     ----------
-    laser_pool
-        Laser points in the pool frame.
-    count
-        Number of points in the stream.
-    lowest_m
-        Height in the pool frame below which points do not count.
+    sample
+        Laser points.
     trajectory
         Poses of the body in the pool frame.
     """
-    pieces = list(laser_pool.fold(_points_of_scanner, count / RAW_SAMPLE, lowest_m))
-    t_ns, points = (np.concatenate([piece[k] for piece in pieces]) for k in range(2))
-    return LaserPoses(*trajectory.poses_at(t_ns), points)
+    return LaserPoses(*trajectory.poses_at(sample.t_ns), sample.points_laser_m)
 
 
-def _points_of_scanner(batch: Batch, one_in: float, lowest_m: float) -> tuple[NDArray[np.int64], Array]:
-    sample = sample_rows(batch, one_in)
-    dry = sample["z_pool_m"] >= lowest_m
-    return sample["t_ns"][dry], point_array(sample, "laser_m", dry)
+def scan_of(sample: LaserSample, trajectory: Trajectory, laser: Mounted) -> Scan:
+    """Return the voxel means, and rays that the scanner sent, whether they came back or not; pool frame.
+
+    A ray that does not come back leaves no record. But the scanner repeats its directions: in each of them from which a
+    point came back at some time, it also looked at all other times. So each ray here has the origin of one point and
+    the direction, in the scanner's frame, of another one.
+
+    Parameters
+    ----------
+    sample
+        Laser points.
+    trajectory
+        Poses of the body in the pool frame.
+    laser
+        Coarse mount of the laser.
+    """
+    points = len(sample.t_ns)
+    origins, directions = np.random.default_rng(0).integers(0, max(1, points), (2, RAYS if points else 0))
+    positions_m, R_pool_from_body = trajectory.poses_at(sample.t_ns[origins])
+    body = sample.points_laser_m[directions] @ laser.R_body_from_sensor.T
+    body /= np.linalg.norm(body, axis=1)[:, None]
+    return Scan(
+        points_m=sample.voxel_means_m,
+        origins_m=positions_m + R_pool_from_body @ laser.lever_arm_body_m,
+        directions=np.einsum("nij,nj->ni", R_pool_from_body, body),
+    )
 
 
 def sounding_sample(soundings_pool: Stream, count: float, trajectory: Trajectory) -> SoundingSample:

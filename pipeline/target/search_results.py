@@ -9,6 +9,7 @@ from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.target.model import TargetFrame
 from pipeline.maths.target.registration import Refinement
 from pipeline.mount import Mounted
+from pipeline.target.rivals import BestRival
 
 Array = NDArray[np.float64]
 
@@ -27,12 +28,8 @@ class LocatedTarget:
         Fit of the azimuth and the origin.
     tilt
         Fit of a small rotation and a shift of the points, starting from that pose.
-    agreement_m2, rival_agreement_m2
-        Area on which points and faces agree, with this pose and with the best rival.
     rival
-        Name of the best rival.
-    ambiguous
-        Whether the rival agrees nearly as well, or better.
+        The best rival, and whether it agrees with the points nearly as well, or better.
     gate_m
         Distance from a face up to which points are labelled.
     within
@@ -45,10 +42,7 @@ class LocatedTarget:
     azimuth_correction_rad: float
     pose: Refinement
     tilt: Refinement
-    agreement_m2: float
-    rival_agreement_m2: float
-    rival: str
-    ambiguous: bool
+    rival: BestRival
     gate_m: float
     within: bool
     pose_sigmas: Array

@@ -51,6 +51,7 @@ def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
     ]
     heads = ("errors of all:", *(name for name, *_ in PARAMETERS), "(deg, m)")
     lines += ["", *text_table(f"<21{'>10' * len(PARAMETERS)}   <1", heads, rows)]
+    lines += [f"  {method}: {other['warning']}" for method, other in result["methods"].items() if other.get("warning")]
     limit = LIMIT * (_largest(settings.pool.verdict) if sigma is None else sigma)
     within = error is not None and bool(np.all(np.abs(error) <= limit))
     accepted = result["verdict"] == "accepted"

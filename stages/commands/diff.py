@@ -40,7 +40,7 @@ def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutp
     Returns
     -------
     int
-        0: the mount has not moved; 1: it has moved, or the mounts cannot be compared.
+        0: no movement of the mount is shown; 1: it has moved, or the mounts cannot be compared.
     """
     difference = compare_runs(first, second, tolerances)
     for option, file in (("--html", outputs.html), ("--rrd", outputs.rrd)):

@@ -155,7 +155,8 @@ def solved(seed: int, ins: Ins = QUIET, settings: Any = None, **options: Any) ->
 
 def problem(model: ObservationModel, ins: Ins) -> CalibrationProblem:
     """The noise of this INS, and nothing else known."""
-    return CalibrationProblem(model, PriorInformation(pose_noise(ins.drift, ins.white)), ConsiderErrors(np.zeros(model.coarse.size)))
+    prior = PriorInformation(pose_noise(ins.drift, ins.white))
+    return CalibrationProblem(model, prior, ConsiderErrors(np.zeros(model.coarse.size)))
 
 
 def test_without_noise_the_truth_comes_back() -> None:

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import ArtefactError, ConfigError
+from pipeline.report.method_blocks import WARNINGS
 from pipeline.run.settings import load_settings, write_settings
 from stages.commands.compare import compare_with_truth, errors_of, read_truth
 from tests.support.toy_run import Pool
@@ -39,7 +40,9 @@ def found(pool: Pool) -> Path:
         "mount": MOUNT,
         "sigma": SIGMA,
     }
-    methods = {"patent_sequential": NOTHING, "patent_alternating": {**block, "sigma": None}, "adjustment": block}
+    literal = {**block, "sigma": None, "warning": WARNINGS["patent_literal"]}
+    methods = {"patent_sequential": NOTHING, "patent_alternating": {**block, "sigma": None}}
+    methods |= {"patent_literal": literal, "adjustment": block}
     _write(pool.run_folder, {"session": "toy", "verdict": "accepted", "reasons": [], "methods": methods})
     R_true = Rotation.from_rotvec(np.radians(EPSILON_DEG)).as_matrix() @ _R_body_from_mbes(MOUNT)
     truth = {"mbes": {"R_body_from_mbes": R_true.tolist(), "lever_arm_m": [0.301, 0.198, -1.997]}}
@@ -75,6 +78,7 @@ def test_one_screen_of_numbers(found: Path) -> None:
     assert float(roll[3]) == pytest.approx(-48.82, abs=0.002)
     assert roll[4:] == ["-0.02000", "0.01000", "-2.0", "deg"]
     assert "no result" in text
+    assert f"  patent_literal: {WARNINGS['patent_literal']}" in text.splitlines()
     assert "adjustment: every error is within 4 sigma" in text
 
 

@@ -16,7 +16,7 @@ from tests.support.tables import place_soundings, write_tables
 
 KEYS = {"schema", "session", "verdict", "reasons", "reason_codes", "mbes", "methods", "inputs", "software"}
 BLOCK = {"R_body_from_mbes", "lever_arm_m", "mount", "correction", "sigma", "covariance"}
-METHODS = ("patent_sequential", "patent_alternating", "adjustment")
+METHODS = ("patent_sequential", "patent_alternating", "patent_literal", "adjustment")
 MOUNT = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
 
 
@@ -66,7 +66,7 @@ def test_shapes(result: dict[str, Any]) -> None:
         assert list(block["correction"]) == ["rotation_vector_deg", "lever_arm_m"]
         assert np.shape(list(block["correction"].values())) == (2, 3)
     assert list(result["mbes"]["sigma"]) == ["rotation_vector_deg", "lever_arm_m"]
-    for method in METHODS[:2]:
+    for method in METHODS[:3]:
         assert result["methods"][method]["sigma"] is None
         assert result["methods"][method]["covariance"] is None
 
@@ -79,6 +79,19 @@ def test_covariance_and_sigma_are_of_one_another(result: dict[str, Any]) -> None
     sigma = np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(result["mbes"]["sigma"]["rotation_vector_deg"], np.degrees(sigma[:3]), rtol=1e-12)
     np.testing.assert_allclose(result["mbes"]["sigma"]["lever_arm_m"], sigma[3:], rtol=1e-12)
+
+
+def test_noise_and_systematic_errors_make_up_the_total(result: dict[str, Any]) -> None:
+    """E R Eᵀ of each block; every parameter once."""
+    total, names = np.array(result["mbes"]["covariance"]), []
+    for block in result["systematic"].values():
+        effects = np.array(list(block["effects"].values())).T
+        correlation = np.eye(effects.shape[1]) if block["correlation"] is None else np.array(block["correlation"])
+        total = total + effects @ correlation @ effects.T
+        names += list(block["effects"])
+    np.testing.assert_allclose(total, result["mbes"]["covariance_total"], rtol=1e-9, atol=1e-18)
+    assert len(names) == len(set(names)) > 20
+    assert result["limits"] == {"max_sigma_deg": 0.05, "max_sigma_m": 0.005}
 
 
 def test_matrix_mount_and_correction_say_the_same(result: dict[str, Any], coarse: dict[str, float]) -> None:
@@ -132,7 +145,7 @@ def test_rejected_by_the_limits(done: Place, result: dict[str, Any]) -> None:
     assert not done.calibrate().complaints
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [method for method in METHODS if method != "patent_literal"])
 def test_another_method_as_the_result(done: Place, result: dict[str, Any], method: str) -> None:
     """Whatever the verdict on it; if it is no, the reasons are that method's own."""
     done.edit_config("", result=method)
@@ -142,6 +155,17 @@ def test_another_method_as_the_result(done: Place, result: dict[str, Any], metho
     assert all(method in reason for reason in again["reasons"])
     assert again["mbes"] == result["methods"][method]
     assert again["methods"] == result["methods"]
+
+
+def test_the_literal_form_is_shown_and_never_the_result(done: Place, result: dict[str, Any]) -> None:
+    """It alone has a warning; as ``result`` it is refused in one line, and the run stays as it was."""
+    assert [method for method, block in result["methods"].items() if block["warning"]] == ["patent_literal"]
+    done.edit_config("", result="patent_literal")
+    told = done.calibrate()
+    assert told.status == 2
+    assert len(told.err.splitlines()) == 1
+    assert "result = 'patent_literal': is shown beside the result, and is never the result itself" in told.err
+    assert done.result() == result
 
 
 def test_rank_deficient_is_an_answer(small: Path, tmp_path: Path) -> None:

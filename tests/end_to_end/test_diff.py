@@ -1,9 +1,10 @@
-"""poolcal diff: a run with itself, with other settings, with a moved sonar, and where nothing can be compared."""
+"""poolcal diff: a run with itself, with other settings, a moved sonar, whose errors count how, nothing comparable."""
 
 import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pipeline.results.diff_text import own_faces_counted
@@ -40,7 +41,7 @@ def test_with_itself_nothing(undisturbed: tuple[Path, Told]) -> None:
     assert found["joint"]["probability"] == 1.0
     told = poolcal("diff", run, run)
     assert told.status == 0
-    assert told.out.splitlines()[-1] == "the same result in both."
+    assert told.out.splitlines()[:2] == ["The same result in both.", ""]
 
 
 def test_other_settings_are_named(undisturbed: tuple[Path, Told], again: Place) -> None:
@@ -52,25 +53,81 @@ def test_other_settings_are_named(undisturbed: tuple[Path, Told], again: Place) 
     assert found["inputs"] == []
     assert {row["stage"] for row in found["counts"]} == {"segment"}
     assert found["planes"]
-    assert "within their noise" in found["sentence"]
+    assert found["answer"] == "no_movement_shown"  # of the same raw files, whatever could be seen
+    assert found["sentence"].startswith("no movement shown: all six differences are within their errors")
+    assert found["visible"] == ""
     largest = max(abs(row["difference"]) for row in found["parameters"] if row["unit"] == "deg")
     for factor, expected in ((0.99, 1), (1.01, 0)):
         status, found = compared(undisturbed[0], again.run, "--tolerance-deg", largest * factor)
         assert (status, bool(found["beyond_tolerance"])) == (expected, bool(expected))
 
 
-def test_a_sonar_moved_by_little_is_found_and_named(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
-    moved = {"roll_deg": -48.75, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.302, "y_m": 0.20, "z_m": -2.01}
+def test_a_sonar_that_moved_is_found_and_named_another_day(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    """A movement of what can be seen without a cast is told apart from the water's layers; the answer comes first."""
+    moved = {"roll_deg": -48.55, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.308, "y_m": 0.20, "z_m": -2.01}
     run = run_of(simulate(tmp_path / "session", 2, mbes={"mount": moved, "ping_rate_hz": 8.0}))
     status, found = compared(undisturbed[0], run)
-    assert status == 1
+    assert (status, found["answer"]) == (1, "moved")
     rows = {row["parameter"]: row for row in found["parameters"]}
-    assert rows["roll"]["difference"] == pytest.approx(0.05, abs=0.025)
-    assert rows["lever arm x"]["difference"] == pytest.approx(0.002, abs=0.0012)
+    assert rows["roll"]["difference"] == pytest.approx(0.25, abs=0.025)
+    assert rows["lever arm x"]["difference"] == pytest.approx(0.008, abs=0.0012)
     assert [name for name, row in rows.items() if row["moved"]] == ["roll", "lever arm x"]
-    assert "roll by +0.0" in found["sentence"]
+    assert "roll by +0.2" in found["sentence"]
     assert "lever arm x by +" in found["sentence"]
-    assert "the rest within noise" in found["sentence"]
+    assert "the rest within its errors" in found["sentence"]
+    lines = poolcal("diff", undisturbed[0], run).out.splitlines()
+    assert lines[0].startswith("The sonar has moved, roll by +0.2")
+    assert lines[1].startswith("Found with a probability of 95 %, whatever moves beside it: roll 0.")
+    assert rows["roll"]["mostly"] == "change of the sound speed with depth"
+    assert all(row["detectable"] >= row["detectable_alone"] > row["sigma"] for row in rows.values())
+    assert found["errors"]["own"] == ["mbes_latency", "sound_speed", "sound_speed_gradient", "laser_latency"]
+    assert {"laser_rotation_x", "mbes_range", "wet_P2_shift"} <= set(found["errors"]["common"])
+    assert not found["errors"]["differing"]
+
+
+def test_what_it_cannot_see_it_says(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    """The same truth on another day: neither moved nor shown to stay, until the tolerance admits what is unseen."""
+    run = run_of(simulate(tmp_path / "session", 2))
+    status, found = compared(undisturbed[0], run)
+    assert (status, found["answer"]) == (0, "too_uncertain")
+    assert [row["parameter"] for row in found["parameters"] if row["uncertain"]] == ["roll"]
+    assert found["sentence"].startswith("too uncertain to say: all six differences are within their errors")
+    assert "in roll may be hidden in them; most of the uncertainty: change of the sound speed" in found["sentence"]
+    status, found = compared(undisturbed[0], run, "--tolerance-deg", 0.5)
+    assert (status, found["answer"]) == (0, "no_movement_shown")
+
+
+def test_another_mount_of_the_laser_and_another_target_share_nothing(
+    undisturbed: tuple[Path, Told], again: Place
+) -> None:
+    """Their errors are then each session's own, which is told, and the sigmas are larger."""
+    _, before = compared(undisturbed[0], again.run)
+    again.edit_session("laser", mount={"x_m": 0.212})
+    again.edit_config("as_built", offset_sigma_m=0.0012)
+    assert again.calibrate().status == 0
+    status, found = compared(undisturbed[0], again.run)
+    assert found["errors"]["differing"] == ["the laser's mount", "the target"]
+    notes = poolcal("diff", undisturbed[0], again.run).out
+    assert "The laser's mount is not the same in both: its errors were counted as each session's own." in notes
+    assert "laser_lever_arm_x" in found["errors"]["own"]
+    x = [next(row for row in one["parameters"] if row["parameter"] == "lever arm x") for one in (before, found)]
+    effect = 0.0015**2 * 2  # of the laser's lever arm, in either session; wet faces come on top
+    assert x[1]["sigma"] ** 2 - x[0]["sigma"] ** 2 > effect
+    assert x[1]["sigma"] ** 2 - x[0]["sigma"] ** 2 < 2 * effect
+    assert (status, x[1]["difference"]) == (0, pytest.approx(0.002, abs=0.0005))  # the sonar follows the laser
+
+
+def test_a_result_of_an_older_version_is_compared_with_caution(done: Place) -> None:
+    path = done.run / "report" / "calibration.json"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    whole = np.sqrt(2 * np.diag(content["mbes"]["covariance_total"]))
+    del content["systematic"], content["limits"]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    status, found = compared(done.run, done.run)
+    assert (status, found["errors"]["cautious"]) == (0, True)
+    x = next(row for row in found["parameters"] if row["parameter"] == "lever arm x")
+    assert x["sigma"] == pytest.approx(whole[3], rel=1e-9)
+    assert "poolcal run again makes the test sharper" in poolcal("diff", done.run, done.run).out
 
 
 @pytest.mark.thorough
@@ -80,6 +137,7 @@ def test_another_target_compares_the_mount_alone(undisturbed: tuple[Path, Told],
     run = run_of(simulate(tmp_path / "session", 3, target=target))
     status, found = compared(undisturbed[0], run)
     assert status == 0, found["sentence"]
+    assert found["errors"]["differing"] == ["the target"]
     assert found["planes"] == []
     assert found["not_compared"] == ["planes: the targets differ (target.a, target.b, target.c, target.e)"]
     assert found["joint"]["probability"] > 0.01

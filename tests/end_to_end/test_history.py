@@ -24,6 +24,8 @@ def planted(folder: Path, template: Path, name: str, day: int, **changes: Any) -
     result["passes"][0]["start_utc"] = f"2026-05-{day:02d}T{changes.get('hour', 8):02d}:00:00Z"
     if changes.get("laser"):
         result["calibrated"] = "laser"
+    for key in changes.get("without", ()):
+        del result[key]
     shift = changes.get("z_m", 0.0)
     for block in (result["mbes"], result["methods"]["adjustment"]):
         block["lever_arm_m"][2] += shift
@@ -64,6 +66,33 @@ def test_in_order_of_time_with_the_jump_alone(runs: Path) -> None:
     assert text["session"].str.removeprefix("'").tolist() == table["session"].tolist()
     assert "'=HYPERLINK" in (runs / "history" / "history.csv").read_text(encoding="utf-8")  # no formula
     np.testing.assert_allclose(text["z_m"], table["z_m"], rtol=1e-12)
+
+
+def test_each_comparison_says_what_it_could_have_seen(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    """As poolcal diff says it; a result of an older version is compared by its total covariance, and sees less."""
+    folder, template = tmp_path / "runs", undisturbed[0]
+    planted(folder, template, "first", 1)
+    planted(folder, template, "second", 2)
+    planted(folder, template, "older", 3, without=("systematic", "limits"))
+    planted(folder, template, "moved", 4, z_m=0.05)
+    assert poolcal("history", folder).status == 0
+    table = table_of(folder).set_index("run")
+    assert table["answer"].tolist() == ["", "too uncertain", "too uncertain", "moved"]
+    found = json.loads(poolcal("diff", template, template, "--json").out)["parameters"]
+    keys = {"roll": "roll_deg", "pitch": "pitch_deg", "lever arm y": "y_m"}
+    for row in found:
+        if row["parameter"] in keys:
+            name = f"detectable_{keys[row['parameter']]}"
+            assert table[name]["second"] == pytest.approx(row["detectable"], rel=1e-12)
+            assert table[name]["older"] > table[name]["second"]
+    assert table["detectable_x_m"]["older"] > 3 * table["detectable_x_m"]["second"]  # the laser's lever arm cancels
+    assert np.isnan(table["detectable_x_m"]["first"])
+    rows = Page((folder / "history" / "history.html").read_text(encoding="utf-8")).table("no.", "date (UTC)")
+    assert [row[-1] for row in rows] == ["", "uncertain", "uncertain", "lever arm z"]
+    assert rows[0][-2] == ""
+    assert rows[1][-2].startswith("0.1")
+    assert "°, " in rows[1][-2]
+    assert rows[1][-2].endswith(" mm")
 
 
 def test_names_are_text(runs: Path) -> None:

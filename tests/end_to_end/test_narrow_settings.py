@@ -21,6 +21,7 @@ FIRST_STAGE: dict[str, tuple[object, str]] = {  # by key: another value, and the
     "mbes.latency_sigma_s": (0.0006, "adjust"),
     "laser.range_sigma_m": (0.006, "segment"),
     "laser.angle_sigma_deg": (0.004, "segment"),
+    "laser.beam_m": (0.02, "segment"),
     "laser.mount_sigma": ({"angle_deg": 0.006}, "adjust"),
     "ins.white": ({"position_m": 0.003}, "segment"),
 }

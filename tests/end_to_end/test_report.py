@@ -51,6 +51,19 @@ def test_verdict_first_then_the_runs_numbers(undisturbed: tuple[Path, Told]) -> 
     assert float(shown[0][2]) == pytest.approx(matrix[1][0], abs=0.0051)  # roll with pitch
 
 
+def test_the_literal_form_stands_beside_the_others_with_its_warning(undisturbed: tuple[Path, Told]) -> None:
+    page, methods = page_of(undisturbed[0]), result_of(undisturbed[0])["methods"]
+    heads = "(0) patent, word for word", "(1) patent, angles, then offsets", "(2) patent, in turn", "(3) adjustment"
+    rows = page.table("", *heads)
+    for row, key in zip(rows, methods["patent_literal"]["mount"], strict=True):
+        literal, adjusted = (methods[method]["mount"][key] for method in ("patent_literal", "adjustment"))
+        assert float(row[1].split()[0]) == pytest.approx(literal, abs=5.1e-5)
+        assert float(row[5].split()[0]) == pytest.approx(literal - adjusted, abs=5.1e-5)
+    warning, steps = methods["patent_literal"]["warning"], methods["patent_literal"]["iterations"]
+    assert methods["patent_literal"]["converged"]
+    assert f" Form (0): {warning}; it converged in {steps} steps." in " ".join(page.text.split())
+
+
 def test_files_counts_settings_and_origin_are_listed(undisturbed: tuple[Path, Told]) -> None:
     run = undisturbed[0]
     page, result = page_of(run), result_of(run)
@@ -114,6 +127,9 @@ def test_a_laser_whose_six_correlate_is_one_part_of_the_total(place: Place) -> N
     effects = freed.loc[mine, [f"effect_{kind}_{axis}" for kind in ("rotation", "lever_arm") for axis in "xyz"]]
     E = effects.to_numpy()
     whole = np.sqrt(np.diag(E.T @ correlation @ E))
+    written = result_of(place.run)["systematic"]["laser_mount"]
+    np.testing.assert_allclose(np.array(list(written["effects"].values())), E, rtol=1e-12)
+    np.testing.assert_allclose(written["correlation"], correlation, atol=1e-12)
     shown = parts[1] * np.r_[np.full(3, np.pi / 180), np.full(3, 1e-3)]
     np.testing.assert_allclose(shown, whole[[1, 0, 2, 3, 4, 5]], rtol=0.03, atol=2e-6)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import binom
 
 from pipeline.maths.comparison import MountEstimate, compare_estimates
 
@@ -82,3 +83,76 @@ def test_a_movement_that_only_all_six_show_together_names_the_largest():
     found = compare_estimates(MountEstimate(np.eye(3), np.zeros(3), C), moved)
     assert found.probability < 0.01
     assert len(found.significant(0.01)) == 1
+
+
+def sensitivity(rng):
+    """To errors in rad and m: near one of the same parameter, and some of every other."""
+    units = np.concatenate([np.full(3, np.radians(0.005)), np.full(3, 5e-4)])
+    return (np.eye(6) + 0.3 * rng.normal(size=(6, 6))) * np.outer(units, 1 / units)
+
+
+def pair_with_systematic_errors(rng, own_counted=True, common_counted=True):
+    """Two estimates whose errors are noise, own errors three times as large, and common ones thirty times as large.
+
+    Of the common ones a fifth does not cancel: the sensitivities of the two sessions differ by as much.
+    """
+    own_C, common_C, S_common = covariance(rng, 3.0), covariance(rng, 30.0), sensitivity(rng)
+    common_error = np.linalg.cholesky(common_C) @ rng.normal(size=6)
+    estimates = []
+    for _ in range(2):
+        C, S_own, S = covariance(rng), sensitivity(rng), S_common * rng.uniform(0.8, 1.2, size=(6, 6))
+        own_error, noise = (np.linalg.cholesky(Q) @ rng.normal(size=6) for Q in (own_C, C))
+        error = noise + S_own @ own_error + S @ common_error
+        found = Rotation.from_rotvec(error[:3]).inv() * MOUNT
+        own = S_own @ np.linalg.cholesky(own_C) if own_counted else np.zeros((6, 0))
+        common = S @ np.linalg.cholesky(common_C) if common_counted else np.zeros((6, 0))
+        estimates.append(MountEstimate(found.as_matrix(), LEVER - error[3:], C, own=own, common=common))
+    return estimates
+
+
+def test_false_alarms_with_own_and_common_errors_are_as_many_as_the_level_says():
+    rng = np.random.default_rng(20260513)
+    found = [compare_estimates(*pair_with_systematic_errors(rng)) for _ in range(1000)]
+    assert binom.ppf(0.001, 1000, 0.01) <= sum(one.probability < 0.01 for one in found) <= binom.ppf(0.999, 1000, 0.01)
+    assert np.mean([one.statistic for one in found]) == pytest.approx(6.0, abs=4 * np.sqrt(12 / 1000))
+
+
+@pytest.mark.parametrize("left_out", ["own_counted", "common_counted"])
+def test_without_either_kind_of_error_there_would_be_many_alarms(left_out):
+    rng = np.random.default_rng(20260514)
+    found = [compare_estimates(*pair_with_systematic_errors(rng, **{left_out: False})) for _ in range(100)]
+    assert sum(one.probability < 0.01 for one in found) > 30
+
+
+def test_a_common_error_cancels_where_both_are_alike_and_doubles_where_they_are_opposite():
+    C, effect = np.eye(6) * 1e-8, np.zeros((6, 1))
+    effect[4] = 3e-3
+    one = MountEstimate(np.eye(3), LEVER, C, common=effect)
+    for other, variance in ((effect, 2e-8), (0 * effect, 2e-8 + 9e-6), (-effect, 2e-8 + 36e-6)):
+        found = compare_estimates(one, MountEstimate(np.eye(3), LEVER, C, common=other))
+        np.testing.assert_allclose(found.sigma[4] ** 2, variance, rtol=1e-12)
+        np.testing.assert_allclose(np.delete(found.sigma, 4), np.sqrt(2e-8), rtol=1e-12)
+
+
+def test_effects_turn_with_a_head_that_looks_athwart():
+    """At a yaw of 90° a turn about body x is roll with the other sign: both noise and effects turn so."""
+    R = Rotation.from_euler("ZXY", [90, 0, 0], degrees=True).as_matrix()
+    effect = np.zeros((6, 1))
+    effect[0] = 1e-3
+    still = MountEstimate(R, LEVER, np.eye(6) * 1e-12)
+    found = compare_estimates(still, MountEstimate(R, LEVER, np.eye(6) * 1e-12, own=effect))
+    np.testing.assert_allclose(found.sigma[:3], [0, 1e-3, 0], atol=2e-6)
+    np.testing.assert_allclose(np.abs(found.effects[:, 0]), [0, 1e-3, 0, 0, 0, 0], atol=1e-12)
+
+
+def test_a_movement_beside_a_large_error_that_resembles_it_is_named():
+    """Roll is uncertain, but together with z alone; a roll without a z is no such error, and no other movement."""
+    C, like_roll = np.eye(6) * 1e-10, np.zeros((6, 1))
+    like_roll[[1, 5], 0] = 1e-3
+    turned = Rotation.from_euler("ZXY", [0, 0, 3e-4]).as_matrix()
+    found = compare_estimates(
+        MountEstimate(np.eye(3), np.zeros(3), C, own=like_roll), MountEstimate(turned, np.zeros(3), C, own=like_roll)
+    )
+    assert found.probability < 1e-6
+    assert np.abs(found.z).max() < 1
+    assert found.significant(0.01) == [1]

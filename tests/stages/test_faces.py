@@ -52,7 +52,7 @@ def test_other_targets_calibrate(name: str, front: str) -> None:
     assert result["verdict"] == "accepted", result["reasons"]
     assert np.all(np.abs(errors(result["mbes"], session.truth)) < 4 * sigmas(result["mbes"]))
     assert front in found["adjust/surfaces"]["family"].tolist()
-    for method in ("patent_sequential", "patent_alternating"):
+    for method in ("patent_sequential", "patent_alternating", "patent_literal"):
         assert "roles P1, P2, P3" in result["methods"][method]["no_result"]
         assert result["methods"][method]["mount"] is None
     assert "roles P1, P2, P3" in found["angle_iterate/angles"]["reason"].iloc[0]

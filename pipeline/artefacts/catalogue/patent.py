@@ -30,21 +30,28 @@ PASS_ITERATIONS = Artefact(
     "angle_iterate", "pass_iterations", "table", "the same, pass by pass",
     (PASS, *_ITERATION, Column("weight", F64, "1", "share of the pass in the combination")),
 )
-ANGLES = Artefact(
-    "angle_iterate", "angles", "table", "result of the angle iteration (one row)",
-    (
-        *ROTATION,
-        Column("converged", BOOL, "", "step and angles stood still within the iterations allowed"),
-        Column("iterations", I32, "1", "steps taken"),
-        Column("reason", TEXT, "", "why there is no result; empty when there is"),
-    ),
+_RESULT = (
+    *ROTATION,
+    Column("converged", BOOL, "", "step and angles stood still, or were below the threshold, within the iterations"),
+    Column("iterations", I32, "1", "steps taken"),
+    Column("reason", TEXT, "", "why there is no result; empty when there is"),
+)
+ANGLES = Artefact("angle_iterate", "angles", "table", "result of the angle iteration (one row)", _RESULT)
+LITERAL_ITERATIONS = Artefact(
+    "angle_iterate", "literal_iterations", "table",
+    "the same word for word (patent_literal): deviations are full angles with the printed signs, all passes together",
+    (*_ITERATION, *ROTATION),
+)
+LITERAL_ANGLES = Artefact(
+    "angle_iterate", "literal_angles", "table", "result of the literal iteration (one row): the added corrections",
+    _RESULT,
 )
 
 # --- offsets ---------------------------------------------------------------------------------------------------------
 OFFSET_PAIRS = Artefact(
     "offsets", "offset_pairs", "table", "each pair of a dry and a wet horizontal face [0127]",
     (
-        Column("method", TEXT, "", "patent_sequential or patent_alternating"),
+        Column("method", TEXT, "", "patent_sequential, patent_alternating or patent_literal"),
         Column("dry_face", TEXT, "", "face seen by the laser"), Column("wet_face", TEXT, "", "face seen by the MBES"),
         Column("measured_m", F64, "m", "z_dry - z_wet as measured"),
         Column("design_m", F64, "m", "z_dry - z_wet by design"),
@@ -62,9 +69,9 @@ ALTERNATION = Artefact(
     ),
 )
 CORRECTIONS = Artefact(
-    "offsets", "corrections", "table", "the patent's two forms: corrections to the coarse mount",
+    "offsets", "corrections", "table", "the patent's three forms: corrections to the coarse mount",
     (
-        Column("method", TEXT, "", "patent_sequential or patent_alternating"),
+        Column("method", TEXT, "", "patent_sequential, patent_alternating or patent_literal"),
         *MOUNT_CORRECTION,
         Column("converged", BOOL, "", "stood still within the iterations allowed"),
         Column("iterations", I32, "1", "turns taken"),

@@ -42,6 +42,21 @@ GEOMETRY = Artefact(
         Column("sigma", F64, "deg or m", "held: standard deviation that an estimate would have had; else NaN"),
     ),
 )
+PARTS = Artefact(
+    "adjust", "parts", "table", "change of the mount if only a part of the session is used, against the whole",
+    (
+        Column("part", TEXT, "", "without pass n; first half, second half (of the passes); near passes, far passes"),
+        Column("passes", TEXT, "", "numbers of the passes that are used"),
+        Column("normalised", F64, "1", "normal deviate of all changes together"),
+        Column("dof", I64, "1", "number of directions in which the part can differ from the whole"),
+        *(
+            Column(f"{kind}_{name}", F64, "deg" if name in ("roll", "pitch", "yaw") else "m", words)
+            for name in ("roll", "pitch", "yaw", "x", "y", "z")
+            for kind, words in (("change", "value of the part less that of the whole; NaN: the parameter is fixed"),
+                                ("sigma", "standard deviation of the change, with the consider parameters"))
+        ),
+    ),
+)
 DRIFT = Artefact(
     "adjust", "drift", "table", "slow errors of the recorded poses, at knots: to be added to the recorded ones",
     (
@@ -178,7 +193,7 @@ ADJUST_SUMMARY = Artefact(
 CALIBRATION = Artefact(
     "report", "calibration", "table", "mount by method: totals that replace the coarse mount, and corrections",
     (
-        Column("method", TEXT, "", "patent_sequential, patent_alternating, adjustment"),
+        Column("method", TEXT, "", "patent_sequential, patent_alternating, patent_literal, adjustment"),
         Column("parameter", TEXT, "", "roll, pitch, yaw, x, y, z"),
         Column("unit", TEXT, "", "deg or m"),
         Column("coarse", F64, "deg or m", "mount as configured"), Column("total", F64, "deg or m", "calibrated mount"),
@@ -194,7 +209,7 @@ CALIBRATION = Artefact(
 CLOSING = Artefact(
     "report", "closing", "table", "agreement of the sonar's planes with the laser's, over all passes, with each mount",
     (
-        Column("mount", TEXT, "", "coarse, patent_sequential, patent_alternating, adjustment"),
+        Column("mount", TEXT, "", "coarse, patent_sequential, patent_alternating, patent_literal, adjustment"),
         Column("plane", TEXT, "", "P1, P2 or P3"),
         Column("angle_deg", F64, "deg", "between the two sensors' normals"),
         Column("distance_m", F64, "m", "of the soundings' centroid from the laser's plane, + toward the boat"),

@@ -9,6 +9,7 @@ from pipeline.errors import DegenerateGeometryError
 
 Array = NDArray[np.float64]
 ACROSS = 1e-3  # variance added to the points' errors in every direction, as a share of the errors' total variance
+NEARLY_LEVEL = 0.9  # |n_z| of a plane at 26° to the horizontal, from which on its tangents follow from y, not z
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,10 @@ class PlaneMoments:
     def of(cls, points_m: Array) -> "PlaneMoments":
         """Return the moments of points (n, 3) m with equal errors in all directions."""
         return cls(len(points_m), points_m.sum(axis=0), points_m.T @ points_m, len(points_m) * np.eye(3))
+
+    def with_equal_errors(self) -> "PlaneMoments":
+        """Return the moments with equal errors in all directions: the plane is then the plain total least squares."""
+        return PlaneMoments(self.count, self.total, self.products, self.count * np.eye(3))
 
     @classmethod
     def zero(cls) -> "PlaneMoments":
@@ -145,8 +150,12 @@ def _signed(rows: Array) -> Array:
 
 
 def tangents_of(normal: Array) -> Array:
-    """Return two unit vectors (2, 3) that span the plane with this normal, right-handed: t1 x t2 = normal."""
-    helper = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    """Return two unit vectors (2, 3) that span the plane with this normal, right-handed: t1 x t2 = normal.
+
+    The first is horizontal, or for a plane within 26° of the horizontal at right angles to y. Almost equal normals so
+    have almost equal tangents: a turn about them means the same in two sessions at one target.
+    """
+    helper = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < NEARLY_LEVEL else np.array([0.0, 1.0, 0.0])
     first = np.cross(helper, normal)
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(normal, first)])

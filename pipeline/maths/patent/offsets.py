@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import DegenerateGeometryError
-from pipeline.maths.geometry.planes import Plane, fit_plane
+from pipeline.maths.geometry.planes import Plane, PlaneMoments, fit_plane
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.maths.patent.angles import PassPlanes, angle_step, mean_attitude
 from pipeline.maths.patent.lifted_moments import plane_moments
@@ -131,6 +131,27 @@ def _cut(plane: Plane, x_m: float) -> float:
     return float(c[1] - (x_m - c[0]) * n[0] / n[1])
 
 
+def height_pair(above: DryFace, below: WetFace, placed: PlaneMoments) -> dict[str, float | str]:
+    """Return the row of a pair of horizontal faces: measured and design height difference, and Z, their difference.
+
+    Parameters
+    ----------
+    above, below
+        The dry face and the wet one.
+    placed
+        Moments of the wet face's soundings, placed in the target frame.
+    """
+    measured = above.mean_z_m - float(placed.total[2] / placed.count)
+    design = above.design_z_m - below.design_z_m
+    return {
+        "dry_face": above.name,
+        "wet_face": below.name,
+        "measured_m": measured,
+        "design_m": design,
+        "dz_m": measured - design,
+    }
+
+
 def _height_pairs(
     observations: OffsetObservations, rotation: Array, lever_arm_m: Array
 ) -> tuple[list[dict[str, float | str]], float]:
@@ -143,18 +164,9 @@ def _height_pairs(
     for below in wet:
         moments = plane_moments(below.lifted, rotation, lever_arm_m)
         for above in dry:
-            measured = above.mean_z_m - moments.total[2] / moments.count
-            design = above.design_z_m - below.design_z_m
-            rows.append((measured - design, _pair_weight(above.count, moments.count)))
-            pairs.append(
-                {
-                    "dry_face": above.name,
-                    "wet_face": below.name,
-                    "measured_m": measured,
-                    "design_m": design,
-                    "dz_m": measured - design,
-                }
-            )
+            pair = height_pair(above, below, moments)
+            rows.append((float(pair["dz_m"]), _pair_weight(above.count, moments.count)))
+            pairs.append(pair)
     total = sum(weight for _, weight in rows)
     for pair, (_, weight) in zip(pairs, rows, strict=True):
         pair["weight"] = weight / total

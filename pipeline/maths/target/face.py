@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.geometry.face_grid import face_axes
+
 Array = NDArray[np.float64]
 
 HORIZONTAL_COSINE = 0.9998  # smallest |n_z| of a horizontal face: within 1.1°
@@ -116,20 +118,21 @@ class Face:
         inside = np.flatnonzero(self.clearance(line) > SAME_CORNER_M)
         return None if len(inside) < 2 else np.array([line[inside[0]], line[inside[-1]]])
 
-    def grid(self, step_m: float, lowest_m: float) -> Array:
-        """Return points (n, 3) about ``step_m`` apart on an upright face, above ``lowest_m``."""
-        low, high = self.vertices_m[:, 2].min(), self.vertices_m[:, 2].max()
-        across = np.array([-self.normal[1], self.normal[0], 0.0]) / np.hypot(*self.normal[:2])
-        up = np.cross(self.normal, across)
-        up *= np.sign(up[2])
-        along = self.vertices_m @ across
-        count = max(1, round(float(np.ptp(along)) / step_m))
-        columns = along.min() + (np.arange(count) + 0.5) / count * np.ptp(along)
-        heights = np.arange(max(low, lowest_m) + step_m / 2, high, step_m)
-        foot = self.distance_m * self.normal
-        rows = (heights - foot[2]) / up[2]
-        points = foot + np.repeat(columns, len(rows))[:, None] * across + np.tile(rows, count)[:, None] * up
-        return np.asarray(points[self.clearance(points) >= 0])
+    def cells(self, step_m: float) -> tuple[Array, float]:
+        """Return the centres (n, 3) m of cells with sides of about ``step_m`` on the face, and the area of each in m².
+
+        The sides run along :func:`face_axes`; whole cells fill the face's extent. A cell counts if its centre lies on
+        the face.
+        """
+        axes = face_axes(self.normal)
+        along = self.vertices_m @ axes.T
+        low, extent = along.min(axis=0), np.ptp(along, axis=0)
+        counts = np.maximum(1, np.rint(extent / step_m)).astype(int)
+        sides = extent / counts
+        columns, rows = (start + (np.arange(n) + 0.5) * side for start, n, side in zip(low, counts, sides, strict=True))
+        flat = np.column_stack([np.repeat(columns, len(rows)), np.tile(rows, len(columns))]) @ axes
+        centres = flat + np.outer(self.distance_m - flat @ self.normal, self.normal)
+        return np.asarray(centres[self.clearance(centres) >= 0]), float(np.prod(sides))
 
     def same_corners(self, other: "Face") -> bool:
         """Return whether both faces have the same corners, in any order."""

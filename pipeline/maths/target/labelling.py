@@ -16,6 +16,7 @@ Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 NO_FACE = -1
+MOST_SLANTED = 0.01  # smallest cosine of incidence by which the length of a round beam's spot is computed
 ROUNDING_M = 1e-6  # rounding of the heights of points on a horizontal face
 
 
@@ -32,7 +33,9 @@ class LabelSettings:
     min_grazing_rad
         Smallest angle between the ray and the face.
     lowest_m, highest_m
-        Heights in the target frame between which points count.
+        Heights in the target frame between which points count, with their whole footprints.
+    spot_m
+        Half the diameter of beams without half widths of their own, which are round and equally wide at all ranges.
     seen
         Faces to use: "dry" (those that the laser uses), "wet" (those that the sonar uses), or "both" (all).
     """
@@ -42,6 +45,7 @@ class LabelSettings:
     min_grazing_rad: float
     lowest_m: float = -np.inf
     highest_m: float = np.inf
+    spot_m: float = 0.0
     seen: str = "both"
 
 
@@ -123,8 +127,11 @@ class _Candidates:
             spreads = beams.spreads(rows, face.normal, reached[steep])
             stray_m = beams.stray * spreads[0]
             clear = face.clearance(on_plane, *spreads, margin_m=settings.margin_m, stray_m=stray_m) >= 0
+            height, half = on_plane[:, 2], sum(np.abs(spread[:, 2]) for spread in spreads)
+            clear &= (height + half < settings.highest_m) & (height - half > settings.lowest_m)
         else:
-            clear = steep & (clearance[inside] >= settings.margin_m)
+            half_length = settings.spot_m / np.maximum(cosine, MOST_SLANTED)
+            clear = steep & (clearance[inside] >= np.maximum(settings.margin_m, half_length))
         better = clear & (np.abs(away) < self.distance_m[rows])
         rows = rows[better]
         self.face[rows], self.cosine[rows] = number, cosine[better]

@@ -97,11 +97,6 @@ class TargetModel:
         corners = np.concatenate([face.vertices_m for face in self.faces])
         return corners.min(axis=0), corners.max(axis=0)
 
-    def upright_grid(self, step_m: float, lowest_m: float) -> Array:
-        """Return points (n, 3) about ``step_m`` apart on the upright faces above ``lowest_m``."""
-        upright = [face for face in self.faces if not face.level and face.vertices_m[:, 2].max() > lowest_m]
-        return np.concatenate([np.empty((0, 3)), *(face.grid(step_m, lowest_m) for face in upright)])
-
     def mirrored(self) -> "TargetModel":
         """Return the target with left and right exchanged: y -> -y."""
         flip = np.array([1.0, -1.0, 1.0])
@@ -152,6 +147,10 @@ class TargetFrame:
     def points_from_pool(self, points_pool_m: Array) -> Array:
         """Return the target coordinates (n, 3) m of points (n, 3) m in the pool frame."""
         return np.asarray((self.R_target_from_pool @ (points_pool_m - self.origin_pool_m).T).T)
+
+    def points_to_pool(self, points_target_m: Array) -> Array:
+        """Return the pool coordinates (n, 3) m of points (n, 3) m in the target frame."""
+        return np.asarray((self.R_target_from_pool.T @ points_target_m.T).T + self.origin_pool_m)
 
     def trajectory_from_pool(self, trajectory: Trajectory) -> Trajectory:
         """Return a trajectory in the target frame, from one in the pool frame."""

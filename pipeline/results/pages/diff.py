@@ -9,6 +9,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pipeline.mount import WITHIN_95
+from pipeline.results.answer_text import answer_lines
 from pipeline.results.diff_text import own_faces_counted
 from pipeline.results.mount_difference import quantity_text
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
@@ -21,6 +22,7 @@ def difference_page(difference: Mapping[str, Any]) -> str:
         "diff.html",
         difference=difference,
         rows=rows,
+        sentences=list(answer_lines(difference)),
         config=list(own_faces_counted(difference["config"])),
         shown=quantity_text,
         plain=lambda value: "–" if value is None else value if isinstance(value, str) else json.dumps(value),

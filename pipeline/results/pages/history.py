@@ -2,7 +2,7 @@
 
 import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,11 @@ from matplotlib.figure import Figure
 
 from pipeline.atomic_files import write_bytes, write_text, writing
 from pipeline.console import plural
+from pipeline.maths.detectable_movement import POWER
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.mount import WITHIN_95
 from pipeline.results.history import TEXT_COLUMNS, History, SessionFilter
+from pipeline.results.mount_difference import least_text
 from pipeline.results.pages.rendering import ALARM, INK, QUIET, WIDTH_IN, drawing_style, picture, render_page
 
 UNITS = {"deg": ("°", 1.0), "m": ("mm", 1000.0)}  # by unit of the setting: unit and factor in the chart
@@ -35,12 +37,17 @@ def history_page(history: History, filters: str) -> str:
             "cells": {name: _number(row[key], 4) for name, _, key, _ in PARAMETERS},
             "probability": "" if np.isnan(row["probability"]) else f"{row['probability']:.2g}",
             "moved": row["moved"],
+            "uncertain": row["answer"] == "too uncertain",
+            "detectable": _detectable(row),
         }
         for row in table.to_dict("records")
     ]
     jumps = table[table["moved"] != ""]
     each = "; ".join(f"{row['session']}: {row['moved']}" for row in jumps.to_dict("records"))
-    sentence = f"Significant movements: {each}." if each else "No movement of the mount is significant."
+    sentence = f"Significant movements: {each}." if each else "No movement of the mount is shown."
+    uncertain = int((table["answer"] == "too uncertain").sum())
+    if uncertain:
+        sentence += f" {plural(uncertain, 'comparison')} would not have found a movement that matters."
     return render_page(
         "history.html",
         rows=rows,
@@ -51,6 +58,7 @@ def history_page(history: History, filters: str) -> str:
         unreadable=history.unreadable,
         without=history.not_shown,
         sessions=plural(len(rows), "session"),
+        power=POWER,
     )
 
 
@@ -70,6 +78,12 @@ def _time_labels(dates: Sequence[str]) -> list[str]:
         label = date[:16].replace("T", " ") if days[date[:10]] > 1 else date[:10]
         labels.append(f"{number}: {label}" if minutes[date[:16]] > 1 else label)
     return labels
+
+
+def _detectable(row: Mapping[Any, Any]) -> str:
+    """Return the least movements that are found, of the angle and of the lever arm of which the least is largest."""
+    of_unit = {unit: max(row[f"detectable_{key}"] for *_, key, own in PARAMETERS if own == unit) for unit in UNITS}
+    return ", ".join(least_text(size, unit) for unit, size in of_unit.items() if not np.isnan(size))
 
 
 def _number(value: float, digits: int) -> str:

@@ -1,6 +1,6 @@
 """Tables of the report about the mount parameters: their values, how the methods differ, and their correlations."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,12 +13,14 @@ from pipeline.maths.mount_parameters import PARAMETERS
 
 Row = Mapping[str, Any]
 STRONG = CORRELATION_LIMIT  # correlations of this size and above are in bold
+STRONG_SIGMAS = 3.0  # changes beyond this many sigmas are in bold
 POSITIVE = {
     "roll": "starboard down", "pitch": "bow up", "yaw": "to port",
     "x": "to starboard", "y": "forward", "z": "up",
 }
 METHODS = {
     "coarse": "coarse mount",
+    "patent_literal": "(0) patent, word for word",
     "patent_sequential": "(1) patent, angles, then offsets",
     "patent_alternating": "(2) patent, in turn",
     "adjustment": "(3) adjustment",
@@ -58,6 +60,30 @@ class Quantity:
         return f"{round(number, digits) + 0.0:{sign}.{digits}f} {unit}"
 
 
+def part_rows(parts: Sequence[Row]) -> list[Row]:
+    """Return one row for each part of the session: the change of each mount parameter with its sigma, and the test.
+
+    Parameters
+    ----------
+    parts
+        The block ``parts`` of calibration.json.
+    """
+    rows: list[Row] = []
+    for part in parts:
+        cells = []
+        for _, _, key, unit in PARAMETERS:
+            change, sigma = (np.nan if part[kind][key] is None else part[kind][key] for kind in ("change", "sigma"))
+            cells.append(
+                {
+                    "change": Quantity(change, unit),
+                    "sigma": Quantity(sigma, unit),
+                    "strong": abs(change) > STRONG_SIGMAS * sigma,
+                }
+            )
+        rows.append({"part": part["part"], "cells": cells, "test": part["test"]})
+    return rows
+
+
 def parameter_rows(
     table: pd.DataFrame, method: str, limits: VerdictLimits, fixed: Collection[str]
 ) -> list[dict[str, Any]]:
@@ -90,7 +116,7 @@ def method_rows(table: pd.DataFrame) -> Iterator[Row]:
     """Yield for each mount parameter the total of every method, and its difference from the adjustment's total."""
     for name, _, _, unit in PARAMETERS:
         rows = table[table["parameter"] == name].set_index("method")
-        totals = {method: float(rows["total"][method]) for method in METHODS if method != "coarse"}
+        totals = {method: float(rows["total"][method]) for method in METHODS if method in rows.index}
         differences = {method: value - totals["adjustment"] for method, value in totals.items()}
         if unit == "deg":
             differences = {method: value - 360.0 * np.round(value / 360.0) for method, value in differences.items()}

@@ -6,24 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.adjustment.error_sources import ERROR_SOURCES, OWNERS, source_of
 from pipeline.config.session import SessionConfig
 from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 
 Row = Mapping[str, Any]
-OF_MOUNT = ("the laser's angles", "the laser's lever arm")
-SOURCES = (  # the beginning of an unknown's name, and the words for it
-    ("laser_rotation", OF_MOUNT[0]),
-    ("laser_lever_arm", OF_MOUNT[1]),
-    ("laser_range", "the laser's ranges"),
-    ("laser_latency", "the laser's clock"),
-    ("mbes_range", "the sonar's ranges"),
-    ("mbes_latency", "the sonar's clock"),
-    ("sound_speed_gradient", "change of the sound speed with depth"),
-    ("sound_speed", "sound speed"),
-    ("wet", "wet faces against dry ones"),
-    ("rotation", "fixed angles"),  # where the laser is calibrated
-    ("lever_arm", "fixed components of the lever arm"),
-)
 
 
 def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) -> Iterator[Row]:
@@ -46,13 +33,14 @@ def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: Sess
     by_name = estimate.set_index("unknown").reindex(MOUNT_NAMES)
     noise, total = (by_name[name].to_numpy(np.float64) for name in ("sigma", "sigma_total"))
     effects = tests[[f"effect_{name}" for name in MOUNT_NAMES]].to_numpy(np.float64)
-    source = tests["unknown"].map(lambda name: next((words for start, words in SOURCES if name.startswith(start)), ""))
-    present = [words for _, words in SOURCES if (source == words).any()]
+    source = tests["unknown"].map(lambda name: source_of(name).words)
+    present = [one.words for one in ERROR_SOURCES if (source == one.words).any()]
     squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for words in present}
     if session.calibrated == "mbes" and session.laser.mount_covariance is not None:
-        others = {words: square for words, square in squares.items() if words not in OF_MOUNT}
+        of_mount = {one.words for one in ERROR_SOURCES if one.owner == "laser_mount"}
+        others = {words: square for words, square in squares.items() if words not in of_mount}
         left = total**2 - noise**2 - np.sum(list(others.values()), axis=0)
-        squares = {"the laser's mount": np.maximum(left, 0.0), **others}
+        squares = {OWNERS["laser_mount"]: np.maximum(left, 0.0), **others}
     for words, of_source in {"noise (the random sigma)": noise**2, **squares}.items():
         yield {
             "name": words,

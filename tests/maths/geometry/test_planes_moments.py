@@ -97,6 +97,16 @@ def test_tangents_are_right_handed():
         np.testing.assert_allclose(np.cross(first, second), normal, atol=1e-14)
 
 
+@pytest.mark.parametrize("normal", [[-1, 0, 0], [-1, -1, 0], [-1, 1, 0], [0, 0, 1], [0, 0, -1], [-1, 0, 1], [0, 1, 0]])
+def test_almost_equal_normals_have_almost_equal_tangents(normal):
+    """Turns of a face about its tangents then mean the same in two sessions, whose normals differ by their noise."""
+    rng, normal = np.random.default_rng(1), np.array(normal) / np.linalg.norm(normal)
+    for _ in range(20):
+        near = normal + rng.normal(scale=1e-4, size=3)
+        near /= np.linalg.norm(near)
+        np.testing.assert_allclose(tangents_of(near), tangents_of(normal), atol=1e-3)
+
+
 def test_lifted_moments_are_those_of_the_placed_points():
     rng = np.random.default_rng(8)
     n = 300

@@ -124,6 +124,28 @@ def test_a_grazed_face_needs_its_margin_along_the_ray(target):
     assert (wide.face >= 0).tolist() == [True, False]
 
 
+def test_the_spot_of_a_round_beam_is_long_where_the_face_is_grazed(target):
+    """A beam of 1 cm at 5.7 degrees is 10 cm long: 4 cm from an edge of a top is too near, 6 cm is not."""
+    points = np.array([[0.75, -1.75, -3.5], [0.96, -1.75, -3.5], [0.94, -1.75, -3.5]])
+    steep, flat = points + np.array([-3.0, 0.0, 3.0]), points + np.array([-6.0, 0.0, 0.6])
+    for origins, good in ((steep, [True, True, True]), (flat, [True, False, True])):
+        rays = points - origins
+        ranges = np.linalg.norm(rays, axis=1)
+        beams = TargetBeams(rays / ranges[:, None], ranges)
+        found = label_points(target, points, beams, LabelSettings(0.05, 0.03, 0.0, spot_m=0.005))
+        assert (found.face >= 0).tolist() == good
+
+
+def test_the_whole_footprint_lies_below_the_highest_point(target):
+    """On the wall the footprint of 2 degrees at 5 m reaches 8.7 cm up and down."""
+    points = np.array([[0.0, 0.0, height] for height in (-1.0, -0.61, -0.57)])
+    origin = np.array([-5.0, 0.0, -0.6])
+    wide = beams_from(origin, points, np.radians(1.0))
+    narrow, limits = TargetBeams(wide.directions, wide.ranges_m), LabelSettings(0.05, 0.03, 0.0, highest_m=-0.5)
+    assert (label_points(target, points, wide, limits).face >= 0).tolist() == [True, True, False]
+    assert (label_points(target, points, narrow, limits).face >= 0).tolist() == [True, True, True]
+
+
 def test_noise_in_the_range_does_not_choose_the_points(target):
     """Else the edges of a grazed face would cut the noise of one sign off, at its two ends alternately."""
     random = np.random.default_rng(1)

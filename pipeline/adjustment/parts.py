@@ -1,0 +1,102 @@
+"""Calibrations from parts of the session: without one pass, from one half of the passes, from near or far passes alone.
+
+The parts need no further reading of the points: the sums of their intervals are solved again, at the final values and
+with the final weights. A calibration that hangs on one pass, or that changes with time or distance, shows here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline.adjustment.iteration import MountAdjustment
+from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.artefacts.catalogue.results import PARTS
+from pipeline.maths.adjustment.parts import Deviation, deviation
+from pipeline.maths.adjustment.solution import solve
+from pipeline.maths.geometry.passes import pass_of
+from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
+
+Integers = NDArray[np.int64]
+APART_M = 0.5  # near and far passes differ by at least this distance
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the session: its name, and the numbers of its passes."""
+
+    name: str
+    passes: tuple[int, ...]
+
+
+def parts_of(passes: pd.DataFrame) -> list[Part]:
+    """Return the parts of a session with these rows of table passes; none of a single pass."""
+    numbers = passes["pass"].tolist()
+    if len(numbers) < 2:
+        return []
+    parts = [
+        Part(f"without pass {left_out}", tuple(number for number in numbers if number != left_out))
+        for left_out in numbers
+    ]
+    half = len(numbers) // 2
+    in_time = passes.sort_values("start_ns")["pass"].tolist()
+    parts += [Part("first half", tuple(in_time[:half])), Part("second half", tuple(in_time[half:]))]
+    distance_m = passes["distance_m"].abs().sort_values(kind="stable")
+    if distance_m.iloc[half] - distance_m.iloc[half - 1] >= APART_M:
+        by_distance = passes["pass"].loc[distance_m.index].tolist()
+        parts += [Part("near passes", tuple(by_distance[:half])), Part("far passes", tuple(by_distance[half:]))]
+    return parts
+
+
+def parts_table(problem: CalibrationProblem, adjustment: MountAdjustment, passes: pd.DataFrame) -> pd.DataFrame:
+    """Return table ``parts``: by how much the mount changes if only a part of the session is used.
+
+    Parameters
+    ----------
+    problem : CalibrationProblem
+        Model, prior information and consider errors of the calibration.
+    adjustment : MountAdjustment
+        The adjusted values.
+    passes : DataFrame
+        Table passes.
+    """
+    rows = [_row(part, mount, difference) for part, mount, difference in _deviations(problem, adjustment, passes)]
+    return pd.DataFrame(rows, columns=[column.name for column in PARTS.columns])
+
+
+def _deviations(
+    problem: CalibrationProblem, adjustment: MountAdjustment, passes: pd.DataFrame
+) -> Iterator[tuple[Part, Integers, Deviation]]:
+    """Yield the deviation of each part that determines all parameters, with the numbers of its mount parameters."""
+    whole = adjustment.solution
+    mount = whole.estimated[whole.estimated < N_MOUNT]
+    if whole.deficiency or not len(mount):
+        return
+    body = problem.model.body
+    starts, ends = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
+    pass_of_record = pass_of(body.trajectory.t_ns, starts, ends)
+    for part in parts_of(passes):
+        inside = np.isin(pass_of_record, part.passes)
+        sums = {
+            sensor: sums.selected(np.flatnonzero(inside[sums.record] | inside[sums.record + 1]))
+            for sensor, sums in adjustment.accumulation.sums.items()
+        }
+        if not all(len(of_sensor) for of_sensor in sums.values()):
+            continue
+        equations = adjustment.equations_of(sums)
+        solution = solve(equations.normal, equations.right, whole.estimated.tolist())
+        if not solution.deficiency:
+            yield part, mount, deviation(solution, whole, problem.consider, mount)
+
+
+def _row(part: Part, mount: Integers, difference: Deviation) -> dict[str, Any]:
+    row: dict[str, Any] = {"part": part.name, "passes": " ".join(map(str, part.passes))}
+    row |= {"normalised": difference.normalised, "dof": difference.dof}
+    for name, number, _, unit in PARAMETERS:
+        place, scale = np.flatnonzero(mount == number), float(np.degrees(1.0)) if unit == "deg" else 1.0
+        for kind, values in (("change", difference.change), ("sigma", difference.sigma)):
+            row[f"{kind}_{name}"] = scale * values[place].item() if len(place) else np.nan
+    return row

@@ -1,0 +1,51 @@
+"""Conditions for labelling a sensor's points with a face, from the settings of stage segment."""
+
+import numpy as np
+
+from pipeline.config.pool import Segment
+from pipeline.maths.target.labelling import LabelSettings
+
+
+def laser_limits(settings: Segment, water_level_m: float, gate_m: float, beam_m: float) -> LabelSettings:
+    """Return the conditions for laser points, which lie on dry faces.
+
+    Parameters
+    ----------
+    settings
+        Settings of stage segment.
+    water_level_m
+        Height of the water, target frame.
+    gate_m
+        Largest distance from the plane of the face.
+    beam_m
+        Diameter of the laser's beam at the target.
+    """
+    return LabelSettings(
+        gate_m=gate_m,
+        margin_m=settings.margin_m,
+        min_grazing_rad=float(np.radians(settings.min_grazing_deg)),
+        lowest_m=water_level_m + settings.water_margin_m,
+        spot_m=beam_m / 2,
+        seen="dry",
+    )
+
+
+def sonar_limits(settings: Segment, water_level_m: float, gate_m: float) -> LabelSettings:
+    """Return the conditions for soundings, which lie on wet faces.
+
+    Parameters
+    ----------
+    settings
+        Settings of stage segment.
+    water_level_m
+        Height of the water, target frame.
+    gate_m
+        Largest distance from the plane of the face.
+    """
+    return LabelSettings(
+        gate_m=gate_m,
+        margin_m=settings.margin_m,
+        min_grazing_rad=float(np.radians(settings.min_grazing_deg)),
+        highest_m=water_level_m - settings.water_margin_m,
+        seen="wet",
+    )

@@ -1,0 +1,44 @@
+"""The systematic errors that a campaign of pairs draws: whose they are, and how large."""
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.config.mount import MountSigma
+from pipeline.config.yaml_models import parse
+from pipeline.maths.mount_parameters import SETTINGS
+from pipeline.simulation.scenario import Scenario
+from tools.campaigns import CAMPAIGNS, scenario_of, systematic_errors
+
+(PAIRS,) = (campaign for campaign in CAMPAIGNS if campaign.own_errors)
+
+
+def scenarios(count: int) -> list[Scenario]:
+    return [parse(Scenario, scenario_of(PAIRS, number), PAIRS.name) for number in range(count)]
+
+
+def test_a_pair_shares_the_laser_s_mount_and_nothing_else() -> None:
+    first, second, third = scenarios(3)
+    assert first.laser.coarse_error is not None
+    assert first.laser.coarse_error == second.laser.coarse_error != third.laser.coarse_error
+    for name in ("sound_speed_true_m_s", "sound_speed_gradient_1_s", "latency_s"):
+        assert len({getattr(one.mbes, name) for one in (first, second, third)}) == 3
+    assert len({one.laser.latency_s for one in (first, second, third)}) == 3
+    assert all(one.mbes.sound_speed_recorded_m_s == 1500.0 for one in (first, second, third))
+
+
+def test_the_errors_are_as_large_as_the_sessions_say() -> None:
+    """Nothing in session.yaml says otherwise than the defaults, which are these."""
+    drawn: list[dict[str, Any]] = [systematic_errors(seed) for seed in range(0, 2000, 2)]
+    of_mount = MountSigma()
+    sizes = {
+        "sound_speed_true_m_s": 0.2, "sound_speed_gradient_1_s": 0.1, "latency_s": 0.0005,
+    }  # fmt: skip
+    for name, sigma in sizes.items():
+        values = np.array([one["mbes"][name] for one in drawn]) - (1500.0 if name.startswith("sound_speed_t") else 0.0)
+        assert 0.9 < values.std() / sigma < 1.1
+        assert abs(values.mean()) < 4 * sigma / np.sqrt(len(values))
+    assert 0.9 < np.std([one["laser"]["latency_s"] for one in drawn]) / 0.0002 < 1.1
+    for key in SETTINGS:
+        sigma = of_mount.angle_deg if key.endswith("_deg") else of_mount.lever_arm_m
+        assert 0.9 < np.std([one["laser"]["coarse_error"][key] for one in drawn]) / sigma < 1.1
