@@ -106,7 +106,7 @@ class _LaserPass:
         return np.where(ranges < to_water, measured, echo)
 
     def _splash_m(self, heights_m: Floats) -> Floats:
-        """Return how much before the face each ray (n,) ends in drops, by the heights at which they meet faces; NaN: none."""
+        """Return how much before the face each ray (n,) ends in drops; ``heights_m``: where it meets one, NaN: none."""
         scenario = self.scenario
         dice = self.random["splash"].random((len(heights_m), 2))
         near = (heights_m > 0) & (heights_m < scenario.splash_height_m)
