@@ -114,6 +114,7 @@ montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.residual_tests
 	$(PY) -m tools.laser
 	$(PY) -m tools.accuracy
+	$(PY) -m tools.patent_forms docs/patent.md
 
 clean: ## remove the demo and the tools' caches; results of other runs stay
 	rm -rf runs/demo runs/demo-session runs/demo-session.truth.json

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.roots import ROOT
+from tools.patent_forms import CASES, MARKS
 
 DOCUMENTS = ["README.md", "CONVENTIONS.md", "Makefile", "pyproject.toml", "configs/defaults.yaml", "docs/patent.md"]
 FILE = re.compile(r"(?<![\w./-])((?:[\w-]+/)*[\w-]+\.py)\b")
@@ -33,3 +34,11 @@ def test_names_that_a_docstring_refers_to_exist() -> None:
             if not file.is_file() or not re.search(rf"\b{name}\b", file.read_text(encoding="utf-8")):
                 missing.append((path.relative_to(ROOT).as_posix(), role[0]))
     assert missing == []
+
+
+def test_the_patents_page_has_every_case_of_its_tool_and_readme_links_to_it() -> None:
+    page = (ROOT / "docs" / "patent.md").read_text(encoding="utf-8")
+    table = page.split(MARKS[0])[1].split(MARKS[1])[0]
+    assert re.findall(r"^\| \*\*(.*)\*\* \|", table, re.MULTILINE) == [case.words for case in CASES]
+    assert table.count("| patent_literal |") == len(CASES)
+    assert "](docs/patent.md)" in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -8,33 +8,26 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
+from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, Runs, interval_sums, merged
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.weighting import (
-    GROUPS,
-    LEAST_SCALE,
-    Weighting,
-    group_of,
-    histogram,
-    rescaled,
-    robust_scale,
-    scatter,
-)
+from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, histogram, robust_scale
+from pipeline.maths.adjustment.weighting import Weighting, rescaled, scatter, shrunk_factors
 
 Array = NDArray[np.float64]
-LEAST_DOF = 30  # smallest number of degrees of freedom for a variance factor
+Integers = NDArray[np.int64]
+PRIOR_POINTS = 22  # all points of a sensor count as this many beside those on a surface, for its robust scale
+Group = tuple[str, int]  # observations of one sensor on one surface: name of the sensor, number of the surface
 
 
 @dataclass(frozen=True)
 class GroupStatistics:
     """Statistics of a group of observations.
 
-    count: number of observations; weights: sum of their robust weights; cut: number of observations with the robust
-    weight zero; reduced: number with a robust weight between zero and one; histogram: counts of the normalised |v|.
+    count: number of observations; cut: number of observations with the robust weight zero; reduced: number with a
+    robust weight between zero and one; histogram: counts of the normalised |v|.
     """
 
     count: int
-    weights: float
     cut: int
     reduced: int
     histogram: Array
@@ -50,20 +43,34 @@ class Accumulation:
     """Result of one reading of all points: interval sums by sensor, and statistics by group of observations."""
 
     sums: Mapping[str, IntervalSums]
-    groups: Mapping[str, GroupStatistics]
+    groups: Mapping[Group, GroupStatistics]
+
+    @property
+    def records(self) -> Integers:
+        """The INS records that begin an interval of any sensor, ascending, each once."""
+        return np.unique(np.concatenate([sums.record for sums in self.sums.values()]))
 
     def observations(self, sensor: str) -> int:
         """Return the number of a sensor's observations."""
-        return sum(group.count for name, group in self.groups.items() if name.startswith(sensor))
+        return sum(group.count for (name, _), group in self.groups.items() if name == sensor)
 
-    def robust_scales(self) -> dict[str, float]:
-        """Return the robust scale of the normalised |v|, by group."""
-        return {name: robust_scale(group.histogram) for name, group in self.groups.items()}
+    def robust_scales(self, n_surfaces: int) -> dict[str, Array]:
+        """Return the robust scales (s,) of the normalised |v| by sensor and surface.
+
+        The median of few |v| scatters. So all points of the sensor are added, with the weight of PRIOR_POINTS.
+        """
+        scales = {}
+        for sensor in self.sums:
+            histograms = {number: group.histogram for (name, number), group in self.groups.items() if name == sensor}
+            total = np.sum(list(histograms.values()), axis=0)
+            usual = total * (PRIOR_POINTS / total.sum())
+            scales[sensor] = np.array([robust_scale(usual + histograms.get(k, 0.0)) for k in range(n_surfaces)])
+        return scales
 
 
 def _accumulate_batch(
     batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues
-) -> tuple[IntervalSums, dict[str, GroupStatistics]]:
+) -> tuple[IntervalSums, dict[Group, GroupStatistics]]:
     observations, weighting = model.linearise(sensor, batch, values), values.weighting
     robust, weight = weighting.weights(observations)
     normalised = weighting.normalised(observations)
@@ -76,13 +83,12 @@ def _accumulate_batch(
         v_m=observations.v_m,
     )
     groups = {}
-    for number in np.flatnonzero(np.bincount(observations.group)).tolist():
-        rows = observations.group == number
+    for surface in Runs.of(observations.surface).starts.tolist():
+        rows = observations.surface == observations.surface[surface]
         w = robust[rows]
         cut = int(np.sum(w == 0))
-        groups[GROUPS[number]] = GroupStatistics(
+        groups[sensor, int(observations.surface[surface])] = GroupStatistics(
             count=len(w),
-            weights=float(w.sum()),
             cut=cut,
             reduced=int(np.sum(w < 1)) - cut,
             histogram=histogram(normalised[rows]),
@@ -102,41 +108,38 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
     values : CurrentValues
         Parameters, drift and weights at which to linearise.
     """
-    sums, groups = {}, dict[str, GroupStatistics]()
+    sums, groups = {}, dict[Group, GroupStatistics]()
     for sensor, stream in streams.items():
         pieces = []
         for piece, statistics in stream.fold(_accumulate_batch, model, sensor, values):
             pieces.append(piece)
-            for name, group in statistics.items():
-                groups[name] = groups[name] + group if name in groups else group
+            for key, group in statistics.items():
+                groups[key] = groups[key] + group if key in groups else group
         sums[sensor] = merged(pieces)
-    return Accumulation(sums, {name: groups[name] for name in GROUPS if name in groups})
+    return Accumulation(sums, groups)
 
 
 def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -> tuple[Accumulation, Weighting]:
     """Return the sums rescaled by new variance factors, and the weighting with these factors.
 
-    The scatter within the intervals changes the factor of each group. A group with too few degrees of freedom takes the
-    change of the sensor's other group; if both have too few, their factors stay.
+    The scatter within the intervals changes the factor of each sensor and surface. Where it has few degrees of freedom,
+    the sensor's other surfaces count as well.
 
     Parameters
     ----------
     accumulation : Accumulation
         Sums with the weights of ``weighting``.
     state : State
-        State with the surfaces. The sonar's observations of horizontal surfaces are a group.
+        State with the surfaces.
     weighting : Weighting
         Weights with which the sums were made.
     """
     factors, sums = dict(weighting.factors), {}
+    surfaces, level = np.arange(len(state.surfaces)), np.array([surface.level for surface in state.surfaces])
     for sensor, intervals in accumulation.sums.items():
-        names = [GROUPS[group_of(sensor, surface.level)] for surface in state.surfaces]
-        scatters = {
-            name: scatter(intervals, np.array(names)[intervals.surface] == name) for name in dict.fromkeys(names)
-        }
-        enough = {name: max(part.factor, LEAST_SCALE**2) for name, part in scatters.items() if part.dof >= LEAST_DOF}
-        default = next(iter(enough.values()), 1.0)
-        changes = {name: enough.get(name, default) for name in scatters}
-        factors |= {name: factors[name] * change for name, change in changes.items()}
-        sums[sensor] = rescaled(intervals, {number: changes[name] for number, name in enumerate(names)})
+        before = weighting.factors_of(sensor, surfaces)
+        parts = [scatter(intervals, intervals.surface == number, weighting.kept) for number in surfaces]
+        change, dof = np.array([(max(part.factor, LEAST_SCALE**2), part.dof) for part in parts]).T
+        factors[sensor] = shrunk_factors(before * change, dof, level)
+        sums[sensor] = rescaled(intervals, factors[sensor] / before)
     return replace(accumulation, sums=sums), replace(weighting, factors=factors)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
 from pipeline.maths.adjustment.design_matrix import SPEED_M_S
-from pipeline.maths.adjustment.parameters import LASER_PARAMETERS
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, PROJECTOR_PARAMETERS
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT
 
@@ -68,6 +68,7 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
         mount_sigmas = [float(np.sqrt(max(row[k], 0.0))) for k, row in enumerate(covariance)]
     sigmas = dict(zip(LASER_MOUNT, mount_sigmas, strict=True))
     sigmas |= {"laser_range": laser.range_bias_sigma_m, "laser_latency": laser.latency_sigma_s}
+    sigmas["laser_incidence"] = laser.incidence_bias_sigma_m
     lean = float(np.radians(as_built.angle_sigma_deg))
     for name in names:
         if name.startswith("wet_"):
@@ -82,6 +83,11 @@ def sonar_errors(
     names: Sequence[str], laser: Laser, mbes: Mbes, as_built: AsBuilt, depth_m: float | None = None
 ) -> ConsiderErrors:
     """Return the a-priori errors for a calibration of the sonar: zero for the sonar's mount and the surfaces.
+
+    ``sound_speed`` is an error common to the column and to the water at the arrays (of the probe, or of the cast as a
+    whole), ``steering_speed`` the difference of the two. They are independent, each with the sigma σ =
+    ``sound_speed_sigma_m_s``. So the speed that steers has the sigma √2 σ, and its correlation with the column's is
+    1/√2.
 
     Parameters
     ----------
@@ -100,6 +106,10 @@ def sonar_errors(
         "mbes_latency": mbes.latency_sigma_s,
         "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
         "sound_speed_gradient": gradient_sigma(mbes, depth_m),
+        "steering_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
+        "mbes_incidence": mbes.incidence_bias_sigma_m,
+        "mbes_level_range": mbes.level_bias_sigma_m,
+        **dict.fromkeys(PROJECTOR_PARAMETERS, mbes.projector_sigma_m),
     }
     sigmas = [of_sonar.get(name, sigma) for name, sigma in zip(names, errors.sigmas.tolist(), strict=True)]
     return ConsiderErrors(np.array(sigmas), errors.blocks)

@@ -50,6 +50,26 @@ ERROR_SOURCES = (  # the first beginning that fits counts
         "clocks are synchronised anew when the recording begins, with another remainder",
     ),
     ErrorSource(
+        "laser_incidence", "the laser's ranges by incidence", "session",
+        "it depends on the faces' paint and on whether they are wet",
+    ),
+    ErrorSource(
+        "mbes_incidence", "the sonar's ranges by incidence", "session",
+        "the bottom detection's settings and the growth on the faces are of the day",
+    ),
+    ErrorSource(
+        "mbes_level_range", "the sonar's ranges on horizontal faces", "session",
+        "as those by incidence",
+    ),
+    ErrorSource(
+        "projector", "the transmitter's place", "sonar",
+        "it is a property of the head",
+    ),
+    ErrorSource(
+        "steering_speed", "sound speed at the arrays", "session",
+        "as the sound speed",
+    ),
+    ErrorSource(
         "mbes_range", "the sonar's ranges", "sonar",
         "the place of its acoustic centre and its detection's delay are properties of the device",
     ),

@@ -8,21 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
-from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.initial_mount import initial_mount
+from pipeline.adjustment.iterate import Iterate
+from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
+from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.interval_sums import IntervalSums
-from pipeline.maths.adjustment.normal_equations import Linearisation, mount_step, normal_equations, updated_sums
+from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
-from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
+from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
+from pipeline.maths.adjustment.pose_errors import DriftEstimate
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
     Scatter,
     Weighting,
-    epoch_variance_factors,
     noise_seen_by_laser,
     scatter,
 )
@@ -67,10 +69,8 @@ class StepLimits:
 
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
 SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step another reading would hardly change the weights
-NEAR_RAD_M = 1e-3  # rad and m: a smaller step ends the initial steps
-LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for the scale of the residuals
+LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for their scale and the white noise
 CLOSING_STEPS = 3  # largest number of steps after the last reading, with its weights
-INITIAL_STEPS = 10  # largest number of steps to bring the soundings near the surfaces
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,10 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount:
-    the mount parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the
-    values and the noise of the final solution.
+    white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
+    sonar or a solution); drift_figures: the figures of the drift, which the solution has; equations: normal equations
+    of all parameters, also of the fixed ones; fixed_mount: the mount parameters that had to be fixed, each with the
+    sigma that it would have had (rad or m); last: the values of the final solution.
     """
 
     state: State
@@ -89,17 +90,18 @@ class MountAdjustment:
     weighting: Weighting
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
+    ping: PingNoise | None
+    drift_figures: DriftFigures
     equations: NormalEquations
     solution: Solution
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
-    last: "_Iterate"
-    noise: PoseNoise
+    last: Iterate
 
     def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
         """Return the normal equations of all parameters, with the prior information, from a part of the sums."""
-        return self.last.of(sums).equations(self.noise)
+        return self.last.of(sums).equations(self.drift_figures.noise)
 
     @property
     def values(self) -> CurrentValues:
@@ -108,12 +110,13 @@ class MountAdjustment:
 
     @property
     def redundancy(self) -> float:
-        """Sum of the robust weights, less the number of estimated parameters.
+        """Expectation of the sum of squares: the observations with a weight, less the number of estimated parameters.
 
-        Pose errors do not count: each has one pseudo-observation.
+        An observation counts as the part of its variance that robust weights leave. Pose errors do not count: each has
+        one pseudo-observation.
         """
-        observations = sum(group.weights for group in self.accumulation.groups.values())
-        return observations - len(self.solution.estimated)
+        observations = sum(group.count - group.cut for group in self.accumulation.groups.values())
+        return self.weighting.kept * observations - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
@@ -121,7 +124,8 @@ class MountAdjustment:
 
         They show how well intervals, passes and sensors agree.
         """
-        parts = [scatter(sums, np.ones(len(sums), dtype=bool)) for sums in self.accumulation.sums.values()]
+        kept = self.weighting.kept
+        parts = [scatter(sums, np.ones(len(sums), dtype=bool), kept) for sums in self.accumulation.sums.values()]
         within = sum(part.squares for part in parts), sum(part.dof for part in parts)
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
@@ -148,23 +152,31 @@ def adjust_mount(
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
     """
-    noise = problem.prior.noise
+    prior = problem.prior
+    figures, ping = DriftFigures.of_session(prior.noise), None
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
     last, estimated = weighted.last, weighted.estimated
     factors: dict[str, EpochVarianceFactor] = {}
     converged = False
     if not weighted.deficient:
-        # take the INS's white noise from the laser's points; further steps have the last weights
-        surfaces, sums_by_sensor = last.linearisation.state.surfaces, last.linearisation.sums
-        factors = epoch_variance_factors(sums_by_sensor, surfaces, noise.white)
-        noise = noise_seen_by_laser(noise, factors["laser"])
-        for _ in range(CLOSING_STEPS):
-            last, solution = last.stepped(noise, estimated)
+        # take the INS's noise from the data: white noise, then drift; further steps have the last weights
+        factors["laser"] = last.record_noise(prior.noise)
+        if "mbes" in streams:  # a part of the sonar's noise is common to a ping
+            soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
+            ping = ping_noise(soundings, surfaces, prior.noise.white, factors["laser"])
+            with_pings = with_ping_noise(soundings, ping, surfaces, prior.noise.white)
+            last = replace(last, linearisation=last.linearisation.with_sums("mbes", with_pings))
+            factors["mbes"] = ping.epoch
+        noise = noise_seen_by_laser(prior.noise, factors["laser"])
+        reduced = last.reduced(noise.white, estimated)
+        figures = last.drift_figures(noise, prior.drift, estimated, reduced)
+        for closing in range(CLOSING_STEPS):
+            last, solution = last.stepped(figures.noise, estimated, None if closing else reduced)
             converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
-    equations = last.equations(noise)
+    equations = last.equations(figures.noise)
     solution = solve(equations.normal, equations.right, estimated.tolist())
     return MountAdjustment(
         state=last.linearisation.state,
@@ -172,60 +184,22 @@ def adjust_mount(
         weighting=weighted.weighting,
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
+        ping=ping,
+        drift_figures=figures,
         equations=equations,
         solution=solution,
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
         last=last,
-        noise=noise,
     )
-
-
-@dataclass(frozen=True)
-class _Iterate:
-    """Current values, and the interval sums linearised at them."""
-
-    linearisation: Linearisation
-    drift: DriftEstimate
-    surfaces: SurfacePrior | None
-
-    def of(self, sums: Mapping[str, IntervalSums]) -> "_Iterate":
-        """Return the same values for other sums, linearised at them."""
-        return replace(self, linearisation=replace(self.linearisation, sums=sums))
-
-    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
-        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
-        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
-        if self.surfaces is None:
-            return equations
-        prior = self.surfaces.pseudo_observations(state)
-        places = np.arange(state.size) if selected is None else selected
-        return replace(
-            equations,
-            normal=equations.normal + prior.normal[np.ix_(places, places)],
-            right=equations.right + prior.right[places],
-            squares=equations.squares + prior.squares,
-        )
-
-    def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["_Iterate", Solution]:
-        """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
-        state = self.linearisation.state
-        equations = self.equations(noise, estimated)
-        solution = solve(equations.normal, equations.right, range(len(estimated)))
-        step, drift_step = np.zeros(state.size), equations.knots(solution.step)
-        step[estimated] = solution.step
-        sums = updated_sums(self.linearisation, step, DriftEstimate(self.drift.knots, drift_step))
-        drift = self.drift.updated(drift_step)
-        linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
-        return _Iterate(linearisation, drift, self.surfaces), solution
 
 
 @dataclass(frozen=True)
 class _WeightedIteration:
     """The iteration after its last reading of the points; ``deficient``: the data leave directions open."""
 
-    last: _Iterate
+    last: Iterate
     estimated: Integers
     fixed_mount: Mapping[int, float]
     weighting: Weighting
@@ -240,29 +214,31 @@ def _weighted_iteration(
 ) -> _WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open."""
     model, prior = problem.model, problem.prior
-    state = _initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
-    values = CurrentValues(state)
+    state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
+    values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free))
     fixed: dict[int, float] = {}
     for iteration in range(1, settings.max_iterations + 1):
-        # read all points, and take the variance factors of the groups from their scatter
+        # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
-        drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
-        start = _Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
+        drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
+        start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
             normal = start.equations(prior.noise).normal
             fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
             estimated = np.setdiff1d(estimated, np.array(list(fixed), dtype=np.int64))
         # solve and step
-        stepped, solution = start.stepped(prior.noise, estimated)
+        stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0
         settled = weighting.robust is not None and _is_small(solution, estimated, SETTLED)
         if deficient or (settled and iteration >= LEAST_PASSES):
             break
-        # from the next reading on reduce the weights of outliers; scales come from residuals without the drift
-        scales = {**weighting.scales, **(accumulation.robust_scales() if iteration > 1 else {})}
-        weighting = replace(weighting, scales=scales, robust=(settings.robust_k0, settings.robust_k1))
+        # from the next reading on reduce the weights of outliers
+        weighting = replace(weighting, robust=(settings.robust_k0, settings.robust_k1))
+        if iteration > 1:  # scales and the INS's white noise come from residuals without the drift and outliers
+            white = noise_seen_by_laser(prior.noise, stepped.record_noise(prior.noise)).white
+            weighting = replace(weighting, scales=accumulation.robust_scales(len(state.surfaces)), white=white)
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
     return _WeightedIteration(
         last=start if deficient else stepped,
@@ -276,21 +252,6 @@ def _weighted_iteration(
     )
 
 
-def _initial_mount(soundings: Stream, model: ObservationModel) -> State:
-    """Return the state after steps of the coarse mount alone, which bring the soundings near the surfaces."""
-    state = model.coarse
-    for _ in range(INITIAL_STEPS):
-        sums = accumulate({"mbes": soundings}, model, CurrentValues(state)).sums
-        step = mount_step(Linearisation(sums, state, model.body))
-        state = state.updated(step)
-        if np.max(np.abs(step)) < NEAR_RAD_M:
-            break
-    return state
-
-
-def _zero_drift(accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float) -> DriftEstimate:
-    record = np.unique(np.concatenate([sums.record for sums in accumulation.sums.values()]))
-    return DriftEstimate.zero(place_knots(record, model.body.seconds, noise.spacing_s, gap_s))
 
 
 def _is_small(solution: Solution, estimated: Integers, limits: StepLimits) -> bool:

@@ -8,23 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Batch, point_array
+from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.design_matrix import (
     PointDesign,
     SensorSigmas,
     SoundingsOnSurface,
     laser_point_design,
+    pose_design,
     sensor_noise,
     sonar_point_design,
 )
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
-from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.normal_equations import RecordErrors, residual_shift
+from pipeline.maths.adjustment.parameters import LASER_FEATURES, MBES_FEATURES, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
-from pipeline.maths.adjustment.weighting import Weighting, group_of
+from pipeline.maths.adjustment.weighting import Weighting, common_variance
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-N_FEATURES = {"laser": N_MOVED + 1, "mbes": N_MOVED + 3}
+N_FEATURES = {"laser": N_MOVED + len(LASER_FEATURES), "mbes": N_MOVED + len(MBES_FEATURES)}
 
 
 @dataclass(frozen=True)
@@ -89,18 +91,18 @@ class LinearisedBatch:
 class Observations:
     """Observations of one batch (n,), ordered by surface and time, so that the points of an interval lie together.
 
-    points: columns of the points; record: INS record before each point; share: place of the point between this record
-    and the next, from 0 to 1; surface, group: number of its surface and of its group; v_m: distance from the surface
-    less mean_m, the mean of the noise; sigma_m: sigma of the sensor's noise in v; common_m: sigma of the INS's white
-    noise, common to the interval; features (F, n) and slopes (F - 1, n): see
+    sensor: the one that observed; points: columns of the points; record: INS record before each point; share: place of
+    the point between this record and the next, from 0 to 1; surface: number of its surface; v_m: distance from the
+    surface less mean_m, the mean of the noise; sigma_m: sigma of the sensor's noise in v; common_m: sigma of the INS's
+    white noise, common to the interval; features (F, n) and slopes (F - 1, n): see
     :mod:`pipeline.maths.adjustment.design_matrix`.
     """
 
+    sensor: str
     points: Batch
     record: Integers
     share: Array
     surface: Integers
-    group: Integers
     v_m: Array
     mean_m: Array
     sigma_m: Array
@@ -120,15 +122,13 @@ class ObservationModel:
 
     body: motion of the body, target frame; surface_of_face (f,): number of each face's surface; height_of_face (f,) m:
     distance of each face from its surface, along the normal; coarse: the state from which the adjustment starts;
-    white_m: sigma of the white noise of the INS's positions, common to all points of an interval; sigmas: standard
-    deviations of each sensor that observes.
+    sigmas: standard deviations of each sensor that observes.
     """
 
     body: BodyMotion
     surface_of_face: Integers
     height_of_face: Array
     coarse: State
-    white_m: float
     sigmas: Mapping[str, SensorSigmas]
 
     def linearise(self, sensor: str, batch: Batch, values: CurrentValues) -> Observations:
@@ -147,8 +147,9 @@ class ObservationModel:
         points, surface = self._ordered(batch)
         record, share = self.body.trajectory.interval_of(points["t_ns"])
         n, n_features = len(surface), N_FEATURES[sensor]
-        v, mean, sigma = np.empty((3, n))
+        v, mean, sigma, common = np.empty((4, n))  # common: a variance
         features, slopes = np.empty((n_features, n)), np.empty((n_features - 1, n))
+        by_pose = pose_design(state.surfaces, np.arange(len(state.surfaces)))
         errors = self._pose_errors(values.drift, record)
         turns = errors.error[:, 3:].T
         shifts = residual_shift(state, sensor, self.body, errors, n_features)  # (r, s, F)
@@ -168,18 +169,19 @@ class ObservationModel:
             turn = on_surface.intervals.spread(on_surface.axes @ turns[:, place])
             features[1, rows] += turn[1] * r[2] - turn[2] * r[1]  # turn × r
             features[2, rows] += turn[2] * r[0] - turn[0] * r[2]
-        group = np.array([group_of(sensor, plane.level) for plane in state.surfaces])[surface]
-        mean *= values.weighting.factors_of(group)
+            derivatives = by_pose[number].T @ features[:N_MOVED, rows]
+            common[rows] = common_variance(derivatives, share[rows], values.weighting.white)
+        mean *= values.weighting.factors_of(sensor, surface)
         return Observations(
+            sensor=sensor,
             points=points,
             record=record,
             share=share,
             surface=surface,
-            group=group,
             v_m=v - mean,
             mean_m=mean,
             sigma_m=sigma,
-            common_m=self.white_m * np.sqrt((1 - share) ** 2 + share**2),
+            common_m=np.sqrt(common),
             features=features,
             slopes=slopes,
         )

@@ -120,7 +120,7 @@ def _batch(
     observations, weighting = model.linearise(sensor, batch, values), values.weighting
     robust, _ = weighting.weights(observations)
     # weights without robust reduction: a bin with large residuals must show, not lose its weight
-    plain = observations.sigma_m * np.sqrt(weighting.factors_of(observations.group))
+    plain = observations.sigma_m * np.sqrt(weighting.factors_of(sensor, observations.surface))
     normalised = np.where(robust > 0, np.abs(weighting.normalised(observations)), 0.0)
     slot = observations.points["t_ns"] // thinning.slot_ns
     sums = {}

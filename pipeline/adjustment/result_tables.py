@@ -7,7 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.adjustment.ins_drift import drift_figures_table
 from pipeline.adjustment.iteration import MountAdjustment
+from pipeline.adjustment.noise_tables import groups_table, sigma_check
 from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_statistics import ResidualStatistics
@@ -28,7 +30,6 @@ from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
 
 Array = NDArray[np.float64]
-COMMON_ERROR = {"laser": "ins_white", "mbes": "ping"}  # name of the error that an interval's points have in common
 
 
 def result_tables(
@@ -56,12 +57,13 @@ def result_tables(
     t_ns = problem.model.body.trajectory.t_ns
     estimate, random, total = _estimate(problem, adjustment)
     return {
-        "estimate": estimate,
+        "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
         "freed": _single_parameter_table(adjustment, problem.consider.sigmas, estimate),
-        "groups": _groups_table(adjustment),
+        "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
         "drift": _drift_table(adjustment, t_ns),
+        "drift_figures": drift_figures_table(problem.prior.noise, adjustment.drift_figures),
         "cells": _pass_means_table(adjustment, statistics, t_ns, passes),
         "surfaces": _surfaces_table(adjustment, statistics),
     }
@@ -189,24 +191,6 @@ def _drift_table(adjustment: MountAdjustment, t_ns: NDArray[np.int64]) -> pd.Dat
     return pd.DataFrame(columns | {f"turn_{axis}_target_deg": turns[:, k] for k, axis in enumerate("xyz")})
 
 
-def _groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
-    rows: list[dict[str, Any]] = [
-        {
-            "group": name,
-            "count": group.count,
-            "variance_factor": adjustment.weighting.factors[name],
-            "scale": adjustment.weighting.scales[name],
-            "cut": group.cut,
-            "reduced": group.reduced,
-        }
-        for name, group in adjustment.accumulation.groups.items()
-    ]
-    for sensor, common in adjustment.epoch_factors.items():
-        row = {"group": COMMON_ERROR[sensor], "count": len(adjustment.accumulation.sums[sensor].record)}
-        rows.append(row | {"variance_factor": common.factor, "scale": np.nan, "cut": 0, "reduced": 0})
-    return pd.DataFrame(rows)
-
-
 def _pass_means_table(
     adjustment: MountAdjustment, statistics: ResidualStatistics, t_ns: NDArray[np.int64], passes: pd.DataFrame
 ) -> pd.DataFrame:
@@ -224,7 +208,8 @@ def _pass_means_table(
         family = adjustment.state.surfaces[surface].family
         beside = sums.record, np.minimum(sums.record + 1, len(t_ns) - 1)  # one of the two may lie outside the pass
         pass_of_interval = np.maximum(*(pass_of(t_ns[record], starts, ends) for record in beside))
-        within = scatter(sums, (pass_of_interval == number) & (sums.surface == surface))
+        rows_here = (pass_of_interval == number) & (sums.surface == surface)
+        within = scatter(sums, rows_here, adjustment.weighting.kept)
         rows.append(
             {
                 "sensor": sensor,

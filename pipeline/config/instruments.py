@@ -29,8 +29,11 @@ PRESETS = CONFIGS / "instruments"
 SENSORS: Mapping[Sensor, type[Model]] = {"ins": Ins, "laser": Laser, "mbes": Mbes}
 SETTINGS: Mapping[Sensor, tuple[str, ...]] = {  # keys that a preset may set and the report shows
     "ins": ("drift", "white"),
-    "laser": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg", "beam_m"),
-    "mbes": ("range_sigma_m", "range_bias_sigma_m", "angle_sigma_deg", "beam_deg", "projector_offset_m"),
+    "laser": ("range_sigma_m", "range_bias_sigma_m", "incidence_bias_sigma_m", "angle_sigma_deg", "beam_m"),
+    "mbes": (
+        "range_sigma_m", "range_bias_sigma_m", "incidence_bias_sigma_m", "level_bias_sigma_m", "angle_sigma_deg",
+        "beam_deg", "projector_offset_m", "projector_sigma_m",
+    ),
 }
 MOST_PRESETS = 1000  # most files that are read for a message
 

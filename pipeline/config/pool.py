@@ -92,7 +92,9 @@ class Offsets(Model):
     apply_x_first: bool = True  # Y is taken after X has been applied (an X error shows fully in Y on a 45° face)
 
 
-Freeable = Literal["mbes_latency", "laser_latency", "sound_speed"]
+Freeable = Literal[
+    "mbes_latency", "laser_latency", "sound_speed", "mbes_incidence", "mbes_level_range", "laser_incidence"
+]
 
 
 class Adjust(Model):

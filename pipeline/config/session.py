@@ -35,6 +35,13 @@ class Drift(Model):
     time_constant_s: Annotated[float, Field(ge=1, le=1e6)] = 200.0
 
 
+class DriftWithin(Model):
+    """Factors within which the figures of the drift hold (one sigma); 1: they are exact, and the data do not count."""
+
+    sigmas: Annotated[float, Field(ge=1, le=100)] = 2.0
+    time_constant: Annotated[float, Field(ge=1, le=100)] = 3.0
+
+
 class White(Model):
     """White noise of the INS, per record."""
 
@@ -54,6 +61,7 @@ class Ins(Model):
     latency_s: Latency = 0.0
     drift: Drift = Drift()
     drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, if they hold any; else those of drift
+    drift_within: DriftWithin = DriftWithin()
     white: White = White()
 
     @model_validator(mode="after")
@@ -86,6 +94,7 @@ class Laser(Model):
     mount_covariance: Covariance | None = None  # takes precedence over mount_sigma
     range_sigma_m: RangeSigma = 0.005
     range_bias_sigma_m: SigmaM = 0.002  # common to all ranges
+    incidence_bias_sigma_m: SigmaM = 0.0004  # of ranges at 45° incidence against 0°, growing like 1 / cos i - 1
     angle_sigma_deg: SigmaDeg = 0.003
     beam_m: Annotated[float, Field(ge=0, le=0.1)] = 0.01  # diameter of the beam at the target
     latency_s: Latency = 0.0
@@ -132,8 +141,11 @@ class Mbes(Model):
     sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2
     sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m, as with 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
+    projector_sigma_m: SigmaM = 0.003  # of its place, each axis
     range_sigma_m: RangeSigma = 0.008
     range_bias_sigma_m: SigmaM = 0.002  # common to all detections
+    incidence_bias_sigma_m: SigmaM = 0.001  # at 45° incidence against 0°, growing like 1 / cos i - 1
+    level_bias_sigma_m: SigmaM = 0.005  # common to all detections on horizontal faces
     angle_sigma_deg: SigmaDeg = 0.06
     beam_deg: tuple[BeamWidth, BeamWidth] = (0.5, 1.0)  # width across track, along track
     latency_s: Latency = 0.0

@@ -59,10 +59,14 @@ class ReasonCode(StrEnum):
     INS_DRIFT_ABOVE_SETTINGS = "ins_drift_above_settings", "the INS drifts farther than its figures say"
 
     # These only warn.
+    INS_DRIFT_OFF_FIGURES = "ins_drift_off_figures", "by the data the INS drifts more, or faster, than its figures say"
     GEOMETRY_GAP = "geometry_gap", "the passes leave a gap in the geometry"
     NOISE_OFF_SIGMAS = "noise_off_sigmas", "observations scatter more, or less, than their sigmas say"
     INS_NOISE_ABOVE_SETTINGS = "ins_noise_above_settings", "INS poses scatter more than ins.white says"
     PING_NOISE_ABOVE_SETTINGS = "ping_noise_above_settings", "whole pings scatter more than ins.white says"
+    NOISE_DIFFERS_BY_FAMILY = "noise_differs_by_family", "a sensor's noise is far larger on one family than on others"
+    BEAMS_CORRELATED = "beams_correlated", "neighbouring beams of the sonar err alike"
+    SIGMAS_OFF_SCATTER = "sigmas_off_scatter", "slots of time scatter more than the random sigmas say"
     MANY_OUTLIERS = "many_outliers", "an unusual share of the observations was cut as outliers"
     TARGET_OFF_ORIGIN = "target_off_origin", "the target stands far from target.origin, or out of plumb"
     PASS_WITHOUT_SOUNDINGS = "pass_without_soundings", "in some passes the laser alone saw the target"

@@ -1,8 +1,10 @@
 """Suspected causes (fixed parameters that the residuals contradict), and the parameters that adjust.free names.
 
-Table ``freed`` has the single-parameter test of each fixed parameter. A parameter is a suspected cause if its estimate
-is farther from zero than noise and its a-priori sigma explain. One error often moves the estimates of several
-parameters. The report names the cause that explains most, with the largest value over sigma.
+Table ``freed`` has the single-parameter test of each fixed parameter. The residuals contradict a parameter if its
+estimate is farther from zero than noise and its a-priori sigma explain. One error often moves the estimates of several
+parameters. The report names the cause that explains most, with the largest value over sigma. Where one parameter is
+contradicted, this may be another that is not: a parameter with a large a-priori sigma, which explains the residuals
+without being off its setting.
 """
 
 from collections.abc import Mapping
@@ -12,10 +14,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.report.cause_words import words_of
+
 SIGNIFICANT = 4.0  # sigmas: by chance one of 16 000 parameters, so one of 400 sessions with forty parameters each
-UNITS = {"mbes_latency": "s", "laser_latency": "s", "sound_speed": "1"}
-AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
-FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
+UNITS = {"sound_speed": "1"} | dict.fromkeys(("mbes_latency", "laser_latency"), "s")
+UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence"), "m")
 
 
 @dataclass(frozen=True)
@@ -47,11 +50,17 @@ class EstimatedParameter:
 
 
 def suspected_causes(freed: pd.DataFrame) -> list[SuspectedCause]:
-    """Return the suspected causes from table ``freed``, the one with the largest value over sigma first."""
+    """Return the suspected causes from table ``freed``, the one with the largest value over sigma first.
+
+    There are none unless the residuals contradict at least one fixed parameter.
+    """
+    fixed = freed[~freed["estimated"]].to_dict("records")
+    if not any(_is_significant(row) for row in fixed):
+        return []
     causes = [
-        SuspectedCause(_words(row), abs(row["value"]) / row["sigma"])
-        for row in freed[~freed["estimated"]].to_dict("records")
-        if _is_significant(row)
+        SuspectedCause(words_of(row), abs(row["value"]) / row["sigma"])
+        for row in fixed
+        if abs(row["value"]) > SIGNIFICANT * row["sigma"]
     ]
     return sorted(causes, key=lambda cause: -cause.normalised)
 
@@ -64,7 +73,7 @@ def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:
             value=row["value"],
             sigma_total=row["sigma"],
             unit=UNITS[row["unknown"]],
-            words=_words(row),
+            words=words_of(row),
             is_significant=_is_significant(row),
         )
         for row in freed[freed["estimated"] & np.isfinite(freed["sigma"])].to_dict("records")
@@ -73,47 +82,3 @@ def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:
 
 def _is_significant(row: Mapping[Any, Any]) -> bool:
     return bool(abs(row["value"]) > SIGNIFICANT * np.hypot(row["sigma"], row["considered"]))
-
-
-def _words(row: Mapping[Any, Any]) -> str:
-    """Return in words the estimate of one parameter, and the setting or device to check."""
-    name, value, sigma = str(row["unknown"]), float(row["value"]), float(row["sigma"])
-    sensor = "laser" if name.startswith("laser") else "mbes"
-    owner = {"laser": "the laser's", "mbes": "the sonar's"}[sensor]
-    if name.endswith("_latency"):
-        size = _size(1e3 * value, 1e3 * sigma, "ms")
-        return f"{owner} clock: its latency is {size} more than {sensor}.latency_s says"
-    if name == "sound_speed":
-        return (
-            f"the sound speed: it is {_size(100 * value, 100 * sigma, '%')} above that recorded, or given as "
-            "mbes.sound_speed_m_s or mbes.svp; measure it at the head"
-        )
-    if name == "sound_speed_gradient":
-        return f"a sound speed that changes with depth, by {_size(value, sigma, 'm/s')} per metre: take a (better) cast"
-    if name.endswith("_range"):
-        return f"{owner} ranges: they should be {_size(1e3 * value, 1e3 * sigma, 'mm')} longer"
-    if name.startswith("laser_rotation"):
-        angle = _size(np.degrees(value), np.degrees(sigma), "°")
-        return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
-    if name.startswith("laser_lever_arm"):
-        return f"laser.mount: {name[-1]}_m should be {_size(1e3 * value, 1e3 * sigma, 'mm')} more"
-    return _words_of_wet_faces(name, value, sigma)
-
-
-def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
-    """Return in words a turn (rad) or shift (m) of a family's wet faces against its dry ones."""
-    family, _, kind = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
-    faces = FACES_OF_FAMILY.get(family, f"of {family}")
-    if kind.startswith("turn"):
-        angle = _size(np.degrees(value), np.degrees(sigma), "°")
-        return f"the target: its wet faces {faces} are turned by {angle} against the dry ones"
-    shift = _size(1e3 * value, 1e3 * sigma, "mm")
-    verb = "lie higher" if family == "H" else "stand off"
-    return f"the target: its wet faces {faces} {verb} by {shift}; check its shape in the config, and its survey"
-
-
-def _size(value: float, sigma: float, unit: str) -> str:
-    """Return a value and its sigma as text, with as many decimals as the first digit of the sigma has."""
-    digits = max(0, -int(np.floor(np.log10(max(sigma, 1e-9)))))
-    gap = "" if unit == "°" else " "
-    return f"{value:+.{digits}f} ± {sigma:.{digits}f}{gap}{unit}"

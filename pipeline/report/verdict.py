@@ -22,7 +22,8 @@ The limits are defined at these places (paths from ``pipeline/``):
 * result and convergence of a patent's form: classes ``FitPlanes``, ``AngleIterate`` and ``Offsets`` of config/pool.py.
 
 Warnings do not reject. Their limits are the ``MAX_...`` constants of warnings.py, as_built.py and cast_checks.py,
-``MAX_DRIFT_RATIO`` of drift_check.py, and, for gaps in the geometry, ``NEAR_M`` of planning/observability.py.
+``MAX_DRIFT_RATIO`` and ``MAX_DEVIATION`` of drift_check.py, and, for gaps in the geometry, ``NEAR_M`` of
+planning/observability.py.
 ``MAX_DRIFT_M`` and ``SAME_STEP_DEG`` of residual_words.py only change the words of a reason.
 """
 
@@ -44,6 +45,7 @@ from pipeline.report.residual_tests import deviations
 from pipeline.report.residual_words import ResidualTests
 from pipeline.report.suspected_causes import estimated_parameters, suspected_causes
 
+NEARLY_AS_WELL = 2.0  # sigmas: a cause whose value over sigma is smaller by no more is named beside the first
 MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
 
 
@@ -152,15 +154,19 @@ def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
 def _suspected_cause(freed: pd.DataFrame, local: bool) -> list[Statement]:
     """Return a reason with the fixed parameter that explains the residuals best, and the number of the others.
 
-    ``local``: another reason names a face, step, pass or ping, which may be the cause instead.
+    Others that explain them nearly as well are named, too. ``local``: another reason names a face, step, pass or ping,
+    which may be the cause instead.
     """
     causes = suspected_causes(freed)
     if not causes:
         return []
-    first, others = causes[0], len(causes) - 1
+    first = causes[0]
+    rivals = [cause for cause in causes[1:] if first.normalised - cause.normalised <= NEARLY_AS_WELL]
+    nearly = "".join(f"; nearly as well ({cause.normalised:.0f} sigma): {cause.words}" for cause in rivals)
+    others = len(causes) - 1 - len(rivals)
     rest = f"; {plural(others, 'other parameter')} would explain it less well" if others else ""
     unless = ", unless the face, step, pass or ping named above is itself the cause" if local else ""
-    words = f"likely cause of residuals{unless} ({first.normalised:.0f} sigma): {first.words}{rest}"
+    words = f"likely cause of residuals{unless} ({first.normalised:.0f} sigma): {first.words}{nearly}{rest}"
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 
 

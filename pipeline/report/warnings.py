@@ -11,7 +11,9 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 MAX_VARIANCE_FACTOR = 2.0  # of a group of observations: above this, or below its inverse, the sigmas are wrong
-MAX_COMMON_VARIANCE_FACTOR = 4.0  # of noise common to an epoch's points; a small one is no warning: the INS is good
+MAX_INS_VARIANCE_FACTOR = 4.0  # of the INS's white noise; a small one is no warning: the INS is good
+MAX_PING_EXCESS = 0.5  # of the variance factor of pings over that of the INS's white noise
+CERTAIN = 3.0  # sigmas by which this excess must differ from zero
 MAX_OUTLIER_SHARE = 0.01  # of a group of observations
 MAX_TARGET_OFFSET_M = 0.1  # from target.origin, along each axis
 MAX_TARGET_TILT_DEG = 0.1  # out of plumb
@@ -21,17 +23,7 @@ GROUP_WORDS = {
     "mbes_vertical": "soundings on vertical faces",
     "mbes_horizontal": "soundings on horizontal faces",
 }
-COMMON_NOISE = {  # groups of noise common to an epoch's points: code, and words with the root of the factor
-    "ins_white": (
-        ReasonCode.INS_NOISE_ABOVE_SETTINGS,
-        "the INS's poses scatter from record to record {:.1f} times as much as ins.white says: its filter, or the "
-        "laser's clock",
-    ),
-    "ping": (
-        ReasonCode.PING_NOISE_ABOVE_SETTINGS,
-        "whole pings scatter {:.1f} times as much as ins.white says: the sonar's clock, or stabilised beams",
-    ),
-}
+COMMON_NOISE = ("ins_white", "ping")  # groups of noise common to an epoch's points
 
 
 def geometry_gaps(geometry: pd.DataFrame, sigmas: Mapping[str, float] | None) -> list[Statement]:
@@ -55,13 +47,9 @@ def _sigma_suffix(sigmas: Mapping[str, float]) -> str:
 
 def unexpected_noise(groups: pd.DataFrame) -> Iterator[Statement]:
     """Yield a warning for each group of observations (table ``groups``) with unexpected noise or many outliers."""
-    for row in groups.to_dict("records"):
+    yield from _common_noise(groups[groups["group"].isin(COMMON_NOISE)].set_index("group").to_dict("index"))
+    for row in groups[(groups["family"] == "") & ~groups["group"].isin(COMMON_NOISE)].to_dict("records"):
         factor, cut_share = row["variance_factor"], row["cut"] / max(row["count"], 1)
-        if row["group"] in COMMON_NOISE:
-            if factor > MAX_COMMON_VARIANCE_FACTOR:
-                code, words = COMMON_NOISE[row["group"]]
-                yield Statement(code, words.format(np.sqrt(factor)))
-            continue
         name = GROUP_WORDS[row["group"]]
         if factor > MAX_VARIANCE_FACTOR or factor < 1 / MAX_VARIANCE_FACTOR:
             yield Statement(
@@ -74,6 +62,26 @@ def unexpected_noise(groups: pd.DataFrame) -> Iterator[Statement]:
                 ReasonCode.MANY_OUTLIERS,
                 f"{100 * cut_share:.1f} % of {name} were cut as outliers: look at the residuals of the faces",
             )
+
+
+def _common_noise(rows: Mapping[Any, Mapping[Any, Any]]) -> Iterator[Statement]:
+    """Yield a warning for unexpected noise that is common to an epoch's points; ``rows``: by group."""
+    ins = rows.get("ins_white", {"variance_factor": 1.0, "sigma": 0.0})
+    if ins["variance_factor"] > MAX_INS_VARIANCE_FACTOR:
+        words = (
+            f"the INS's poses scatter from record to record {np.sqrt(ins['variance_factor']):.1f} times as much as "
+            "ins.white says: its filter, or the laser's clock"
+        )
+        yield Statement(ReasonCode.INS_NOISE_ABOVE_SETTINGS, words)
+    if "ping" in rows:
+        ping = rows["ping"]
+        excess = ping["variance_factor"] - ins["variance_factor"]
+        if excess > max(MAX_PING_EXCESS, CERTAIN * np.hypot(ping["sigma"], ins["sigma"])):
+            words = (
+                f"whole pings scatter {np.sqrt(ping['variance_factor']):.1f} times as much as ins.white says: the "
+                "sonar's clock, or stabilised beams; the sigmas allow for it"
+            )
+            yield Statement(ReasonCode.PING_NOISE_ABOVE_SETTINGS, words)
 
 
 def target_off_origin(target: Mapping[str, Any]) -> list[Statement]:

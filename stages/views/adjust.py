@@ -89,10 +89,9 @@ def _span(residuals: pd.DataFrame) -> dict[str, float]:
 def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
     """Return by sensor the number of observations for one row of table ``residuals``, which is thinned."""
     total = dict.fromkeys(SENSORS, 0)
-    for row in tables.table(GROUPS).to_dict("records"):
-        sensor = str(row["group"]).partition("_")[0]
-        if sensor in total:
-            total[sensor] += row["count"]
+    groups = tables.table(GROUPS)
+    for sensor, count in groups[groups["family"] != ""].groupby("sensor")["count"].sum().items():
+        total[str(sensor)] += int(count)
     return {s: round(total[s] / max(1, int((residuals["sensor"] == s).sum()))) for s in SENSORS}
 
 

@@ -7,6 +7,7 @@ from pipeline.adjustment.consider import gradient_sigma, sonar_errors
 from pipeline.config.mount import Mount
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
+from pipeline.maths.adjustment.parameters import PROJECTOR_PARAMETERS
 
 MOUNT = Mount(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, x_m=0.0, y_m=0.0, z_m=0.0)
 
@@ -36,6 +37,20 @@ def test_where_there_is_no_cast_the_gradient_is_as_unknown_as_without() -> None:
     assert gradient_sigma(sonar(sound_speed_gradient_sigma_1_s=0.3), 4.0) == 0.3
     assert gradient_sigma(whole, 4.0) == pytest.approx(np.sqrt(2) * 0.05 / 4)
     assert gradient_sigma(half, 4.0) == pytest.approx(np.hypot(np.sqrt(2) * 0.05 / 2, 0.15))
+
+
+def test_each_bias_has_its_own_setting() -> None:
+    """In the unit of its parameter: metres, and shares of the sound speed."""
+    laser = Laser(files=["a"], format="las", mount=MOUNT, incidence_bias_sigma_m=0.0007)
+    mbes = sonar(
+        incidence_bias_sigma_m=0.002, level_bias_sigma_m=0.006, projector_sigma_m=0.004, sound_speed_sigma_m_s=0.74
+    )
+    expected = {"laser_incidence": 0.0007, "mbes_incidence": 0.002, "mbes_level_range": 0.006}
+    expected |= dict.fromkeys(PROJECTOR_PARAMETERS, 0.004)
+    expected |= dict.fromkeys(("sound_speed", "steering_speed"), 0.74 / 1480)
+    found = sonar_errors(list(expected), laser, mbes, AsBuilt())
+    assert dict(zip(expected, found.sigmas, strict=True)) == pytest.approx(expected)
+    assert not found.blocks  # independent of each other
 
 
 def test_it_is_never_nothing_unless_it_is_said_to_be() -> None:

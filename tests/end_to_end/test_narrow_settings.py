@@ -16,6 +16,7 @@ FIRST_STAGE: dict[str, tuple[object, str]] = {  # by key: another value, and the
     "mbes.angle_sigma_deg": (0.07, "segment"),
     "mbes.range_sigma_m": (0.009, "segment"),
     "mbes.range_bias_sigma_m": (0.003, "adjust"),
+    "mbes.projector_sigma_m": (0.004, "adjust"),
     "mbes.sound_speed_sigma_m_s": (0.3, "adjust"),
     "mbes.sound_speed_gradient_sigma_1_s": (0.2, "adjust"),
     "mbes.latency_sigma_s": (0.0006, "adjust"),

@@ -125,6 +125,17 @@ def test_of_several_causes_the_most_telling_is_named():
     assert "20 sigma): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason.words
 
 
+@pytest.mark.parametrize(("value", "is_named"), [(0.00181, True), (0.00179, False)])
+def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_named):
+    names = (("mbes_range", 0.002), ("laser_range", value), ("mbes_level_range", 0.001))
+    one = {"estimated": False, "considered": 0.0, "sigma": 1e-4}
+    (reason,) = judged(replace(evidence(), freed=pd.DataFrame([one | {"unknown": k, "value": v} for k, v in names])))
+    words = reason.words
+    assert "(20 sigma): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words
+    assert ("longer; nearly as well (18 sigma): the laser's ranges: they should be +1.8 ± 0.1 mm" in words) == is_named
+    assert words.endswith(f"; {'1 other parameter' if is_named else '2 other parameters'} would explain it less well")
+
+
 def test_an_ins_that_is_allowed_no_drift_is_named_first():
     check = check_ins_drift(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0)))
     assert rejections(evidence(), methods(), ADJUSTED, check) == []

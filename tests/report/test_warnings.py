@@ -5,10 +5,22 @@ import pytest
 
 from pipeline.config.session import Drift, Mbes
 from pipeline.report.cast_checks import cast_warnings
-from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.drift_check import check_ins_drift, figures_disagree
+from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
-from tests.support.evidence import FIGURES, FOUND, SIGMA, codes, drift, gaps, groups
+from tests.support.evidence import (
+    FIGURES,
+    FOUND,
+    SIGMA,
+    checked,
+    codes,
+    drift,
+    drift_figures,
+    families,
+    gaps,
+    groups,
+)
 
 
 @pytest.mark.parametrize(
@@ -21,7 +33,9 @@ from tests.support.evidence import FIGURES, FOUND, SIGMA, codes, drift, gaps, gr
         ({"variance_factor": 0.49}, [ReasonCode.NOISE_OFF_SIGMAS]),
         ({"group": "ins_white", "variance_factor": 0.01}, []),
         ({"group": "ins_white", "variance_factor": 4.1}, [ReasonCode.INS_NOISE_ABOVE_SETTINGS]),
-        ({"group": "ping", "variance_factor": 3.9}, []),
+        ({"group": "ping", "variance_factor": 1.49}, []),
+        ({"group": "ping", "variance_factor": 1.51}, [ReasonCode.PING_NOISE_ABOVE_SETTINGS]),
+        ({"group": "ping", "variance_factor": 1.51, "sigma": 0.18}, []),
         ({"group": "ping", "variance_factor": 9.0}, [ReasonCode.PING_NOISE_ABOVE_SETTINGS]),
         ({"cut": 10}, []),
         ({"cut": 11}, [ReasonCode.MANY_OUTLIERS]),
@@ -30,6 +44,49 @@ from tests.support.evidence import FIGURES, FOUND, SIGMA, codes, drift, gaps, gr
 )
 def test_noise_that_is_not_as_configured(change, expected):
     assert codes([*unexpected_noise(groups(**change))]) == expected
+
+
+@pytest.mark.parametrize(
+    ("sensor", "factors", "sigma", "warned"),
+    [
+        ("mbes", {}, 0.01, 0),
+        ("mbes", {"P1": 8.9, "P3": 8.9}, 0.001, 0),  # three times the sigma is usual at 45° along track
+        ("mbes", {"H": 9.4}, 0.01, 1),
+        ("mbes", {"H": 9.4}, 0.1, 0),  # it may be chance
+        ("mbes", {"P2": 0.05}, 0.01, 0),  # a wall that is quieter than the other faces
+        ("laser", {"H": 3.9}, 0.001, 0),
+        ("laser", {"H": 4.4}, 0.01, 1),
+    ],
+)
+def test_a_family_that_is_far_noisier_than_a_sensors_others(sensor, factors, sigma, warned):
+    assert codes([*uneven_noise(families(sensor, sigma=sigma, **factors))]) == [
+        ReasonCode.NOISE_DIFFERS_BY_FAMILY
+    ] * warned  # fmt: skip
+
+
+def test_a_family_alone_is_compared_with_nothing():
+    assert [*uneven_noise(families("mbes", P1=50.0).head(1))] == []
+
+
+@pytest.mark.parametrize(("effects", "warned"), [((1.0, 1.49), 0), ((1.0, 1.51), 1), ((1.51, 1.0), 1)])
+def test_beams_that_err_alike(effects, warned):
+    assert codes([*correlated_beams(families("mbes", {"P2": effects}))]) == [ReasonCode.BEAMS_CORRELATED] * warned
+
+
+@pytest.mark.parametrize(
+    ("ratio", "slots", "warned"),
+    [
+        (1.44, 1e6, 0),  # a fifth in sigma
+        (1.46, 1e6, 1),
+        (2.5, 10.0, 0),  # ten slots may scatter so
+        (2.5, 100.0, 1),
+        (0.3, 100.0, 0),  # sigmas that are too large do no harm
+        (0.0, 0.0, 0),  # nothing left of the slots
+    ],
+)
+def test_sigmas_that_slots_of_time_contradict(ratio, slots, warned):
+    found = codes([*sigmas_too_small(checked(rotation_z=(ratio, slots)), 0.001)])
+    assert found == [ReasonCode.SIGMAS_OFF_SCATTER] * warned
 
 
 @pytest.mark.parametrize(
@@ -61,6 +118,24 @@ def test_an_ins_that_drifts_farther_than_its_figures(sigmas, far):
         check = check_ins_drift(drift(sigmas), figures)
         assert (check is not None and check.code == ReasonCode.INS_DRIFT_ABOVE_SETTINGS) == far
     assert check_ins_drift(drift(sigmas).iloc[:0], Drift()) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "warned"),
+    [
+        ({}, False),
+        ({"time_constant_s": (20.0, -1.99)}, False),
+        ({"time_constant_s": (20.0, -2.01)}, True),
+        ({"time_constant_s": (2000.0, 5.0)}, False),  # a slower drift is no fault
+        ({"horizontal_m": (0.05, 2.01)}, True),
+        ({"heading_deg": (0.1, 2.01)}, True),
+        ({"heading_deg": (0.001, -5.0)}, False),
+    ],
+)
+def test_an_ins_that_drifts_more_or_faster_than_its_figures(changes, warned):
+    check = figures_disagree(drift_figures(**changes), "the INS's files say")
+    assert (check is not None and check.code == ReasonCode.INS_DRIFT_OFF_FIGURES) == warned
+    assert check is None or "than the INS's files say" in check.words
 
 
 CAST = ((0.0, 1500.0), (5.0, 1501.0))

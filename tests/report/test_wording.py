@@ -13,7 +13,8 @@ from pipeline.config.session import Drift, Mbes
 from pipeline.report.as_built import deviations_from_design
 from pipeline.report.calibration_document import statement_lists
 from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
-from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.drift_check import check_ins_drift, figures_disagree
+from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.verdict import rejections
 from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
@@ -24,8 +25,11 @@ from tests.support.evidence import (
     OFF,
     SEARCH,
     SIGMA,
+    checked,
     drift,
+    drift_figures,
     evidence,
+    families,
     gaps,
     groups,
     judged,
@@ -94,6 +98,12 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before you look",
     ),
     (
+        lambda: _one(figures_disagree(drift_figures(time_constant_s=(10.0, -2.5), horizontal_m=(0.03, 1.0)))),
+        ReasonCode.INS_DRIFT_OFF_FIGURES,
+        "the INS drifts otherwise than ins.drift says: 2.0 times as far in position and 1.0 times as far in attitude, "
+        "with a time constant of 10 s, not 200 s; the sigmas count with that, but look for the cause in the INS",
+    ),
+    (
         lambda: geometry_gaps(gaps("one pass alone"), SIGMA),
         ReasonCode.GEOMETRY_GAP,
         "one pass alone; total sigmas are up to 0.006° (yaw) and 0.6 mm (lever arm y)",
@@ -113,6 +123,21 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         lambda: unexpected_noise(groups(group="ping", variance_factor=9.0)),
         ReasonCode.PING_NOISE_ABOVE_SETTINGS,
         "whole pings scatter 3.0 times as much as ins.white says",
+    ),
+    (
+        lambda: uneven_noise(families("mbes", P1=12.0)),
+        ReasonCode.NOISE_DIFFERS_BY_FAMILY,
+        "soundings on P1 scatter 3.5 times as much as on the other faces (up to 3 times is usual): look at their",
+    ),
+    (
+        lambda: correlated_beams(families("mbes", effects={"P2": (1.0, 1.6), "H": (2.3, 1.0), "P1": (1.5, 1.0)})),
+        ReasonCode.BEAMS_CORRELATED,
+        "neighbouring beams err alike on P2, H: of up to 2.3 soundings of a ping only one counts; the sigmas allow",
+    ),
+    (
+        lambda: sigmas_too_small(checked(rotation_y=(4.0, 50.0), lever_arm_z=(2.56, 128.0)), 0.001),
+        ReasonCode.SIGMAS_OFF_SCATTER,
+        "more than the random sigmas say: roll 2.0 ± 0.2 times (50 slots), lever arm z 1.6 ± 0.1 times (128 slots);",
     ),
     (
         lambda: unexpected_noise(groups(cut=11)),

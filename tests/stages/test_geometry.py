@@ -77,12 +77,14 @@ def test_without_any_swing_of_the_heading_nothing_is_lacking() -> None:
     ("unknown", "scenario", "laser", "value"),
     [
         ("mbes_latency", {"mbes": {"latency_s": 0.02}}, {}, 0.02),
+        ("projector_z", {"mbes": {"projector_offset_m": [0.0, 0.0, 0.119]}}, {}, 0.119),
         ("sound_speed", {"mbes": {"sound_speed_recorded_m_s": 1504.5}}, {}, 1500 / 1504.5 - 1),
         ("laser_rotation_z", {}, {"yaw_deg": 0.2}, -np.radians(0.2)),
         ("laser_latency", {"laser": {"latency_s": 0.03}}, {}, 0.03),
         ("sound_speed_gradient", {"mbes": {"sound_speed_gradient_1_s": 0.8}}, {}, 0.8),
         ("laser_lever_arm_z", {}, {"z_m": 0.05}, -0.05),
-    ][: often(2, 6)],
+        ("projector_x", {"mbes": {"projector_offset_m": [-0.04, 0.0, 0.0]}}, {}, -0.04),
+    ][: often(2, 8)],
 )
 def test_what_is_wrong_is_found_by_the_simulators_own_sign(
     unknown: str, scenario: dict[str, Any], laser: dict[str, float], value: float
@@ -96,6 +98,7 @@ def test_what_is_wrong_is_found_by_the_simulators_own_sign(
     assert result["verdict"] == "rejected"
     (cause,) = (reason for reason in result["reasons"] if "likely cause" in reason)
     words = {"mbes_latency": "the sonar's clock", "laser_latency": "the laser's clock", "sound_speed": "sound speed"}
+    words |= {"projector_z": " mm higher than mbes.projector", "projector_x": " mm farther to port than mbes.projector"}
     assert words.get(unknown, "with depth" if "gradient" in unknown else "laser.mount") in cause
 
 

@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from pipeline.config.pool import VerdictLimits
+from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.ambiguities import MountSearch
 from pipeline.report.evidence import Evidence
 from pipeline.report.reason_codes import ReasonCode, Statement
@@ -92,8 +94,27 @@ def codes(statements: Sequence[Statement]) -> list[ReasonCode]:
 
 def groups(**changes: Any) -> pd.DataFrame:
     """The table of variance factors, with one group."""
-    row = {"group": "mbes_horizontal", "count": 1000, "variance_factor": 1.0, "cut": 0}
+    row = {"group": "mbes_horizontal", "family": "", "count": 1000, "variance_factor": 1.0, "sigma": 0.1, "cut": 0}
     return pd.DataFrame([row | changes])
+
+
+def families(
+    sensor: str, effects: Mapping[str, tuple[float, float]] | None = None, sigma: float = 0.01, **factors: float
+) -> pd.DataFrame:
+    """The rows of one sensor and family each; ``effects``: of mean and slope; ``sigma``: of a factor of one."""
+    rows = []
+    for family in ("P1", "P2", "P3", "H"):
+        factor, (mean, slope) = factors.get(family, 1.0), (effects or {}).get(family, (1.0, 1.0))
+        row = {"group": f"{sensor}:{family}", "sensor": sensor, "family": family, "variance_factor": factor}
+        rows.append(row | {"sigma": sigma * factor, "mean_effect": mean, "slope_effect": slope})
+    return pd.DataFrame(rows)
+
+
+def checked(**found: tuple[float, float]) -> pd.DataFrame:
+    """The table estimate: variance by slots over sigma², and their number, by mount parameter; else 1 of 50 slots."""
+    rows = [(name, *found.get(name, (1.0, 50.0))) for name in MOUNT_NAMES]
+    rows.append(("P1_shift", np.nan, np.nan))
+    return pd.DataFrame(rows, columns=["unknown", "slots_ratio", "slots_dof"])
 
 
 def gaps(*words: str) -> pd.DataFrame:
@@ -108,3 +129,11 @@ def drift(sigmas: float) -> pd.DataFrame:
     columns = {f"{axis}_target_m": value for axis, value in values[0].items()}
     columns |= {f"turn_{axis}_target_deg": value for axis, value in values[1].items()}
     return pd.DataFrame([{name: sign * sigmas * value for name, value in columns.items()} for sign in (1, -1, -1)])
+
+
+def drift_figures(**changes: tuple[float, float]) -> pd.DataFrame:
+    """The table drift_figures, as configured; changes by figure: estimated value, and deviation."""
+    configured = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
+    configured["time_constant_s"] = 200.0
+    rows = [(name, value, *changes.get(name, (value, 0.0)), 0.3) for name, value in configured.items()]
+    return pd.DataFrame(rows, columns=["figure", "configured", "estimated", "deviation", "sigma_log"])

@@ -118,6 +118,36 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         "the sonar's clock: its latency is +20.0 ± 0.1 ms more",
     ),
     (
+        {"freed": {"unknown": "projector_z", "value": 0.119, "sigma": 0.0017}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the transmitter sits 119 ± 2 mm higher than mbes.projector_offset_m says (null: where the receiver is), in",
+    ),
+    (
+        {"freed": {"unknown": "projector_x", "value": -0.0204, "sigma": 0.0008}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the transmitter sits 20.4 ± 0.8 mm farther to port than",
+    ),
+    (
+        {"freed": {"unknown": "mbes_incidence", "value": -0.01, "sigma": 3e-4}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the sonar's ranges go with the angle at which it sees a face: at 45° they should be -10.0 ± 0.3 mm longer",
+    ),
+    (
+        {"freed": {"unknown": "laser_incidence", "value": 0.01, "sigma": 3e-4}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the laser's ranges go with the angle at which it sees a face: at 45° they should be +10.0 ± 0.3 mm longer",
+    ),
+    (
+        {"freed": {"unknown": "mbes_level_range", "value": -0.03, "sigma": 2e-3}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the sonar's ranges on horizontal faces: they should be -30 ± 2 mm longer; what it hears there may be",
+    ),
+    (
+        {"freed": {"unknown": "steering_speed", "value": 0.002}},
+        ReasonCode.SUSPECTED_CAUSE,
+        "the sound speed at the arrays, which steers the beams: it is +0.20 ± 0.01 % above that of the water",
+    ),
+    (
         {"freed": {"unknown": "laser_rotation_y", "value": -0.01}},
         ReasonCode.SUSPECTED_CAUSE,
         "laser.mount: it should be turned by -0.573 ± 0.006° about body y (roll of the boat)",

@@ -24,6 +24,8 @@ ESTIMATE = Artefact(
         Column("value", F64, "rad or m", "estimate (rotation: vector from coarse; surfaces: from the laser's planes)"),
         Column("sigma", F64, "rad or m", "standard deviation from the sensors' and the INS's noise"),
         Column("sigma_total", F64, "rad or m", "the same with the consider parameters"),
+        Column("slots_ratio", F64, "1", "mount: variance by the scatter of slots of a second / sigma²; else NaN"),
+        Column("slots_dof", F64, "1", "effective number of these slots: slots_ratio scatters as χ² / number"),
     ),
 )
 COVARIANCE = Artefact(
@@ -64,6 +66,17 @@ DRIFT = Artefact(
         *(Column(f"turn_{axis}_target_deg", F64, "deg", f"about target {axis}") for axis in "xyz"),
     ),
 )
+DRIFT_FIGURES = Artefact(
+    "adjust", "drift_figures", "table", "the drift's figures: as configured, and by data and configured ones together",
+    (
+        Column("figure", TEXT, "", "horizontal_m, vertical_m, roll_pitch_deg, heading_deg, time_constant_s"),
+        Column("configured", F64, "m, deg or s", "by ins.drift or the INS's files"),
+        Column("estimated", F64, "m, deg or s", "by the likelihood of the data, with ins.drift_within as prior"),
+        Column("sigma_log", F64, "1", "standard deviation of the natural logarithm of estimated (0: not estimated)"),
+        Column("deviation", F64, "1",
+               "log(estimated / configured) in sigmas of what ins.drift_within allows (0: not estimated)"),
+    ),
+)
 FREED = Artefact(
     "adjust", "freed", "table", "single-parameter test of each fixed parameter, and the effect of its error",
     (
@@ -88,14 +101,20 @@ SURFACES = Artefact(
     ),
 )
 GROUPS = Artefact(
-    "adjust", "groups", "table", "variance factors by group of observations",
+    "adjust", "groups", "table", "variance factors of the noise: of families together, of common errors, by family",
     (
-        Column("group", TEXT, "", "laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping"),
+        Column("group", TEXT, "",
+               "families together: laser, mbes_vertical, mbes_horizontal; common to an epoch: ins_white (laser), ping; "
+               "one family: sensor:family"),
         Column("count", I64, "1", "observations; ins_white, ping: epochs"),
         Column("variance_factor", F64, "1", "estimated variance / variance expected from the session's sigmas"),
         Column("scale", F64, "1", "robust scale of residual / its expected sigma, the INS's noise included"),
         Column("cut", I64, "1", "observations whose weight became zero"),
         Column("reduced", I64, "1", "observations whose weight was reduced"),
+        Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H; else empty"),
+        Column("sigma", F64, "1", "standard deviation of the variance factor"),
+        Column("mean_effect", F64, "1", "sonar, by family: variance of a ping's mean / that of independent beams"),
+        Column("slope_effect", F64, "1", "the same of its slope; both are 1 where they are not certainly larger"),
     ),
 )
 CELLS = Artefact(
@@ -108,7 +127,7 @@ CELLS = Artefact(
         Column("normalised", F64, "1", "of the difference from other passes, as in patterns (NaN: too few time slots)"),
         Column("largest", F64, "1", "largest |residual| / its expected sigma, among those with a weight"),
         Column("redundancy", F64, "1", "observations, less a shift and turn in each interval between INS records"),
-        Column("variance_factor", F64, "1", "of the scatter within these intervals, divided by that of its group"),
+        Column("variance_factor", F64, "1", "of the scatter within these intervals / that of this sensor and family"),
     ),
 )
 PATTERNS = Artefact(

@@ -37,10 +37,14 @@ a range too long would get a smaller weight. It is the range of the recorded ray
 
 Further features. A range b added to every range has the feature n · d. For the sonar, a sound speed higher by the share
 k makes the ranges longer by k, and likewise sin θ and sin τ, because flat arrays steer their beams with the recorded
-speed. With (x, y, z) = ρ (s, p, -c) and c² = 1 - s² - p² the point moves by k (2 x, 2 y, z - (x² + y²) / z). For the
-gradient g = dc/d(depth), c is the speed measured at the head. With D = -d_z s the depth below the head, ds/dt = c + g D
-makes the path longer by -g d_z ρ² / 2c. The ray bends away from the faster water, d(d)/ds = (g / c)(e_z - d_z d), so
-that the point moves by (g ρ² / 2c)(e_z - 2 d_z d), first order in g.
+speed. With (x, y, z) = ρ (s, p, -c) and c² = 1 - s² - p² the point moves by k (2 x, 2 y, z - (x² + y²) / z). Of this
+k (x, y, z) is due to the ranges, and the rest, k (x, y, -(x² + y²) / z), to the speed at the arrays, which steers. For
+the gradient g = dc/d(depth), c is the speed measured at the head. With D = -d_z s the depth below the head,
+ds/dt = c + g D makes the path longer by -g d_z ρ² / 2c. The ray bends away from the faster water, d(d)/ds =
+(g / c)(e_z - d_z d), so that the point moves by (g ρ² / 2c)(e_z - 2 d_z d), first order in g. A transmitter that sits
+at o + δ, not at o, from the receiver makes the range of the same path longer by δ · (x - o) / (L - o · d)
+(:func:`~pipeline.maths.sonar.soundings.points_in_mbes`, differentiated by o). With L = 2 ρ this is δ · d / 2 but for
+the share |o| / ρ, which is neglected. So the features of its components are n · d d_k / 2, d in frame mbes.
 
 **An interval.** With q = (1, α, β, …), α = t1 · r, β = t2 · r, every derivative of v = n · (X - c) - shift is q times a
 column of C or K. The column is the same for the whole interval (:mod:`pipeline.maths.adjustment.interval_sums`). With
@@ -54,6 +58,13 @@ the body at p, T = R_target_from_body, its velocity (ṗ, ω) in the target fram
     turns of the surface:      t_k · (X - c) = t_k · (p - c) + (α or β)
     its shift:                 -1
     further features:          each is a derivative itself
+    incidence:                 -(1 + n · d) / (√2 - 1)
+    level range:               n · d if the surface is horizontal, else 0
+
+The bias of ranges with incidence i, cos i = -n · d, is b (1 / cos i - 1) / (√2 - 1): none where a ray meets its surface
+at right angles, b at 45°, 6.9 b at 75°. It grows like the range within the footprint, ρ / cos i, and is to stand for
+whatever else goes with incidence. As all points lie on fronts, n · d < 0, it changes v by -b (1 + n · d) / (√2 - 1),
+and its column needs the features 1 and n · d only.
 
 The turns need no reduction of X - c by a horizontal face's height: the reduction is along n, and t_k · n = 0.
 """
@@ -65,6 +76,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
 from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE
@@ -76,6 +88,7 @@ Integers = NDArray[np.int64]
 SPEED_M_S = 1480.0  # sound speed for the gradient's feature: a nominal value, as the effect is small
 FLATTEST = 0.05  # smallest |n · d|, 3°: flatter than any labelled ray, once the mount is nearly right
 STEEPEST = 0.02  # smallest |c| for the feature of the sound speed, which divides by c
+AT_45_DEG = float(np.sqrt(2) - 1)  # 1 / cos i - 1 at 45°
 FLATTEST_FAN = 0.25  # smallest |c| for the curvature of a tilted fan: 15° from the array's plane
 
 
@@ -141,11 +154,11 @@ class SoundingsOnSurface:
 
 
 def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> PointDesign:
-    """Return the design of soundings, F = 6; see the module's docstring for each formula.
+    """Return the design of soundings, F = 10; see the module's docstring for each formula.
 
     A row of the design matrix is q · C: a sounding's features q times its interval's design C of
-    :func:`parameter_design`. A feature is a number of the sounding that multiplies a row of C. The six are
-    q = (1, α, β, n · d, derivative of v by the sound speed's relative change, and by its gradient).
+    :func:`parameter_design`. A feature is a number of the sounding that multiplies a row of C. They are
+    q = (1, α, β, …) and the derivatives of v by ``MBES_FEATURES`` of :mod:`~pipeline.maths.adjustment.parameters`.
     """
     points_m, axes, r = soundings.points_m, soundings.axes, soundings.r
     x, y, z = points_m
@@ -158,13 +171,15 @@ def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> P
     mean = slant * reached_m * sigmas.angle_rad**2 * (0.5 + (side / slant) ** 2)
     mean -= _curvature(axes[2], y / range_m, -z / range_m) * reached_m * sigmas.angle_rad**2 / 2
     down = np.copysign(np.maximum(np.abs(z), STEEPEST * range_m), -z)
-    speed = 2 * (axes[2, 0] * x + axes[2, 1] * y) + axes[2, 2] * (z + (x * x + y * y) / down)
+    steering = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * (x * x + y * y) / down
+    speed = steering + ray[2] * range_m
     up_of_ray = np.einsum("in,in->n", soundings.up, points_m) / range_m
     up_of_normal = np.einsum("in,in->n", soundings.up, axes[2])
     gradient = (up_of_normal - 2 * up_of_ray * ray[2]) * range_m**2 / (2 * SPEED_M_S)
-    features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2], speed, gradient])
-    by_range = np.stack([ray[0], ray[1], np.zeros_like(x), speed / range_m, 2 * gradient / range_m])
-    return PointDesign(mean, np.sqrt(variance), features, by_range / slant)
+    projector, zero = points_m * (ray[2] / (2 * range_m)), np.zeros_like(x)
+    features = np.stack([np.ones_like(x), r[0], r[1], ray[2], speed, gradient, steering, *projector])
+    by_range = [ray[0], ray[1], zero, speed / range_m, 2 * gradient / range_m, steering / range_m, zero, zero, zero]
+    return PointDesign(mean, np.sqrt(variance), features, np.stack(by_range) / slant)
 
 
 def _curvature(normal: Array, p: Array, c: Array) -> Array:
@@ -180,6 +195,19 @@ def sensor_noise(v_m: Array, weight: Array, intervals: Runs, common_m: Array) ->
     λ = s² / (s² + 1 / Σ p). If e were all of v, the correction would move α with w and turn the heading again, in the
     opposite sense: by 0.4 sigma at 2 mm.
 
+    s must be true, not only stated. Let the true sigma be s₀, with λ₀, and let the normal equations weight v by
+    V⁻¹ = P - λ' P 1 1ᵀ P / Σ p, with their own λ'. With ê = v - λ v̄ for e, the noise of α = slope · e, and
+    E Σ p v̄² = 1 + s₀² Σ p = 1 / (1 - λ₀), an interval of n points adds
+
+        E (slope · (e - ê)ᵀ V⁻¹ v) = slope · ((n - λ') - (n - 1) - (1 - λ) (1 - λ') / (1 - λ₀))
+                                   = slope · (1 - λ') (λ - λ₀) / (1 - λ₀)
+
+    to the right side of the normal equations. With an INS without white noise (λ₀ = 0), 2 mm in the design (λ = 0.9 for
+    25 laser points) and the right value in the weights (λ' = 0), 0.9 of one point's product stays in each interval, 3 %
+    of all. It turns the slanted faces. As long as the poses count as true, the wall holds these faces. If the drift may
+    move the body from face to face, the lever arm along the track is wrong by 0.4 mm, 0.6 sigma. So s has the variance
+    factor that the laser's points show (:func:`pipeline.maths.adjustment.weighting.noise_seen_by_laser`).
+
     Parameters
     ----------
     v_m : (n,) array
@@ -189,24 +217,12 @@ def sensor_noise(v_m: Array, weight: Array, intervals: Runs, common_m: Array) ->
     intervals : Runs
         The points of each interval.
     common_m : (n,) array
-        Standard deviations s, from the INS's white noise.
+        Standard deviations s (:func:`pipeline.maths.adjustment.weighting.common_variance`).
     """
     p = intervals.total(weight)
     mean = np.divide(intervals.total(weight * v_m), p, out=np.zeros_like(p), where=p > 0)
     information = common_m**2 * intervals.spread(p)
     return np.asarray(v_m - information / (1 + information) * intervals.spread(mean))
-
-
-@dataclass(frozen=True)
-class BodyPoses:
-    """The body at g instants, target frame.
-
-    positions_m (g, 3); R_target_from_body (g, 3, 3); rates (g, 6): velocity (m/s) and angular velocity (rad/s).
-    """
-
-    positions_m: Array
-    R_target_from_body: Array
-    rates: Array
 
 
 @dataclass(frozen=True)
@@ -260,11 +276,15 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     design[:, 0, turn] = -np.einsum("gij,gi->gj", T, np.cross(T @ observed.lever_arm_m, plane.normal))
     design[:, 1, turn], design[:, 2, turn] = -(second @ T), first @ T
     design[:, 0, arm] = plane.normal @ T
-    # latency, and parameters with a feature of their own
+    # latency, parameters with a feature of their own, and biases of ranges that go with the surface
     latency = N_SURFACE + N_MOUNT
     design[:, :N_MOVED, latency] = -poses.rates @ pose_design([plane], np.zeros(1, dtype=np.int64))[0].T
     for further in range(observed.features - N_MOVED):
         design[:, N_MOVED + further, latency + 1 + further] = 1.0
+    incidence = latency + 1 + observed.features - N_MOVED
+    design[:, [0, N_MOVED], incidence] = -1 / AT_45_DEG
+    if observed.sensor == "mbes" and plane.level:
+        design[:, N_MOVED, incidence + 1] = 1.0
     # the wet faces turn and shift like the surface
     if observed.sensor == "mbes":
         design[:, :, -N_SURFACE:] = design[:, :, :N_SURFACE]

@@ -1,8 +1,12 @@
 """The parameters of the adjustment, in one order: mount, instruments, surfaces, and the surfaces' parts under water.
 
-* the sonar's: rotation ε and lever arm λ (the six mount parameters, body axes), latency τ (s, added to the recorded
-  latency), range (m, added to every range), sound speed (relative increase), and its gradient ((m/s)/m, downward);
-* the laser's: ε, λ, latency and range, with the same meaning;
+* the sonar's: rotation ε and lever arm λ (the six mount parameters, body axes); latency τ (s, added to the recorded
+  latency); range (m, added to every range); sound speed (relative increase), its gradient ((m/s)/m, downward), and
+  steering speed (a further relative increase of the speed at the arrays, which steers the beams, alone); projector
+  x, y, z (m, added to the place of the transmitter, frame mbes); incidence (m, added to ranges by the law of
+  :mod:`~pipeline.maths.adjustment.design_matrix`, its size at 45°); level range (m, added to ranges of horizontal
+  faces alone);
+* the laser's: ε, λ, latency, range and incidence, with the same meaning;
 * each surface's: two turns of the normal (rad) and a shift (m), shared by both sensors;
 * each surface's part under water: two further turns and a shift, by which the wet faces as built differ from the dry
   ones.
@@ -29,9 +33,13 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Sensor = Literal["mbes", "laser"]
 
-MBES_PARAMETERS = (*MOUNT_NAMES, "mbes_latency", "mbes_range", "sound_speed", "sound_speed_gradient")
-LASER_PARAMETERS = (*(f"laser_{name}" for name in MOUNT_NAMES), "laser_latency", "laser_range")
-CALIBRATED_LASER_PARAMETERS = (*MOUNT_NAMES, "laser_latency", "laser_range")
+PROJECTOR_PARAMETERS = ("projector_x", "projector_y", "projector_z")
+MBES_FEATURES = ("mbes_range", "sound_speed", "sound_speed_gradient", "steering_speed", *PROJECTOR_PARAMETERS)
+LASER_FEATURES = ("laser_range",)  # as MBES_FEATURES: the parameters whose derivative is a feature of its own
+MBES_PARAMETERS = (*MOUNT_NAMES, "mbes_latency", *MBES_FEATURES, "mbes_incidence", "mbes_level_range")
+OF_LASER = ("laser_latency", *LASER_FEATURES, "laser_incidence")
+LASER_PARAMETERS = (*(f"laser_{name}" for name in MOUNT_NAMES), *OF_LASER)
+CALIBRATED_LASER_PARAMETERS = (*MOUNT_NAMES, *OF_LASER)
 SURFACE_PARAMETERS = ("turn_1", "turn_2", "shift")
 N_SURFACE = len(SURFACE_PARAMETERS)
 

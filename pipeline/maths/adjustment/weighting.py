@@ -1,91 +1,49 @@
 """The stochastic model: variance factors of the sensors' noise and of errors that intervals share; robust weights.
 
-**Sensors.** Their variance factor f follows from the scatter of each interval's points about a plane of their own. When
-v is fitted by (1, α, β) within an interval, pose, mount and surface have no effect. Only the sensor's noise remains
-(pure error, Draper & Smith 1998, 2.1). The expectation of the remaining Σ w v² is f times n - rank. The rank is 3 if
-the points spread over the surface and 2 if they lie on a line, like those of one ping. (Noise moves the points of a
-line aside, and a fit to that direction would remove the noise: f came out a third too small.)
+**Sensors.** Each sensor has a variance factor f for each family of faces, because its noise depends on what it sees: a
+beam of 1° spreads over decimetres of slant range on a face at 45° along track, and over millimetres on a wall. f
+follows from the scatter of each interval's points about a plane of their own. When v is fitted by (1, α, β) within an
+interval, pose, mount and surface have no effect. Only the sensor's noise remains (pure error, Draper & Smith 1998,
+2.1). The expectation of the remaining Σ w v² is f times n - rank. The rank is 3 if the points spread over the surface
+and 2 if they lie on a line, like those of one ping. (Noise moves the points of a line aside, and a fit to that
+direction would remove the noise: f came out a third too small.) Robust weights remove a part of the variance of good
+observations too, so the expectation is multiplied by the part that they leave
+(:func:`~pipeline.maths.adjustment.robust_weights.variance_kept`). Where few intervals see a family, f is drawn to the
+sensor's other families: :func:`shrunk_factors`.
 
-**In common.** The variance factor of the error that an interval's points share follows from the intervals' means
-m = Σ w v / Σ w. For an interval with q̄ = Σ w q / Σ w, K its design of pose errors and W the white noise of a record,
-
-    E m² = 1 / Σ w + f c,     c = ((1 - s)² + s²) q̄ᵀ K W Kᵀ q̄,
-
-so that f follows by regression with the weights of maximum likelihood, c / (1 / Σ w + f c)². The regression is done
-twice, first with f = 1. The laser's f is the ratio of the INS's white noise to its value in the session. The sonar's f
-also contains the errors that all beams of a ping share: an unsteady clock, or beams stabilised by another attitude than
-the INS's.
+**In common.** The points of an interval share errors: the white noise of the INS's records, whose variance factor
+follows from the laser's points (:mod:`~pipeline.maths.adjustment.record_noise`), and those that the soundings of a ping
+share (:mod:`~pipeline.maths.adjustment.ping_noise`). The white noise goes into the normal equations and into the design
+(:func:`pipeline.maths.adjustment.design_matrix.sensor_noise`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
-from pipeline.maths.adjustment.parameters import ObservedSurface
-from pipeline.maths.adjustment.pose_errors import PoseNoise
+from pipeline.maths.adjustment.pose_errors import N_POSE, PoseNoise
+from pipeline.maths.adjustment.robust_weights import igg3_weights, variance_kept
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-BINS = np.linspace(0.0, 50.0, 2001)  # |residual| / sigma; larger ones count into the last bin
-NORMAL_MEDIAN = 0.6744897501960817  # median of |standard normal|
-LEAST_SCALE = 0.01  # no sensor's noise is a hundred times smaller than its stated sigma: less is rounding
 FEWEST = 6  # smallest number of points of an interval that is used
 FLAT = 1e-5  # an eigenvalue of the scaled sums below this counts as zero: 3 mm aside of a line, seen from a metre
-GROUPS = ("laser", "mbes_vertical", "mbes_horizontal")  # groups of observations: one variance factor each
-SURE, UNLIKELY = 0.1, 100.0  # sigma below which the white noise's factor is applied; largest factor, and its inverse
-
-
-def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
-    """Return the weights (n,) of IGG III (Yang 1999).
-
-    They are 1 up to k0, k0 / |v| · ((k1 - |v|) / (k1 - k0))² up to k1, and 0 above.
-
-    Parameters
-    ----------
-    normalised : (n,) array
-        Residuals in units of their sigma.
-    k0, k1 : float
-        Largest residual with full weight, and with any weight.
-
-    Examples
-    --------
-    >>> igg3_weights(np.array([0.0, 2.0, 7.0]), 3.0, 6.0)
-    array([1., 1., 0.])
-    """
-    size = np.abs(normalised)
-    middle = k0 / np.maximum(size, k0) * ((k1 - np.minimum(size, k1)) / (k1 - k0)) ** 2
-    return np.where(size <= k0, 1.0, middle)
-
-
-def histogram(normalised: Array) -> Array:
-    """Return the counts of |v| in :data:`BINS`; counts of several batches add up, and their median gives the scale."""
-    last = len(BINS) - 2
-    width = BINS[-1] / (last + 1)
-    return np.bincount(np.minimum(np.abs(normalised) / width, last).astype(np.int64), minlength=last + 1).astype(float)
-
-
-def robust_scale(counts: Array) -> float:
-    """Return the median of |v|, from the histogram, divided by NORMAL_MEDIAN; 1 without data.
-
-    >>> round(robust_scale(histogram(np.random.default_rng(0).normal(scale=2.0, size=100_000))), 1)
-    2.0
-    """
-    total = counts.sum()
-    if total == 0:
-        return 1.0
-    cumulative = np.concatenate([[0.0], np.cumsum(counts)])
-    return float(max(np.interp(total / 2, cumulative, BINS) / NORMAL_MEDIAN, LEAST_SCALE))
+PRIOR_DOF = 8.0  # degrees of freedom that what is known of other families counts as, beside a family's own
+SURE, UNLIKELY = 0.1, 100.0  # sigma, as a share of a factor above 1, below which the white noise's is applied; largest
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Σ w v² about the intervals' own planes, with the weights of the sums, and its degrees of freedom."""
+    """Σ w v² about the intervals' own planes, with the weights of the sums, and its expectation at these weights.
+
+    ``dof`` is this expectation: the number of degrees of freedom, times the part of the variance that robust weights
+    leave.
+    """
 
     squares: float
     dof: float
@@ -96,8 +54,11 @@ class Scatter:
         return self.squares / self.dof if self.dof > 0 else 1.0
 
 
-def scatter(sums: IntervalSums, rows: NDArray[np.bool_]) -> Scatter:
-    """Return the scatter of the intervals in the mask (g,) together. Intervals of few points are left out."""
+def scatter(sums: IntervalSums, rows: NDArray[np.bool_], kept: float) -> Scatter:
+    """Return the scatter of the intervals in the mask (g,) together. Intervals of few points are left out.
+
+    ``kept``: the part of the variance that the robust weights leave.
+    """
     use = np.flatnonzero(rows & (sums.count >= FEWEST))
     normal, right = sums.normal[use][:, :N_MOVED, :N_MOVED], sums.right[use][:, :N_MOVED]
     scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", normal), 1e-300))
@@ -105,12 +66,42 @@ def scatter(sums: IntervalSums, rows: NDArray[np.bool_]) -> Scatter:
     determined = values > FLAT
     along = np.einsum("gik,gi->gk", vectors, right * scale)
     fitted = np.sum(np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0), axis=1)
-    return Scatter(float(np.sum(sums.squares[use] - fitted)), float(np.sum(sums.count[use] - determined.sum(axis=1))))
+    freedom = kept * float(np.sum(sums.count[use] - determined.sum(axis=1)))
+    return Scatter(float(np.sum(sums.squares[use] - fitted)), freedom)
 
 
-def rescaled(sums: IntervalSums, factor_by_surface: Mapping[int, float]) -> IntervalSums:
-    """Return the sums with the weights divided by the factor of their surface."""
-    share = 1 / np.array([factor_by_surface[k] for k in range(len(factor_by_surface))])[sums.surface]
+def shrunk_factors(factors: Array, dof: Array, level: NDArray[np.bool_]) -> Array:
+    """Return the variance factors (s,) of one sensor by surface, those of few observations drawn to the others.
+
+    The mean of two estimates of a variance with ν and ν₀ degrees of freedom, weighted by these, is that of all squares
+    together. So f = (ν₀ f₀ + ν f_own) / (ν₀ + ν), where f₀ is what the other surfaces say, and counts as ν₀ = PRIOR_DOF
+    (Smyth 2004, "Linear models and empirical Bayes methods", eq. 3). With ν = 30 a family has four fifths of its own
+    factor, with ν = 1000 all of it. f₀ is the factor of all surfaces of equal kind (horizontal or not), drawn in the
+    same way to that of all the sensor's surfaces, which is drawn to 1: the session's sigmas.
+
+    Parameters
+    ----------
+    factors, dof : (s,) arrays
+        Variance factor of each surface alone, against the session's sigmas, and its degrees of freedom.
+    level : (s,) array of bool
+        The horizontal surfaces.
+    """
+    of_sensor = _drawn(factors, dof, 1.0)
+    result = np.empty(len(dof))
+    for kind in (level, ~level):
+        of_kind = _drawn(factors[kind], dof[kind], of_sensor)
+        result[kind] = (PRIOR_DOF * of_kind + dof[kind] * factors[kind]) / (PRIOR_DOF + dof[kind])
+    return result
+
+
+def _drawn(factors: Array, dof: Array, prior: float) -> float:
+    """Return the common factor of several surfaces, drawn to the prior one."""
+    return float((PRIOR_DOF * prior + dof @ factors) / (PRIOR_DOF + dof.sum()))
+
+
+def rescaled(sums: IntervalSums, factor_by_surface: Array) -> IntervalSums:
+    """Return the sums with the weights divided by the factor of their surface, (s,)."""
+    share = 1 / factor_by_surface[sums.surface]
     names = ("normal", "swept", "swept_twice", "right", "right_swept", "squares")
     parts = {name: getattr(sums, name) for name in names}
     return replace(sums, **{name: part * share.reshape(-1, *[1] * (part.ndim - 1)) for name, part in parts.items()})
@@ -124,65 +115,45 @@ class EpochVarianceFactor:
     sigma: float
 
 
-def epoch_variance_factor(sums: IntervalSums, pose_designs: Array, white: Array) -> EpochVarianceFactor:
-    """Return the variance factor of the common error of an interval's points.
+def common_variance(by_pose: Array, share: Array, white: Array) -> Array:
+    """Return the variance (n,) m² of the records' white noise in v. Points of an interval have this noise in common.
+
+    At the place s between two records the pose error is e = (1 - s) w_k + s w_{k+1}, with covariance ((1 - s)² + s²) W.
+    It changes v by q · K e.
 
     Parameters
     ----------
-    sums : IntervalSums
-        Intervals of one sensor.
-    pose_designs : (s, 3, 6) array
-        Design K of pose errors by surface.
+    by_pose : (6, n) array
+        Derivatives q · K of v by the pose error.
+    share : (n,) array
+        Places s, from 0 to 1.
     white : (6,) array
-        Standard deviations of a record's white noise, m and rad.
+        Standard deviations of a record's noise, m and rad.
     """
-    information = sums.normal[:, 0, 0]
-    by_pose = np.einsum("gi,gij->gj", sums.normal[:, 0, :N_MOVED] / information[:, None], pose_designs[sums.surface])
-    share = sums.share
-    c = ((1 - share) ** 2 + share**2) * np.sum((by_pose * white) ** 2, axis=1)
-    own, squared = 1 / information, (sums.right[:, 0] / information) ** 2
-    factor, weight = 1.0, 0.0
-    for _ in range(2):
-        by_variance = c / (own + max(factor, 0.0) * c) ** 2
-        weight = float(np.sum(by_variance * c))
-        if weight <= 0:
-            return EpochVarianceFactor(1.0, np.inf)
-        factor = float(np.sum(by_variance * (squared - own))) / weight
-    return EpochVarianceFactor(factor, float(np.sqrt(2 / weight)))
-
-
-def epoch_variance_factors(
-    sums_by_sensor: Mapping[str, IntervalSums], surfaces: Sequence[ObservedSurface], white: Array
-) -> dict[str, EpochVarianceFactor]:
-    """Return the variance factor of the common error of an interval's points, by sensor.
-
-    Parameters
-    ----------
-    sums_by_sensor : mapping of IntervalSums
-        Intervals of each sensor.
-    surfaces : sequence of ObservedSurface
-        The surfaces, in the order of their numbers in the sums.
-    white : (6,) array
-        Standard deviations of a record's white noise, m and rad.
-    """
-    designs = pose_design(surfaces, np.arange(len(surfaces)))
-    return {sensor: epoch_variance_factor(sums, designs, white) for sensor, sums in sums_by_sensor.items()}
+    return np.asarray(((1 - share) ** 2 + share**2) * (white**2 @ by_pose**2))
 
 
 def noise_seen_by_laser(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
-    """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE)."""
-    if laser.sigma < SURE:
-        return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY), 1.0)
-    return noise
+    """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE).
 
-
-def group_of(sensor: str, level: bool) -> int:
-    """Return the number among GROUPS of a sensor's observations of a surface, which is horizontal if ``level``."""
-    return 0 if sensor == "laser" else 2 if level else 1
+    The factor may be zero. (Without any white noise its estimate is negative as often as not.)
+    """
+    is_sure = laser.sigma < SURE * max(laser.factor, 1.0)
+    return noise.scaled(min(max(laser.factor, 0.0), UNLIKELY)) if is_sure else noise
 
 
 class Residuals(Protocol):
-    """Residuals of n points: distance v_m from the surface; sigma_m; common_m, see :class:`Weighting`; their group."""
+    """Residuals of n points of a sensor: distance v_m from the surface; sigma_m; common_m, see :class:`Weighting`."""
+
+    @property
+    def sensor(self) -> str:
+        """The sensor that observed the points."""
+        ...
+
+    @property
+    def surface(self) -> Integers:
+        """Numbers (n,) of their surfaces."""
+        ...
 
     @property
     def v_m(self) -> Array:
@@ -199,37 +170,43 @@ class Residuals(Protocol):
         """Standard deviations (n,) m of the error that the points of an interval share."""
         ...
 
-    @property
-    def group(self) -> Integers:
-        """Numbers (n,) among GROUPS."""
-        ...
-
 
 @dataclass(frozen=True)
 class Weighting:
-    """Variance factors f and robust scales by group, and the bounds of IGG III (None: no weight is reduced).
+    """Variance factors f and robust scales (s,) by sensor and surface, and the bounds of IGG III.
 
-    Residuals are normalised by sqrt(f σ² + c²), c being the INS's white noise common to the points of an interval.
-    Without c, points at grazing incidence (σ = 1 mm) would be rejected because of the INS's 2 mm. In a trial they were
-    rejected, and the sigmas of the result came out 3 % too small.
+    white (6,): standard deviations of the white noise of the INS's records, m and rad. A sensor without factors or
+    scales has 1 for all surfaces. Bounds None: no weight is reduced. Residuals are normalised by sqrt(f σ² + c²), c
+    being the INS's white noise common to the points of an interval. Without c, points at grazing incidence (σ = 1 mm)
+    would be rejected because of the INS's 2 mm. In a trial they were rejected, and the sigmas of the result came out
+    3 % too small.
     """
 
-    factors: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 1.0))
-    scales: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 1.0))
+    factors: Mapping[str, Array] = field(default_factory=dict)
+    scales: Mapping[str, Array] = field(default_factory=dict)
     robust: tuple[float, float] | None = None
+    white: Array = field(default_factory=lambda: np.zeros(N_POSE))
+
+    @property
+    def kept(self) -> float:
+        """The part of the variance of normal observations that the robust weights leave."""
+        return 1.0 if self.robust is None else variance_kept(*self.robust)
 
     def weights(self, residuals: Residuals) -> tuple[Array, Array]:
         """Return the robust weights w (n,) and the full weights w / (σ² f) (n,)."""
-        scales = np.array([self.scales[name] for name in GROUPS])[residuals.group]
-        size = self.normalised(residuals) / scales
+        size = self.normalised(residuals) / _of_surfaces(self.scales, residuals.sensor, residuals.surface)
         robust = np.ones(len(size)) if self.robust is None else igg3_weights(size, *self.robust)
-        return robust, robust / (residuals.sigma_m**2 * self.factors_of(residuals.group))
+        return robust, robust / (residuals.sigma_m**2 * self.factors_of(residuals.sensor, residuals.surface))
 
     def normalised(self, residuals: Residuals) -> Array:
         """Return v / sqrt(f σ² + c²) (n,)."""
-        factor = self.factors_of(residuals.group)
+        factor = self.factors_of(residuals.sensor, residuals.surface)
         return residuals.v_m / np.sqrt(factor * residuals.sigma_m**2 + residuals.common_m**2)
 
-    def factors_of(self, group: Integers) -> Array:
-        """Return the variance factors (n,) of these groups (n,)."""
-        return np.array([self.factors[name] for name in GROUPS])[group]
+    def factors_of(self, sensor: str, surface: Integers) -> Array:
+        """Return the variance factors (n,) of a sensor's observations of these surfaces (n,)."""
+        return _of_surfaces(self.factors, sensor, surface)
+
+
+def _of_surfaces(values: Mapping[str, Array], sensor: str, surface: Integers) -> Array:
+    return values[sensor][surface] if sensor in values else np.ones(len(surface))

@@ -15,7 +15,15 @@ import pandas as pd
 from markupsafe import Markup
 
 from pipeline.artefacts.catalogue.points import FILES, GAPS, PASSES, POOL_FRAME
-from pipeline.artefacts.catalogue.results import ADJUST_SUMMARY, CALIBRATION, CELLS, ESTIMATE, FREED, GROUPS
+from pipeline.artefacts.catalogue.results import (
+    ADJUST_SUMMARY,
+    CALIBRATION,
+    CELLS,
+    DRIFT_FIGURES,
+    ESTIMATE,
+    FREED,
+    GROUPS,
+)
 from pipeline.atomic_files import write_text
 from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
@@ -29,7 +37,7 @@ from pipeline.results.pages.mount_tables import METHODS, correlation_rows, metho
 from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_rows
 from pipeline.results.pages.plots import picture_names
 from pipeline.results.pages.rendering import render_page
-from pipeline.results.pages.sigma_sources import sigma_source_rows
+from pipeline.results.pages.sigma_sources import sigma_source_rows, slot_checks
 from pipeline.run import manifest
 from pipeline.run.results import PAGE, Tables, agreeing, calibration
 from pipeline.run.settings import Settings, read_settings
@@ -116,6 +124,7 @@ def _result_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "planes": planes,
         "several_planes": list(dict.fromkeys(row["plane"] for row in planes if np.isnan(row["angle_deg"]))),
         "sigma_sources": list(sigma_source_rows(tables.table(FREED), tables.table(ESTIMATE), settings.session)),
+        "slot_checks": slot_checks(tables.table(ESTIMATE)),
         "as_built": as_built_rows(result["target"]["as_found"], design_shape(target_of(settings.pool.target))),
         "correlations": correlation_rows(result),
     }
@@ -130,6 +139,7 @@ def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "tests": [row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
         "parts": part_rows(result.get("parts", [])),
         "groups": tables.table(GROUPS).to_dict("records"),
+        "drift_figures": [row for row in tables.table(DRIFT_FIGURES).to_dict("records") if row["sigma_log"]],
         "summary": tables.table(ADJUST_SUMMARY).to_dict("records")[0],
     }
 

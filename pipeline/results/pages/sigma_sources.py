@@ -49,3 +49,14 @@ def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: Sess
                 for sigma, unit in ((np.sqrt(of_source[place]), unit) for _, place, _, unit in PARAMETERS)
             ],
         }
+
+
+def slot_checks(estimate: pd.DataFrame) -> list[str]:
+    """Return for each mount parameter the random sigma by the scatter of slots of time, over the sigma, in words."""
+    rows = estimate.set_index("unknown")
+    checked = [(name, rows.loc[MOUNT_NAMES[place]]) for name, place, *_ in PARAMETERS]
+    return [
+        f"{name} {np.sqrt(row['slots_ratio']):.2f} ± {np.sqrt(row['slots_ratio'] / (2 * row['slots_dof'])):.2f}"
+        for name, row in checked
+        if row["slots_dof"] > 0
+    ]

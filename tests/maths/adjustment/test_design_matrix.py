@@ -7,13 +7,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
-from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, ObservedSurface, State
+from pipeline.maths.adjustment.body_motion import BodyPoses
+from pipeline.maths.adjustment.design_matrix import SensorOnSurface, parameter_design, pose_design
+from pipeline.maths.adjustment.parameters import (
+    LASER_FEATURES,
+    LASER_PARAMETERS,
+    MBES_FEATURES,
+    MBES_PARAMETERS,
+    ObservedSurface,
+    State,
+)
+from pipeline.maths.adjustment.weighting import common_variance
 from pipeline.maths.geometry.rotations import exp_so3
 
 STEP = 1e-6
 ROOT = np.sqrt(0.5)
-NORMALS = np.array([[-ROOT, -ROOT, 0.05], [-1.0, 0.02, -0.03], [-ROOT, ROOT, 0.0], [0.01, -0.02, 1.0]])
+NORMALS = np.array([[-ROOT, -ROOT, 0.05], [-1.0, 0.02, -0.03], [-ROOT, ROOT, 0.0], [0.01, -0.008, 1.0]])
 SURFACES = tuple(
     ObservedSurface.at(name, normal / np.linalg.norm(normal), np.array([0.3, -2.0 + k, 1.0]), 0.01 * k)
     for k, (name, normal) in enumerate(zip(("P1", "P2", "P3", "H"), NORMALS, strict=True))
@@ -33,8 +42,14 @@ def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.nd
         R, lever = exp_so3(turn) @ R_LASER, LASER_LEVER + [other[f"laser_lever_arm_{axis}"] for axis in "xyz"]
     latency = other[f"{prefix or 'mbes_'}latency"]
     turned = exp_so3(-TURNING * latency) @ T
-    longer = 1 + other[f"{prefix or 'mbes_'}range"] / np.linalg.norm(x, axis=1, keepdims=True)
-    r = (x * longer @ R.T + lever) @ turned.T
+    range_m = np.linalg.norm(x, axis=1)
+    incidence = np.arccos(np.abs(x @ R.T @ T.T @ SURFACES[surface].normal) / range_m)
+    bias = other[f"{prefix or 'mbes_'}range"]
+    bias = bias + other[f"{prefix or 'mbes_'}incidence"] * (1 / np.cos(incidence) - 1) / (np.sqrt(2) - 1)
+    if sensor == "mbes" and SURFACES[surface].family == "H":
+        bias = bias + other["mbes_level_range"]
+    longer = 1 + bias / range_m
+    r = (x * longer[:, None] @ R.T + lever) @ turned.T
     X = P - VELOCITY * latency + pose[:3] + r + np.cross(pose[3:], r)
     one = state.surfaces[surface]
     if sensor == "mbes":
@@ -50,12 +65,13 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     state = State.at(R, np.array([0.3, 0.2, -2.0]), SURFACES)
     x, still = 3 * rng.normal(size=(7, 3)), np.zeros(6)
     mount, lever = (R, state.lever_arm_m) if sensor == "mbes" else (R_LASER, LASER_LEVER)
-    r = (x @ mount.T + lever) @ T.T
     one = SURFACES[surface]
+    x *= -np.sign(x @ mount.T @ T.T @ one.normal)[:, None]  # all points on the front
+    r = (x @ mount.T + lever) @ T.T
     ray = x @ mount.T @ T.T / np.linalg.norm(x, axis=1, keepdims=True)
     q = np.vstack([np.ones(7), one.tangents @ r.T, ray @ one.normal])
-    features = 4 if sensor == "laser" else 6
-    q = np.vstack([q, np.zeros((features - 4, 7))])  # sound speed is tested where its features are made
+    features = 3 + len(LASER_FEATURES if sensor == "laser" else MBES_FEATURES)
+    q = np.vstack([q, np.zeros((features - 4, 7))])  # the sonar's others are tested where they are made
     poses = BodyPoses(P[None], T[None], np.concatenate([VELOCITY, TURNING])[None])
     C = parameter_design(state, SensorOnSurface(sensor, lever, surface, features), poses)[0]
     K = pose_design(SURFACES, np.array([surface]))[0]
@@ -75,6 +91,21 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     for k in range(6):
         unit = np.eye(6)[k]
         np.testing.assert_allclose(q[:3].T @ K[:, k], slope(lambda h, unit=unit: (state, h * unit)), atol=2e-8)
+
+
+def test_the_common_variance_is_the_scatter_of_points_under_noisy_records() -> None:
+    """Poses in error by a mean of two records' noise, each component with a sigma of its own."""
+    rng = np.random.default_rng(4)
+    white = np.array([0.001, 0.003, 0.002, 4e-4, 2e-4, 6e-4])
+    r, shares = 5 * rng.normal(size=(4, 3)), np.array([0.0, 0.3, 0.5, 1.0])
+    sooner, later = white * rng.normal(size=(2, 100_000, 6))
+    for one, K in zip(SURFACES, pose_design(SURFACES, np.arange(4)), strict=True):
+        q = np.vstack([np.ones(4), one.tangents @ r.T])
+        found = common_variance(K.T @ q, shares, white)
+        for place, s, variance in zip(r, shares, found, strict=True):
+            pose = (1 - s) * sooner + s * later
+            moved = (pose[:, :3] + np.cross(pose[:, 3:], place)) @ one.normal
+            assert variance == pytest.approx(np.var(moved), rel=0.024)
 
 
 def test_a_state_moves_each_unknown_by_its_name() -> None:

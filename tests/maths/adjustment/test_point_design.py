@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.design_matrix import (
@@ -13,7 +14,8 @@ from pipeline.maths.adjustment.design_matrix import (
     sensor_noise,
     sonar_point_design,
 )
-from pipeline.maths.adjustment.interval_sums import Runs
+from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
+from pipeline.maths.adjustment.parameters import MBES_FEATURES, PROJECTOR_PARAMETERS
 from pipeline.maths.geometry.planes import tangents_of
 from pipeline.maths.sonar.soundings import points_in_mbes
 
@@ -82,6 +84,8 @@ def test_beams_that_look_up_have_the_features_of_those_that_look_down() -> None:
     up, r = np.repeat([[0.0], [0.0], [1.0]], 5, axis=1), np.zeros((3, 5))
     found = sonar_point_design(SoundingsOnSurface(points, axes, up, r, np.zeros(5)), SIGMAS)
     expected = sonar_point_design(SoundingsOnSurface(flip @ points, turned, flip @ up, r, np.zeros(5)), SIGMAS)
+    place = [N_MOVED + MBES_FEATURES.index(name) for name in PROJECTOR_PARAMETERS]
+    expected.features[place] = flip @ expected.features[place]  # along the axes of the sonar
     np.testing.assert_allclose(found.features, expected.features, atol=1e-12)
     np.testing.assert_allclose(found.mean_m, expected.mean_m, rtol=1e-9)
     np.testing.assert_allclose(found.sigma_m, expected.sigma_m, rtol=1e-12)
@@ -100,6 +104,50 @@ def test_the_features_are_what_errors_do_to_the_point(tilts: np.ndarray) -> None
     for number, (ahead, behind) in ((3, longer), (4, faster)):
         slope = NORMAL @ R_TARGET_FROM_MBES @ (ahead - behind) / (2 * step)
         np.testing.assert_allclose(q[number], slope, atol=1e-8)
+
+
+def feature(name: str, tilts: np.ndarray) -> np.ndarray:
+    """The feature (n,) of one of the sonar's parameters."""
+    return np.asarray(seen(beams(ANGLES, RANGES, tilts)).features[N_MOVED + MBES_FEATURES.index(name)])
+
+
+@of_both_fans
+def test_the_speed_at_the_arrays_turns_the_beams_and_leaves_the_ranges(tilts: np.ndarray) -> None:
+    """sin θ / c and sin τ / c are what the arrays set; the travel time is turned into a range with the other speed."""
+    step = 1e-6
+    ends = [beams(np.arcsin(k * np.sin(ANGLES)), RANGES, np.arcsin(k * np.sin(tilts))) for k in (1 + step, 1 - step)]
+    slope = NORMAL @ R_TARGET_FROM_MBES @ (ends[0] - ends[1]) / (2 * step)
+    np.testing.assert_allclose(feature("steering_speed", tilts), slope, atol=1e-8)
+    assert np.ptp(slope) > 5  # the same for all would be a shift
+
+
+def along_paths(rays: np.ndarray, paths: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """Points (3, n) on unit rays from the receiver whose way to the transmitter and to the receiver is the path."""
+
+    def missing(range_m: float, ray: np.ndarray, path: float) -> float:
+        return float(range_m + np.linalg.norm(range_m * ray - offset) - path)
+
+    return rays * [brentq(missing, 0.1, 20.0, one, xtol=1e-14) for one in zip(rays.T, paths, strict=True)]
+
+
+@of_both_fans
+@pytest.mark.parametrize("name", PROJECTOR_PARAMETERS)
+def test_a_transmitter_elsewhere_lengthens_the_range_of_the_same_path(name: str, tilts: np.ndarray) -> None:
+    rays, moved = beams(ANGLES, np.ones(5), tilts), 1e-4 * np.eye(3)[PROJECTOR_PARAMETERS.index(name)]
+    ends = [along_paths(rays, 2 * RANGES, offset) for offset in (moved, -moved)]
+    slope = NORMAL @ R_TARGET_FROM_MBES @ (ends[0] - ends[1]) / 2e-4
+    np.testing.assert_allclose(feature(name, tilts), slope, atol=1e-8)
+    assert np.any(np.abs(slope) > 0.02) or (name == "projector_y" and not np.any(tilts))
+
+
+@pytest.mark.parametrize("name", PROJECTOR_PARAMETERS)
+def test_about_a_known_place_the_transmitters_feature_is_right_but_for_the_share_of_its_distance(name: str) -> None:
+    rays, known = beams(ANGLES, np.ones(5), TILTS), np.array([0.02, -0.1, 0.119])
+    paths = RANGES + np.linalg.norm(rays * RANGES - known[:, None], axis=0)
+    moved = 1e-4 * np.eye(3)[PROJECTOR_PARAMETERS.index(name)]
+    ends = [along_paths(rays, paths, known + side * moved) for side in (1, -1)]
+    slope = NORMAL @ R_TARGET_FROM_MBES @ (ends[0] - ends[1]) / 2e-4
+    assert np.all(np.abs(feature(name, TILTS) - slope) < np.linalg.norm(known) / RANGES)
 
 
 @of_both_fans

@@ -1,0 +1,76 @@
+"""Robust weights by the function IGG III, what they leave of the variance of good observations, and robust scales."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+Array = NDArray[np.float64]
+
+BINS = np.linspace(0.0, 50.0, 2001)  # |residual| / sigma; larger ones count into the last bin
+NORMAL_MEDIAN = 0.6744897501960817  # median of |standard normal|
+LEAST_SCALE = 0.01  # no sensor's noise is a hundred times smaller than its stated sigma: less is rounding
+
+
+def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
+    """Return the weights (n,) of IGG III (Yang 1999).
+
+    They are 1 up to k0, k0 / |v| · ((k1 - |v|) / (k1 - k0))² up to k1, and 0 above.
+
+    Parameters
+    ----------
+    normalised : (n,) array
+        Residuals in units of their sigma.
+    k0, k1 : float
+        Largest residual with full weight, and with any weight.
+
+    Examples
+    --------
+    >>> igg3_weights(np.array([0.0, 2.0, 7.0]), 3.0, 6.0)
+    array([1., 1., 0.])
+    """
+    size = np.abs(normalised)
+    middle = k0 / np.maximum(size, k0) * ((k1 - np.minimum(size, k1)) / (k1 - k0)) ** 2
+    return np.where(size <= k0, 1.0, middle)
+
+
+def variance_kept(k0: float, k1: float) -> float:
+    """Return E[w z² | w > 0], the part of the variance of a standard normal z that the weights of IGG III leave.
+
+    With the normal density φ, its integral Φ and Mⱼ = ∫ zʲ φ dz from k0 to k1,
+
+        E[w z²] = 2 (Φ(k0) - 1/2 - k0 φ(k0)) + 2 k0 / (k1 - k0)² · (k1² M₁ - 2 k1 M₂ + M₃),
+        M₁ = φ(k0) - φ(k1),  M₂ = k0 φ(k0) - k1 φ(k1) + Φ(k1) - Φ(k0),  M₃ = k0² φ(k0) - k1² φ(k1) + 2 M₁,
+
+    divided by 2 Φ(k1) - 1, the share of observations with a weight.
+
+    Examples
+    --------
+    >>> round(variance_kept(3.0, 6.0), 4), round(variance_kept(30.0, 60.0), 4)
+    (0.9924, 1.0)
+    """
+    low, high = (np.exp(-k * k / 2) / np.sqrt(2 * np.pi) for k in (k0, k1))
+    first, between = low - high, float(ndtr(k1) - ndtr(k0))
+    second = k0 * low - k1 * high + between
+    third = k0**2 * low - k1**2 * high + 2 * first
+    reduced = 2 * k0 / (k1 - k0) ** 2 * (k1**2 * first - 2 * k1 * second + third)
+    return float((2 * (ndtr(k0) - 0.5 - k0 * low) + reduced) / (2 * ndtr(k1) - 1))
+
+
+def histogram(normalised: Array) -> Array:
+    """Return the counts of |v| in :data:`BINS`; counts of several batches add up, and their median gives the scale."""
+    last = len(BINS) - 2
+    width = BINS[-1] / (last + 1)
+    return np.bincount(np.minimum(np.abs(normalised) / width, last).astype(np.int64), minlength=last + 1).astype(float)
+
+
+def robust_scale(counts: Array) -> float:
+    """Return the median of |v|, from the histogram, divided by NORMAL_MEDIAN; 1 without data.
+
+    >>> round(robust_scale(histogram(np.random.default_rng(0).normal(scale=2.0, size=100_000))), 1)
+    2.0
+    """
+    total = counts.sum()
+    if total == 0:
+        return 1.0
+    cumulative = np.concatenate([[0.0], np.cumsum(counts)])
+    return float(max(np.interp(total / 2, cumulative, BINS) / NORMAL_MEDIAN, LEAST_SCALE))

@@ -1,0 +1,95 @@
+"""The estimate of a fixed parameter in words, with the setting or the device to check."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
+FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
+WORDS = {  # by parameter: scale and unit of its estimate, and the words round it
+    "mbes_latency": (1e3, "ms", "the sonar's clock: its latency is {} more than mbes.latency_s says"),
+    "laser_latency": (1e3, "ms", "the laser's clock: its latency is {} more than laser.latency_s says"),
+    "mbes_range": (1e3, "mm", "the sonar's ranges: they should be {} longer"),
+    "laser_range": (1e3, "mm", "the laser's ranges: they should be {} longer"),
+    "mbes_incidence": (
+        1e3,
+        "mm",
+        "the sonar's ranges go with the angle at which it sees a face: at 45° they should be {} longer, against a face "
+        "seen at right angles (at 75° seven times as much): its bottom detection, or what coats the faces",
+    ),
+    "laser_incidence": (
+        1e3,
+        "mm",
+        "the laser's ranges go with the angle at which it sees a face: at 45° they should be {} longer, against a face "
+        "seen at right angles (at 75° seven times as much): faces that are glazed, wet or dark",
+    ),
+    "mbes_level_range": (
+        1e3,
+        "mm",
+        "the sonar's ranges on horizontal faces: they should be {} longer; what it hears there may be the corner with "
+        "the wall behind, and not the face",
+    ),
+    "sound_speed": (
+        1e2,
+        "%",
+        "the sound speed: it is {} above that recorded, or given as mbes.sound_speed_m_s or mbes.svp; measure it at "
+        "the head",
+    ),
+    "steering_speed": (
+        1e2,
+        "%",
+        "the sound speed at the arrays, which steers the beams: it is {} above that of the water before them; measure "
+        "it at the head, and look for warm water there",
+    ),
+    "sound_speed_gradient": (
+        1.0,
+        "m/s",
+        "a sound speed that changes with depth, by {} per metre: take a (better) cast",
+    ),
+}
+PLACES = {  # of the transmitter by component: where it sits if the estimate is positive, and if it is negative
+    "projector_x": ("farther to starboard", "farther to port"),
+    "projector_y": ("farther forward", "farther aft"),
+    "projector_z": ("higher", "lower"),
+}
+
+
+def words_of(row: Mapping[Any, Any]) -> str:
+    """Return in words the estimate of one parameter, and the setting or device to check."""
+    name, value, sigma = str(row["unknown"]), float(row["value"]), float(row["sigma"])
+    if name in WORDS:
+        scale, unit, words = WORDS[name]
+        return words.format(_size(scale * value, scale * sigma, unit))
+    if name in PLACES:
+        farther = PLACES[name][int(value < 0)]
+        size = _size(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
+        return (
+            f"the transmitter sits {size} {farther} than mbes.projector_offset_m says (null: where the receiver is), "
+            "in the sonar's own axes: measure it at the head, or find out to which point the head reduces its ranges"
+        )
+    if name.startswith("laser_rotation"):
+        angle = _size(np.degrees(value), np.degrees(sigma), "°")
+        return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
+    if name.startswith("laser_lever_arm"):
+        return f"laser.mount: {name[-1]}_m should be {_size(1e3 * value, 1e3 * sigma, 'mm')} more"
+    return _words_of_wet_faces(name, value, sigma)
+
+
+def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
+    """Return in words a turn (rad) or shift (m) of a family's wet faces against its dry ones."""
+    family, _, kind = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
+    faces = FACES_OF_FAMILY.get(family, f"of {family}")
+    if kind.startswith("turn"):
+        angle = _size(np.degrees(value), np.degrees(sigma), "°")
+        return f"the target: its wet faces {faces} are turned by {angle} against the dry ones"
+    shift = _size(1e3 * value, 1e3 * sigma, "mm")
+    verb = "lie higher" if family == "H" else "stand off"
+    return f"the target: its wet faces {faces} {verb} by {shift}; check its shape in the config, and its survey"
+
+
+def _size(value: float, sigma: float, unit: str) -> str:
+    """Return a value and its sigma as text, with as many decimals as the first digit of the sigma has."""
+    digits = max(0, -int(np.floor(np.log10(max(sigma, 1e-9)))))
+    gap = "" if unit == "°" else " "
+    return f"{value:+.{digits}f} ± {sigma:.{digits}f}{gap}{unit}"

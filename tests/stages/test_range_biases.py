@@ -1,0 +1,80 @@
+"""Ranges of the sonar that go with the face, planted in the labelled soundings of a simulated session."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.from_tables import trajectory_in_target
+from pipeline.artefacts.streams import MemoryPart, Stream, point_array
+from pipeline.simulation.session import SimulatedSession
+from tests.support.effort import often
+from tests.support.simulated import calibrated
+
+Law = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of the incidence (n,) rad and |n_z| (n,) of the face
+
+
+def by_incidence(incidence: np.ndarray, n_z: np.ndarray) -> np.ndarray:
+    """1 at 45°, 0 at right angles."""
+    return np.asarray((1 / np.cos(incidence) - 1) / (np.sqrt(2) - 1))
+
+
+def on_level_faces(incidence: np.ndarray, n_z: np.ndarray) -> np.ndarray:
+    """1 on horizontal faces."""
+    return (n_z > 0.9).astype(float)
+
+
+def recorded_too_long(session: SimulatedSession, bias_m: float, law: Law) -> Callable[[str, Any], Any]:
+    """The labelled soundings with this much too much range, by the true mount's incidence."""
+    seen: dict[str, Any] = {}
+    R_body_from_mbes = np.array(session.truth["mbes"]["R_body_from_mbes"])
+
+    def lengthened(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        trajectory = trajectory_in_target(seen["georeference/poses"], seen["segment/target_pose"])
+        faces, points = seen["segment/faces"], point_array(columns, "mbes_m")
+        normals = faces[[f"normal_{axis}_target_1" for axis in "xyz"]].to_numpy()[columns["face"].astype(int)]
+        range_m = np.linalg.norm(points, axis=1)
+        _, R_target_from_body = trajectory.poses_at(columns["t_ns"])
+        rays = np.einsum("nij,nj->ni", R_target_from_body, points @ R_body_from_mbes.T) / range_m[:, None]
+        incidence = np.arccos(np.minimum(-np.sum(rays * normals, axis=1), 1.0))
+        longer = 1 + bias_m * law(incidence, np.abs(normals[:, 2])) / range_m
+        return columns | {f"{axis}_mbes_m": points[:, k] * longer for k, axis in enumerate("xyz")}
+
+    def changed(key: str, value: Any) -> Any:
+        seen[key] = value
+        if key != "segment/soundings_labelled":
+            return value
+        return Stream(tuple(MemoryPart(part.name, lengthened(part.columns)) for part in value.parts))
+
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("unknown", "law", "bias_m", "words"),
+    [
+        ("mbes_incidence", by_incidence, 0.012, "the angle at which it sees a face: at 45° they should be -"),
+        ("mbes_level_range", on_level_faces, -0.04, "ranges on horizontal faces: they should be +"),
+    ][: often(1, 2)],
+)
+def test_a_bias_is_found_named_and_estimated_if_it_is_freed(
+    noisy: SimulatedSession, errors_of: Any, unknown: str, law: Law, bias_m: float, words: str
+) -> None:
+    found = calibrated(noisy, changed=recorded_too_long(noisy, bias_m, law))
+    row = found["adjust/freed"].set_index("unknown").loc[unknown]
+    assert abs(row["value"] + bias_m) < 0.1 * abs(bias_m) + 3 * row["sigma"]
+    result = json.loads(found["report/calibration.json"])
+    (cause,) = (reason for reason in result["reasons"] if "likely cause" in reason)
+    assert words in cause.split("nearly as well")[0]
+    tied = abs(errors_of(result["mbes"], noisy.truth)[5])
+    assert tied > 9  # mm of z
+    freed = calibrated(noisy, changed=recorded_too_long(noisy, bias_m, law), pool={"adjust": {"free": [unknown]}})
+    result = json.loads(freed["report/calibration.json"])
+    one = result["free"][unknown]
+    assert one["unit"] == "m"
+    assert abs(one["value"] + bias_m) < 4 * one["sigma_total"]
+    sigma = np.sqrt(np.diag(result["mbes"]["covariance_total"])) * np.repeat([180 / np.pi, 1000.0], 3)
+    errors = np.abs(errors_of(result["mbes"], noisy.truth))
+    assert np.all(errors < 4 * sigma)
+    assert errors[5] < tied / 2
