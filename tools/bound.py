@@ -29,7 +29,7 @@ from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, hstack, iden
 from scipy.sparse.linalg import splu
 
 from pipeline.gps_time import NS
-from pipeline.simulation.ins import pose_sigmas
+from pipeline.simulation.ins_errors import pose_sigmas
 from pipeline.simulation.scenario import Scenario, load_scenario
 from tools.forward_model import NORMALS, Array, Rays, World
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.simulation.raycast import RayCaster
-from pipeline.simulation.scenario_sensors import MbesScenario
+from pipeline.simulation.scenario_mbes import MbesScenario
 from pipeline.simulation.site import Floats
 
 LEAST_WEIGHT = 0.3  # least weight of the rays that meet a surface; with less there is no detection

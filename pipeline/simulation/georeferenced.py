@@ -7,7 +7,7 @@ from pipeline.gps_time import NS
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import R_level_from_body
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
-from pipeline.simulation.scenario_sensors import LaserScenario
+from pipeline.simulation.scenario_laser import LaserScenario
 from pipeline.simulation.site import Floats, R_ecef_from_level
 
 _CHUNK = 200_000

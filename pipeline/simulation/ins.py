@@ -1,16 +1,12 @@
-"""Records of the INS: the true poses, Gauss-Markov drift through the whole session, GNSS steps and white noise."""
-
-from itertools import pairwise
+"""Records of the INS: the true poses, with drift through the whole session, GNSS steps and white noise."""
 
 import numpy as np
-from scipy.signal import lfilter
 
-from pipeline.config.session import Drift
 from pipeline.gps_time import NS
+from pipeline.simulation.ins_errors import gauss_markov_drift, gnss_steps, white_noise
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.random_streams import generator
-from pipeline.simulation.scenario_sensors import NO_DRIFT, InsScenario
-from pipeline.simulation.site import Floats
+from pipeline.simulation.scenario_ins import NO_DRIFT, InsScenario
 
 Columns = dict[str, np.ndarray]
 _POSE_COLUMNS = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
@@ -63,86 +59,3 @@ def _epochs(rate_hz: float, start_ns: int, end_ns: int) -> Times:
     """Return epochs (GPS ns) from start to before end, at whole multiples of the interval, as receivers log them."""
     interval_ns = round(NS / rate_hz)
     return np.arange(-(-start_ns // interval_ns), -(-end_ns // interval_ns), dtype=np.int64) * interval_ns
-
-
-def pose_sigmas(position_m: tuple[float, float, float], attitude_deg: tuple[float, float, float]) -> Floats:
-    """Return sigmas (6, 1) of east, north, up in m and of roll, pitch, azimuth in rad."""
-    return np.concatenate([position_m, np.radians(attitude_deg)])[:, None]
-
-
-def white_noise(scenario: InsScenario, count: int, seed: int) -> Floats:
-    """Return independent errors of the records.
-
-    Parameters
-    ----------
-    scenario : InsScenario
-        Their sigmas.
-    count : int
-        Number of records.
-    seed : int
-        Seed of the session.
-
-    Returns
-    -------
-    (6, count) array
-        East, north, up in m; roll, pitch, azimuth in rad.
-    """
-    position, attitude = scenario.white.position_m, scenario.white.attitude_deg
-    noise = generator(seed, "ins_white").standard_normal((6, count))
-    return pose_sigmas((position,) * 3, (attitude,) * 3) * noise
-
-
-def gnss_steps(step_m: float, t_ns: Times, random: np.random.Generator) -> Floats:
-    """Return position errors (3, n) that stay for a second of GPS time and are independent of those of the next.
-
-    Parameters
-    ----------
-    step_m : float
-        RMS of the step from one second to the next, √2 times that of the error.
-    t_ns : (n,) array
-        Times of the records, GPS ns, in order.
-    random : Generator
-        Generator of the random numbers.
-    """
-    _, second = np.unique(t_ns // NS, return_inverse=True)
-    errors: Floats = step_m / np.sqrt(2) * random.standard_normal((int(second.max(initial=-1)) + 1, 3))
-    return errors[second].T
-
-
-def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator) -> Floats:
-    """Return first-order Gauss-Markov errors. The process continues through gaps.
-
-    x(t + dt) = f x(t) + sqrt(1 - f²) sigma w, f = exp(-dt / tau): stationary from the first record on.
-
-    Parameters
-    ----------
-    scenario : Drift
-        Sigmas and time constant.
-    t_ns : (n,) array
-        Times of the records, GPS ns.
-    random : Generator
-        Generator of the random numbers.
-
-    Returns
-    -------
-    (6, n) array
-        East, north, up in m; roll, pitch, azimuth in rad.
-    """
-    scale = pose_sigmas(
-        (scenario.horizontal_m, scenario.horizontal_m, scenario.vertical_m),
-        (scenario.roll_pitch_deg, scenario.roll_pitch_deg, scenario.heading_deg),
-    )
-    shocks = random.standard_normal((6, len(t_ns)))
-    steps = np.diff(t_ns)
-    usual = np.median(steps) if len(steps) else 1
-    breaks = [0, *(np.flatnonzero(np.abs(steps - usual) > 1) + 1), len(t_ns)]
-    result = np.empty_like(shocks)
-    last, before_ns = np.zeros(6), None
-    for begin, end in pairwise(breaks):
-        f = 0.0 if before_ns is None else np.exp(-(t_ns[begin] - before_ns) / NS / scenario.time_constant_s)
-        shocks[:, begin] = f * last + np.sqrt(1 - f**2) * shocks[:, begin]
-        f = np.exp(-usual / NS / scenario.time_constant_s)
-        shocks[:, begin + 1 : end] *= np.sqrt(1 - f**2)
-        result[:, begin:end] = lfilter([1.0], [1.0, -f], shocks[:, begin:end], axis=1)
-        last, before_ns = result[:, end - 1], t_ns[end - 1]
-    return scale * result

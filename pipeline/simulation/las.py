@@ -9,7 +9,7 @@ from laspy.header import GpsTimeType
 
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_NS
 from pipeline.simulation.ins import Columns
-from pipeline.simulation.scenario_sensors import LaserScenario
+from pipeline.simulation.scenario_laser import LaserScenario
 
 _CHUNK = 1_000_000
 

@@ -1,22 +1,20 @@
 """Records of the laser scanner: lines athwart to starboard, in the scanner's own frame."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.gps_time import NS
-from pipeline.simulation.echoes import range_bias
 from pipeline.simulation.ins import Columns
+from pipeline.simulation.laser_returns import Rays, measured_ranges
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
 from pipeline.simulation.random_streams import generator
 from pipeline.simulation.raycast import Pool
-from pipeline.simulation.scenario_sensors import LaserScenario
+from pipeline.simulation.scenario_laser import LaserScenario
 from pipeline.simulation.site import Floats
 
 _CHUNK = 200_000
 _SHORTEST_M = 0.5
 BELOW_WATER_M = 0.3
-_PULSE_M = 0.5  # echoes farther apart than this are told apart
 
 
 def scan_directions(zenith_rad: Floats, azimuth_rad: Floats) -> Floats:
@@ -101,40 +99,15 @@ class _LaserPass:
         to_water = np.divide(height, directions[:, 2], out=np.full(len(height), np.inf), where=down)
         dice = self.random["water"].random((len(t_ns), 2))
         echo = np.where(dice[:, 0] < self.scenario.water_return_share, to_water + BELOW_WATER_M * dice[:, 1], np.inf)
-        measured = self._mixed(ranges, surfaces, origins, directions)
-        if self.scenario.incidence_bias_m or self.scenario.level_bias_m:
-            normals = self.pool.caster.normals(origins, directions)
-            measured = measured + range_bias(self.scenario, normals, directions, "tangent_squared")
-        return np.where(ranges < to_water, measured - self._splash_m(origins, directions, ranges), echo)
+        measured = measured_ranges(self.scenario, self.pool, Rays(origins, directions, ranges, surfaces))
+        if self.scenario.splash_share:
+            reach = np.where(np.isfinite(ranges), ranges, np.nan)
+            measured = measured - self._splash_m(reach * directions[:, 2] - height)
+        return np.where(ranges < to_water, measured, echo)
 
-    def _mixed(self, ranges: Floats, surfaces: NDArray[np.int64], origins: Floats, directions: Floats) -> Floats:
-        """Return the ranges (n,) of beams with a width, from those of their axes and the surfaces that these meet.
-
-        A beam that meets more than one plane is four rays round its axis beside the axis itself, which counts twice.
-        Their mean is measured, without those that end in water or whose echoes can be told apart from the axis's.
-        """
+    def _splash_m(self, heights_m: Floats) -> Floats:
+        """Return how much before the face each ray (n,) ends in drops; ``heights_m``: where it meets one, NaN: none."""
         scenario = self.scenario
-        if not (scenario.spot_m or scenario.spot_divergence_deg):
-            return ranges
-        side = np.cross(directions, [0.0, 0.0, 1.0])
-        side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
-        total, count, mixed = 2 * ranges, np.full(len(ranges), 2.0), np.zeros(len(ranges), dtype=bool)
-        widening = np.tan(np.radians(scenario.spot_divergence_deg) / 2)
-        for way in (side, -side, np.cross(side, directions), -np.cross(side, directions)):
-            leaning = (directions + widening * way) / np.hypot(1.0, widening)
-            found, surface = self.pool.caster.cast(origins + scenario.spot_m / 2 * way, leaning)
-            near = np.abs(found - np.where(np.isfinite(ranges), ranges, 0.0)) < _PULSE_M
-            near &= origins[:, 2] + np.where(near, found, 0.0) * leaning[:, 2] > self.pool.water_level_m
-            total, count = np.where(near, total + found, total), count + near
-            mixed |= near & (surface != surfaces)
-        return np.where(mixed, total / count, ranges)
-
-    def _splash_m(self, origins: Floats, directions: Floats, ranges: Floats) -> Floats:
-        """Return how much before the face each ray (n,) ends in drops; zero for most, and all that end higher up."""
-        scenario = self.scenario
-        if not scenario.splash_share:
-            return np.zeros(len(ranges))
-        dice = self.random["splash"].random((len(ranges), 2))
-        height = origins[:, 2] + np.where(np.isfinite(ranges), ranges, 0.0) * directions[:, 2] - self.pool.water_level_m
-        wet = (dice[:, 0] < scenario.splash_share) & (height > 0) & (height < scenario.splash_height_m)
-        return np.where(wet, scenario.splash_depth_m * dice[:, 1], 0.0)
+        dice = self.random["splash"].random((len(heights_m), 2))
+        near = (heights_m > 0) & (heights_m < scenario.splash_height_m)
+        return np.where(near & (dice[:, 0] < scenario.splash_share), scenario.splash_depth_m * dice[:, 1], 0.0)

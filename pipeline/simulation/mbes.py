@@ -11,7 +11,7 @@ from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
 from pipeline.simulation.random_streams import generator
 from pipeline.simulation.raycast import Pool
-from pipeline.simulation.scenario_sensors import MbesScenario
+from pipeline.simulation.scenario_mbes import MbesScenario
 from pipeline.simulation.site import Floats
 from pipeline.simulation.water_column import WaterColumn
 

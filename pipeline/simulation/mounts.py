@@ -5,7 +5,8 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config.mount import Mount
 from pipeline.simulation.random_streams import generator
-from pipeline.simulation.scenario_sensors import LaserScenario, MbesScenario
+from pipeline.simulation.scenario_laser import LaserScenario
+from pipeline.simulation.scenario_mbes import MbesScenario
 from pipeline.simulation.site import Floats
 
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from pipeline.gps_time import GPS_EPOCH_UNIX_S, LEAP_SECONDS, NS
 from pipeline.simulation.beams import FanAngles
 from pipeline.simulation.ins import Columns
-from pipeline.simulation.scenario_sensors import MbesScenario
+from pipeline.simulation.scenario_mbes import MbesScenario
 
 _XTF_PING_HEADER_BYTES = 256  # XTF ping header, its first 14 bytes being the packet header
 PHASE_DETECT, MAGNITUDE_DETECT = 0b1011, 0b0111  # nibbles as a real head sets them

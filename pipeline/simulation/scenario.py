@@ -13,7 +13,9 @@ from pipeline.config.target_mesh import with_mesh
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-from pipeline.simulation.scenario_sensors import InsScenario, LaserScenario, MbesScenario
+from pipeline.simulation.scenario_ins import InsScenario
+from pipeline.simulation.scenario_laser import LaserScenario
+from pipeline.simulation.scenario_mbes import MbesScenario
 from pipeline.simulation.scenario_surroundings import Surroundings
 
 SCENARIOS_FOLDER = CONFIGS / "scenarios"

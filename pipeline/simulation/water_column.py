@@ -7,7 +7,7 @@ than the beam, and the time along the beam is counted, not that along the chord.
 import numpy as np
 
 from pipeline.simulation.beams import BeamBundles, directions_in_mbes
-from pipeline.simulation.scenario_sensors import MbesScenario
+from pipeline.simulation.scenario_mbes import MbesScenario
 from pipeline.simulation.site import Floats
 
 _STEPS = 64  # of the integration along a ray: 0.1 m

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.config.load import load_session
 from pipeline.config.session import Drift
 from pipeline.errors import ConfigError
-from pipeline.simulation.ins import gauss_markov_drift
+from pipeline.simulation.ins_errors import gauss_markov_drift
 from pipeline.simulation.scenario import Scenario, load_scenario
-from pipeline.simulation.session import SimulatedSession, simulate_session
+from pipeline.simulation.session import SimulatedSession, simulate_session, write_session
+from tests.support.files.build import read
 from tests.support.level_geometry import LEVEL, STILL, range_m
 
 Change = Callable[..., Scenario]
@@ -157,3 +159,15 @@ def test_an_effect_does_not_change_the_draws_of_others(
             if 1e-12 in values.values():
                 assert np.mean(np.abs(one[column] - two[column]) > 1e-7) < 1e-3
     assert len(other.mbes["t_ns"]) == pytest.approx(len(plain.mbes["t_ns"]), rel=1e-3)
+
+
+def test_files_hold_a_cast_and_stamps_of_detections(changed: Change, noisy: Scenario, tmp_path: Any) -> None:
+    given = {"format": "parquet", "stamp": "reception", "svp_declared": [[0.0, 1501.0], [4.0, 1499.0]]}
+    scenario = changed(noisy, mbes=given)
+    simulated = simulate_session(scenario, 2)
+    write_session(simulated, tmp_path / "s", scenario)
+    told = load_session(tmp_path / "s").mbes
+    assert told is not None
+    assert told.svp == ((0.0, 1501.0), (4.0, 1499.0))
+    parts = [read("mbes", tmp_path / "s" / "mbes" / f"pass_{k}.parquet", "table")[0] for k in (0, 1)]
+    np.testing.assert_array_equal(np.concatenate([part["t_ns"] for part in parts]), simulated.mbes["t_ns"])

@@ -113,10 +113,10 @@ def test_no_beam_is_narrower_than_the_aperture(changed: Change, noise_free: Scen
 
 def test_a_side_lobe_hears_the_corner(one_pass: Pass) -> None:
     """The corner of P1-1 and the back wall is at (1, -2.5); from y = -2.4 the beam meets P1-1 at x = 0.9."""
-    dense = {"ping_rate_hz": 20.0}  # a ping every 2 cm
+    dense = {"ping_rate_hz": 10.0}  # a ping every 4 cm
     plain, strong = one_pass(**dense), one_pass(**dense, side_lobe_share=1.0)
     theta = np.radians(74.0)
-    assert range_m(plain, 74.0, -2.4) == pytest.approx(5.9 / np.sin(theta), abs=0.012)
+    assert range_m(plain, 74.0, -2.4) == pytest.approx(5.9 / np.sin(theta), abs=0.022)
     corner = np.linalg.norm([6.0, -0.1, 6.0 / np.tan(theta)])
     assert range_m(strong, 74.0, -2.4) == pytest.approx(corner, abs=1e-3)  # late by a decimetre
     for angle_deg, y_m in ((60.0, 0.0), (-30.0, 0.0), (74.0, -2.0), (65.0, -1.45)):  # far from any, or it is hidden

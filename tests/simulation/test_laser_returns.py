@@ -98,7 +98,7 @@ def test_a_beam_widens_with_range(
     one_pass: Callable[..., SimulatedSession], divergence_deg: float, half_m: float
 ) -> None:
     """Points of slanted faces that mix with the back wall below lie no higher above the edge than half the spot."""
-    dense = {"line_rate_hz": 100.0, "point_rate_hz": 20000.0}
+    dense = {"line_rate_hz": 50.0, "point_rate_hz": 10000.0}
     ranges, zenith, points = seen(one_pass(**dense))
     wide = seen(one_pass(**dense, spot_m=0.02, spot_divergence_deg=divergence_deg))[0]
     x, y, z = points.T

@@ -13,7 +13,7 @@ from pipeline.config.load import load_pool, load_session
 from pipeline.config.yaml_file import read_yaml
 from pipeline.errors import ConfigError
 from pipeline.simulation import session as session_module
-from pipeline.simulation.ins import gauss_markov_drift
+from pipeline.simulation.ins_errors import gauss_markov_drift
 from pipeline.simulation.motion import Movement
 from pipeline.simulation.scenario import Scenario, load_scenario
 from pipeline.simulation.session import simulate_session, simulate_to_folder, write_session

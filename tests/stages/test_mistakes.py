@@ -7,15 +7,17 @@ import pandas as pd
 import pytest
 
 from pipeline.config.yaml_models import parse
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, SURFACE_PARAMETERS
 from pipeline.report.reason_codes import ReasonCode
+from pipeline.simulation.face_faults import face_of_polygon
 from pipeline.simulation.mesh import build_mesh
-from pipeline.simulation.relief import face_of_polygon
 from pipeline.simulation.scenario import Scenario
 from tools.campaigns import THIN
 from tools.mistake_kinds import EFFECTS, MISTAKES
 from tools.mistakes import named_first
 
-PARAMETERS = ("mbes_", "laser_", "sound_speed", "steering_speed", "projector_", "wet_")
+WET = {f"wet_{family}_{name}" for family in ("P1", "P2", "P3", "H") for name in SURFACE_PARAMETERS}
+PARAMETERS = {*MBES_PARAMETERS, *LASER_PARAMETERS, *WET}
 
 
 def scenario_of(name: str) -> dict[str, Any]:
@@ -42,7 +44,7 @@ def test_names_that_would_be_right_are_names_of_the_program() -> None:
     faces = {face_of_polygon(default.target, polygon) for polygon in polygons} - {""}
     for name, kind in MISTAKES.items():
         for right in kind.right:
-            assert right in set(ReasonCode) | faces or right.startswith(PARAMETERS), (name, right)
+            assert right in set(ReasonCode) | faces | PARAMETERS, (name, right)
 
 
 def artefacts(*causes: tuple[str, float]) -> dict[str, Any]:
