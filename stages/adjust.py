@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.adjustment.consider import sonar_errors
-from pipeline.adjustment.ins_drift import drift_model, pose_noise
+from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.laser_design import (
     fixed_parameters_table,
@@ -29,6 +29,7 @@ from pipeline.artefacts.catalogue.results import (
     CELLS,
     COVARIANCE,
     DRIFT,
+    DRIFT_FIGURES,
     ESTIMATE,
     FREED,
     GEOMETRY,
@@ -98,6 +99,7 @@ class Outputs:
     geometry: Annotated[pd.DataFrame, GEOMETRY]
     surfaces: Annotated[pd.DataFrame, SURFACES]
     drift: Annotated[pd.DataFrame, DRIFT]
+    drift_figures: Annotated[pd.DataFrame, DRIFT_FIGURES]
     freed: Annotated[pd.DataFrame, FREED]
     groups: Annotated[pd.DataFrame, GROUPS]
     cells: Annotated[pd.DataFrame, CELLS]
@@ -142,6 +144,7 @@ def session_data(inputs: Inputs, config: Config, drift: Drift) -> SessionData:
         trajectory=trajectory_in_target(inputs.poses, inputs.target_pose),
         laser_lever_arm_m=mount_of(config.laser.mount).lever_arm_body_m,
         noise=pose_noise(drift, config.ins.white),
+        drift=drift_prior(config.ins.drift_within),
         as_built=config.as_built,
     )
 

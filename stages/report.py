@@ -17,6 +17,7 @@ from pipeline.report.as_built import design_shape, deviations_from_design, measu
 from pipeline.report.calibration_document import (
     SCHEMA,
     documents,
+    estimated_drift_block,
     free_block,
     geometry_block,
     instruments_block,
@@ -24,7 +25,7 @@ from pipeline.report.calibration_document import (
     statement_lists,
     target_block,
 )
-from pipeline.report.drift_check import NO_DRIFT, check_ins_drift
+from pipeline.report.drift_check import NO_DRIFT, check_ins_drift, figures_disagree
 from pipeline.report.evidence import Evidence
 from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
@@ -99,6 +100,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *sigmas_too_small(inputs.estimate, config.adjust.test_level),
         *target_off_origin(target),
         *(check for check in [drift_check] if check is not None and check not in (NO_DRIFT, *reasons)),
+        *(check for check in [figures_disagree(inputs.drift_figures, source)] if check is not None),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model)),
         *report.cast_warnings,
@@ -123,6 +125,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         **report.data_keys,
         **_systematic(inputs.freed, config),
         "ins_drift": drift.model_dump() | {"from_files": list(drift_figures)},
+        "ins_drift_estimated": estimated_drift_block(inputs.drift_figures),
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
         **instruments_block({"ins": config.ins, "laser": config.laser, **report.instruments}),

@@ -68,7 +68,7 @@ import resource, sys, time
 from pathlib import Path
 from pipeline.adjustment.accumulation import accumulate
 from pipeline.adjustment.observation_model import CurrentValues
-from pipeline.adjustment.ins_drift import pose_noise
+from pipeline.adjustment.ins_drift import drift_prior, pose_noise
 from pipeline.adjustment.problem import SessionData, sonar_problem, surfaces_of_laser
 from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.maths.adjustment.weighting import Weighting
@@ -85,7 +85,8 @@ data = SessionData(
     target=target, surfaces=surfaces_of_laser(target, tables.table(PLANES)),
     trajectory=trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE)),
     laser_lever_arm_m=mount_of(laser.mount).lever_arm_body_m,
-    noise=pose_noise(session.ins.drift, session.ins.white), as_built=pool.as_built,
+    noise=pose_noise(session.ins.drift, session.ins.white), drift=drift_prior(session.ins.drift_within),
+    as_built=pool.as_built,
 )
 model = sonar_problem(data, mount_of(mbes.mount), {"laser": laser, "mbes": mbes}).model
 streams = {"laser": tables.stream(LASER_LABELLED), "mbes": tables.stream(SOUNDINGS_LABELLED)}

@@ -14,6 +14,7 @@ from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, histogram, rob
 from pipeline.maths.adjustment.weighting import Weighting, rescaled, scatter, shrunk_factors
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 PRIOR_POINTS = 22  # all points of a sensor count as this many beside those on a surface, for its robust scale
 Group = tuple[str, int]  # observations of one sensor on one surface: name of the sensor, number of the surface
 
@@ -43,6 +44,11 @@ class Accumulation:
 
     sums: Mapping[str, IntervalSums]
     groups: Mapping[Group, GroupStatistics]
+
+    @property
+    def records(self) -> Integers:
+        """The INS records that begin an interval of any sensor, ascending, each once."""
+        return np.unique(np.concatenate([sums.record for sums in self.sums.values()]))
 
     def observations(self, sensor: str) -> int:
         """Return the number of a sensor's observations."""

@@ -1,7 +1,8 @@
 """Figures of the INS's noise: sigmas of drift and white noise, from its files (table ins_sigmas) or session.yaml.
 
-This module provides only these figures. pipeline/maths/adjustment/eliminate_drift.py eliminates the drift from the
-normal equations.
+This module provides only these figures, and the table of the drift's figures as the data correct them.
+pipeline/maths/adjustment/eliminate_drift.py eliminates the drift from the normal equations, drift_likelihood.py beside
+it corrects the figures.
 """
 
 from collections.abc import Mapping
@@ -11,7 +12,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.config.session import Drift, White
+from pipeline.config.session import Drift, DriftWithin, White
+from pipeline.maths.adjustment.drift_likelihood import DriftFigures, DriftPrior
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.geometry.passes import pass_of
 
@@ -90,3 +92,32 @@ def pose_noise(drift: Drift, white: White) -> PoseNoise:
         drift=np.r_[drift.horizontal_m, drift.horizontal_m, drift.vertical_m, angles],
         time_constant_s=drift.time_constant_s,
     )
+
+
+def drift_prior(within: DriftWithin) -> DriftPrior:
+    """Return how well the figures of the drift are known: the logarithms of the factors of ``ins.drift_within``."""
+    return DriftPrior(float(np.log(within.sigmas)), float(np.log(within.time_constant)))
+
+
+def drift_figures_table(configured: PoseNoise, figures: DriftFigures) -> pd.DataFrame:
+    """Return table ``drift_figures``.
+
+    Parameters
+    ----------
+    configured : PoseNoise
+        The pose errors by the session's figures.
+    figures : DriftFigures
+        Those by data and session.
+    """
+    # of each figure: its component of the drift (None: the time constant), and its place among the logarithms
+    places = {"horizontal_m": (0, 0), "vertical_m": (2, 0), "roll_pitch_deg": (3, 1), "heading_deg": (5, 1)}
+    places_of_all: dict[str, tuple[int | None, int]] = {**places, "time_constant_s": (None, 2)}
+    sigmas, rows = np.sqrt(np.diag(figures.covariance)), []
+    for name, (component, place) in places_of_all.items():
+        before, after = (
+            noise.time_constant_s if component is None else float(noise.drift[component])
+            for noise in (configured, figures.noise)
+        )
+        unit = float(np.degrees(1.0)) if name.endswith("_deg") else 1.0
+        rows.append((name, before * unit, after * unit, sigmas[place], figures.deviation[place]))
+    return pd.DataFrame(rows, columns=["figure", "configured", "estimated", "sigma_log", "deviation"])

@@ -1,4 +1,4 @@
-"""Values during the iteration of the adjustment: their normal equations, and a step from them."""
+"""Values during the iteration of the adjustment: normal equations at them, a step from them, figures of the noise."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -6,14 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.design_matrix import pose_design
+from pipeline.maths.adjustment.drift_likelihood import DriftFigures, DriftPrior, drift_figures
+from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
+from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.interval_sums import IntervalSums
-from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations, updated_sums
+from pipeline.maths.adjustment.normal_equations import Linearisation, reduced_intervals, updated_sums
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
+from pipeline.maths.adjustment.record_noise import record_noise_factor
 from pipeline.maths.adjustment.solution import Solution, solve
-from pipeline.maths.adjustment.weighting import EpochVarianceFactor, epoch_variance_factors
+from pipeline.maths.adjustment.weighting import EpochVarianceFactor
 
+Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
@@ -29,9 +34,19 @@ class Iterate:
         """Return the same values for other sums, linearised at them."""
         return replace(self, linearisation=replace(self.linearisation, sums=sums))
 
-    def equations(self, noise: PoseNoise, selected: Integers | None = None) -> NormalEquations:
-        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces."""
-        equations, state = normal_equations(self.linearisation, self.drift, noise, selected), self.linearisation.state
+    def reduced(self, white: Array, selected: Integers | None = None) -> ReducedIntervals:
+        """Return the normal equations before the drift is eliminated; ``white`` (6,): sigmas of a record's noise."""
+        return reduced_intervals(self.linearisation, self.drift.knots, white, selected)
+
+    def equations(
+        self, noise: PoseNoise, selected: Integers | None = None, reduced: ReducedIntervals | None = None
+    ) -> NormalEquations:
+        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces.
+
+        ``reduced``: those of :meth:`reduced` with the same white noise and parameters, if they are at hand.
+        """
+        reduced = self.reduced(noise.white, selected) if reduced is None else reduced
+        equations, state = eliminate_drift(reduced, noise, self.drift), self.linearisation.state
         if self.surfaces is None:
             return equations
         prior = self.surfaces.pseudo_observations(state)
@@ -43,10 +58,21 @@ class Iterate:
             squares=equations.squares + prior.squares,
         )
 
-    def stepped(self, noise: PoseNoise, estimated: Integers) -> tuple["Iterate", Solution]:
-        """Return the values after a step of the estimated parameters, and the solution for these parameters alone."""
+    def drift_figures(
+        self, noise: PoseNoise, prior: DriftPrior, estimated: Integers, reduced: ReducedIntervals
+    ) -> DriftFigures:
+        """Return the figures of the drift by data and session; ``reduced``: as for :meth:`equations`."""
+        return drift_figures(lambda tried: self.equations(tried, estimated, reduced), noise, prior)
+
+    def stepped(
+        self, noise: PoseNoise, estimated: Integers, reduced: ReducedIntervals | None = None
+    ) -> tuple["Iterate", Solution]:
+        """Return the values after a step of the estimated parameters, and the solution for these parameters alone.
+
+        ``reduced``: as for :meth:`equations`.
+        """
         state = self.linearisation.state
-        equations = self.equations(noise, estimated)
+        equations = self.equations(noise, estimated, reduced)
         solution = solve(equations.normal, equations.right, range(len(estimated)))
         step, drift_step = np.zeros(state.size), equations.knots(solution.step)
         step[estimated] = solution.step
@@ -55,7 +81,8 @@ class Iterate:
         linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
         return Iterate(linearisation, drift, self.surfaces), solution
 
-    def epoch_factors(self, noise: PoseNoise) -> dict[str, EpochVarianceFactor]:
-        """Return the variance factor of the common error of an interval's points, by sensor."""
-        linearisation = self.linearisation
-        return epoch_variance_factors(linearisation.sums, linearisation.state.surfaces, noise.white)
+    def record_noise(self, noise: PoseNoise) -> EpochVarianceFactor:
+        """Return the variance factor of the records' white noise, from the laser's points."""
+        surfaces = self.linearisation.state.surfaces
+        designs = pose_design(surfaces, np.arange(len(surfaces)))
+        return record_noise_factor(self.linearisation.sums["laser"], designs, noise.white)

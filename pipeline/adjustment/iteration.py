@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
 from pipeline.adjustment.initial_mount import initial_mount
 from pipeline.adjustment.iterate import Iterate
-from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
+from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise, place_knots
+from pipeline.maths.adjustment.pose_errors import DriftEstimate
 from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
@@ -79,9 +80,9 @@ class MountAdjustment:
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
-    sonar or a solution); equations: normal equations of all parameters, also of the fixed ones; fixed_mount: the mount
-    parameters that had to be fixed, each with the sigma that it would have had (rad or m); last, noise: the values and
-    the noise of the final solution.
+    sonar or a solution); drift_figures: the figures of the drift, which the solution has; equations: normal equations
+    of all parameters, also of the fixed ones; fixed_mount: the mount parameters that had to be fixed, each with the
+    sigma that it would have had (rad or m); last: the values of the final solution.
     """
 
     state: State
@@ -90,17 +91,17 @@ class MountAdjustment:
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
     ping: PingNoise | None
+    drift_figures: DriftFigures
     equations: NormalEquations
     solution: Solution
     fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
     last: Iterate
-    noise: PoseNoise
 
     def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
         """Return the normal equations of all parameters, with the prior information, from a part of the sums."""
-        return self.last.of(sums).equations(self.noise)
+        return self.last.of(sums).equations(self.drift_figures.noise)
 
     @property
     def values(self) -> CurrentValues:
@@ -151,29 +152,31 @@ def adjust_mount(
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
     """
-    noise = problem.prior.noise
-    ping: PingNoise | None = None
+    prior = problem.prior
+    figures, ping = DriftFigures.of_session(prior.noise), None
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
     last, estimated = weighted.last, weighted.estimated
     factors: dict[str, EpochVarianceFactor] = {}
     converged = False
     if not weighted.deficient:
-        # take the INS's white noise from the laser's points; further steps have the last weights
-        factors = last.epoch_factors(noise)
+        # take the INS's noise from the data: white noise, then drift; further steps have the last weights
+        factors["laser"] = last.record_noise(prior.noise)
         if "mbes" in streams:  # a part of the sonar's noise is common to a ping
             soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
-            ping = ping_noise(soundings, surfaces, noise.white, factors["laser"])
-            with_pings = with_ping_noise(soundings, ping, surfaces, noise.white)
+            ping = ping_noise(soundings, surfaces, prior.noise.white, factors["laser"])
+            with_pings = with_ping_noise(soundings, ping, surfaces, prior.noise.white)
             last = replace(last, linearisation=last.linearisation.with_sums("mbes", with_pings))
             factors["mbes"] = ping.epoch
-        noise = noise_seen_by_laser(noise, factors["laser"])
-        for _ in range(CLOSING_STEPS):
-            last, solution = last.stepped(noise, estimated)
+        noise = noise_seen_by_laser(prior.noise, factors["laser"])
+        reduced = last.reduced(noise.white, estimated)
+        figures = last.drift_figures(noise, prior.drift, estimated, reduced)
+        for closing in range(CLOSING_STEPS):
+            last, solution = last.stepped(figures.noise, estimated, None if closing else reduced)
             converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
-    equations = last.equations(noise)
+    equations = last.equations(figures.noise)
     solution = solve(equations.normal, equations.right, estimated.tolist())
     return MountAdjustment(
         state=last.linearisation.state,
@@ -182,13 +185,13 @@ def adjust_mount(
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
         ping=ping,
+        drift_figures=figures,
         equations=equations,
         solution=solution,
         fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
         last=last,
-        noise=noise,
     )
 
 
@@ -218,7 +221,7 @@ def _weighted_iteration(
     for iteration in range(1, settings.max_iterations + 1):
         # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
-        drift = values.drift or _zero_drift(accumulation, model, prior.noise, gap_s)
+        drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
         start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
@@ -234,9 +237,8 @@ def _weighted_iteration(
         # from the next reading on reduce the weights of outliers
         weighting = replace(weighting, robust=(settings.robust_k0, settings.robust_k1))
         if iteration > 1:  # scales and the INS's white noise come from residuals without the drift and outliers
-            scales, factors = accumulation.robust_scales(len(state.surfaces)), stepped.epoch_factors(prior.noise)
-            white = noise_seen_by_laser(prior.noise, factors["laser"]).white
-            weighting = replace(weighting, scales=scales, white=white)
+            white = noise_seen_by_laser(prior.noise, stepped.record_noise(prior.noise)).white
+            weighting = replace(weighting, scales=accumulation.robust_scales(len(state.surfaces)), white=white)
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
     return _WeightedIteration(
         last=start if deficient else stepped,
@@ -250,9 +252,6 @@ def _weighted_iteration(
     )
 
 
-def _zero_drift(accumulation: Accumulation, model: ObservationModel, noise: PoseNoise, gap_s: float) -> DriftEstimate:
-    record = np.unique(np.concatenate([sums.record for sums in accumulation.sums.values()]))
-    return DriftEstimate.zero(place_knots(record, model.body.seconds, noise.spacing_s, gap_s))
 
 
 def _is_small(solution: Solution, estimated: Integers, limits: StepLimits) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Batch, point_array
+from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.design_matrix import (
     PointDesign,
     SensorSigmas,
@@ -18,7 +19,7 @@ from pipeline.maths.adjustment.design_matrix import (
     sonar_point_design,
 )
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
-from pipeline.maths.adjustment.normal_equations import BodyMotion, RecordErrors, residual_shift
+from pipeline.maths.adjustment.normal_equations import RecordErrors, residual_shift
 from pipeline.maths.adjustment.parameters import LASER_FEATURES, MBES_FEATURES, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
 from pipeline.maths.adjustment.weighting import Weighting, common_variance

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import laser_planes
+from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.design_matrix import SensorSigmas
-from pipeline.maths.adjustment.normal_equations import BodyMotion
+from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftPrior
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, SurfacePrior
@@ -62,12 +63,14 @@ class PriorInformation:
     """Prior information.
 
     noise: white noise and drift of the recorded poses; surfaces: pseudo-observations of the surfaces; required_sigmas
-    (6,) rad and m: a mount parameter that would have a larger sigma is fixed (None: all are estimated).
+    (6,) rad and m: a mount parameter that would have a larger sigma is fixed (None: all are estimated); drift: how well
+    the figures of the drift in ``noise`` are known.
     """
 
     noise: PoseNoise
     surfaces: SurfacePrior | None = None
     required_sigmas: Array | None = None
+    drift: DriftPrior = EXACT
 
 
 @dataclass(frozen=True)
@@ -88,8 +91,8 @@ class SessionData:
     """Data of a session, as the functional model and the prior information need them.
 
     target: the design; surfaces: the surface of each family, at which the adjustment starts; trajectory: recorded
-    poses, target frame; laser_lever_arm_m (3,), body axes; noise: errors of the poses; as_built: the target as
-    surveyed.
+    poses, target frame; laser_lever_arm_m (3,), body axes; noise: errors of the poses; drift: how well the
+    figures of their drift are known; as_built: the target as surveyed.
     """
 
     target: TargetModel
@@ -97,6 +100,7 @@ class SessionData:
     trajectory: Trajectory
     laser_lever_arm_m: Array
     noise: PoseNoise
+    drift: DriftPrior
     as_built: SurveyedFaces
 
 
@@ -115,7 +119,8 @@ def sonar_problem(session: SessionData, mount: Mounted, noise: Mapping[str, Poin
         Settings of laser and sonar.
     """
     state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, session.surfaces, "mbes")
-    prior = PriorInformation(session.noise, _parallel_families(session.target, session.as_built))
+    parallel = _parallel_families(session.target, session.as_built)
+    prior = PriorInformation(session.noise, parallel, drift=session.drift)
     return problem_at(session, state, prior, noise)
 
 

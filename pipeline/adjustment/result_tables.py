@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.adjustment.ins_drift import drift_figures_table
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.noise_tables import groups_table, sigma_check
 from pipeline.adjustment.pattern_tests import passes_test
@@ -62,6 +63,7 @@ def result_tables(
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
         "drift": _drift_table(adjustment, t_ns),
+        "drift_figures": drift_figures_table(problem.prior.noise, adjustment.drift_figures),
         "cells": _pass_means_table(adjustment, statistics, t_ns, passes),
         "surfaces": _surfaces_table(adjustment, statistics),
     }

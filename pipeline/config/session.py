@@ -35,6 +35,13 @@ class Drift(Model):
     time_constant_s: Annotated[float, Field(ge=1, le=1e6)] = 200.0
 
 
+class DriftWithin(Model):
+    """Factors within which the figures of the drift hold (one sigma); 1: they are exact, and the data do not count."""
+
+    sigmas: Annotated[float, Field(ge=1, le=100)] = 2.0
+    time_constant: Annotated[float, Field(ge=1, le=100)] = 3.0
+
+
 class White(Model):
     """White noise of the INS, per record."""
 
@@ -54,6 +61,7 @@ class Ins(Model):
     latency_s: Latency = 0.0
     drift: Drift = Drift()
     drift_from: Literal["settings", "files"] = "files"  # files: their sigmas, if they hold any; else those of drift
+    drift_within: DriftWithin = DriftWithin()
     white: White = White()
 
     @model_validator(mode="after")

@@ -17,9 +17,9 @@ from pipeline.adjustment.observation_model import CurrentValues, ObservationMode
 from pipeline.adjustment.problem import sensor_sigmas
 from pipeline.config.plan import Pass
 from pipeline.gps_time import NS
+from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
-from pipeline.maths.adjustment.normal_equations import BodyMotion, Linearisation, normal_equations
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, place_knots
+from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations
 from pipeline.maths.geometry.rotations import rotation_from_attitude
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import mount_of
@@ -140,7 +140,7 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
     if not len(record):
         return np.zeros((setting.state.size, setting.state.size))
     noise = pose_noise(setting.ins.drift, setting.ins.white)
-    drift = DriftEstimate.zero(place_knots(record, body.seconds, noise.spacing_s, PAUSE_S))
+    drift = body.zero_drift(record, noise, PAUSE_S)
     return normal_equations(Linearisation(sums, setting.state, body, drift), drift, noise).normal
 
 

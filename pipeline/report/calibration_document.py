@@ -59,6 +59,16 @@ def free_block(freed: pd.DataFrame) -> dict[str, Any]:
     }
 
 
+def estimated_drift_block(figures: pd.DataFrame) -> dict[str, Any]:
+    """Return the drift's figures by data and session, and by figure the sigma of its logarithm and its deviation."""
+    names = figures["figure"].tolist()
+    columns = {
+        column: {name: json_number(value) for name, value in zip(names, figures[column], strict=True)}
+        for column in ("estimated", "sigma_log", "deviation")
+    }
+    return columns.pop("estimated") | columns
+
+
 def target_block(pose: pd.Series) -> dict[str, Any]:
     """Return the target's pose relative to the pool's config, from a row of the table ``target_pose``."""
     return {

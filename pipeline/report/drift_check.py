@@ -1,4 +1,4 @@
-"""Check whether the INS drifts farther than the figures of the session or of its files allow."""
+"""Checks of the INS's drift against the figures of the session or of its files, never against the estimated ones."""
 
 import numpy as np
 import pandas as pd
@@ -7,6 +7,7 @@ from pipeline.config.session import Drift
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 MAX_DRIFT_RATIO = 1.2  # RMS of estimated drift over its sigma: a larger one contradicts the figures
+MAX_DEVIATION = 2.0  # of a figure, in sigmas of what data and ins.drift_within allow
 NO_DRIFT = Statement(
     ReasonCode.INS_DRIFT_NOT_GIVEN,
     "ins.drift allows the INS no drift at all: give its figures before you look for any other cause",
@@ -39,4 +40,33 @@ def check_ins_drift(drift: pd.DataFrame, allowed: Drift, source: str = "ins.drif
         ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
         f"the INS drifts at least {ratio:.1f} times as far as {source}: give its figures before you look for "
         "any other cause",
+    )
+
+
+def figures_disagree(figures: pd.DataFrame, source: str = "ins.drift says") -> Statement | None:
+    """Return a statement if the data say that the INS drifts more, or faster, than its figures; otherwise None.
+
+    A smaller or a slower drift is no fault: the INS is good. The result needs no correction, for the adjustment used
+    the estimated figures; they should be used for the survey, too, and for the next session.
+
+    Parameters
+    ----------
+    figures : table ``drift_figures``
+    source : subject and verb of the statement, which name the source of the figures
+    """
+    rows = {str(row["figure"]): row for row in figures.to_dict("records")}
+    worse = [(-1 if name == "time_constant_s" else 1) * row["deviation"] for name, row in rows.items()]
+    if not max(worse, default=0.0) > MAX_DEVIATION:
+        return None
+    parts = [
+        f"{rows[name]['estimated'] / rows[name]['configured']:.1f} times as far {words}"
+        for name, words in (("horizontal_m", "in position"), ("roll_pitch_deg", "in attitude"))
+        if rows[name]["configured"] > 0
+    ]
+    seconds = rows["time_constant_s"]
+    return Statement(
+        ReasonCode.INS_DRIFT_OFF_FIGURES,
+        f"the INS drifts otherwise than {source}: {' and '.join(parts)}, with a time constant of "
+        f"{seconds['estimated']:.0f} s, not {seconds['configured']:.0f} s; the sigmas count with that, but look for "
+        "the cause in the INS",
     )

@@ -12,6 +12,7 @@ from pipeline.artefacts.catalogue.results import (
     CELLS,
     COVARIANCE,
     DRIFT,
+    DRIFT_FIGURES,
     ESTIMATE,
     FREED,
     GEOMETRY,
@@ -38,6 +39,7 @@ class Evidence:
     covariance: Annotated[pd.DataFrame, COVARIANCE]
     geometry: Annotated[pd.DataFrame, GEOMETRY]
     drift: Annotated[pd.DataFrame, DRIFT]
+    drift_figures: Annotated[pd.DataFrame, DRIFT_FIGURES]
     freed: Annotated[pd.DataFrame, FREED]
     patterns: Annotated[pd.DataFrame, PATTERNS]
     parts: Annotated[pd.DataFrame, PARTS]

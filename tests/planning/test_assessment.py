@@ -1,5 +1,6 @@
 """A plan's prediction: against the adjustment of a simulated session of the same plan, and what it says and chooses."""
 
+import copy
 import json
 import re
 from collections import Counter
@@ -47,7 +48,10 @@ def configs() -> tuple[PoolConfig, SessionConfig]:
 @pytest.mark.parametrize("drift", often([{"ins": {"drift": DRIFT}}], [{}, {"ins": {"drift": DRIFT}}]))
 def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift: dict[str, Any]) -> None:
     distances = (4.0, 8.0, 5.0, 7.0)
-    session = made({"track": {"distances_m": list(distances)}, "mbes": {"coarse_angle_deg": 0.1}}, drift, seed=6)
+    track = {"track": {"distances_m": list(distances)}, "mbes": {"coarse_angle_deg": 0.1}}
+    session = copy.deepcopy(made(track, drift, seed=6))
+    exact = {"drift_within": {"sigmas": 1.0, "time_constant": 1.0}}  # no plan knows what the data will say of the drift
+    session.session["ins"] |= exact
     result = json.loads(calibrated(session)["report/calibration.json"])["methods"]["adjustment"]
     pool, settings = parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
     answer = assessment.assess_plan(plan_of(*distances), pool, settings)

@@ -5,11 +5,22 @@ import pytest
 
 from pipeline.config.session import Drift, Mbes
 from pipeline.report.cast_checks import cast_warnings
-from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.drift_check import check_ins_drift, figures_disagree
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
-from tests.support.evidence import FIGURES, FOUND, SIGMA, checked, codes, drift, families, gaps, groups
+from tests.support.evidence import (
+    FIGURES,
+    FOUND,
+    SIGMA,
+    checked,
+    codes,
+    drift,
+    drift_figures,
+    families,
+    gaps,
+    groups,
+)
 
 
 @pytest.mark.parametrize(
@@ -107,6 +118,24 @@ def test_an_ins_that_drifts_farther_than_its_figures(sigmas, far):
         check = check_ins_drift(drift(sigmas), figures)
         assert (check is not None and check.code == ReasonCode.INS_DRIFT_ABOVE_SETTINGS) == far
     assert check_ins_drift(drift(sigmas).iloc[:0], Drift()) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "warned"),
+    [
+        ({}, False),
+        ({"time_constant_s": (20.0, -1.99)}, False),
+        ({"time_constant_s": (20.0, -2.01)}, True),
+        ({"time_constant_s": (2000.0, 5.0)}, False),  # a slower drift is no fault
+        ({"horizontal_m": (0.05, 2.01)}, True),
+        ({"heading_deg": (0.1, 2.01)}, True),
+        ({"heading_deg": (0.001, -5.0)}, False),
+    ],
+)
+def test_an_ins_that_drifts_more_or_faster_than_its_figures(changes, warned):
+    check = figures_disagree(drift_figures(**changes), "the INS's files say")
+    assert (check is not None and check.code == ReasonCode.INS_DRIFT_OFF_FIGURES) == warned
+    assert check is None or "than the INS's files say" in check.words
 
 
 CAST = ((0.0, 1500.0), (5.0, 1501.0))

@@ -13,7 +13,7 @@ from pipeline.config.session import Drift, Mbes
 from pipeline.report.as_built import deviations_from_design
 from pipeline.report.calibration_document import statement_lists
 from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
-from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.drift_check import check_ins_drift, figures_disagree
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.verdict import rejections
@@ -27,6 +27,7 @@ from tests.support.evidence import (
     SIGMA,
     checked,
     drift,
+    drift_figures,
     evidence,
     families,
     gaps,
@@ -95,6 +96,12 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         lambda: _one(check_ins_drift(drift(1.21), Drift())),
         ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
         "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before you look",
+    ),
+    (
+        lambda: _one(figures_disagree(drift_figures(time_constant_s=(10.0, -2.5), horizontal_m=(0.03, 1.0)))),
+        ReasonCode.INS_DRIFT_OFF_FIGURES,
+        "the INS drifts otherwise than ins.drift says: 2.0 times as far in position and 1.0 times as far in attitude, "
+        "with a time constant of 10 s, not 200 s; the sigmas count with that, but look for the cause in the INS",
     ),
     (
         lambda: geometry_gaps(gaps("one pass alone"), SIGMA),

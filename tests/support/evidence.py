@@ -41,6 +41,7 @@ def evidence(
     alternating: Mapping[str, Any] | None = None,
     freed: Mapping[str, Any] | None = None,
     patterns: Sequence[Mapping[str, Any]] = ({},),
+    parts: Mapping[str, Any] | None = None,
     fixed: Sequence[str] = (),
     count: int = 500,
 ) -> Evidence:
@@ -68,7 +69,12 @@ def evidence(
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     geometry = [("remedy", "two more passes at 3 m would do", 0.0)] + [("held", name, 0.1) for name in fixed]
     tables: dict[str, Any] = {field.name: pd.DataFrame() for field in fields(Evidence)}
+    part: dict[str, Any] = {"part": "without pass 2", "passes": "0 1 3", "normalised": 1.0, "dof": 6}
+    for name in ("roll", "pitch", "yaw", "x", "y", "z"):
+        sigma = 0.01 if name in ("roll", "pitch", "yaw") else 0.001
+        part |= {f"change_{name}": 0.5 * sigma, f"sigma_{name}": sigma}
     tables |= {
+        "parts": pd.DataFrame([part | dict(parts or {}), part | {"part": "without pass 3"}]),
         "faces": pd.DataFrame({"name": ["P1-0", "P2"]}),
         "target_pose": pd.DataFrame([pose_row | dict(pose or {})]),
         "provisional_mount": pd.DataFrame([mount_row | dict(mount or {})]),
@@ -129,3 +135,11 @@ def drift(sigmas: float) -> pd.DataFrame:
     columns = {f"{axis}_target_m": value for axis, value in values[0].items()}
     columns |= {f"turn_{axis}_target_deg": value for axis, value in values[1].items()}
     return pd.DataFrame([{name: sign * sigmas * value for name, value in columns.items()} for sign in (1, -1, -1)])
+
+
+def drift_figures(**changes: tuple[float, float]) -> pd.DataFrame:
+    """The table drift_figures, as configured; changes by figure: estimated value, and deviation."""
+    configured = {"horizontal_m": 0.015, "vertical_m": 0.02, "roll_pitch_deg": 0.01, "heading_deg": 0.03}
+    configured["time_constant_s"] = 200.0
+    rows = [(name, value, *changes.get(name, (value, 0.0)), 0.3) for name, value in configured.items()]
+    return pd.DataFrame(rows, columns=["figure", "configured", "estimated", "deviation", "sigma_log"])

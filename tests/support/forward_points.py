@@ -13,7 +13,7 @@ from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Adjust
 from pipeline.config.session import Drift, Ins, Laser, Mbes, White
-from pipeline.maths.adjustment.normal_equations import BodyMotion
+from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.trajectory import Trajectory

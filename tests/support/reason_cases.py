@@ -13,12 +13,13 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"pose": {"ambiguous": True}},
         ReasonCode.AMBIGUOUS_TARGET_POSE,
-        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m²); let the laser see the wall's",
+        "'one block higher' fits the laser points nearly as well (9.00 against 10.00 m² of its faces seen, those "
+        "missed deducted); let the laser see the wall's",
     ),
     (
         {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0}},
         ReasonCode.AMBIGUOUS_TARGET_POSE,
-        "better (11.00 against 10.00 m²); check target.origin",
+        "better (11.00 against 10.00 m² of its faces seen, those missed deducted); check target.origin",
     ),
     (
         {"pose": {"ambiguous": True, "rival_agreement_m2": 11.0, "rival": "left and right exchanged"}},
@@ -91,6 +92,16 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         {"patterns": [OFF | {"by": "step"}]},
         ReasonCode.RESIDUALS_STEP,
         "residuals go with angle: at a receive angle of 20° the sonar's distance from P2 steps by +1.0 mm",
+    ),
+    (
+        {"parts": {"normalised": 4.5, "change_x": 0.0031}},
+        ReasonCode.PARTS_DISAGREE,
+        "without pass 2 x would be another by 3.1 mm ± 1.0 mm (4.5 sigma over all parameters): something changed during",
+    ),
+    (
+        {"parts": {"part": "near passes", "normalised": 4.5, "change_yaw": -0.05}},
+        ReasonCode.PARTS_DISAGREE,
+        "from the near passes alone yaw would be another by -0.050° ± 0.010°",
     ),
     (
         {"patterns": [OFF | {"by": "ping_2", "low": 1.0}]},

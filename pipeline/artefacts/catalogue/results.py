@@ -66,6 +66,17 @@ DRIFT = Artefact(
         *(Column(f"turn_{axis}_target_deg", F64, "deg", f"about target {axis}") for axis in "xyz"),
     ),
 )
+DRIFT_FIGURES = Artefact(
+    "adjust", "drift_figures", "table", "the drift's figures: as configured, and by data and configured ones together",
+    (
+        Column("figure", TEXT, "", "horizontal_m, vertical_m, roll_pitch_deg, heading_deg, time_constant_s"),
+        Column("configured", F64, "m, deg or s", "by ins.drift or the INS's files"),
+        Column("estimated", F64, "m, deg or s", "by the likelihood of the data, with ins.drift_within as prior"),
+        Column("sigma_log", F64, "1", "standard deviation of the natural logarithm of estimated (0: not estimated)"),
+        Column("deviation", F64, "1",
+               "log(estimated / configured) in sigmas of what ins.drift_within allows (0: not estimated)"),
+    ),
+)
 FREED = Artefact(
     "adjust", "freed", "table", "single-parameter test of each fixed parameter, and the effect of its error",
     (

@@ -74,6 +74,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
 from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE
@@ -219,18 +220,6 @@ def sensor_noise(v_m: Array, weight: Array, intervals: Runs, common_m: Array) ->
     mean = np.divide(intervals.total(weight * v_m), p, out=np.zeros_like(p), where=p > 0)
     information = common_m**2 * intervals.spread(p)
     return np.asarray(v_m - information / (1 + information) * intervals.spread(mean))
-
-
-@dataclass(frozen=True)
-class BodyPoses:
-    """The body at g instants, target frame.
-
-    positions_m (g, 3); R_target_from_body (g, 3, 3); rates (g, 6): velocity (m/s) and angular velocity (rad/s).
-    """
-
-    positions_m: Array
-    R_target_from_body: Array
-    rates: Array
 
 
 @dataclass(frozen=True)

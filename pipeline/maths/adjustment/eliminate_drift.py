@@ -47,26 +47,27 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
     Parameters
     ----------
     reduced : ReducedIntervals
-        Normal equations by span between two knots.
+        Normal equations without the records' noise.
     noise : PoseNoise
         Standard deviations and time constant of the drift.
     drift : DriftEstimate
         The drift at which the observations were linearised.
     """
     knots, current = drift.knots, drift.values
-    u, count = reduced.normal.shape[1] - 2 * N_POSE - 1, len(knots.record)
+    u, count = len(reduced.others) - 1, len(knots.record)
     scale = noise.drift
-    before, after = slice(u, u + N_POSE), slice(u + N_POSE, u + 2 * N_POSE)
+    first, second = slice(0, N_POSE), slice(N_POSE, 2 * N_POSE)  # rows of a span's knots
+    before, after = slice(u, u + N_POSE), slice(u + N_POSE, u + 2 * N_POSE)  # their columns
     sides = [*range(u), u + 2 * N_POSE]  # x and v
     # blocks of the normal matrix: each knot with itself (diagonal), with the next (coupling), with x and v (border)
-    diagonal, coupling = np.zeros((count, N_POSE, N_POSE)), reduced.normal[:, before, after] * scale[:, None] * scale
+    diagonal, coupling = np.zeros((count, N_POSE, N_POSE)), reduced.spans[:, first, after] * scale[:, None] * scale
     border = np.zeros((count, N_POSE, u + 1))
-    for place, of in ((slice(0, -1), before), (slice(1, None), after)):
-        diagonal[place] += reduced.normal[:, of, of]
-        border[place] += reduced.normal[:, of][:, :, sides]
+    for place, rows, of in ((slice(0, -1), first, before), (slice(1, None), second, after)):
+        diagonal[place] += reduced.spans[:, rows, of]
+        border[place] += reduced.spans[:, rows][:, :, sides]
     diagonal, border = diagonal * scale[:, None] * scale, border * scale[:, None]
     phi = np.exp(-np.diff(knots.seconds) / noise.time_constant_s)
-    variance = 1 - phi**2
+    variance = -np.expm1(-2 * np.diff(knots.seconds) / noise.time_constant_s)  # 1 - φ², exact for a long τ too
     unit = np.eye(N_POSE)
     diagonal[0] += unit
     diagonal[:-1] += (phi**2 / variance)[:, None, None] * unit
@@ -81,7 +82,7 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
     factor = cholesky_banded(_banded(diagonal, coupling), lower=True)
     flat = border.reshape(-1, u + 1)
     solved = cho_solve_banded((factor, True), flat)
-    total = reduced.normal[:, sides][:, :, sides].sum(axis=0)
+    total = reduced.others.copy()
     total[u, u] += float(np.sum(xi[0] ** 2) + np.sum(innovation * weighted))
     total -= flat.T @ solved
     log_determinant = 2 * float(np.sum(np.log(factor[0]))) + N_POSE * float(np.sum(np.log(variance)))

@@ -24,7 +24,7 @@ from pipeline.maths.adjustment.pose_errors import N_POSE, Knots
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SIDE_BY_SIDE = 64  # number of spans that are eliminated together
+SIDE_BY_SIDE = 256  # number of spans that are eliminated together
 
 
 @dataclass(frozen=True)
@@ -64,19 +64,22 @@ class TimeAxis:
 
 @dataclass(frozen=True)
 class ReducedIntervals:
-    """Normal equations of each span between two knots, without the records' noise.
+    """Normal equations of all spans between two knots, without the records' noise.
 
-    normal (j, u + 13, u + 13) of x, the knots before and after, and v; log_determinant of the eliminated blocks.
+    spans (j, 12, u + 13): of each span, the rows of its knot before and its knot after; their columns are x, the knot
+    before, the knot after, and v. others (u + 1, u + 1): the blocks of x and v, sums over all spans. log_determinant of
+    the eliminated blocks.
     """
 
-    normal: Array
+    spans: Array
+    others: Array
     log_determinant: float
 
 
 def eliminate_white_noise(
     sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array
 ) -> ReducedIntervals:
-    """Return the normal equations by span, with the white noise of single records eliminated.
+    """Return the normal equations, with the white noise of single records eliminated span by span.
 
     Parameters
     ----------
@@ -92,7 +95,8 @@ def eliminate_white_noise(
     knots = times.knots
     spans = len(knots.record) - 1
     width = n_parameters + 2 * N_POSE + 1
-    normal = np.zeros((spans, width, width))
+    rows, sides = slice(n_parameters, width - 1), [*range(n_parameters), width - 1]  # the knots; x and v
+    by_span, others = np.zeros((spans, 2 * N_POSE, width)), np.zeros((n_parameters + 1, n_parameters + 1))
     located = [(source, knots.interval_of(source.record)) for source in sources]
     log_determinant = 0.0
     for first in range(0, spans, SIDE_BY_SIDE):
@@ -103,8 +107,9 @@ def eliminate_white_noise(
             if high > low:
                 chain.add(source.linearised(slice(int(low), int(high))), span[low:high], times)
         log_determinant += chain.eliminate(white)
-        normal[first:last] = chain.normal
-    return ReducedIntervals(normal, log_determinant)
+        by_span[first:last] = chain.normal[:, rows]
+        others += chain.normal.sum(axis=0)[np.ix_(sides, sides)]
+    return ReducedIntervals(by_span, others, log_determinant)
 
 
 @dataclass(frozen=True)

@@ -26,65 +26,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
+from pipeline.maths.adjustment.body_motion import BodyMotion
+from pipeline.maths.adjustment.design_matrix import SensorOnSurface, parameter_design, pose_design
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
+from pipeline.maths.adjustment.eliminate_white_noise import (
+    LinearisedIntervals,
+    ReducedIntervals,
+    TimeAxis,
+    eliminate_white_noise,
+)
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
-from pipeline.maths.geometry.rotations import exp_so3
-from pipeline.maths.geometry.trajectory import NS_PER_S, Trajectory
+from pipeline.maths.adjustment.pose_errors import (
+    DriftEstimate,
+    Knots,
+    PoseNoise,
+)
 from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-REACH_S = 0.2  # rates are means over this time on either side: between two records noise of 2 mm gives 0.5 m/s
 BLOCK = 50_000  # number of intervals whose designs are computed at a time
-
-
-@dataclass(frozen=True)
-class BodyMotion:
-    """The motion of the body in the target frame.
-
-    trajectory of n records; seconds (n,): their times since the first; rates (n, 6): velocity (m/s) and angular
-    velocity (rad/s) there; laser_lever_arm_m (3,), body axes.
-    """
-
-    trajectory: Trajectory
-    seconds: Array
-    rates: Array
-    laser_lever_arm_m: Array
-
-    @classmethod
-    def of(cls, trajectory: Trajectory, laser_lever_arm_m: Array) -> "BodyMotion":
-        """Return the motion along a trajectory in the target frame."""
-        seconds = (trajectory.t_ns - trajectory.t_ns[0]) / NS_PER_S
-        return cls(trajectory, seconds, trajectory.rates(REACH_S), laser_lever_arm_m)
-
-    def times(self, record: Integers, share: Array) -> Array:
-        """Return the times (g,) s at these shares of the interval from each record to the next."""
-        seconds = self.seconds
-        return np.asarray(seconds[record] + share * (seconds[record + 1] - seconds[record]))
-
-    def poses(self, record: Integers, share: Array, drift: DriftEstimate | None) -> BodyPoses:
-        """Return the poses at these shares of the intervals, corrected by the drift: the best known for the design.
-
-        Parameters
-        ----------
-        record, share : (g,) arrays
-            Record before each instant, and the share of the interval to the next.
-        drift : DriftEstimate or None
-            The drift estimated so far.
-        """
-        positions, T = self.trajectory.poses_within(record, share)
-        if drift is not None:
-            error = drift.at(self.times(record, share))
-            positions, T = positions + error[:, :3], exp_so3(error[:, 3:]) @ T
-        return BodyPoses(positions, T, self.rates[record])
-
-    def lever_arm(self, sensor: str, state: State) -> Array:
-        """Return the sensor's lever arm (3,) m, body axes: the estimate if it is calibrated, else as configured."""
-        return state.lever_arm_m if sensor == state.calibrated else self.laser_lever_arm_m
 
 
 @dataclass(frozen=True)
@@ -160,10 +122,28 @@ def normal_equations(
     selected : (s,) array, optional
         Parameters, ascending.
     """
+    return eliminate_drift(reduced_intervals(linearisation, drift.knots, noise.white, selected), noise, drift)
+
+
+def reduced_intervals(
+    linearisation: Linearisation, knots: Knots, white: Array, selected: Integers | None = None
+) -> ReducedIntervals:
+    """Return the normal equations of parameters and knots: they hold for any figures of the drift.
+
+    Parameters
+    ----------
+    linearisation : Linearisation
+        Interval sums, and the values at which they were taken.
+    knots : Knots
+        The knots of the drift.
+    white : (6,) array
+        Standard deviations of a record's white noise, m and rad.
+    selected : (s,) array, optional
+        Parameters, ascending; all by default.
+    """
     sources = list(linearisation.by_surface(selected))
     n_parameters = linearisation.state.size if selected is None else len(selected)
-    times = TimeAxis(linearisation.body.seconds, drift.knots)
-    return eliminate_drift(eliminate_white_noise(sources, n_parameters, times, noise.white), noise, drift)
+    return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:

@@ -1,8 +1,9 @@
 """Noise that the soundings of one ping share, beside the INS's: correlated beams, and an error of the whole ping.
 
 Independent soundings determine the mean m = Σ w v / Σ w of an interval and the slopes of v along the surface with the
-covariances 1 / Σ w and C⁻¹, C = Σ w t tᵀ, t = (α - ᾱ, β - β̄). The INS's white noise adds f c K W Kᵀ (see
-:mod:`pipeline.maths.adjustment.weighting`). Two further errors are the sonar's:
+covariances 1 / Σ w and C⁻¹, C = Σ w t tᵀ, t = (α - ᾱ, β - β̄). The INS's white noise W adds f c K W Kᵀ with the design
+K of pose errors and c = (1 - s)² + s² at the place s between two records (see
+:func:`pipeline.maths.adjustment.weighting.common_variance`). Two further errors are the sonar's:
 
 * Neighbouring beams are correlated (they share array elements, filters, a bottom detection). The scatter of the points
   about the interval's own line hardly shows it. But the variance of a mean of n beams is larger by the *design effect*

@@ -8,8 +8,21 @@ X -> X + δ + ω × r). Between records the error is interpolated like the poses
 * w_k: white noise of record k, w ~ N(0, W), W diagonal (position, attitude);
 * ξ: drift, a first-order Gauss-Markov process of standard deviations σ (6,) and time constant τ, through all passes and
   the time between them (Gelb 1974, 3.8). It has values at *knots* and is linear between them. For two knots d apart,
-  ξ_{j+1} = φ ξ_j + N(0, (1 - φ²) σ²), φ = exp(-d / τ). Linear interpolation omits the process between knots, up to
-  σ √(d / 2τ): at 15 mm and 200 s this is 0.5 mm for d = 0.5 s, and 1.7 mm for 5 s, which is too much.
+  ξ_{j+1} = φ ξ_j + N(0, (1 - φ²) σ²), φ = exp(-d / τ).
+
+**Distance of the knots.** For times much shorter than τ the drift is a random walk of rate q = 2 σ² / τ (m²/s). Linear
+interpolation omits the bridge between two knots: variance q s (1 - s) d at the share s of their distance, in the mean
+q d / 6, independent from one bridge to the next. The integral of its covariance over time is its power density below
+1/d: a bridge's own integral has the variance q d³ / 12, per time d, so that q d² / 12 is missing (both-sided, m² s).
+The drift itself has q / (2πf)² at the frequency f. So the model omits the share (2πf d)² / 12 of the drift's power at
+f, *whatever q is*: the same knots do for every σ and τ. The boat's roll tells the adjustment most: a roll error or a
+lever arm changes residuals at the frequency of the roll, and, because the change depends on the roll, at twice that. So
+the knots are so close that at most :data:`OMITTED` is missing there:
+
+    d = √(12 OMITTED) / (2π · 2 f_roll):        0.12 s for a roll of 4.5 s
+
+(With 0.5 s, a quarter of the drift's power at 0.6 Hz was missing, and a laser's sigmas of x, y, z came out 4 to 7 % too
+small.)
 
 **Test of the drift**: the difference between its mean in one pass and its mean in the others is compared with the INS's
 sigmas. An error of one sensor in one pass (a bracket that moves, a clock that jumps) does not always stay in the
@@ -25,7 +38,7 @@ Var ξ = variance of the estimate + variance of its error). So a test against th
 rarely, never too often.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +49,9 @@ from pipeline.maths.geometry.trajectory import NS_PER_S, Trajectory
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_POSE = 6  # components of a pose error: position x, y, z, turn x, y, z
-SPACING = 1 / 400  # largest distance of two knots, as a share of the time constant
+OMITTED = 0.01  # share of the drift's power, at twice the frequency of the boat's motion, that is missing between knots
+LEAST_SPACING_S, LARGEST_SPACING_S = 0.05, 0.5  # bounds of the distance of two knots: an agile boat, a still one
+SHIFTS, TURNS = slice(0, 3), slice(3, 6)  # components of a pose error
 
 
 @dataclass(frozen=True)
@@ -51,13 +66,30 @@ class PoseNoise:
     time_constant_s: float
 
     @property
-    def spacing_s(self) -> float:
-        """Return the largest distance of two knots."""
-        return SPACING * self.time_constant_s
+    def drifts(self) -> bool:
+        """Return whether any component drifts."""
+        return bool(np.any(self.drift > 0))
 
-    def scaled(self, white: float, drift: float) -> "PoseNoise":
-        """Return the noise with both variances multiplied by these factors."""
-        return PoseNoise(self.white * np.sqrt(white), self.drift * np.sqrt(drift), self.time_constant_s)
+    def scaled(self, white: float) -> "PoseNoise":
+        """Return the noise with the variance of its white part multiplied by this factor."""
+        return replace(self, white=self.white * np.sqrt(white))
+
+    def drifting(self, shifts: float, turns: float, time_constant: float) -> "PoseNoise":
+        """Return the noise with the drift's standard deviations and its time constant multiplied by these factors."""
+        drift = self.drift * np.repeat([shifts, turns], N_POSE // 2)
+        return replace(self, drift=drift, time_constant_s=self.time_constant_s * time_constant)
+
+
+def knot_spacing(motion_hz: float) -> float:
+    """Return the largest distance (s) of two knots of the drift, by the frequency of the boat's motion.
+
+    >>> round(knot_spacing(1 / 4.5), 2), knot_spacing(0.0)
+    (0.12, 0.5)
+    """
+    if motion_hz <= 0:
+        return LARGEST_SPACING_S
+    spacing_s = np.sqrt(12 * OMITTED) / (2 * np.pi * 2 * motion_hz)
+    return float(np.clip(spacing_s, LEAST_SPACING_S, LARGEST_SPACING_S))
 
 
 @dataclass(frozen=True)

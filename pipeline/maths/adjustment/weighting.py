@@ -11,28 +11,20 @@ observations too, so the expectation is multiplied by the part that they leave
 (:func:`~pipeline.maths.adjustment.robust_weights.variance_kept`). Where few intervals see a family, f is drawn to the
 sensor's other families: :func:`shrunk_factors`.
 
-**In common.** The variance factor of the error that an interval's points share follows from the intervals' means
-m = Σ w v / Σ w. For an interval with q̄ = Σ w q / Σ w, K its design of pose errors and W the white noise of a record,
-
-    E m² = 1 / Σ w + f c,     c = ((1 - s)² + s²) q̄ᵀ K W Kᵀ q̄,
-
-so that f follows by regression with the weights of maximum likelihood, c / (1 / Σ w + f c)². The regression is done
-twice, first with f = 1. The laser's f is the ratio of the INS's white noise to its value in the session. It goes into
-the normal equations and into the design (:func:`pipeline.maths.adjustment.design_matrix.sensor_noise`). The sonar's f
-also contains the errors that all beams of a ping share: an unsteady clock, or beams stabilised by another attitude than
-the INS's.
+**In common.** The points of an interval share errors: the white noise of the INS's records, whose variance factor
+follows from the laser's points (:mod:`~pipeline.maths.adjustment.record_noise`), and those that the soundings of a ping
+share (:mod:`~pipeline.maths.adjustment.ping_noise`). The white noise goes into the normal equations and into the design
+(:func:`pipeline.maths.adjustment.design_matrix.sensor_noise`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
-from pipeline.maths.adjustment.parameters import ObservedSurface
 from pipeline.maths.adjustment.pose_errors import N_POSE, PoseNoise
 from pipeline.maths.adjustment.robust_weights import igg3_weights, variance_kept
 
@@ -42,6 +34,7 @@ Integers = NDArray[np.int64]
 FEWEST = 6  # smallest number of points of an interval that is used
 FLAT = 1e-5  # an eigenvalue of the scaled sums below this counts as zero: 3 mm aside of a line, seen from a metre
 PRIOR_DOF = 8.0  # degrees of freedom that what is known of other families counts as, beside a family's own
+CERTAIN = 3.0  # sigmas by which a variance factor must differ from 1 to be applied, if it is not sure
 SURE, UNLIKELY = 0.1, 100.0  # sigma, as a share of a factor above 1, below which the white noise's is applied; largest
 
 
@@ -141,57 +134,14 @@ def common_variance(by_pose: Array, share: Array, white: Array) -> Array:
     return np.asarray(((1 - share) ** 2 + share**2) * (white**2 @ by_pose**2))
 
 
-def epoch_variance_factor(sums: IntervalSums, pose_designs: Array, white: Array) -> EpochVarianceFactor:
-    """Return the variance factor of the common error of an interval's points.
-
-    Parameters
-    ----------
-    sums : IntervalSums
-        Intervals of one sensor.
-    pose_designs : (s, 3, 6) array
-        Design K of pose errors by surface.
-    white : (6,) array
-        Standard deviations of a record's white noise, m and rad.
-    """
-    information = sums.normal[:, 0, 0]
-    by_pose = np.einsum("gi,gij->jg", sums.normal[:, 0, :N_MOVED] / information[:, None], pose_designs[sums.surface])
-    c = common_variance(by_pose, sums.share, white)
-    own, squared = 1 / information, (sums.right[:, 0] / information) ** 2
-    factor, weight = 1.0, 0.0
-    for _ in range(2):
-        by_variance = c / (own + max(factor, 0.0) * c) ** 2
-        weight = float(np.sum(by_variance * c))
-        if weight <= 0:
-            return EpochVarianceFactor(1.0, np.inf)
-        factor = float(np.sum(by_variance * (squared - own))) / weight
-    return EpochVarianceFactor(factor, float(np.sqrt(2 / weight)))
-
-
-def epoch_variance_factors(
-    sums_by_sensor: Mapping[str, IntervalSums], surfaces: Sequence[ObservedSurface], white: Array
-) -> dict[str, EpochVarianceFactor]:
-    """Return the variance factor of the common error of an interval's points, by sensor.
-
-    Parameters
-    ----------
-    sums_by_sensor : mapping of IntervalSums
-        Intervals of each sensor.
-    surfaces : sequence of ObservedSurface
-        The surfaces, in the order of their numbers in the sums.
-    white : (6,) array
-        Standard deviations of a record's white noise, m and rad.
-    """
-    designs = pose_design(surfaces, np.arange(len(surfaces)))
-    return {sensor: epoch_variance_factor(sums, designs, white) for sensor, sums in sums_by_sensor.items()}
-
-
 def noise_seen_by_laser(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoise:
-    """Return the noise, its white part multiplied by the laser's variance factor if that is certain (SURE).
+    """Return the noise, its white part multiplied by the laser's variance factor if that is known well enough.
 
-    The factor may be zero. (Without any white noise its estimate is negative as often as not.)
+    It is, if its sigma is small (SURE), or if it differs from 1 by more than CERTAIN sigmas: then the stated noise is
+    the worse of both. The factor may be zero. (Without any white noise its estimate is negative as often as not.)
     """
-    is_sure = laser.sigma < SURE * max(laser.factor, 1.0)
-    return noise.scaled(min(max(laser.factor, 0.0), UNLIKELY), 1.0) if is_sure else noise
+    is_sure = laser.sigma < SURE * max(laser.factor, 1.0) or abs(laser.factor - 1) > CERTAIN * laser.sigma
+    return noise.scaled(min(max(laser.factor, 0.0), UNLIKELY)) if is_sure else noise
 
 
 class Residuals(Protocol):

@@ -15,7 +15,15 @@ import pandas as pd
 from markupsafe import Markup
 
 from pipeline.artefacts.catalogue.points import FILES, GAPS, PASSES, POOL_FRAME
-from pipeline.artefacts.catalogue.results import ADJUST_SUMMARY, CALIBRATION, CELLS, ESTIMATE, FREED, GROUPS
+from pipeline.artefacts.catalogue.results import (
+    ADJUST_SUMMARY,
+    CALIBRATION,
+    CELLS,
+    DRIFT_FIGURES,
+    ESTIMATE,
+    FREED,
+    GROUPS,
+)
 from pipeline.atomic_files import write_text
 from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
@@ -131,6 +139,7 @@ def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "tests": [row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
         "parts": part_rows(result.get("parts", [])),
         "groups": tables.table(GROUPS).to_dict("records"),
+        "drift_figures": [row for row in tables.table(DRIFT_FIGURES).to_dict("records") if row["sigma_log"]],
         "summary": tables.table(ADJUST_SUMMARY).to_dict("records")[0],
     }
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment.design_matrix import BodyPoses, SensorOnSurface, parameter_design, pose_design
+from pipeline.maths.adjustment.body_motion import BodyPoses
+from pipeline.maths.adjustment.design_matrix import SensorOnSurface, parameter_design, pose_design
 from pipeline.maths.adjustment.parameters import (
     LASER_FEATURES,
     LASER_PARAMETERS,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
-from pipeline.maths.adjustment.weighting import epoch_variance_factor, rescaled, scatter
+from pipeline.maths.adjustment.weighting import rescaled, scatter
 
 FEATURES = 5
 
@@ -95,26 +95,3 @@ def test_epochs_of_few_points_tell_no_scatter() -> None:
     sums = sums_of(np.repeat([3, 4], 5), np.zeros(10), np.zeros(10, dtype=int), q, np.ones(10), np.arange(10.0))
     found = scatter(sums, np.ones(2, dtype=bool), 1.0)
     assert (found.dof, found.factor) == (0.0, 1.0)
-
-
-@pytest.mark.parametrize("factor", [0.0, 1.0, 4.0])
-def test_what_an_epoch_has_in_common_is_found(factor: float) -> None:
-    """Errors of the two records beside each epoch, mixed by the points' own places between them."""
-    rng = np.random.default_rng(12)
-    epochs, each = 3000, 15
-    record = np.repeat(2 * np.arange(epochs), each)  # every other step: no error is shared
-    n = len(record)
-    white = np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.5])
-    poses = rng.normal(size=(2, 3, 6))
-    surface = np.repeat(rng.integers(0, 2, epochs), each)
-    share = np.repeat(rng.uniform(size=epochs), each)
-    q = np.vstack([np.ones(n), np.repeat(rng.normal(size=(2, epochs)), each, axis=1)])
-    errors = np.sqrt(factor) * white * rng.normal(size=(2, epochs, 6))
-    at = record // 2
-    e = (1 - share)[:, None] * errors[0][at] + share[:, None] * errors[1][at]
-    v = np.einsum("in,nij,nj->n", q, poses[surface], e) + 3.0 * rng.normal(size=n)
-    sums = sums_of(record, share, surface, q, np.full(n, 1 / 9), v)
-    found = epoch_variance_factor(sums, poses, white)
-    assert abs(found.factor - factor) < 4 * found.sigma
-    assert found.sigma < 0.03 + 0.1 * factor
-    assert epoch_variance_factor(sums, poses, np.zeros(6)) == epoch_variance_factor(sums, 0 * poses, white)

@@ -1,6 +1,6 @@
 """Pose errors eliminated epoch by epoch against one dense least squares with every unknown written out."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,15 @@ from scipy.spatial.transform import Rotation
 from pipeline.maths.adjustment.eliminate_drift import eliminate_drift
 from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise, place_knots
+from pipeline.maths.adjustment.pose_errors import (
+    LARGEST_SPACING_S,
+    LEAST_SPACING_S,
+    DriftEstimate,
+    Knots,
+    PoseNoise,
+    knot_spacing,
+    place_knots,
+)
 from pipeline.maths.geometry.trajectory import Trajectory
 
 RATE_HZ = 10.0
@@ -137,7 +145,8 @@ def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.Mon
     whole = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), white)
     monkeypatch.setattr("pipeline.maths.adjustment.eliminate_white_noise.SIDE_BY_SIDE", 3)
     parts = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), white)
-    np.testing.assert_allclose(parts.normal, whole.normal, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(parts.spans, whole.spans, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(parts.others, whole.others, rtol=1e-12, atol=1e-12)
     assert parts.log_determinant == pytest.approx(whole.log_determinant)
 
 
@@ -158,12 +167,35 @@ def test_knots_keep_to_the_passes() -> None:
     assert np.allclose(drift.updated(drift.values).at(np.array([0.0, 30.0, 99.0])), 2.0)
 
 
-def test_scaled_noise_has_scaled_variances() -> None:
-    noise = PoseNoise(np.full(SIX, 2.0), np.full(SIX, 3.0), 200.0)
-    assert noise.spacing_s == 0.5
-    assert replace(noise, time_constant_s=20.0).spacing_s == 0.05
-    scaled = noise.scaled(4.0, 9.0)
-    assert (scaled.white[0], scaled.drift[0]) == (4.0, 9.0)
+def test_factors_of_the_noise() -> None:
+    noise = PoseNoise(np.full(SIX, 2.0), np.arange(SIX) + 1.0, 200.0)
+    np.testing.assert_array_equal(noise.scaled(4.0).white, 4.0)
+    changed = noise.drifting(2.0, 3.0, 0.1)
+    np.testing.assert_array_equal(changed.drift, [2, 4, 6, 12, 15, 18])
+    assert changed.time_constant_s == pytest.approx(20.0)
+
+
+def test_knots_leave_a_hundredth_of_the_drift_at_twice_the_rolls_frequency() -> None:
+    """Against the spectrum of a random walk and of its linear interpolation, from a long simulated one."""
+    rng, fine, roll_hz = np.random.default_rng(8), 0.005, 0.25
+    each = round(knot_spacing(roll_hz) / fine)
+    spacing = each * fine
+    count = 40_000 // each * each
+    power = np.zeros(2)
+    for _ in range(60):
+        walk = np.r_[0.0, np.cumsum(rng.normal(size=count))]
+        t = np.arange(count + 1) * fine
+        between = np.interp(t, t[::each], walk[::each])
+        wave = np.exp(-2j * np.pi * 2 * roll_hz * t) * np.sin(np.pi * t / t[-1]) ** 2
+        power += np.abs([np.sum(wave * walk), np.sum(wave * (walk - between))]) ** 2
+    assert spacing == pytest.approx(knot_spacing(roll_hz), rel=0.05)
+    assert power[1] / power[0] == pytest.approx(0.01 * (spacing / knot_spacing(roll_hz)) ** 2, rel=0.4)
+
+
+def test_knots_are_never_farther_apart_nor_closer_than_their_bounds() -> None:
+    assert knot_spacing(0.0) == knot_spacing(0.01) == LARGEST_SPACING_S
+    assert knot_spacing(100.0) == LEAST_SPACING_S
+    assert knot_spacing(0.2) == pytest.approx(2 * knot_spacing(0.4))
 
 
 def test_a_corrected_trajectory_has_lost_the_drift() -> None:

@@ -1,0 +1,175 @@
+"""Figures of the INS's drift from the data: the factors of its sigmas and its time constant, by restricted likelihood.
+
+The drift's sigmas and its time constant τ of a session are often guesses. If the INS errs faster than they say, the
+adjustment takes errors of the pose for noise of the sensors, and its sigmas come out too small: 1.4 times at a tenth of
+τ. But the data know: the laser sees the drift against the planes, thousands of times.
+
+**Likelihood.** With the design A of the parameters x, C of the drift ξ at its knots, B of the records' white noise w,
+and noise e of covariance P⁻¹,
+
+    v = A x + C ξ + B w + e,      v ~ N(A x, V),      V = P⁻¹ + B Bᵀ + C K Cᵀ,
+
+K the covariance of the Gauss-Markov process, by its figures θ. The likelihood of θ alone is that of v with x integrated
+out under a flat prior (restricted likelihood: Patterson & Thompson 1971; as this integral Harville 1974). With x̂ the
+least-squares estimate under V, the integral over x is a Gaussian one:
+
+    -2 log L(θ) = (v - A x̂)ᵀ V⁻¹ (v - A x̂) + log det V + log det(Aᵀ V⁻¹ A) + (n - u) log 2π.
+
+Without the last determinant τ and the sigmas would come out too small, for planes and mount follow a slow drift. By
+elimination (Schur complements) V is never formed:
+
+* log det V = log det P⁻¹ + ``log_determinant`` of :class:`NormalEquations`: log det(I + …) of the records' blocks, and
+  log det(K⁻¹ + Cᵀ M C) + log det K of the knots;
+* Aᵀ V⁻¹ A is their ``normal`` N, and the square is what remains at the solution: ``squares`` + b · x̂, N x̂ = -b.
+
+Constants, which do not depend on θ: (n - u) log 2π, log det P⁻¹ with the robust weights of the last reading, and the
+determinants of pseudo-observations of the surfaces, which add to N, b and ``squares``. Only the knots depend on θ, so
+that one evaluation is one elimination of the knots, whatever the number of points.
+
+**Prior.** What the session says of the drift is information as well. Each figure is right within a factor, log-normal:
+
+    J(z) = -2 log L + Σ (z_i / s_i)²,      z = log(estimate / session's figure),
+
+z for the sigmas of the shifts (position), for those of the turns (attitude), and for τ; s_i the logarithm of the factor
+within which the session's figure holds (one sigma). Within a session not much longer than τ the data determine the rate
+2 σ² / τ well, σ and τ themselves hardly: along this valley the prior decides. Within shifts, and within turns, the
+components keep the session's ratios: the data hardly tell them apart.
+
+J is minimised by Newton's method with differences (10 evaluations a step). Its second derivatives give the covariance
+of z, 2 (∂²J)⁻¹. An estimate by data and prior varies less than the prior, z ~ N(0, S - C) for a session whose figures
+are right as far as they say, with S = diag(s²) and C the covariance (Var z_true = Var estimate + Var of its error).
+This is the measure by which data and session disagree.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.pose_errors import SHIFTS, TURNS, PoseNoise
+
+Array = NDArray[np.float64]
+STEP = 0.05  # of the differences, in log figures
+FARTHEST_STEP = 1.0  # largest change of a log figure in one step
+LARGEST_LOG = float(np.log(1000.0))  # bound of the log figures: beyond it the drift is as good as absent, or white
+MAX_STEPS = 12
+NEAR = 0.2  # predicted decrease of J from which one last step is enough: half a sigma
+HALVINGS = 5
+LEAST_LOG = 1e-6  # a figure known better than this is exact
+
+
+@dataclass(frozen=True)
+class DriftPrior:
+    """Logarithms of the factors within which the session's figures are right (one sigma); 0: they are exact.
+
+    sigma: of the drift's standard deviations; time_constant: of its time constant.
+    """
+
+    sigma: float
+    time_constant: float
+
+
+EXACT = DriftPrior(0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class DriftFigures:
+    """Figures of the drift by data and session.
+
+    noise: the pose errors with these figures; log (3,): logarithms of the factors of the sigmas of shifts, of those of
+    turns, and of the time constant; covariance (3, 3) of log; deviation (3,): log in units of what the session's
+    figures, right as far as they say, allow (0: not estimated).
+    """
+
+    noise: PoseNoise
+    log: Array
+    covariance: Array
+    deviation: Array
+
+    @classmethod
+    def of_session(cls, noise: PoseNoise) -> "DriftFigures":
+        """Return the session's figures as they are."""
+        return cls(noise, np.zeros(3), np.zeros((3, 3)), np.zeros(3))
+
+
+def drift_figures(
+    equations: Callable[[PoseNoise], NormalEquations], noise: PoseNoise, prior: DriftPrior
+) -> DriftFigures:
+    """Return the figures of the drift that data and session make most likely.
+
+    Parameters
+    ----------
+    equations : callable
+        The normal equations of the estimated parameters, for these pose errors.
+    noise : PoseNoise
+        The pose errors by the session's figures.
+    prior : DriftPrior
+        How well the session knows the drift's figures.
+    """
+    drifts = [bool(np.any(noise.drift[part] > 0)) for part in (SHIFTS, TURNS)]
+    known = np.array([prior.sigma if drifts[0] else 0.0, prior.sigma if drifts[1] else 0.0, prior.time_constant])
+    free = np.flatnonzero(known > LEAST_LOG) if noise.drifts else np.array([], dtype=np.int64)
+    if not len(free):
+        return DriftFigures.of_session(noise)
+    z, covariance, deviation = np.zeros(3), np.zeros((3, 3)), np.zeros(3)
+
+    def objective(values: Array) -> float:
+        z = np.zeros(3)
+        z[free] = values
+        return restricted(equations(noise.drifting(*np.exp(z).tolist()))) + float(np.sum((values / known[free]) ** 2))
+
+    found, curvature = _minimum(objective, len(free))
+    z[free] = found
+    of_free = 2 * np.linalg.inv(curvature)
+    covariance[np.ix_(free, free)] = of_free
+    # the prior has that part of its variance that the data could have moved the estimate by
+    movable = np.maximum(known[free] ** 2 - np.diag(of_free), LEAST_LOG**2)
+    deviation[free] = found / np.sqrt(movable)
+    return DriftFigures(noise.drifting(*np.exp(z).tolist()), z, covariance, deviation)
+
+
+def restricted(equations: NormalEquations) -> float:
+    """Return -2 log L, but for constants, of the figures with which these equations were made."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(equations.normal), 1e-300))
+    scaled = equations.normal * np.outer(scale, scale)
+    step = -scale * np.linalg.solve(scaled, scale * equations.right)
+    of_parameters = float(np.linalg.slogdet(scaled)[1] - 2 * np.sum(np.log(scale)))
+    return equations.squares + float(equations.right @ step) + equations.log_determinant + of_parameters
+
+
+def _minimum(objective: Callable[[Array], float], size: int) -> tuple[Array, Array]:
+    """Return the minimum (k,) of a function near zero, and its second derivatives (k, k) there."""
+    place, value = np.zeros(size), objective(np.zeros(size))
+    slope, curvature = _derivatives(objective, place, value)
+    for _ in range(MAX_STEPS):
+        step = -np.linalg.solve(curvature, slope)
+        if -float(slope @ step) < 2 * NEAR:
+            return np.clip(place + step, -LARGEST_LOG, LARGEST_LOG), curvature
+        step *= min(1.0, FARTHEST_STEP / float(np.max(np.abs(step))))
+        for _ in range(HALVINGS):
+            there = np.clip(place + step, -LARGEST_LOG, LARGEST_LOG)
+            lower = objective(there)
+            if lower < value:
+                break
+            step = step / 2
+        else:
+            break
+        place, value = there, lower
+        slope, curvature = _derivatives(objective, place, value)
+    return place, curvature
+
+
+def _derivatives(objective: Callable[[Array], float], place: Array, value: float) -> tuple[Array, Array]:
+    """Return the first (k,) and the second derivatives (k, k), by differences; the second ones positive definite."""
+    steps = STEP * np.eye(len(place))
+    ahead, behind = (np.array([objective(place + sign * step) for step in steps]) for sign in (1, -1))
+    curvature = np.diag(ahead + behind - 2 * value)
+    for i in range(len(place)):
+        for k in range(i):
+            both = objective(place + steps[i] + steps[k])
+            curvature[i, k] = curvature[k, i] = both - ahead[i] - ahead[k] + value
+    values, vectors = np.linalg.eigh(curvature / STEP**2)
+    least = 1e-6 * max(float(values[-1]), 1e-300)
+    return (ahead - behind) / (2 * STEP), (vectors * np.maximum(np.abs(values), least)) @ vectors.T
