@@ -61,10 +61,8 @@ the body at p, T = R_target_from_body, its velocity (ṗ, ω) in the target fram
     incidence:                 -(1 + n · d) / (√2 - 1)
     level range:               n · d if the surface is horizontal, else 0
 
-The bias of ranges with incidence i, cos i = -n · d, is b (1 / cos i - 1) / (√2 - 1): none where a ray meets its surface
-at right angles, b at 45°, 6.9 b at 75°. It grows like the range within the footprint, ρ / cos i, and is to stand for
-whatever else goes with incidence. As all points lie on fronts, n · d < 0, it changes v by -b (1 + n · d) / (√2 - 1),
-and its column needs the features 1 and n · d only.
+The bias of ranges with incidence i, cos i = -n · d, is b (1 / cos i - 1) / (√2 - 1): none at right angles, b at 45°,
+6.9 b at 75°. As all points lie on fronts, n · d < 0, it changes v by -b (1 + n · d) / (√2 - 1).
 
 The turns need no reduction of X - c by a horizontal face's height: the reduction is along n, and t_k · n = 0.
 """
@@ -156,9 +154,8 @@ class SoundingsOnSurface:
 def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> PointDesign:
     """Return the design of soundings, F = 10; see the module's docstring for each formula.
 
-    A row of the design matrix is q · C: a sounding's features q times its interval's design C of
-    :func:`parameter_design`. A feature is a number of the sounding that multiplies a row of C. They are
-    q = (1, α, β, …) and the derivatives of v by ``MBES_FEATURES`` of :mod:`~pipeline.maths.adjustment.parameters`.
+    The features q = (1, α, β, …) multiply the rows of :func:`parameter_design`. Those beyond β are the derivatives of v
+    by ``MBES_FEATURES`` of :mod:`~pipeline.maths.adjustment.parameters`.
     """
     points_m, axes, r = soundings.points_m, soundings.axes, soundings.r
     x, y, z = points_m
