@@ -35,9 +35,8 @@ def laser_problem(session: SessionData, calibration: LaserCalibration) -> Calibr
     )
     coarse = coarse_covariance(session.laser, calibration)
     design = design_prior(session.target, session.target_pose, calibration)
-    prior = PriorInformation(
-        pose_noise(session.ins), design, required_sigmas(coarse, calibration), drift_prior(session.ins)
-    )
+    required = required_sigmas(coarse, calibration)
+    prior = PriorInformation(pose_noise(session.ins), design, required, drift_prior(session.ins))
     # a fixed mount parameter has the error of the coarse mount
     errors = laser_errors(model.coarse.names, session.laser, session.as_built)
     sigmas = np.concatenate([np.sqrt(np.diag(coarse)), errors.sigmas[N_MOUNT:]])

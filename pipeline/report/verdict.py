@@ -20,7 +20,8 @@ The limits are defined at these places (paths from ``pipeline/``):
 * result and convergence of a patent's form: classes ``FitPlanes``, ``AngleIterate`` and ``Offsets`` of config/pool.py.
 
 Warnings do not reject. Their limits are the ``MAX_...`` constants of warnings.py, as_built.py and cast_checks.py,
-``MAX_DRIFT_RATIO`` and ``MAX_DEVIATION`` of drift_check.py, and, for gaps in the geometry, ``NEAR_M`` of planning/observability.py.
+``MAX_DRIFT_RATIO`` and ``MAX_DEVIATION`` of drift_check.py, and, for gaps in the geometry, ``NEAR_M`` of
+planning/observability.py.
 ``MAX_DRIFT_M`` and ``SAME_STEP_DEG`` of residual_words.py only change the words of a reason.
 """
 
