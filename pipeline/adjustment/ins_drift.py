@@ -109,15 +109,11 @@ def drift_figures_table(configured: PoseNoise, figures: DriftFigures) -> pd.Data
     figures : DriftFigures
         Those by data and session.
     """
-    # of each figure: its component of the drift (None: the time constant), and its place among the logarithms
-    places = {"horizontal_m": (0, 0), "vertical_m": (2, 0), "roll_pitch_deg": (3, 1), "heading_deg": (5, 1)}
-    places_of_all: dict[str, tuple[int | None, int]] = {**places, "time_constant_s": (None, 2)}
-    sigmas, rows = np.sqrt(np.diag(figures.covariance)), []
-    for name, (component, place) in places_of_all.items():
-        before, after = (
-            noise.time_constant_s if component is None else float(noise.drift[component])
-            for noise in (configured, figures.noise)
-        )
-        unit = float(np.degrees(1.0)) if name.endswith("_deg") else 1.0
-        rows.append((name, before * unit, after * unit, sigmas[place], figures.deviation[place]))
-    return pd.DataFrame(rows, columns=["figure", "configured", "estimated", "sigma_log", "deviation"])
+    table: dict[str, Any] = {"figure": [*AXES, "time_constant_s"]}
+    for column, noise in (("configured", configured), ("estimated", figures.noise)):
+        horizontal, _, vertical, *angles = noise.drift.tolist()
+        turns = np.degrees([angles[0], angles[2]]).tolist()
+        table[column] = [horizontal, vertical, *turns, noise.time_constant_s]
+    of_figure = [0, 0, 1, 1, 2]  # places among the logarithms: shifts, turns, time constant
+    table["sigma_log"] = np.sqrt(np.diag(figures.covariance))[of_figure].tolist()
+    return pd.DataFrame(table | {"deviation": figures.deviation[of_figure]})

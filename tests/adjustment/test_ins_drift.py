@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
+from pipeline.adjustment.ins_drift import drift_figures_table, drift_model, drift_prior, pose_noise, sigmas_from_files
 from pipeline.config.session import Drift, Ins
 from pipeline.config.yaml_models import parse
+from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftFigures
 from pipeline.readers.file_summaries import thin_sigmas
 
 NS = 1_000_000_000
@@ -95,3 +96,23 @@ def test_two_rows_a_second_are_kept() -> None:
     assert kept["t_ns"].tolist() == [7 + k * NS // 2 for k in range(20)]
     assert kept["up_m"].tolist() == [t / NS for t in kept["t_ns"].tolist()]
     assert thin_sigmas({}) == {}
+
+
+def test_the_table_has_each_figure_in_its_unit() -> None:
+    drift = {"horizontal_m": 0.01, "vertical_m": 0.02, "roll_pitch_deg": 0.03, "heading_deg": 0.04}
+    settings = ins(drift=drift | {"time_constant_s": 50.0})
+    noise = pose_noise(settings.drift, settings.white)
+    covariance, deviation = np.diag([0.01, 0.04, 0.09]), np.array([1.0, 2.0, -3.0])
+    found = DriftFigures(noise.drifting(2.0, 3.0, 0.5), np.zeros(3), covariance, deviation)
+    table = drift_figures_table(noise, found).set_index("figure")
+    assert table["configured"].to_dict() == pytest.approx(drift | {"time_constant_s": 50.0})
+    factors = {"horizontal_m": 2, "vertical_m": 2, "roll_pitch_deg": 3, "heading_deg": 3, "time_constant_s": 0.5}
+    assert (table["estimated"] / table["configured"]).to_dict() == pytest.approx(factors)
+    assert table["sigma_log"].tolist() == pytest.approx([0.1, 0.1, 0.2, 0.2, 0.3])
+    assert table["deviation"].tolist() == [1.0, 1.0, 2.0, 2.0, -3.0]
+
+
+def test_how_well_the_figures_are_known_is_a_factor() -> None:
+    assert drift_prior(ins(drift_within={"sigmas": 1.0, "time_constant": 1.0}).drift_within) == EXACT
+    assert drift_prior(ins().drift_within).sigma == pytest.approx(np.log(2.0))
+    assert drift_prior(ins().drift_within).time_constant == pytest.approx(np.log(3.0))

@@ -35,10 +35,10 @@ within which the session's figure holds (one sigma). Within a session not much l
 2 σ² / τ well, σ and τ themselves hardly: along this valley the prior decides. Within shifts, and within turns, the
 components keep the session's ratios: the data hardly tell them apart.
 
-J is minimised by Newton's method with differences (10 evaluations a step). Its second derivatives give the covariance
-of z, 2 (∂²J)⁻¹. An estimate by data and prior varies less than the prior, z ~ N(0, S - C) for a session whose figures
-are right as far as they say, with S = diag(s²) and C the covariance (Var z_true = Var estimate + Var of its error).
-This is the measure by which data and session disagree.
+J is minimised by Newton's method (:mod:`~pipeline.maths.adjustment.newton`, 10 evaluations a step). Its second
+derivatives give the covariance of z, 2 (∂²J)⁻¹. An estimate by data and prior varies less than the prior, z ~ N(0, S -
+C) for a session whose figures are right as far as they say, with S = diag(s²) and C the covariance (Var z_true = Var
+estimate + Var of its error). This is the measure by which data and session disagree.
 """
 
 from collections.abc import Callable
@@ -48,15 +48,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.newton import newton_minimum
 from pipeline.maths.adjustment.pose_errors import SHIFTS, TURNS, PoseNoise
 
 Array = NDArray[np.float64]
-STEP = 0.05  # of the differences, in log figures
-FARTHEST_STEP = 1.0  # largest change of a log figure in one step
 LARGEST_LOG = float(np.log(1000.0))  # bound of the log figures: beyond it the drift is as good as absent, or white
-MAX_STEPS = 12
-NEAR = 0.2  # predicted decrease of J from which one last step is enough: half a sigma
-HALVINGS = 5
 LEAST_LOG = 1e-6  # a figure known better than this is exact
 
 
@@ -120,7 +116,7 @@ def drift_figures(
         z[free] = values
         return restricted(equations(noise.drifting(*np.exp(z).tolist()))) + float(np.sum((values / known[free]) ** 2))
 
-    found, curvature = _minimum(objective, len(free))
+    found, curvature = newton_minimum(objective, len(free), LARGEST_LOG)
     z[free] = found
     of_free = 2 * np.linalg.inv(curvature)
     covariance[np.ix_(free, free)] = of_free
@@ -137,39 +133,3 @@ def restricted(equations: NormalEquations) -> float:
     step = -scale * np.linalg.solve(scaled, scale * equations.right)
     of_parameters = float(np.linalg.slogdet(scaled)[1] - 2 * np.sum(np.log(scale)))
     return equations.squares + float(equations.right @ step) + equations.log_determinant + of_parameters
-
-
-def _minimum(objective: Callable[[Array], float], size: int) -> tuple[Array, Array]:
-    """Return the minimum (k,) of a function near zero, and its second derivatives (k, k) there."""
-    place, value = np.zeros(size), objective(np.zeros(size))
-    slope, curvature = _derivatives(objective, place, value)
-    for _ in range(MAX_STEPS):
-        step = -np.linalg.solve(curvature, slope)
-        if -float(slope @ step) < 2 * NEAR:
-            return np.clip(place + step, -LARGEST_LOG, LARGEST_LOG), curvature
-        step *= min(1.0, FARTHEST_STEP / float(np.max(np.abs(step))))
-        for _ in range(HALVINGS):
-            there = np.clip(place + step, -LARGEST_LOG, LARGEST_LOG)
-            lower = objective(there)
-            if lower < value:
-                break
-            step = step / 2
-        else:
-            break
-        place, value = there, lower
-        slope, curvature = _derivatives(objective, place, value)
-    return place, curvature
-
-
-def _derivatives(objective: Callable[[Array], float], place: Array, value: float) -> tuple[Array, Array]:
-    """Return the first (k,) and the second derivatives (k, k), by differences; the second ones positive definite."""
-    steps = STEP * np.eye(len(place))
-    ahead, behind = (np.array([objective(place + sign * step) for step in steps]) for sign in (1, -1))
-    curvature = np.diag(ahead + behind - 2 * value)
-    for i in range(len(place)):
-        for k in range(i):
-            both = objective(place + steps[i] + steps[k])
-            curvature[i, k] = curvature[k, i] = both - ahead[i] - ahead[k] + value
-    values, vectors = np.linalg.eigh(curvature / STEP**2)
-    least = 1e-6 * max(float(values[-1]), 1e-300)
-    return (ahead - behind) / (2 * STEP), (vectors * np.maximum(np.abs(values), least)) @ vectors.T
