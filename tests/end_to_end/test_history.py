@@ -44,8 +44,8 @@ def runs(undisturbed: tuple[Path, Told], tmp_path: Path) -> Path:
     planted(folder, template, "b_first", 1)
     planted(folder, template, "a_second", 2, session=HOSTILE)
     planted(folder, template, "refused", 3, verdict="rejected", z_m=0.5)
-    planted(folder, template, "moved", 4, z_m=0.01)
-    planted(folder, template, "after", 5, z_m=0.01, session='=HYPERLINK("x")')
+    planted(folder, template, "moved", 4, z_m=0.06)
+    planted(folder, template, "after", 5, z_m=0.06, session='=HYPERLINK("x")')
     planted(folder, template, "nothing", 6, verdict="rejected", nothing=True)
     return folder
 
@@ -74,7 +74,7 @@ def test_each_comparison_says_what_it_could_have_seen(undisturbed: tuple[Path, T
     planted(folder, template, "first", 1)
     planted(folder, template, "second", 2)
     planted(folder, template, "older", 3, without=("systematic", "limits"))
-    planted(folder, template, "moved", 4, z_m=0.05)
+    planted(folder, template, "moved", 4, z_m=0.06)
     assert poolcal("history", folder).status == 0
     table = table_of(folder).set_index("run")
     assert table["answer"].tolist() == ["", "too uncertain", "too uncertain", "moved"]
