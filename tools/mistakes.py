@@ -53,7 +53,7 @@ def named_first(reason_codes: list[str], artefacts: Mapping[str, Any]) -> frozen
     first = next(iter(reason_codes), "")
     if ReasonCode.SUSPECTED_CAUSE in reason_codes and not local & set(reason_codes):
         freed = artefacts["adjust/freed"]
-        beyond = freed["value"].abs() > SIGNIFICANT * np.hypot(freed["sigma"], freed["considered"])
+        beyond = freed["value"].abs() > SIGNIFICANT * freed["expected"]
         causes = freed[~freed["estimated"] & beyond]
         parameter = str(causes.loc[(causes["value"].abs() / causes["sigma"]).idxmax(), "unknown"])
         return frozenset({parameter, *parameter.split("_")})

@@ -59,7 +59,7 @@ def result_tables(
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
-        "freed": _single_parameter_table(adjustment, problem.consider.sigmas, estimate),
+        "freed": _single_parameter_table(adjustment, problem.consider, estimate),
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
         "drift": _drift_table(adjustment, t_ns),
@@ -147,26 +147,28 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
 
 
 def _single_parameter_table(
-    adjustment: MountAdjustment, consider_sigmas: Array, estimate: pd.DataFrame
+    adjustment: MountAdjustment, consider: ConsiderErrors, estimate: pd.DataFrame
 ) -> pd.DataFrame:
     """Return table ``freed``: rows of the fixed parameters (test, effect on the mount) and of the additional ones."""
     state, solution, equations = adjustment.state, adjustment.solution, adjustment.equations
-    tests = {test.parameter: test for test in single_parameter_tests(equations.normal, equations.right, solution)}
+    found = single_parameter_tests(equations.normal, equations.right, solution, consider)
+    tests, considered = {test.parameter: test for test in found}, consider.sigmas
     sensitivity = solution.sensitivity_of(np.arange(N_MOUNT))
     rows = []
     for place, number in enumerate(solution.fixed.tolist()):
-        test = tests.get(number, ParameterTest(number, np.nan, np.nan))
-        effect = sensitivity[:, place] * consider_sigmas[number]
-        row: dict[str, Any] = {"unknown": state.names[number], "considered": consider_sigmas[number]}
-        row |= {"estimated": False, "value": test.value, "sigma": test.sigma}
+        test = tests.get(number, ParameterTest(number, np.nan, np.nan, np.nan))
+        effect = sensitivity[:, place] * considered[number]
+        row: dict[str, Any] = {"unknown": state.names[number], "considered": considered[number]}
+        row |= {"estimated": False, "value": test.value, "sigma": test.sigma, "expected": test.expected}
         rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(MOUNT_NAMES)})
     on_surfaces = range(state.surface_slice.start, state.surface_slice.stop)
     by_name = estimate.set_index("unknown", drop=False)
     for number in solution.estimated.tolist():
         if number >= N_MOUNT and number not in on_surfaces:
             parameter = by_name.loc[state.names[number]]
-            row = {"unknown": parameter["unknown"], "estimated": True, "considered": consider_sigmas[number]}
+            row = {"unknown": parameter["unknown"], "estimated": True, "considered": considered[number]}
             row |= {"value": parameter["value"], "sigma": parameter["sigma_total"]}
+            row |= {"expected": np.hypot(parameter["sigma_total"], considered[number])}
             rows.append(row | {f"effect_{name}": 0.0 for name in MOUNT_NAMES})
     return pd.DataFrame(rows)
 

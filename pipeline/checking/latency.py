@@ -23,7 +23,7 @@ def latency_findings(freed: pd.DataFrame) -> Iterator[Finding]:
     ``freed`` is the adjustment's table of single-parameter tests.
     """
     fixed = freed[~freed["estimated"] & np.isfinite(freed["value"])].to_dict("records")
-    statistic = {str(row["unknown"]): abs(row["value"]) / np.hypot(row["sigma"], row["considered"]) for row in fixed}
+    statistic = {str(row["unknown"]): abs(row["value"]) / row["expected"] for row in fixed}
     if not statistic or not max(statistic, key=lambda name: statistic[name]).endswith("_latency"):
         return
     latencies = {

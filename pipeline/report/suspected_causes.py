@@ -1,10 +1,10 @@
 """Suspected causes (fixed parameters that the residuals contradict), and the parameters that adjust.free names.
 
 Table ``freed`` has the single-parameter test of each fixed parameter. The residuals contradict a parameter if its
-estimate is farther from zero than noise and its a-priori sigma explain. One error often moves the estimates of several
-parameters. The report names the cause that explains most, with the largest value over sigma. Where one parameter is
-contradicted, this may be another that is not: a parameter with a large a-priori sigma, which explains the residuals
-without being off its setting.
+estimate is farther from zero than noise and all a-priori errors explain: its own, and those of others that look alike.
+One error often moves the estimates of several parameters. The report names the cause that explains most, with the
+largest value over sigma. Where one parameter is contradicted, this may be another that is not: a parameter with a large
+a-priori sigma, which explains the residuals without being off its setting.
 """
 
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ class EstimatedParameter:
     unknown : name of the parameter
     value, sigma_total : estimate and total sigma in ``unit``
     words : the estimate, and the setting or device to check
-    is_significant : whether the value is farther from zero than its sigma and its a-priori sigma explain
+    is_significant : whether the value is farther from zero than its total sigma and its a-priori sigma explain
     """
 
     unknown: str
@@ -81,4 +81,4 @@ def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:
 
 
 def _is_significant(row: Mapping[Any, Any]) -> bool:
-    return bool(abs(row["value"]) > SIGNIFICANT * np.hypot(row["sigma"], row["considered"]))
+    return bool(abs(row["value"]) > SIGNIFICANT * row["expected"])

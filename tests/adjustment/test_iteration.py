@@ -75,7 +75,8 @@ def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str
     """While fixed, its test is far beyond its sigma; estimated by adjust.free, it leaves the mount right again."""
     held = solved(3, NOISY, **options)
     equations, names = held.equations, held.state.names
-    found_tests = single_parameter_tests(equations.normal, equations.right, held.solution)
+    nothing = ConsiderErrors(np.zeros(held.state.size))
+    found_tests = single_parameter_tests(equations.normal, equations.right, held.solution, nothing)
     tests = {names[one.parameter]: one for one in found_tests}
     assert abs(tests[name].value) > 10 * tests[name].sigma
     found = solved(3, NOISY, Adjust(free=(name,)), **options)

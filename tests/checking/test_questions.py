@@ -191,7 +191,7 @@ def test_families_of_soundings_stand_in_their_order_with_their_share() -> None:
 
 def test_a_latency_is_told_as_an_interval() -> None:
     """A guess from a sample: the adjustment of all points finds the amount."""
-    row = {"unknown": "mbes_latency", "estimated": False, "value": 0.0156, "sigma": 0.0008, "considered": 0.0005}
+    row = {"unknown": "mbes_latency", "estimated": False, "value": 0.0156, "sigma": 0.0008, "expected": 0.001}
     (found,) = latency_findings(pd.DataFrame([row]))
     assert "mbes: its clock is 16 ms ahead of the INS's (14.0 to 17.2 ms, 95 %)" in found.words
     assert "adjust.free: [mbes_latency]" in found.words
@@ -200,7 +200,7 @@ def test_a_latency_is_told_as_an_interval() -> None:
 @pytest.mark.parametrize(("ahead_s", "said"), [(0.020, "behind"), (-0.020, "ahead of")])
 def test_a_latency_of_the_ins_is_given_with_its_sign(ahead_s: float, said: str) -> None:
     """Both sensors are ahead of an INS that is behind them; latency is taken off the recorded time."""
-    of = {"estimated": False, "value": ahead_s, "sigma": 0.0008, "considered": 0.0005}
+    of = {"estimated": False, "value": ahead_s, "sigma": 0.0008, "expected": 0.001}
     (found,) = latency_findings(pd.DataFrame([{"unknown": f"{sensor}_latency"} | of for sensor in ("laser", "mbes")]))
     assert f"ins: its clock is 20 ms {said} both sensors' (18.9 to 21.1 ms, 95 %)" in found.words
     assert f"about {-ahead_s:+.3f} s, to ins.latency_s" in found.words

@@ -30,7 +30,7 @@ from tests.support.evidence import (
 IN_TURN = replace(ADJUSTED, method="patent_alternating")
 LIMITS = ((0.006, 6e-4), (0.0059, 5.9e-4))  # either side of the largest total sigmas
 LEVEL = ADJUSTED.test_level
-CLOCK = {"sigma": 3e-4, "considered": 4e-4}
+CLOCK = {"sigma": 3e-4, "expected": 5e-4}
 
 
 def test_a_good_session_has_no_reason():
@@ -99,8 +99,8 @@ def test_both_sensors_off_together_is_the_ins():
 
 
 def test_both_sides_of_four_sigmas():
-    """Noise and the a-priori sigma count together."""
-    near, far = ({"value": value, "sigma": 3e-4, "considered": 4e-4} for value in (1.99e-3, 2.01e-3))
+    """Noise and all a-priori sigmas count together."""
+    near, far = ({"value": value, "sigma": 3e-4, "expected": 5e-4} for value in (1.99e-3, 2.01e-3))
     assert judged(evidence(freed=near)) == []
     assert codes(judged(evidence(freed=far))) == [ReasonCode.SUSPECTED_CAUSE]
 
@@ -112,13 +112,15 @@ def test_what_was_freed_and_is_not_as_the_session_says(value, expected):
 
 
 def test_what_was_freed_where_there_is_no_result():
-    nothing = {"unknown": "mbes_latency", "estimated": True, "considered": 4e-4, "value": 0.0, "sigma": np.nan}
+    nothing = {"unknown": "mbes_latency", "estimated": True, "expected": 4e-4, "value": 0.0, "sigma": np.nan}
     assert judged(evidence(freed=nothing)) == []
 
 
 def test_of_several_causes_the_most_telling_is_named():
     sigmas = (("mbes_range", 1e-3), ("laser_range", 1e-4))
-    sonar, laser = ({"unknown": name, "estimated": False, "considered": 0.0, "sigma": sigma} for name, sigma in sigmas)
+    sonar, laser = (
+        {"unknown": name, "estimated": False, "expected": sigma, "sigma": sigma} for name, sigma in sigmas
+    )
     both = replace(evidence(), freed=pd.DataFrame([sonar | {"value": 0.01}, laser | {"value": 0.002}]))
     (reason,) = judged(both)
     assert reason.code == ReasonCode.SUSPECTED_CAUSE
@@ -128,7 +130,7 @@ def test_of_several_causes_the_most_telling_is_named():
 @pytest.mark.parametrize(("value", "is_named"), [(0.00181, True), (0.00179, False)])
 def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_named):
     names = (("mbes_range", 0.002), ("laser_range", value), ("mbes_level_range", 0.001))
-    one = {"estimated": False, "considered": 0.0, "sigma": 1e-4}
+    one = {"estimated": False, "expected": 1e-4, "sigma": 1e-4}
     (reason,) = judged(replace(evidence(), freed=pd.DataFrame([one | {"unknown": k, "value": v} for k, v in names])))
     words = reason.words
     assert "(20 sigma): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words

@@ -49,7 +49,7 @@ def test_names_that_would_be_right_are_names_of_the_program() -> None:
 
 def artefacts(*causes: tuple[str, float]) -> dict[str, Any]:
     """Tests of fixed parameters, each of a sigma of 1, and two means of faces."""
-    freed = pd.DataFrame(causes, columns=["unknown", "value"]).assign(sigma=1.0, considered=0.5, estimated=False)
+    freed = pd.DataFrame(causes, columns=["unknown", "value"]).assign(sigma=1.0, expected=1.1, estimated=False)
     patterns = pd.DataFrame({"by": ["face", "face", "pass"], "low": [0.0, 1.0, 2.0], "normalised": [5.0, -6.0, 9.0]})
     return {"adjust/freed": freed, "adjust/patterns": patterns, "segment/faces": pd.DataFrame({"name": ["P2", "P1-0"]})}
 

@@ -56,7 +56,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         "no mount parameter can be estimated: this target and these passes determine none within its limit",
     ),
     (
-        {"freed": {"unknown": "mbes_latency", "estimated": True, "value": 2.01e-3, "sigma": 3e-4, "considered": 4e-4}},
+        {"freed": {"unknown": "mbes_latency", "estimated": True, "value": 2.01e-3, "sigma": 3e-4, "expected": 5e-4}},
         ReasonCode.ESTIMATE_OFF_SETTINGS,
         "adjust.free found the sonar's clock: its latency is +2.0 ± 0.3 ms more than mbes.latency_s says: the mount "
         "is valid only with that value; correct it, in the settings and in the survey, and run again",

@@ -85,6 +85,7 @@ FREED = Artefact(
         Column("considered", F64, "rad, m, s, 1 or 1/s", "its a-priori sigma, as a consider parameter"),
         Column("value", F64, "rad, m, s, 1 or 1/s", "its estimate, if it alone were estimated (NaN: not determined)"),
         Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of this estimate"),
+        Column("expected", F64, "rad, m, s, 1 or 1/s", "its standard deviation if all a-priori errors hold"),
         *(
             Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount by an error of one a-priori sigma")
             for kind, unit in (("rotation", "rad"), ("lever_arm", "m")) for axis in "xyz"

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment.solution import CORRELATION_LIMIT, correlated_pair, weakest_direction
+from pipeline.maths.adjustment.solution import (
+    CORRELATION_LIMIT,
+    ConsiderErrors,
+    correlated_pair,
+    single_parameter_tests,
+    solve,
+    weakest_direction,
+)
 
 YAW, ARM_Y = 2, 4
 
@@ -44,3 +51,20 @@ def test_what_is_said_of_the_sigma_is_what_fixing_the_other_does(rho: float) -> 
 
 def test_those_that_cannot_be_told_apart_at_all_leave_a_number() -> None:
     assert "1000.0 times smaller" in weakest_direction(covariance_of(1.0))
+
+
+def test_a_tested_value_scatters_by_the_errors_of_all_that_look_alike() -> None:
+    """Noise, and errors of three fixed parameters, against the sigmas and the expected standard deviations."""
+    rng = np.random.default_rng(4)
+    design = rng.normal(size=(40, 5))
+    design[:, 4] = 0.8 * design[:, 3] + 0.2 * design[:, 4]  # two of the fixed parameters look alike
+    consider = ConsiderErrors(np.array([0.0, 0.0, 0.3, 0.2, 1.0]))
+    normal, values, tests = design.T @ design, [], []
+    for _ in range(4000):
+        v = rng.normal(size=40) - design @ (consider.sigmas * rng.normal(size=5))
+        right = design.T @ v
+        tests = single_parameter_tests(normal, right, solve(normal, right, [0, 1]), consider)
+        values.append([one.value for one in tests])
+    assert [one.parameter for one in tests] == [2, 3, 4]
+    np.testing.assert_allclose(np.std(values, axis=0), [one.expected for one in tests], rtol=0.04)
+    assert tests[1].expected > 3 * np.hypot(tests[1].sigma, 0.2)
