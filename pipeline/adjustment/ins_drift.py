@@ -97,7 +97,7 @@ def drift_figures_table(configured: PoseNoise, figures: DriftFigures) -> pd.Data
     figures : DriftFigures
         Those by data and session.
     """
-    table = {"figure": [*AXES, "time_constant_s"]}
+    table: dict[str, list[Any]] = {"figure": [*AXES, "time_constant_s"]}
     for column, noise in (("configured", configured), ("estimated", figures.noise)):
         horizontal, _, vertical, *angles = noise.drift.tolist()
         turns = np.degrees([angles[0], angles[2]]).tolist()
