@@ -64,7 +64,8 @@ def laser_problem(
     """
     state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, session.surfaces, "laser")
     required = required_sigmas(coarse_covariance(laser, calibration), calibration)
-    prior = PriorInformation(session.noise, design_prior(session.target, set_up, calibration), required, session.drift)
+    # the figures of the drift stay as given: corrected by likelihood they made the sigmas of pitch and roll too small
+    prior = PriorInformation(session.noise, design_prior(session.target, set_up, calibration), required)
     return problem_at(session, state, prior, {"laser": laser})
 
 

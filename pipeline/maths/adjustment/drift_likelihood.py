@@ -36,9 +36,9 @@ within which the session's figure holds (one sigma). Within a session not much l
 components keep the session's ratios: the data hardly tell them apart.
 
 J is minimised by Newton's method (:mod:`~pipeline.maths.adjustment.newton`, 10 evaluations a step). Its second
-derivatives give the covariance of z, 2 (∂²J)⁻¹. An estimate by data and prior varies less than the prior, z ~ N(0, S -
-C) for a session whose figures are right as far as they say, with S = diag(s²) and C the covariance (Var z_true = Var
-estimate + Var of its error). This is the measure by which data and session disagree.
+derivatives give the covariance of z, 2 (∂²J)⁻¹. Along the valley J is far from quadratic, and this variance may exceed
+the prior's. So data and session are compared by z_i / s_i alone. An estimate by both varies less than the prior (Var
+z_true = Var estimate + Var of its error), so that this measure says too rarely, never too often, that they disagree.
 """
 
 from collections.abc import Callable
@@ -75,8 +75,8 @@ class DriftFigures:
     """Figures of the drift by data and session.
 
     noise: the pose errors with these figures; log (3,): logarithms of the factors of the sigmas of shifts, of those of
-    turns, and of the time constant; covariance (3, 3) of log; deviation (3,): log in units of what the session's
-    figures, right as far as they say, allow (0: not estimated).
+    turns, and of the time constant; covariance (3, 3) of log; deviation (3,): log in sigmas of the prior (0: not
+    estimated).
     """
 
     noise: PoseNoise
@@ -120,9 +120,7 @@ def drift_figures(
     z[free] = found
     of_free = 2 * np.linalg.inv(curvature)
     covariance[np.ix_(free, free)] = of_free
-    # the prior has that part of its variance that the data could have moved the estimate by
-    movable = np.maximum(known[free] ** 2 - np.diag(of_free), LEAST_LOG**2)
-    deviation[free] = found / np.sqrt(movable)
+    deviation[free] = found / known[free]
     return DriftFigures(noise.drifting(*np.exp(z).tolist()), z, covariance, deviation)
 
 
