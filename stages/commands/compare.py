@@ -56,7 +56,7 @@ def compare_with_truth(run: Path, truth_path: Path) -> tuple[str, bool]:
     within = error is not None and bool(np.all(np.abs(error) <= limit))
     accepted = result["verdict"] == "accepted"
     bound = "sigma" if sigma is not None else "the largest sigma allowed"
-    lines += ["", "error: what is still wrong; of angles the rotation from found to true about the body's axes"]
+    lines += ["", "error: truth minus calibrated; of angles, the rotation from calibrated to true, body axes"]
     how = f"{'every error is' if within else 'an error is not'} within {LIMIT:g} {bound}"
     lines.append(f"{chosen}: {how if accepted else 'the calibration was rejected'}")
     return "\n".join(lines), accepted and within
