@@ -139,7 +139,7 @@ def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -
     for sensor, intervals in accumulation.sums.items():
         before = weighting.factors_of(sensor, surfaces)
         parts = [scatter(intervals, intervals.surface == number, weighting.kept) for number in surfaces]
-        change, dof = np.array([(max(part.factor, LEAST_SCALE**2), part.dof) for part in parts]).T
-        factors[sensor] = shrunk_factors(before * change, dof, level)
+        change, dof = np.array([(part.factor, part.dof) for part in parts]).T
+        factors[sensor] = shrunk_factors(np.maximum(before * change, LEAST_SCALE**2), dof, level)
         sums[sensor] = rescaled(intervals, factors[sensor] / before)
     return replace(accumulation, sums=sums), replace(weighting, factors=factors)

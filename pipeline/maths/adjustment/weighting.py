@@ -138,10 +138,10 @@ def noise_seen_by_laser(noise: PoseNoise, laser: EpochVarianceFactor) -> PoseNoi
     """Return the noise, its white part multiplied by the laser's variance factor if that is known well enough.
 
     It is, if its sigma is small (SURE), or if it differs from 1 by more than CERTAIN sigmas: then the stated noise is
-    the worse of both. The factor may be zero. (Without any white noise its estimate is negative as often as not.)
+    the worse of both. (Without any white noise its estimate is negative as often as not.)
     """
     is_sure = laser.sigma < SURE * max(laser.factor, 1.0) or abs(laser.factor - 1) > CERTAIN * laser.sigma
-    return noise.scaled(min(max(laser.factor, 0.0), UNLIKELY)) if is_sure else noise
+    return noise.scaled(min(max(laser.factor, 1 / UNLIKELY), UNLIKELY)) if is_sure else noise
 
 
 class Residuals(Protocol):
