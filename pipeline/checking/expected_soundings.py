@@ -31,6 +31,7 @@ from pipeline.target.surface import ClosestSurface
 Array = NDArray[np.float64]
 RAN = 0.3  # share of a pass up to which the sonar counts as switched off
 POOR, NONE, FEWEST = 0.4, 0.15, 200  # found / expected below it: a look, a fault; fewest expected to judge
+SAMPLE_SIGMAS = 2.0
 USUAL = "usual: 60 to 120 %"
 NEAR_M = 0.35  # a sounding placed with the coarse mount counts for the nearest face within this distance
 PINGS, BEAMS = 400, 100_000  # pings that are cast as rays, and rows from which the beams' angles are taken
@@ -39,10 +40,19 @@ FARTHEST_M = 100.0
 
 @dataclass(frozen=True)
 class SoundingCounts:
-    """Numbers of soundings on each face (f,), in the order of the model's faces: expected, and found (estimated)."""
+    """Numbers of soundings on each face (f,), in the order of the model's faces: expected, and found (estimated).
+
+    each: number of soundings for which one of the sample stands.
+    """
 
     expected: Array
     found: Array
+    each: float = 1.0
+
+    def found_at_most(self, faces: NDArray[np.bool_]) -> float:
+        """Return the largest number found on these faces (f,) that the sample leaves likely: two of its sigmas more."""
+        found = float(self.found[faces].sum())
+        return found + SAMPLE_SIGMAS * float(np.sqrt(found * self.each))
 
 
 @dataclass(frozen=True)
@@ -98,8 +108,9 @@ def count_soundings(
     face = np.concatenate(faces) if faces else _nearest_faces(track, sample, model)
     rows_read = labelled_rows if faces else len(sample.t_ns)
     rows = sum(file.records for file in files if file.sensor == "mbes")
-    found = np.bincount(face[face >= 0], minlength=len(model.faces)) * (rows / max(1, rows_read))
-    return SoundingCounts(expected, np.asarray(found, dtype=np.float64))
+    each = rows / max(1, rows_read)
+    found = np.bincount(face[face >= 0], minlength=len(model.faces)) * each
+    return SoundingCounts(expected, np.asarray(found, dtype=np.float64), each)
 
 
 def _beams_that_meet(pings: PingsOnTarget, t_ns: Times) -> Array:
@@ -149,16 +160,17 @@ def faces_missed(model: TargetModel, counts: SoundingCounts) -> Iterator[Finding
     half_told = False
     for words, half in (("lower", deep), ("upper", ~deep)):
         expected, found = float(counts.expected[half].sum()), float(counts.found[half].sum())
-        if expected >= FEWEST and found < POOR * expected:
+        if expected >= FEWEST and counts.found_at_most(half) < POOR * expected:
             half_told = True
             yield Finding(
                 "faces",
                 f"mbes: about {found:.0f} soundings on the faces in the {words} half of the water, where these pings "
                 f"should give about {expected:.0f} ({found / expected:.0%}; {USUAL}): the fan does not reach them, or "
                 f"sees little there; {remedy}",
-                "fault" if found < NONE * expected else "look",
+                "fault" if counts.found_at_most(half) < NONE * expected else "look",
             )
-    bare = (counts.expected >= FEWEST) & (counts.found < NONE * counts.expected)
+    at_most = np.array([counts.found_at_most(face) for face in np.eye(len(model.faces), dtype=bool)])
+    bare = (counts.expected >= FEWEST) & (at_most < NONE * counts.expected)
     if bare.any() and not half_told:
         barest = int(np.argmax(np.where(bare, counts.expected, 0.0)))
         others = f", and {plural(int(bare.sum()) - 1, 'other face')} likewise" if bare.sum() > 1 else ""

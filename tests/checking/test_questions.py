@@ -167,6 +167,16 @@ def test_how_many_soundings_are_too_few(share: float, severity: str | None) -> N
     assert all(f"({share:.0%}; usual: 60 to 120 %)" in one.words for one in found)
 
 
+@pytest.mark.parametrize(("each", "severity"), [(1.0, "look"), (50.0, "look"), (400.0, None)])
+def test_a_small_sample_does_not_tell_that_soundings_are_few(each: float, severity: str | None) -> None:
+    """Some 4000 in each half: with one in 400 read they are ten soundings, and may as well be twice as many."""
+    model = target_of(_blocks())
+    wanted = np.full(len(model.faces), 1000.0)
+    counts = expected_soundings.SoundingCounts(wanted, 0.3 * wanted, each)
+    found = expected_soundings.faces_missed(model, counts)
+    assert {one.severity for one in found} == ({severity} if severity else set())
+
+
 def test_one_face_that_is_bare_is_to_be_looked_at() -> None:
     model = target_of(_blocks())
     wanted = np.full(len(model.faces), 1000.0)

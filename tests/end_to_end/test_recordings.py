@@ -233,7 +233,7 @@ def test_two_runs_in_one_recording(undisturbed: tuple[Path, Told], tmp_path: Pat
     shown = points(found["/both/a"])
     np.testing.assert_allclose(shown[np.lexsort(shown.T)], after[np.lexsort(after.T)], atol=1e-5)  # the mount is a's
     assert "/pool/laser" not in found
-    assert "the same result in both." in text(found, "/tables/comparison")
+    assert "The same result in both." in text(found, "/tables/comparison")
     assert "ACCEPTED" in text(found, "/b/tables/summary")
     told = poolcal("view", undisturbed[0], run, "--stage", "adjust")
     assert (told.status, "two runs are shown as a whole" in told.err) == (2, True)
