@@ -163,7 +163,8 @@ def margin_m2(pose: pd.Series) -> float:
     return float(pose["agreement_m2"] - pose["rival_agreement_m2"])
 
 
-@pytest.mark.parametrize("seed", often([9045], [9045, 9000, 9001]))
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", [9045, 9000, 9001])
 def test_twelve_passes_with_drift_are_not_ambiguous(seed: int) -> None:
     """In 9045 the laser's points of the back wall lay beside a rival's uppermost block."""
     campaign = next(one for one in CAMPAIGNS if one.name == "twelve passes, INS drift")

@@ -56,6 +56,7 @@ def by_azimuth(errors_of):
     return errors
 
 
+@pytest.mark.thorough
 def test_the_angles_do_not_know_north(by_azimuth):
     at_north = by_azimuth[0.0]["patent_literal"]
     for azimuth_deg in (90.0, 163.0):
@@ -63,6 +64,7 @@ def test_the_angles_do_not_know_north(by_azimuth):
     assert 0.01 < np.abs(at_north[:3]).max() < 0.5
 
 
+@pytest.mark.thorough
 def test_the_lever_arm_is_wrong_off_north(by_azimuth):
     """At 0° y has the whole x error in it, 80 mm, and no more; off north the differences belong to other axes."""
     x, y, z = by_azimuth[0.0]["patent_literal"][3:]
