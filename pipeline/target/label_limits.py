@@ -1,5 +1,7 @@
 """Conditions for labelling a sensor's points with a face, from the settings of stage segment."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.config.pool import Segment
@@ -20,14 +22,8 @@ def laser_limits(settings: Segment, water_level_m: float, gate_m: float, beam_m:
     beam_m
         Diameter of the laser's beam at the target.
     """
-    return LabelSettings(
-        gate_m=gate_m,
-        margin_m=settings.margin_m,
-        min_grazing_rad=float(np.radians(settings.min_grazing_deg)),
-        lowest_m=water_level_m + settings.water_margin_m,
-        spot_m=beam_m / 2,
-        seen="dry",
-    )
+    lowest_m = water_level_m + settings.water_margin_m
+    return replace(_common(settings, gate_m), lowest_m=lowest_m, spot_m=beam_m / 2, seen="dry")
 
 
 def sonar_limits(settings: Segment, water_level_m: float, gate_m: float) -> LabelSettings:
@@ -42,10 +38,9 @@ def sonar_limits(settings: Segment, water_level_m: float, gate_m: float) -> Labe
     gate_m
         Largest distance from the plane of the face.
     """
-    return LabelSettings(
-        gate_m=gate_m,
-        margin_m=settings.margin_m,
-        min_grazing_rad=float(np.radians(settings.min_grazing_deg)),
-        highest_m=water_level_m - settings.water_margin_m,
-        seen="wet",
-    )
+    highest_m = water_level_m - settings.water_margin_m
+    return replace(_common(settings, gate_m), highest_m=highest_m, seen="wet")
+
+
+def _common(settings: Segment, gate_m: float) -> LabelSettings:
+    return LabelSettings(gate_m, settings.margin_m, float(np.radians(settings.min_grazing_deg)))
