@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.consider import sonar_errors
+from pipeline.adjustment.consider import known_parameters, sonar_errors
 from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.laser_design import (
@@ -154,8 +154,10 @@ def calibration_problem(session: SessionData, inputs: Inputs, config: Config) ->
     laser, as_built = config.laser, config.as_built
     if config.mbes is not None:
         problem = sonar_problem(session, mount_of(config.mbes.mount), {"laser": laser, "mbes": config.mbes})
-        names = problem.model.coarse.names
-        return replace(problem, consider=sonar_errors(names, laser, config.mbes, as_built, session.target.depth_m))
+        state = problem.model.coarse
+        errors = sonar_errors(state.names, laser, config.mbes, as_built, session.target.depth_m)
+        known = known_parameters(state, errors, config.adjust.free)
+        return replace(problem, prior=replace(problem.prior, parameters=known), consider=errors)
     calibration = config.calibration
     assert isinstance(calibration, LaserCalibration)
     pose = target_frame(inputs.target_pose), float(np.radians(inputs.target_pose["azimuth_correction_deg"].iloc[0]))

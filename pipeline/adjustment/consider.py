@@ -1,7 +1,9 @@
-"""A-priori errors of the fixed parameters: systematic errors, which enter the total covariance.
+"""A-priori errors of parameters: systematic errors, which enter the total covariance.
 
-This module provides only the errors. pipeline/maths/adjustment/solution.py computes the total covariance C + S Q Sᵀ:
-``ConsiderErrors.covariance`` returns Q, and ``Solution.total_covariance`` the sum.
+The points tell something of errors of the wet faces, of biases that go with the incidence, and of the transmitter's
+place. These parameters are estimated; their a-priori sigma is prior information (:func:`known_parameters`). All others
+are fixed. This module provides only the errors. pipeline/maths/adjustment/solution.py computes the total covariance
+C + S Q Sᵀ: ``ConsiderErrors.covariance`` returns Q, and ``Solution.total_covariance`` the sum.
 """
 
 from collections.abc import Sequence
@@ -12,13 +14,15 @@ from numpy.typing import NDArray
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
 from pipeline.maths.adjustment.design_matrix import SPEED_M_S
-from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, PROJECTOR_PARAMETERS
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, PROJECTOR_PARAMETERS, State
+from pipeline.maths.adjustment.pseudo_observations import ParameterPrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 LEAST_SPAN_M = 0.1  # smallest depth and smallest span that count
 LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
+ESTIMATED_WITH_PRIOR = ("wet_", "mbes_incidence", "mbes_level_range", "laser_incidence", "projector_")  # beginnings
 
 
 def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
@@ -113,3 +117,27 @@ def sonar_errors(
     }
     sigmas = [of_sonar.get(name, sigma) for name, sigma in zip(names, errors.sigmas.tolist(), strict=True)]
     return ConsiderErrors(np.array(sigmas), errors.blocks)
+
+
+def known_parameters(state: State, errors: ConsiderErrors, free: Sequence[str]) -> ParameterPrior | None:
+    """Return the prior information of the additional parameters that are estimated: zero, with their a-priori sigmas.
+
+    A parameter whose sigma is zero is known exactly, and stays fixed. None if there is no such parameter.
+
+    Parameters
+    ----------
+    state : State
+        A state, for the names of the parameters, in which they are zero.
+    errors : ConsiderErrors
+        The a-priori errors; those of these parameters are independent.
+    free : sequence of str
+        Parameters that are estimated without prior information.
+    """
+    numbers = [
+        number
+        for number, name in enumerate(state.names)
+        if name.startswith(ESTIMATED_WITH_PRIOR) and name not in free and errors.sigmas[number] > 0
+    ]
+    if not numbers:
+        return None
+    return ParameterPrior(np.array(numbers), np.diag(errors.sigmas[numbers] ** 2), state)

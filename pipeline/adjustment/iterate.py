@@ -1,6 +1,6 @@
 """Values during the iteration of the adjustment: normal equations at them, a step from them, figures of the noise."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.normal_equations import Linearisation, reduced_intervals, updated_sums
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
-from pipeline.maths.adjustment.pseudo_observations import SurfacePrior
+from pipeline.maths.adjustment.pseudo_observations import Prior, PseudoObservations, all_pseudo_observations
 from pipeline.maths.adjustment.record_noise import record_noise_factor
 from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.adjustment.weighting import EpochVarianceFactor
@@ -28,7 +28,7 @@ class Iterate:
 
     linearisation: Linearisation
     drift: DriftEstimate
-    surfaces: SurfacePrior | None
+    priors: Sequence[Prior]
 
     def of(self, sums: Mapping[str, IntervalSums]) -> "Iterate":
         """Return the same values for other sums, linearised at them."""
@@ -41,15 +41,13 @@ class Iterate:
     def equations(
         self, noise: PoseNoise, selected: Integers | None = None, reduced: ReducedIntervals | None = None
     ) -> NormalEquations:
-        """Return the normal equations of all parameters, or of the selected ones, with the prior of the surfaces.
+        """Return the normal equations of all parameters, or of the selected ones, with the prior information.
 
         ``reduced``: those of :meth:`reduced` with the same white noise and parameters, if they are at hand.
         """
         reduced = self.reduced(noise.white, selected) if reduced is None else reduced
         equations, state = eliminate_drift(reduced, noise, self.drift), self.linearisation.state
-        if self.surfaces is None:
-            return equations
-        prior = self.surfaces.pseudo_observations(state)
+        prior = self.prior
         places = np.arange(state.size) if selected is None else selected
         return replace(
             equations,
@@ -57,6 +55,11 @@ class Iterate:
             right=equations.right + prior.right[places],
             squares=equations.squares + prior.squares,
         )
+
+    @property
+    def prior(self) -> PseudoObservations:
+        """The prior information, at these values."""
+        return all_pseudo_observations(self.priors, self.linearisation.state)
 
     def drift_figures(
         self, noise: PoseNoise, prior: DriftPrior, estimated: Integers, reduced: ReducedIntervals
@@ -79,7 +82,7 @@ class Iterate:
         sums = updated_sums(self.linearisation, step, DriftEstimate(self.drift.knots, drift_step))
         drift = self.drift.updated(drift_step)
         linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
-        return Iterate(linearisation, drift, self.surfaces), solution
+        return Iterate(linearisation, drift, self.priors), solution
 
     def record_noise(self, noise: PoseNoise) -> EpochVarianceFactor:
         """Return the variance factor of the records' white noise, from the laser's points."""

@@ -110,13 +110,13 @@ class MountAdjustment:
 
     @property
     def redundancy(self) -> float:
-        """Expectation of the sum of squares: the observations with a weight, less the number of estimated parameters.
+        """Expectation of the sum of squares: observations with a weight, prior information, less estimated parameters.
 
         An observation counts as the part of its variance that robust weights leave. Pose errors do not count: each has
         one pseudo-observation.
         """
         observations = sum(group.count - group.cut for group in self.accumulation.groups.values())
-        return self.weighting.kept * observations - len(self.solution.estimated)
+        return self.weighting.kept * observations + self.last.prior.count - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
@@ -155,7 +155,8 @@ def adjust_mount(
     prior = problem.prior
     figures, ping = DriftFigures.of_session(prior.noise), None
     weighted = _weighted_iteration(problem, streams, settings, gap_s)
-    last, estimated = weighted.last, weighted.estimated
+    # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
+    last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
     factors: dict[str, EpochVarianceFactor] = {}
     converged = False
     if not weighted.deficient:
@@ -177,7 +178,7 @@ def adjust_mount(
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
     equations = last.equations(figures.noise)
-    solution = solve(equations.normal, equations.right, estimated.tolist())
+    solution = solve(equations.normal, equations.right, estimated.tolist(), last.prior.normal)
     return MountAdjustment(
         state=last.linearisation.state,
         drift=last.drift,
@@ -222,7 +223,7 @@ def _weighted_iteration(
         # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
-        start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.surfaces)
+        start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.priors)
         # fix the mount parameters whose sigma would be larger than required
         if iteration == 1 and prior.required_sigmas is not None:
             normal = start.equations(prior.noise).normal

@@ -73,7 +73,6 @@ def sigma_check(adjustment: MountAdjustment) -> pd.DataFrame:
     if solution.deficiency:
         return pd.DataFrame(columns=columns, dtype=np.float64)
     last = adjustment.last
-    prior = None if last.surfaces is None else last.surfaces.pseudo_observations(state)
-    check = score_check(last.linearisation, last.drift, adjustment.drift_figures.noise, prior, solution.estimated)
+    check = score_check(last.linearisation, last.drift, adjustment.drift_figures.noise, last.prior, solution.estimated)
     names = [state.names[number] for number in solution.estimated if number < N_MOUNT]
     return pd.DataFrame(np.column_stack([check.ratio, check.dof]), index=names, columns=columns)

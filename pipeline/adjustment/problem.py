@@ -19,7 +19,7 @@ from pipeline.maths.adjustment.design_matrix import SensorSigmas
 from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftPrior
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
-from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, SurfacePrior
+from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, ParameterPrior, Prior
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.model import TargetModel
@@ -64,13 +64,25 @@ class PriorInformation:
 
     noise: white noise and drift of the recorded poses; surfaces: pseudo-observations of the surfaces; required_sigmas
     (6,) rad and m: a mount parameter that would have a larger sigma is fixed (None: all are estimated); drift: how well
-    the figures of the drift in ``noise`` are known.
+    the figures of the drift in ``noise`` are known; parameters: the values known beforehand of parameters that are
+    estimated.
     """
 
     noise: PoseNoise
-    surfaces: SurfacePrior | None = None
+    surfaces: Prior | None = None
     required_sigmas: Array | None = None
     drift: DriftPrior = EXACT
+    parameters: ParameterPrior | None = None
+
+    @property
+    def priors(self) -> tuple[Prior, ...]:
+        """All pseudo-observations."""
+        return tuple(prior for prior in (self.surfaces, self.parameters) if prior is not None)
+
+    @property
+    def known_parameters(self) -> Integers:
+        """Numbers (k,) of the parameters whose values are known beforehand."""
+        return np.empty(0, dtype=np.int64) if self.parameters is None else self.parameters.numbers
 
 
 @dataclass(frozen=True)

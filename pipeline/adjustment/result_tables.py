@@ -16,17 +16,15 @@ from pipeline.adjustment.residual_statistics import ResidualStatistics
 from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
-from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.solution import (
-    ConsiderErrors,
     ParameterTest,
     Solution,
+    prior_parameter_tests,
     single_parameter_tests,
     weakest_direction,
 )
 from pipeline.maths.adjustment.weighting import scatter
 from pipeline.maths.geometry.passes import pass_of
-from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
 
 Array = NDArray[np.float64]
@@ -59,7 +57,7 @@ def result_tables(
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
-        "freed": _single_parameter_table(adjustment, problem.consider, estimate),
+        "freed": _single_parameter_table(problem, adjustment, estimate),
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
         "drift": _drift_table(adjustment, t_ns),
@@ -76,9 +74,9 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
     """
     state, solution = adjustment.state, adjustment.solution
     numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, even if it is fixed
-    random = solution.total_covariance(ConsiderErrors(np.zeros(state.size)), numbers)
+    random = solution.noise_covariance(numbers)
     total = solution.total_covariance(problem.consider, numbers)
-    values = _values(state, problem.model.coarse)[numbers]
+    values = state.deviation_from(problem.model.coarse)[numbers]
     if solution.deficiency:
         values[:N_MOUNT], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
     table = pd.DataFrame(
@@ -90,15 +88,6 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
         }
     )
     return table, random, total
-
-
-def _values(state: State, coarse: State) -> Array:
-    """Return the values (u,) of all parameters: the mount's corrections, the surfaces' shifts, additional values."""
-    values = state.additional_values()
-    correction = log_so3(state.R_body_from_sensor @ coarse.R_body_from_sensor.T)
-    values[:N_MOUNT] = np.concatenate([correction, state.lever_arm_m - coarse.lever_arm_m])
-    values[state.surface_slice] = [value for surface in state.surfaces for value in (0.0, 0.0, surface.shift_m)]
-    return values
 
 
 def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.DataFrame:
@@ -147,29 +136,34 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
 
 
 def _single_parameter_table(
-    adjustment: MountAdjustment, consider: ConsiderErrors, estimate: pd.DataFrame
+    problem: CalibrationProblem, adjustment: MountAdjustment, estimate: pd.DataFrame
 ) -> pd.DataFrame:
-    """Return table ``freed``: rows of the fixed parameters (test, effect on the mount) and of the additional ones."""
+    """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
+
+    The parameters are fixed, or estimated with a value known beforehand, or named in adjust.free.
+    """
     state, solution, equations = adjustment.state, adjustment.solution, adjustment.equations
+    consider, known, mount = problem.consider, problem.prior.known_parameters, np.arange(N_MOUNT)
+    known = known[known >= N_MOUNT]
     found = single_parameter_tests(equations.normal, equations.right, solution, consider)
-    tests, considered = {test.parameter: test for test in found}, consider.sigmas
-    sensitivity = solution.sensitivity_of(np.arange(N_MOUNT))
-    rows = []
-    for place, number in enumerate(solution.fixed.tolist()):
-        test = tests.get(number, ParameterTest(number, np.nan, np.nan, np.nan))
-        effect = sensitivity[:, place] * considered[number]
-        row: dict[str, Any] = {"unknown": state.names[number], "considered": considered[number]}
-        row |= {"estimated": False, "value": test.value, "sigma": test.sigma, "expected": test.expected}
-        rows.append(row | {f"effect_{name}": effect[k] for k, name in enumerate(MOUNT_NAMES)})
+    deviation = state.deviation_from(problem.model.coarse) + solution.step
+    found += prior_parameter_tests(solution, deviation, consider, known)
+    tests, effects = {test.parameter: test for test in found}, np.zeros((N_MOUNT, state.size))
+    effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
+    effects[:, known] = solution.prior_effects(mount)[:, np.searchsorted(solution.estimated, known)]
+    by_name, rows = estimate.set_index("unknown"), []
     on_surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    by_name = estimate.set_index("unknown", drop=False)
-    for number in solution.estimated.tolist():
-        if number >= N_MOUNT and number not in on_surfaces:
-            parameter = by_name.loc[state.names[number]]
-            row = {"unknown": parameter["unknown"], "estimated": True, "considered": considered[number]}
-            row |= {"value": parameter["value"], "sigma": parameter["sigma_total"]}
-            row |= {"expected": np.hypot(parameter["sigma_total"], considered[number])}
-            rows.append(row | {f"effect_{name}": 0.0 for name in MOUNT_NAMES})
+    freed = np.setdiff1d(solution.estimated, [*mount, *on_surfaces, *known]).tolist()
+    for number in [*sorted([*solution.fixed.tolist(), *known.tolist()]), *freed]:
+        name, considered = state.names[number], consider.sigmas[number]
+        test = tests.get(number, ParameterTest(number, np.nan, np.nan, np.nan))
+        if number in freed:
+            parameter = by_name.loc[name]
+            sigma = parameter["sigma_total"]
+            test = ParameterTest(number, parameter["value"], sigma, float(np.hypot(sigma, considered)))
+        row: dict[str, Any] = {"unknown": name, "estimated": number in freed, "considered": considered}
+        row |= {"value": test.value, "sigma": test.sigma, "expected": test.expected}
+        rows.append(row | {f"effect_{axis}": effects[k, number] for k, axis in enumerate(MOUNT_NAMES)})
     return pd.DataFrame(rows)
 
 

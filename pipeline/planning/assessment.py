@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.consider import sonar_errors
+from pipeline.adjustment.consider import known_parameters, sonar_errors
 from pipeline.adjustment.iteration import estimated_columns
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
@@ -96,20 +96,21 @@ class _Adjustment:
     """Inputs of an adjustment of predicted passes, apart from the passes.
 
     ``turn_s``: time of a turn; ``considered``: errors of the fixed parameters; ``free``: numbers of the estimated
-    parameters.
+    parameters; ``prior`` (u, u): normal matrix of what is known of them beforehand.
     """
 
     setting: PredictionSetting
     turn_s: float
     considered: ConsiderErrors
     free: list[int]
+    prior: Array
 
     def accuracy(self, passes: Sequence[Pass]) -> Accuracy:
         """Return the predicted accuracy of a calibration from these passes."""
         predicted = predict(self.setting, passes, self.turn_s)
-        normal = predicted.normal
-        solution = solve(normal, np.zeros(len(normal)), self.free)
-        random = solution.covariance[:N_MOUNT, :N_MOUNT]
+        normal = predicted.normal + self.prior
+        solution = solve(normal, np.zeros(len(normal)), self.free, self.prior)
+        random = solution.noise_covariance()[:N_MOUNT, :N_MOUNT]
         total = solution.total_covariance(self.considered)[:N_MOUNT, :N_MOUNT]
         if solution.deficiency:
             random, total = np.full((N_MOUNT, N_MOUNT), np.nan), np.full((N_MOUNT, N_MOUNT), np.nan)
@@ -159,8 +160,11 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     depth = setting.model.depth_m
     considered = sonar_errors(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
-    free = estimated_columns(setting.state, pool.adjust.free)
-    adjustment = _Adjustment(setting, turn_s, considered, free)
+    free, prior = estimated_columns(setting.state, pool.adjust.free), np.zeros_like(np.diag(considered.sigmas))
+    known = known_parameters(setting.state, considered, pool.adjust.free)
+    if known is not None:
+        free, prior = sorted({*free, *known.numbers.tolist()}), known.pseudo_observations(setting.state).normal
+    adjustment = _Adjustment(setting, turn_s, considered, free, prior)
     given = adjustment.accuracy(plan.passes)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
     coverage = Coverage(
@@ -170,7 +174,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
         speed_m_s=float(speeds),
         heading_swing_deg=float(swings),
     )
-    advice = geometry_advice(setting, coverage, given.predicted.normal, given.solution)
+    advice = geometry_advice(setting, coverage, given.predicted.normal + prior, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:
         better = _best_within_budget(adjustment, plan.candidates, plan.budget.seconds)
@@ -209,6 +213,7 @@ def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], sec
     bounds = np.repeat([np.radians(usual.max_sigma_deg), usual.max_sigma_m], 3)
     vague = np.zeros((setting.state.size, setting.state.size))
     vague[free, free] = VAGUE**-2
+    vague = vague + adjustment.prior
 
     def cost(normal: Array) -> float:
         covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:N_MOUNT, :N_MOUNT]

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.geometry.planes import tangents_of
-from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
 from pipeline.maths.target.face import HORIZONTAL_COSINE
 
@@ -187,6 +187,17 @@ class State:
         split = self.surface_slice.start - N_MOUNT
         values[N_MOUNT : self.surface_slice.start] = self.additional[:split]
         values[self.surface_slice.stop :] = self.additional[split:]
+        return values
+
+    def deviation_from(self, other: "State") -> Array:
+        """Return the deviation (u,) of all parameters but the turns from those of another state.
+
+        R = Exp(deviation) R_other; the shift of a surface counts from its centre, and its turns are zero.
+        """
+        values = self.additional_values() - other.additional_values()
+        values[:3] = log_so3(self.R_body_from_sensor @ other.R_body_from_sensor.T)
+        values[3:N_MOUNT] = self.lever_arm_m - other.lever_arm_m
+        values[self.surface_slice][2::N_SURFACE] = [surface.shift_m for surface in self.surfaces]
         return values
 
     def updated(self, step: Array) -> "State":

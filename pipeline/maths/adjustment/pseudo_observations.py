@@ -1,4 +1,4 @@
-"""Prior information about the surfaces, as pseudo-observations: the target as designed, or families that are parallel.
+"""Prior information as pseudo-observations: the target as designed, parallel families, values known beforehand.
 
 **The target as designed.** It is the reference for a laser that is itself calibrated. The design is a rigid body. It
 stands where it was set up, except for a displacement g = (d, ω) (m and rad, target frame; X -> X + d + ω × X). The
@@ -21,6 +21,14 @@ and tangents t_k of the first, t'_j of the second
 
 and a step of their turns, a_k and b_j, changes it by a_k - Σ_j t_k · t'_j b_j. So a wall above the water, which the
 laser sees, determines the direction of the wall's foot, which the sonar alone sees.
+
+**Values known beforehand.** Parameters with the deviation d from a value that is known with the covariance Q:
+
+    d = 0 ± Q,        N = Q⁻¹,      b = Q⁻¹ d.
+
+So a systematic error of which the data tell something is estimated, with its a-priori sigma as one observation. Where
+the data tell nothing of it, the result is the same as with a consider parameter: the total covariance of the other
+parameters is equal (Bierman 1977, "Factorization methods for discrete sequential estimation", on consider filters).
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,9 +38,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 N_DISPLACEMENT = 6  # d and ω
 REACH_M = 2.0  # distance at which a turn of a surface counts as a shift
 UNDETERMINED = 1e-6  # a singular value below this share of the largest leaves a direction open
@@ -43,20 +52,54 @@ OPEN = 1e-12  # an eigenvalue of the scaled normal matrix of g below this leaves
 class PseudoObservations:
     """Contribution of prior information to the normal equations N x + b = 0 of all parameters.
 
-    normal N (u, u); right b (u,); squares: contribution to the sum of squares at x = 0.
+    normal N (u, u); right b (u,); squares: contribution to the sum of squares at x = 0; count: number of
+    pseudo-observations, less the number of further unknowns that are eliminated.
     """
 
     normal: Array
     right: Array
     squares: float
+    count: int
+
+    def __add__(self, other: "PseudoObservations") -> "PseudoObservations":
+        return PseudoObservations(
+            self.normal + other.normal, self.right + other.right, self.squares + other.squares, self.count + other.count
+        )
 
 
-class SurfacePrior(Protocol):
-    """Prior information about the surfaces."""
+class Prior(Protocol):
+    """Prior information about surfaces or other parameters."""
 
     def pseudo_observations(self, state: State) -> PseudoObservations:
-        """Return the pseudo-observations of this prior information, linearised at the current surfaces."""
+        """Return the pseudo-observations of this prior information, linearised at the current values."""
         ...
+
+
+def all_pseudo_observations(priors: Sequence[Prior], state: State) -> PseudoObservations:
+    """Return the sum of all prior information, linearised at the current values."""
+    nothing = PseudoObservations(np.zeros((state.size, state.size)), np.zeros(state.size), 0.0, 0)
+    return sum((prior.pseudo_observations(state) for prior in priors), start=nothing)
+
+
+@dataclass(frozen=True)
+class ParameterPrior:
+    """Values of parameters that are known beforehand: those of a state.
+
+    numbers (k,): the parameters, ascending; covariance (k, k); known: the state with their values.
+    """
+
+    numbers: Integers
+    covariance: Array
+    known: State
+
+    def pseudo_observations(self, state: State) -> PseudoObservations:
+        """Return the pseudo-observations of these values, at the current ones."""
+        N, b = np.zeros((state.size, state.size)), np.zeros(state.size)
+        information = np.linalg.inv(self.covariance)
+        deviation = state.deviation_from(self.known)[self.numbers]
+        N[np.ix_(self.numbers, self.numbers)] = information
+        b[self.numbers] = information @ deviation
+        return PseudoObservations(N, b, float(deviation @ b[self.numbers]), len(self.numbers))
 
 
 @dataclass(frozen=True)
@@ -94,7 +137,10 @@ class DesignPrior:
             squares += float(np.sum(weight * r**2))
         inverse = _inverse(N_g)
         return PseudoObservations(
-            N - N_xg @ inverse @ N_xg.T, b - N_xg @ inverse @ b_g, squares - float(b_g @ inverse @ b_g)
+            normal=N - N_xg @ inverse @ N_xg.T,
+            right=b - N_xg @ inverse @ b_g,
+            squares=squares - float(b_g @ inverse @ b_g),
+            count=N_SURFACE * len(state.surfaces) + int(np.sum(information > 0)) - N_DISPLACEMENT,
         )
 
 
@@ -138,7 +184,7 @@ class ParallelPrior:
             N[np.ix_(place, place)] += J.T @ J / self.sigma_rad**2
             b[place] += J.T @ r / self.sigma_rad**2
             squares += float(r @ r) / self.sigma_rad**2
-        return PseudoObservations(N, b, squares)
+        return PseudoObservations(N, b, squares, 2 * len(self.pairs))
 
 
 def _misclosures(surface: ObservedSurface, n0: Array, q: Array) -> tuple[Array, Array, Array]:

@@ -52,7 +52,7 @@ def score_check(
     linearisation: Linearisation,
     drift: DriftEstimate,
     noise: PoseNoise,
-    prior: PseudoObservations | None,
+    prior: PseudoObservations,
     estimated: Integers,
 ) -> ScoreCheck:
     """Return the check of the sigmas of the estimated mount parameters.
@@ -65,16 +65,15 @@ def score_check(
         The drift with which the observations were taken.
     noise : PoseNoise
         Standard deviations of the pose errors.
-    prior : PseudoObservations or None
-        Prior information about the surfaces.
+    prior : PseudoObservations
+        The prior information.
     estimated : (f,) array
         The estimated parameters, ascending.
     """
     slots = [normal_equations(part, own, noise, estimated) for part, own in _slots(linearisation, drift)]
     normals, rights = np.array([slot.normal for slot in slots]), np.array([slot.right for slot in slots])
-    N, b = normals.sum(axis=0), rights.sum(axis=0)
-    if prior is not None:
-        N, b = N + prior.normal[np.ix_(estimated, estimated)], b + prior.right[estimated]
+    N = normals.sum(axis=0) + prior.normal[np.ix_(estimated, estimated)]
+    b = rights.sum(axis=0) + prior.right[estimated]
     inverse = np.linalg.pinv(N, hermitian=True)
     scores = rights - normals @ (inverse @ b)
     mount = np.flatnonzero(estimated < N_MOUNT)

@@ -11,7 +11,19 @@ if all a-priori errors hold, a value has the variance
 
     1 / M_ii + (M Q M)_ii / M_ii²,
 
-which contains its own Q_ii. (An error of one parameter shows in the values of all that look alike. In a trial, ranges
+which contains its own Q_ii.
+
+N contains prior information as well (:mod:`~pipeline.maths.adjustment.pseudo_observations`): N = N_points + P. Of the
+covariance C, the part C P C is due to errors of the prior information, so that the noise of the points alone gives
+C - C P C. Let a parameter i have a value known beforehand, with the sigma q, P_ii = 1 / q². An error h of that value
+changes the parameters by C_·i h / q². Without this prior information the parameter would have the value and the
+variance
+
+    x_i / (1 - C_ii / q²),      C_ii / (1 - C_ii / q²),
+
+and its test compares this value with 0 ± q, the variances and those of the other errors added.
+
+(An error of one parameter shows in the values of all that look alike. In a trial, ranges
 seemed wrong by 7 mm because those on horizontal faces were, within their own sigma.)
 """
 
@@ -26,6 +38,7 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
+KNOWN_SHARE = 1e-6  # least share of the information that counts
 VAGUE = 10.0  # rad or m: prior sigma that stands for no prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
@@ -55,8 +68,9 @@ class ConsiderErrors:
 class Solution:
     """Solution for the parameters ``estimated`` (f,), the others ``fixed`` (h,).
 
-    step (u,), zero for the fixed ones; covariance C (f, f); sensitivity S (f, h); condition number of the scaled normal
-    matrix; deficiency: number of directions that the data do not determine.
+    step (u,), zero for the fixed ones; covariance C (f, f); sensitivity S (f, h); prior information P (f, f) that the
+    normal matrix contains; condition number of the scaled normal matrix; deficiency: number of directions that the data
+    do not determine.
     """
 
     estimated: Integers
@@ -64,11 +78,12 @@ class Solution:
     step: Array
     covariance: Array
     sensitivity: Array
+    prior: Array
     condition: float
     deficiency: int
 
     def total_covariance(self, consider: ConsiderErrors, numbers: Integers | None = None) -> Array:
-        """Return the covariance (k, k) with the errors of the fixed parameters.
+        """Return the covariance (k, k) with the errors of the fixed parameters and of the prior information.
 
         Parameters
         ----------
@@ -79,13 +94,33 @@ class Solution:
             alone; this error correlates the estimated parameters with it.
         """
         chosen = self.estimated if numbers is None else np.asarray(numbers)
-        Q = consider.covariance(self.fixed)
-        sensitivity, noise = self.sensitivity_of(chosen), np.zeros((len(chosen), len(chosen)))
+        sensitivity = self.sensitivity_of(chosen)
+        total = self._among(self.covariance, chosen) + sensitivity @ consider.covariance(self.fixed) @ sensitivity.T
+        return np.asarray((total + total.T) / 2)
+
+    def noise_covariance(self, numbers: Integers | None = None) -> Array:
+        """Return the covariance (k, k) C - C P C due to the noise of the points; zero for fixed parameters."""
+        C = self.covariance
+        return self._among(C - C @ self.prior @ C, self.estimated if numbers is None else np.asarray(numbers))
+
+    def prior_effects(self, numbers: Integers) -> Array:
+        """Return the change (k, f) of parameters (k,) by one sigma of each estimated one's value known beforehand.
+
+        Zero for those without one. The values known beforehand are independent.
+        """
+        rows = np.zeros((len(numbers), len(self.estimated)))
+        for row, number in enumerate(np.asarray(numbers).tolist()):
+            if number in self.estimated:
+                rows[row] = self.covariance[int(np.searchsorted(self.estimated, number))]
+        return rows * np.sqrt(np.diag(self.prior))
+
+    def _among(self, covariance: Array, chosen: Integers) -> Array:
+        """Return the part (k, k) of a covariance (f, f) of the estimated parameters; zero for fixed ones."""
+        part = np.zeros((len(chosen), len(chosen)))
         estimated = np.flatnonzero(np.isin(chosen, self.estimated))
         place = np.searchsorted(self.estimated, chosen[estimated])
-        noise[np.ix_(estimated, estimated)] = self.covariance[np.ix_(place, place)]
-        total = noise + sensitivity @ Q @ sensitivity.T
-        return np.asarray((total + total.T) / 2)
+        part[np.ix_(estimated, estimated)] = covariance[np.ix_(place, place)]
+        return part
 
     def sensitivity_of(self, numbers: Integers) -> Array:
         """Return the sensitivity (k, h) of parameters (k,) to errors of the fixed ones.
@@ -101,7 +136,7 @@ class Solution:
         return rows
 
 
-def solve(normal: Array, right: Array, estimated: Sequence[int]) -> Solution:
+def solve(normal: Array, right: Array, estimated: Sequence[int], prior: Array | None = None) -> Solution:
     """Return the least squares step of the estimated parameters, through the eigenvalues of D N D, D = diag(N)^(-1/2).
 
     Directions with an eigenvalue below rounding get no step; they are counted, not repaired.
@@ -114,6 +149,8 @@ def solve(normal: Array, right: Array, estimated: Sequence[int]) -> Solution:
         Right side b.
     estimated : sequence of int
         The parameters to estimate.
+    prior : (u, u) array, optional
+        The part of N that is due to prior information; none by default.
     """
     chosen = np.array(sorted(estimated), dtype=np.int64)
     fixed = np.setdiff1d(np.arange(len(right)), chosen)
@@ -135,6 +172,7 @@ def solve(normal: Array, right: Array, estimated: Sequence[int]) -> Solution:
         step=step,
         covariance=covariance,
         sensitivity=-covariance @ normal[np.ix_(chosen, fixed)],
+        prior=np.zeros_like(N) if prior is None else prior[np.ix_(chosen, chosen)],
         condition=float(largest / values[0]) if values[0] > 0 else np.inf,
         deficiency=int(is_open.sum()),
     )
@@ -142,7 +180,7 @@ def solve(normal: Array, right: Array, estimated: Sequence[int]) -> Solution:
 
 @dataclass(frozen=True)
 class ParameterTest:
-    """Value and sigma that a fixed parameter would have if it were estimated as well.
+    """Value and sigma that a parameter would have without what is known of it: if it were not fixed, or had no prior.
 
     expected: standard deviation of the value if all a-priori errors hold.
     """
@@ -182,6 +220,37 @@ def single_parameter_tests(
             value, variance = float(values[place]) / information, 1 / information
             expected = float(np.sqrt(variance + a_priori[place] / information**2))
             tests.append(ParameterTest(number, value, float(np.sqrt(variance)), expected))
+    return tests
+
+
+def prior_parameter_tests(
+    solution: Solution, deviation: Array, consider: ConsiderErrors, numbers: Integers
+) -> list[ParameterTest]:
+    """Return the single-parameter test of each estimated parameter with a value known beforehand.
+
+    Parameters that the points cannot determine are left out.
+
+    Parameters
+    ----------
+    solution : Solution
+        Solution of the normal equations.
+    deviation : (u,) array
+        Deviations from the values known beforehand, after the solution's step.
+    consider : ConsiderErrors
+        A-priori errors of the fixed parameters, and of these.
+    numbers : (k,) array
+        The parameters; the values known beforehand are independent.
+    """
+    S = solution.sensitivity_of(numbers)
+    others = np.einsum("ij,jk,ik->i", S, consider.covariance(solution.fixed), S)
+    places, tests = np.searchsorted(solution.estimated, numbers), []
+    for number, place, of_others in zip(numbers.tolist(), places.tolist(), others.tolist(), strict=True):
+        variance, information = float(solution.covariance[place, place]), float(solution.prior[place, place])
+        share = 1 - variance * information  # of the information on it that is due to the points
+        if share > KNOWN_SHARE:
+            expected = float(np.sqrt(variance / share + 1 / information + of_others / share**2))
+            value = float(deviation[number]) / share
+            tests.append(ParameterTest(number, value, float(np.sqrt(variance / share)), expected))
     return tests
 
 
