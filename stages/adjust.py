@@ -155,14 +155,14 @@ def calibration_problem(session: SessionData, inputs: Inputs, config: Config) ->
     if config.mbes is not None:
         problem = sonar_problem(session, mount_of(config.mbes.mount), {"laser": laser, "mbes": config.mbes})
         state = problem.model.coarse
-        errors = sonar_errors(state.names, laser, config.mbes, as_built, session.target.depth_m)
+        errors = sonar_errors(problem.model.names, laser, config.mbes, as_built, session.target.depth_m)
         known = known_parameters(state, errors, config.adjust.free)
         return replace(problem, prior=replace(problem.prior, parameters=known), consider=errors)
     calibration = config.calibration
     assert isinstance(calibration, LaserCalibration)
     pose = target_frame(inputs.target_pose), float(np.radians(inputs.target_pose["azimuth_correction_deg"].iloc[0]))
     problem = laser_problem(session, mount_of(laser.mount), laser, calibration, surveyed_displacement(*pose))
-    names = problem.model.coarse.names
+    names = problem.model.names
     return replace(problem, consider=laser_consider(names, laser, calibration, as_built))
 
 

@@ -89,6 +89,14 @@ ERROR_SOURCES = (  # the first beginning that fits counts
         "wet", "wet faces against dry ones", "target",
         "the target was built and surveyed once",
     ),
+    ErrorSource(
+        "face_", "single faces", "target",
+        "as the wet faces",
+    ),
+    ErrorSource(
+        "surfaces_", "the target's design: directions, distances, parallel faces", "target",
+        "as the wet faces",
+    ),
     ErrorSource("rotation", "fixed angles", "laser_mount", "kept at the coarse mount where the laser is calibrated"),
     ErrorSource(
         "lever_arm", "fixed components of the lever arm", "laser_mount",

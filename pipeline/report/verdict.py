@@ -14,7 +14,7 @@ The limits are defined at these places (paths from ``pipeline/``):
 * the mount from parts of the session: ``test_level`` of class ``Adjust``, ``APART_M`` of adjustment/parts.py, and
   ``SAME`` of maths/adjustment/parts.py;
 * drift of the INS, beside deviating residuals or a suspected cause: ``MAX_DRIFT_RATIO`` of drift_check.py;
-* suspected causes, and estimates off their settings: ``SIGNIFICANT`` of suspected_causes.py;
+* suspected causes, and estimates off their settings: ``test_level`` of class ``Adjust``;
 * total sigmas, and difference of a patent's form from the adjustment: ``max_sigma_deg`` and ``max_sigma_m`` of class
   ``VerdictLimits`` of config/pool.py;
 * all six mount parameters of the laser fixed: ``hold_share`` of class ``LaserFit`` of config/pool.py, and the limits of
@@ -43,7 +43,7 @@ from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.residual_tests import deviations
 from pipeline.report.residual_words import ResidualTests
-from pipeline.report.suspected_causes import estimated_parameters, suspected_causes
+from pipeline.report.suspected_causes import estimated_parameters, significance_limit, suspected_causes
 
 NEARLY_AS_WELL = 2.0  # sigmas: a cause whose value over sigma is smaller by no more is named beside the first
 MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
@@ -110,7 +110,7 @@ def rejections(
     reasons += _too_few_soundings(evidence.cells)
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
-    reasons += _estimates_off_settings(evidence.freed)
+    reasons += _estimates_off_settings(evidence.freed, criteria.test_level)
     if len(evidence.fixed) == len(PARAMETERS):
         words = "no mount parameter can be estimated: this target and these passes determine none within its limit"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
@@ -130,7 +130,7 @@ def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: State
         tolerance_m=criteria.tolerance_m,
     )
     deviating = deviations(tests, criteria.test_level)
-    causes = _suspected_cause(evidence.freed, any(deviation.is_local for deviation in deviating))
+    causes = _suspected_cause(evidence.freed, criteria.test_level, any(deviation.is_local for deviation in deviating))
     reasons = [deviation.statement for deviation in deviating]
     if (deviating or causes) and drift_check is not None:
         reasons.append(drift_check)
@@ -151,13 +151,13 @@ def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
     ]
 
 
-def _suspected_cause(freed: pd.DataFrame, local: bool) -> list[Statement]:
-    """Return a reason with the fixed parameter that explains the residuals best, and the number of the others.
+def _suspected_cause(freed: pd.DataFrame, level: float, local: bool) -> list[Statement]:
+    """Return a reason with the parameter that explains the residuals best, and the number of the others.
 
     Others that explain them nearly as well are named, too. ``local``: another reason names a face, step, pass or ping,
     which may be the cause instead.
     """
-    causes = suspected_causes(freed)
+    causes = suspected_causes(freed, level)
     if not causes:
         return []
     first = causes[0]
@@ -170,7 +170,7 @@ def _suspected_cause(freed: pd.DataFrame, local: bool) -> list[Statement]:
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 
 
-def _estimates_off_settings(freed: pd.DataFrame) -> list[Statement]:
+def _estimates_off_settings(freed: pd.DataFrame, level: float) -> list[Statement]:
     """Return a reason for each parameter of ``adjust.free`` that differs significantly from its setting.
 
     The mount is right only together with this estimate, and the survey has the same error.
@@ -182,5 +182,5 @@ def _estimates_off_settings(freed: pd.DataFrame) -> list[Statement]:
             "settings and in the survey, and run again",
         )
         for parameter in estimated_parameters(freed)
-        if parameter.is_significant
+        if parameter.normalised > significance_limit(freed, level)
     ]

@@ -114,6 +114,26 @@ class Solution:
                 rows[row] = self.covariance[int(np.searchsorted(self.estimated, number))]
         return rows * np.sqrt(np.diag(self.prior))
 
+    def group_effects(self, numbers: Integers, group: Integers) -> Array:
+        """Return k changes (k, k) of parameters (k,) by independent errors in the prior information of a group.
+
+        They are the columns of the symmetric root of E = (C P C)_kk, P restricted to the group, in units of the
+        parameters' sigmas. Of all roots of E it is the one that changes least with E. So effects of two sessions with
+        the same prior information and nearly the same geometry are nearly equal, column by column.
+
+        Parameters
+        ----------
+        numbers : (k,) array
+            Estimated parameters.
+        group : (g,) array
+            Estimated parameters, whose prior information is not connected with that of others.
+        """
+        rows, places = np.searchsorted(self.estimated, numbers), np.searchsorted(self.estimated, group)
+        sigma = np.sqrt(np.diag(self.covariance)[rows])
+        by_group = self.covariance[np.ix_(rows, places)] / sigma[:, None]
+        values, vectors = np.linalg.eigh(by_group @ self.prior[np.ix_(places, places)] @ by_group.T)
+        return np.asarray(sigma[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
     def _among(self, covariance: Array, chosen: Integers) -> Array:
         """Return the part (k, k) of a covariance (f, f) of the estimated parameters; zero for fixed ones."""
         part = np.zeros((len(chosen), len(chosen)))
