@@ -17,11 +17,9 @@ from pipeline.adjustment.residual_statistics import ResidualStatistics
 from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
+from pipeline.maths.adjustment.parameter_tests import ParameterTest, prior_parameter_tests, single_parameter_tests
 from pipeline.maths.adjustment.solution import (
-    ParameterTest,
     Solution,
-    prior_parameter_tests,
-    single_parameter_tests,
     weakest_direction,
 )
 from pipeline.maths.adjustment.weighting import scatter

@@ -1,30 +1,14 @@
-"""Solution of the normal equations N x + b = 0: step, rank, covariance; effects of fixed parameters, and their tests.
+"""Solution of the normal equations N x + b = 0: step, rank, covariance; effects of fixed parameters.
 
 Some parameters are *estimated* (f), the others *fixed* (h) at their values. With S = -N_ff⁻¹ N_fh,
 
     x_f = -N_ff⁻¹ b_f,     C = N_ff⁻¹,     dx_f = S x_h for an error x_h of the fixed ones,
     C_total = C + S Q Sᵀ,  Q the covariance of the consider parameters (Gelb 1974, 7.5 "consider" filter).
 
-If one fixed parameter i were estimated together with f, its value would be -(b_h + Sᵀ b_f)_i / M_ii with
-M = N_hh + N_hf S, and its sigma M_ii^(-1/2). Errors x_h of the fixed parameters change the values by M x_h / M_ii. So
-if all a-priori errors hold, a value has the variance
-
-    1 / M_ii + (M Q M)_ii / M_ii²,
-
-which contains its own Q_ii.
-
 N contains prior information as well (:mod:`~pipeline.maths.adjustment.pseudo_observations`): N = N_points + P. Of the
 covariance C, the part C P C is due to errors of the prior information, so that the noise of the points alone gives
 C - C P C. Let a parameter i have a value known beforehand, with the sigma q, P_ii = 1 / q². An error h of that value
-changes the parameters by C_·i h / q². Without this prior information the parameter would have the value and the
-variance
-
-    x_i / (1 - C_ii / q²),      C_ii / (1 - C_ii / q²),
-
-and its test compares this value with 0 ± q, the variances and those of the other errors added.
-
-(An error of one parameter shows in the values of all that look alike. In a trial, ranges
-seemed wrong by 7 mm because those on horizontal faces were, within their own sigma.)
+changes the parameters by C_·i h / q².
 """
 
 from collections.abc import Sequence
@@ -38,7 +22,6 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
-KNOWN_SHARE = 1e-6  # least share of the information that counts
 VAGUE = 10.0  # rad or m: prior sigma that stands for no prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
@@ -196,82 +179,6 @@ def solve(normal: Array, right: Array, estimated: Sequence[int], prior: Array | 
         condition=float(largest / values[0]) if values[0] > 0 else np.inf,
         deficiency=int(is_open.sum()),
     )
-
-
-@dataclass(frozen=True)
-class ParameterTest:
-    """Value and sigma that a parameter would have without what is known of it: if it were not fixed, or had no prior.
-
-    expected: standard deviation of the value if all a-priori errors hold.
-    """
-
-    parameter: int
-    value: float
-    sigma: float
-    expected: float
-
-
-def single_parameter_tests(
-    normal: Array, right: Array, solution: Solution, consider: ConsiderErrors
-) -> list[ParameterTest]:
-    """Return the single-parameter test of each fixed parameter.
-
-    Parameters that the observations cannot determine beside the estimated ones are left out.
-
-    Parameters
-    ----------
-    normal : (u, u) array
-        Normal matrix N of all parameters.
-    right : (u,) array
-        Right side b.
-    solution : Solution
-        Solution of these normal equations.
-    consider : ConsiderErrors
-        A-priori errors of the fixed parameters.
-    """
-    fixed, S = solution.fixed, solution.sensitivity
-    M = normal[np.ix_(fixed, fixed)] + normal[np.ix_(fixed, solution.estimated)] @ S
-    values = -(right[fixed] + S.T @ right[solution.estimated])
-    a_priori = np.einsum("ij,jk,ik->i", M, consider.covariance(fixed), M)
-    tests = []
-    for place, number in enumerate(fixed.tolist()):
-        information = float(M[place, place])
-        if information > RANK_TOLERANCE * max(float(normal[number, number]), 1e-300):
-            value, variance = float(values[place]) / information, 1 / information
-            expected = float(np.sqrt(variance + a_priori[place] / information**2))
-            tests.append(ParameterTest(number, value, float(np.sqrt(variance)), expected))
-    return tests
-
-
-def prior_parameter_tests(
-    solution: Solution, deviation: Array, consider: ConsiderErrors, numbers: Integers
-) -> list[ParameterTest]:
-    """Return the single-parameter test of each estimated parameter with a value known beforehand.
-
-    Parameters that the points cannot determine are left out.
-
-    Parameters
-    ----------
-    solution : Solution
-        Solution of the normal equations.
-    deviation : (u,) array
-        Deviations from the values known beforehand, after the solution's step.
-    consider : ConsiderErrors
-        A-priori errors of the fixed parameters, and of these.
-    numbers : (k,) array
-        The parameters; the values known beforehand are independent.
-    """
-    S = solution.sensitivity_of(numbers)
-    others = np.einsum("ij,jk,ik->i", S, consider.covariance(solution.fixed), S)
-    places, tests = np.searchsorted(solution.estimated, numbers), []
-    for number, place, of_others in zip(numbers.tolist(), places.tolist(), others.tolist(), strict=True):
-        variance, information = float(solution.covariance[place, place]), float(solution.prior[place, place])
-        share = 1 - variance * information  # of the information on it that is due to the points
-        if share > KNOWN_SHARE:
-            expected = float(np.sqrt(variance / share + 1 / information + of_others / share**2))
-            value = float(deviation[number]) / share
-            tests.append(ParameterTest(number, value, float(np.sqrt(variance / share)), expected))
-    return tests
 
 
 def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) -> dict[int, float]:

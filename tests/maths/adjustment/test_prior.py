@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.maths.adjustment.parameter_tests import prior_parameter_tests
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pseudo_observations import ParameterPrior, all_pseudo_observations
-from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, prior_parameter_tests, solve
+from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve
 from pipeline.maths.geometry.rotations import exp_so3
 
 SIGMAS = np.array([0.0, 0.0, 0.3, 0.05, 0.5])  # of parameters 2 and 3, known beforehand, and of 4, fixed

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from pipeline.maths.adjustment.parameter_tests import single_parameter_tests
 from pipeline.maths.adjustment.solution import (
     CORRELATION_LIMIT,
     ConsiderErrors,
     correlated_pair,
-    single_parameter_tests,
     solve,
     weakest_direction,
 )
