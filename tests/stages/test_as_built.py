@@ -26,8 +26,9 @@ def test_tops_and_bottoms_that_are_built_too_high_lift_the_sonar(noisy, noisy_fo
     wet = faces[(faces["family"] == "H") & (faces["distance_m"] * faces["normal_z_target_1"] < 0)]
     higher = {row.name: 0.005 * row.normal_z_target_1 for row in wet.itertuples(index=False)}
     exact = dict.fromkeys(("face_sigma_m", "offset_sigma_m", "angle_sigma_deg", "bow_sigma_m"), 0.0)
-    without_bias = noisy.session["mbes"] | {"level_bias_sigma_m": 0.0, "incidence_bias_sigma_m": 0.0}
-    session = replace(noisy, session=noisy.session | {"mbes": without_bias})
+    biases = ("level_bias_sigma_m", "incidence_bias_sigma_m", "projector_sigma_m", "sound_speed_gradient_sigma_1_s")
+    without = noisy.session["mbes"] | dict.fromkeys(biases, 0.0)
+    session = replace(noisy, session=noisy.session | {"mbes": without})
     plain, lifted = (
         result(calibrated(session, pool={"as_built": survey}))["mbes"]["lever_arm_m"]
         for survey in (exact, exact | {"faces": higher})
