@@ -76,10 +76,42 @@ class ReducedIntervals:
     log_determinant: float
 
 
+@dataclass(frozen=True)
+class ReducedGroups:
+    """As :class:`ReducedIntervals`, with the sums by group of spans, so that each group can be left out.
+
+    group (j,): number of each span's group; others (h, u + 1, u + 1) and log_determinant (h,) by group.
+    """
+
+    spans: Array
+    others: Array
+    log_determinant: Array
+    group: Integers
+
+    def of(self, groups: Sequence[int]) -> ReducedIntervals:
+        """Return the normal equations of the spans in these groups alone."""
+        numbers = np.asarray(groups, dtype=np.int64)
+        spans = np.where(np.isin(self.group, numbers)[:, None, None], self.spans, 0.0)
+        return ReducedIntervals(
+            spans, self.others[numbers].sum(axis=0), float(self.log_determinant[numbers].sum())
+        )
+
+
 def eliminate_white_noise(
     sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array
 ) -> ReducedIntervals:
     """Return the normal equations, with the white noise of single records eliminated span by span.
+
+    The parameters are those of :func:`reduced_groups`.
+    """
+    whole = reduced_groups(sources, n_parameters, times, white, np.zeros(len(times.knots.record) - 1, dtype=np.int64))
+    return ReducedIntervals(whole.spans, whole.others[0], float(whole.log_determinant[0]))
+
+
+def reduced_groups(
+    sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array, group: Integers
+) -> ReducedGroups:
+    """Return the normal equations without the white noise of single records, with sums by group of spans.
 
     Parameters
     ----------
@@ -91,14 +123,16 @@ def eliminate_white_noise(
         Times of the INS records, and knots.
     white : (6,) array
         Standard deviations of a record's noise, m and rad.
+    group : (j,) array
+        Number of the group of each span, from 0.
     """
     knots = times.knots
-    spans = len(knots.record) - 1
+    spans, groups = len(group), int(group.max(initial=0)) + 1
     width = n_parameters + 2 * N_POSE + 1
     rows, sides = slice(n_parameters, width - 1), [*range(n_parameters), width - 1]  # the knots; x and v
-    by_span, others = np.zeros((spans, 2 * N_POSE, width)), np.zeros((n_parameters + 1, n_parameters + 1))
+    by_span, others = np.zeros((spans, 2 * N_POSE, width)), np.zeros((groups, n_parameters + 1, n_parameters + 1))
     located = [(source, knots.interval_of(source.record)) for source in sources]
-    log_determinant = 0.0
+    log_determinant = np.zeros(groups)
     seen = np.unique(np.concatenate([span for _, span in located]))  # spans with an interval; the others add nothing
     for first in range(0, len(seen), SIDE_BY_SIDE):
         together = seen[first : first + SIDE_BY_SIDE]
@@ -107,10 +141,13 @@ def eliminate_white_noise(
             low, high = np.searchsorted(span, [together[0], together[-1] + 1])
             if high > low:
                 chain.add(source.linearised(slice(int(low), int(high))), span[low:high], times)
-        log_determinant += chain.eliminate(white)
+        of_blocks = chain.eliminate(white)
         by_span[together] = chain.normal[:, rows]
-        others += chain.normal.sum(axis=0)[np.ix_(sides, sides)]
-    return ReducedIntervals(by_span, others, log_determinant)
+        for number in np.unique(group[together]).tolist():
+            inside = group[together] == number
+            log_determinant[number] += of_blocks[inside].sum()
+            others[number] += chain.normal[inside].sum(axis=0)[np.ix_(sides, sides)]
+    return ReducedGroups(by_span, others, log_determinant, group)
 
 
 @dataclass(frozen=True)
@@ -174,15 +211,15 @@ class _RecordChain:
             border_line[place + offset] += spread
         ahead_line[place] += KT @ (swept - twice) @ K  # sums with (1 - s) s
 
-    def eliminate(self, white: Array) -> float:
-        """Eliminate the white noise of the records from ``normal``, in place; return the sum of log det of its blocks.
+    def eliminate(self, white: Array) -> Array:
+        """Eliminate the white noise of the records from ``normal``, in place; return the spans' log det (j,).
 
         The unknowns are the noise divided by its standard deviations ``white``. So their prior is the unit matrix, and
         a standard deviation of zero is no special case.
         """
         count, length, _, width = self.border.shape
         if not length:
-            return 0.0
+            return np.zeros(count)
         own, ahead = (blocks * (white[:, None] * white) for blocks in (self.own, self.ahead))
         own += np.eye(N_POSE)
         border = self.border * white[:, None]
@@ -196,7 +233,7 @@ class _RecordChain:
                 border[:, step + 1] -= back @ solved[:, step]
         lines = (count, length * N_POSE, width)  # one product for all records of a span
         self.normal[...] -= np.swapaxes(border.reshape(lines), 1, 2) @ solved.reshape(lines)
-        return float(np.sum(np.linalg.slogdet(own)[1]))
+        return np.asarray(np.sum(np.linalg.slogdet(own)[1], axis=1))
 
 
 def _sum_of_products(left: Array, right: Array, starts: Integers) -> Array:

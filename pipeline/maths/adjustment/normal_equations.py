@@ -31,9 +31,11 @@ from pipeline.maths.adjustment.design_matrix import SensorOnSurface, parameter_d
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
 from pipeline.maths.adjustment.eliminate_white_noise import (
     LinearisedIntervals,
+    ReducedGroups,
     ReducedIntervals,
     TimeAxis,
     eliminate_white_noise,
+    reduced_groups,
 )
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.parameters import State
@@ -144,6 +146,20 @@ def reduced_intervals(
     sources = list(linearisation.by_surface(selected))
     n_parameters = linearisation.state.size if selected is None else len(selected)
     return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white)
+
+
+def reduced_by_group(linearisation: Linearisation, knots: Knots, white: Array, group: Integers) -> ReducedGroups:
+    """Return the normal equations of all parameters and of the knots, with sums by group of spans.
+
+    Parameters
+    ----------
+    linearisation, knots, white
+        As for :func:`reduced_intervals`.
+    group : (k - 1,) array
+        Number of the group of the span after each knot but the last, from 0.
+    """
+    times = TimeAxis(linearisation.body.seconds, knots)
+    return reduced_groups(list(linearisation.by_surface()), linearisation.state.size, times, white, group)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:

@@ -8,7 +8,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.eliminate_drift import eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
+from pipeline.maths.adjustment.eliminate_white_noise import (
+    LinearisedIntervals,
+    TimeAxis,
+    eliminate_white_noise,
+    reduced_groups,
+)
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
 from pipeline.maths.adjustment.pose_errors import (
     LARGEST_SPACING_S,
@@ -148,6 +153,31 @@ def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.Mon
     np.testing.assert_allclose(parts.spans, whole.spans, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(parts.others, whole.others, rtol=1e-12, atol=1e-12)
     assert parts.log_determinant == pytest.approx(whole.log_determinant)
+
+
+def test_a_group_of_spans_is_the_same_as_its_intervals_alone() -> None:
+    rng = np.random.default_rng(5)
+    seconds = np.r_[np.arange(31), 90 + np.arange(31)] / RATE_HZ
+    found, _ = sources(rng, np.r_[np.arange(30), 31 + np.arange(30)])
+    records = np.unique(np.concatenate([one.record for one in found]))
+    knots, white = place_knots(records, seconds, 1.0, 2.0), np.full(SIX, 0.4)
+    times = TimeAxis(seconds, knots)
+    second = (knots.record[:-1] >= 31).astype(np.int64)
+    groups = reduced_groups(found, UNKNOWNS, times, white, second)
+    for number, inside in enumerate((lambda record: record < 31, lambda record: record >= 31)):
+        some = [
+            Source(one.sums.selected(rows), one.design[rows], one.columns, one.pose)
+            for one in found
+            for rows in [np.flatnonzero(inside(one.record))]
+        ]
+        alone, group = eliminate_white_noise(some, UNKNOWNS, times, white), groups.of([number])
+        np.testing.assert_allclose(group.spans, alone.spans, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(group.others, alone.others, rtol=1e-12, atol=1e-12)
+        assert group.log_determinant == pytest.approx(alone.log_determinant)
+    both, whole = groups.of([0, 1]), eliminate_white_noise(found, UNKNOWNS, times, white)
+    np.testing.assert_allclose(both.spans, whole.spans, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(both.others, whole.others, rtol=1e-12, atol=1e-12)
+    assert both.log_determinant == pytest.approx(whole.log_determinant)
 
 
 def test_knots_keep_to_the_passes() -> None:
