@@ -23,7 +23,7 @@ from pipeline.target.labelled_points import LabellingContext, label_batch
 
 ROUNDS = 2  # adjustments of the sample; a third changes less than 0.1 % of the labels
 READ = 1_000_000  # about this many points of a stream are looked at
-SAMPLE = {"laser_pool": 200_000, "soundings_pool": 60_000}  # about this many of them near the target are used
+SAMPLE = {"laser_pool": 60_000, "soundings_pool": 20_000}  # about this many of them near the target are used
 BEYOND_M = 0.5  # a point farther outside the target's bounds is not near it
 BUILT_RAD, BUILT_M = float(np.radians(0.02)), 0.002  # sigmas of a family's direction and place against the design
 SENSOR = {"laser_labelled": "laser", "soundings_labelled": "mbes"}  # by the name of the labelled stream
