@@ -91,27 +91,15 @@ class ReducedGroups:
     def of(self, groups: Sequence[int]) -> ReducedIntervals:
         """Return the normal equations of the spans in these groups alone."""
         numbers = np.asarray(groups, dtype=np.int64)
-        spans = np.where(np.isin(self.group, numbers)[:, None, None], self.spans, 0.0)
-        return ReducedIntervals(
-            spans, self.others[numbers].sum(axis=0), float(self.log_determinant[numbers].sum())
-        )
+        inside = np.isin(self.group, numbers)
+        spans = self.spans if inside.all() else np.where(inside[:, None, None], self.spans, 0.0)
+        return ReducedIntervals(spans, self.others[numbers].sum(axis=0), float(self.log_determinant[numbers].sum()))
 
 
 def eliminate_white_noise(
-    sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array
-) -> ReducedIntervals:
-    """Return the normal equations, with the white noise of single records eliminated span by span.
-
-    The parameters are those of :func:`reduced_groups`.
-    """
-    whole = reduced_groups(sources, n_parameters, times, white, np.zeros(len(times.knots.record) - 1, dtype=np.int64))
-    return ReducedIntervals(whole.spans, whole.others[0], float(whole.log_determinant[0]))
-
-
-def reduced_groups(
     sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array, group: Integers
 ) -> ReducedGroups:
-    """Return the normal equations without the white noise of single records, with sums by group of spans.
+    """Return the normal equations, with the white noise of single records eliminated span by span.
 
     Parameters
     ----------

@@ -35,7 +35,6 @@ from pipeline.maths.adjustment.eliminate_white_noise import (
     ReducedIntervals,
     TimeAxis,
     eliminate_white_noise,
-    reduced_groups,
 )
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.parameters import State
@@ -108,10 +107,8 @@ class SurfaceIntervals:
         return LinearisedIntervals(sums, design[:, :, kept], np.searchsorted(self.selected, columns[kept]), pose)
 
 
-def normal_equations(
-    linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise, selected: Integers | None = None
-) -> NormalEquations:
-    """Return the normal equations of all parameters, or of the selected ones.
+def normal_equations(linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise) -> NormalEquations:
+    """Return the normal equations of all parameters.
 
     Parameters
     ----------
@@ -121,10 +118,8 @@ def normal_equations(
         The drift with which the observations were taken.
     noise : PoseNoise
         Standard deviations of the pose errors.
-    selected : (s,) array, optional
-        Parameters, ascending.
     """
-    return eliminate_drift(reduced_intervals(linearisation, drift.knots, noise.white, selected), noise, drift)
+    return eliminate_drift(reduced_intervals(linearisation, drift.knots, noise.white), noise, drift)
 
 
 def reduced_intervals(
@@ -143,23 +138,24 @@ def reduced_intervals(
     selected : (s,) array, optional
         Parameters, ascending; all by default.
     """
-    sources = list(linearisation.by_surface(selected))
-    n_parameters = linearisation.state.size if selected is None else len(selected)
-    return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white)
+    return reduced_by_group(linearisation, knots, white, np.zeros(len(knots.inner), dtype=np.int64), selected).of([0])
 
 
-def reduced_by_group(linearisation: Linearisation, knots: Knots, white: Array, group: Integers) -> ReducedGroups:
-    """Return the normal equations of all parameters and of the knots, with sums by group of spans.
+def reduced_by_group(
+    linearisation: Linearisation, knots: Knots, white: Array, group: Integers, selected: Integers | None = None
+) -> ReducedGroups:
+    """Return the normal equations of parameters and knots, with sums by group of spans.
 
     Parameters
     ----------
-    linearisation, knots, white
+    linearisation, knots, white, selected
         As for :func:`reduced_intervals`.
     group : (k - 1,) array
         Number of the group of the span after each knot but the last, from 0.
     """
-    times = TimeAxis(linearisation.body.seconds, knots)
-    return reduced_groups(list(linearisation.by_surface()), linearisation.state.size, times, white, group)
+    sources = list(linearisation.by_surface(selected))
+    n_parameters = linearisation.state.size if selected is None else len(selected)
+    return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white, group)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:
