@@ -9,6 +9,7 @@ import pytest
 from tools.campaign_statistics import HEAD, markdown_row, nse_band, statistics_of
 from tools.campaigns import path_of
 from tools.laser_pairs import agreement, report
+from tools.montecarlo import session_report
 from tools.session_rows import NAMES, UNITS, error_columns
 from tools.stress import table_of
 from tools.stress_campaigns import STRESS
@@ -130,3 +131,14 @@ def test_ninety_three_of_a_hundred_pairs_must_agree(agreeing: int, word: str) ->
     table = pd.DataFrame({"p_both": probability, "p_either": 1.0, "held_calm": "x y z", "held_rough": ""})
     table = table.assign(accepted_calm=True, accepted_rough=True, **{f"z_{name}": np.nan for name in NAMES})
     assert f"estimated by both, jointly: {agreeing} of 200 agree, {agreeing / 2:.1f} %, {word} (93 %" in report(table)
+
+
+@pytest.mark.parametrize(("accepted", "reasons"), [(True, ""), (False, "wet P1 is turned")])
+def test_a_single_session_shows_its_verdict_with_the_reasons(accepted: bool, reasons: str) -> None:
+    row = rows(np.array([[1.0, -2.0, 0.5, 1.5, -0.5, 2.0]])).to_dict("records")[0]
+    row |= {"campaign": "x", "seed": 8, "accepted": accepted, "reasons": reasons, "warnings": ""}
+    first, errors, *rest = session_report(row).splitlines()
+    word = "accepted" if accepted else "rejected"
+    assert first == f"x, seed 8: {word}; normalised squared error 11.75, by the total covariance 2.94"
+    assert "pitch +1.0, roll -2.0, yaw +0.5" in errors
+    assert rest == ([] if accepted else [f"  reasons: {reasons}"])
