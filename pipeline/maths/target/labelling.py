@@ -36,6 +36,8 @@ class LabelSettings:
         Heights in the target frame between which points count, with their whole footprints.
     spot_m
         Half the diameter of beams without half widths of their own, which are round and equally wide at all ranges.
+    beam_factor
+        By how much the footprints of beams with half widths count as larger than these say.
     seen
         Faces to use: "dry" (those that the laser uses), "wet" (those that the sonar uses), or "both" (all).
     """
@@ -46,6 +48,7 @@ class LabelSettings:
     lowest_m: float = -np.inf
     highest_m: float = np.inf
     spot_m: float = 0.0
+    beam_factor: float = 1.0
     seen: str = "both"
 
 
@@ -124,8 +127,9 @@ class _Candidates:
         steep &= face.clearance(self.points_m[rows] - away[:, None] * plane.axis) >= settings.margin_m / 2
         if beams.half_widths:
             rows, away, on_plane, cosine = rows[steep], away[steep], on_plane[steep], cosine[steep]
-            spreads = beams.spreads(rows, face.normal, reached[steep])
-            stray_m = beams.stray * spreads[0]
+            reached = reached[steep]
+            spreads = beams.spreads(rows, face.normal, reached, settings.beam_factor)
+            stray_m = beams.stray_on(rows, face.normal, reached)
             clear = face.clearance(on_plane, *spreads, margin_m=settings.margin_m, stray_m=stray_m) >= 0
             height, half = on_plane[:, 2], sum(np.abs(spread[:, 2]) for spread in spreads)
             clear &= (height + half < settings.highest_m) & (height - half > settings.lowest_m)
