@@ -159,7 +159,7 @@ class World:
         angles = fan_angles(s).angles_rad
         t_ns, angle = (values.ravel() for values in np.meshgrid(pings, angles, indexing="ij"))
         tilt = transmit_tilts_rad(s, angles, number).ravel()
-        across, along = SETTINGS.beam_factor * np.radians(s.beam_deg) / 2
+        across, along = np.radians(s.beam_deg) / 2
         ends = ((0, 0), (across, 0), (0, along))
         _, exists = swing_rad(np.sin(angle), tilt)
         bundle = np.stack([_ray(angle + turn, tilt + tilt_change) for turn, tilt_change in ends], axis=1)

@@ -46,9 +46,7 @@ class TargetBeams:
         for side, end in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
             yield self.directions[rows] + side * (wider[0] + self.stray) * across + end * wider[1] * along
 
-    def spreads(
-        self, rows: NDArray[np.int64], normal: Array, reached_m: Array, factor: float = 1.0
-    ) -> tuple[Array, ...]:
+    def spreads(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> tuple[Array, ...]:
         """Return the half axes, (n, 3) m each, of the footprints on a plane.
 
         A tilt of a ray u by a small angle towards t moves its intersection with the plane by
@@ -63,13 +61,9 @@ class TargetBeams:
             Unit normal (3,) of the plane.
         reached_m
             Ranges (n,) at which the rays meet the plane.
-        factor
-            How many half widths count.
         """
         halves = zip(self.half_widths, self.near_m, strict=False)
-        return tuple(
-            self._moved(rows, normal, factor * np.maximum(reached_m, near), half) for half, near in halves
-        )
+        return tuple(self._moved(rows, normal, np.maximum(reached_m, near), half) for half, near in halves)
 
     def stray_on(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> Array:
         """Return the vectors (n, 3) m by which footprints on a plane may stray; parameters as of ``spreads``."""
