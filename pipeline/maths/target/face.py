@@ -152,7 +152,7 @@ class Face:
         on_face = on_plane & (other.clearance(self.vertices_m) > -SAME_CORNER_M)
         behind = other.vertices_m.mean(axis=0) @ self.normal - self.distance_m < -TOUCH_M
         behind &= self.vertices_m.mean(axis=0) @ other.normal - other.distance_m < -TOUCH_M
-        return on_face & np.roll(on_face, -1) & behind
+        return np.asarray(on_face & np.roll(on_face, -1) & behind)
 
     def cells(self, step_m: float) -> tuple[Array, float]:
         """Return the centres (n, 3) m of cells with sides of about ``step_m`` on the face, and the area of each in m².
