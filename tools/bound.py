@@ -7,13 +7,15 @@ in one sparse matrix. A ray whose whole footprint lies on a plane n · X = d giv
     n · X(range, angles; mount parameters, pose) - d - (two turns and a shift of the plane's family) = 0
 
 whose variance Σ (n · dX/ds)² σ_s² follows from the noise of its range and angles. The unknowns are x (the six mount
-parameters, the families' turns and shifts) and e (the INS errors: white at records, Gauss-Markov at knots, linear
-between them). Their information matrix is
+parameters, the families' turns and shifts, biases) and e (the INS errors: white at records, Gauss-Markov at knots,
+linear between them). Their information matrix is
 
     [ Jxᵀ W Jx    Jxᵀ W Je     ]
-    [ Jeᵀ W Jx    Jeᵀ W Je + P ]        W: 1 / variance, P: inverse of the covariance of e,
+    [ Jeᵀ W Jx    Jeᵀ W Je + P ]        W: 1 / variance, P: inverse of the covariance of e.
 
-and the bound is the first 6 x 6 block of its inverse.
+Let N be what it leaves of x after e is eliminated. Without biases the bound is the first 6 x 6 block of N⁻¹. An
+estimator that allows for biases (:mod:`tools.bound_biases`), known to be zero within their sigmas, Q, gives up some of
+that: the best of all such errs by noise with the covariance C N C, C = (N + Q⁻¹)⁻¹. That is the bound here.
 
 Where the laser itself is calibrated (:func:`laser_bound`), the mount parameters are the laser's and there is no sonar.
 One displacement of the whole target, plumb within a sigma, then takes the place of the families' turns and shifts in x.
@@ -28,17 +30,19 @@ import numpy as np
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, hstack, identity, kron
 from scipy.sparse.linalg import splu
 
+from pipeline.config.pool import Segment
 from pipeline.gps_time import NS
 from pipeline.simulation.ins_errors import pose_sigmas
 from pipeline.simulation.scenario import Scenario, load_scenario
-from tools.forward_model import NORMALS, Array, Rays, World
+from tools.bound_biases import derivatives, sigmas
+from tools.forward_model import DEFAULTS, NORMALS, Array, Rays, World
 
 KNOT_S = 0.0625  # of the drift: with 0.25 s the bound of a laser was 3 % too low
 STEP = np.array([1e-5] * 3 + [1e-4] * 3)  # of differences, rad and m
 
 
 def equations(world: World, rays: Rays, calibrated: str = "mbes") -> tuple[Array, Array, Array]:
-    """Return Jx (n, 18), or (n, 12) for the laser; derivatives by the pose errors (n, 6); weights (n,).
+    """Return Jx (n, 41), or (n, 12) for the laser; derivatives by the pose errors (n, 6); weights (n,).
 
     Parameters
     ----------
@@ -65,20 +69,30 @@ def equations(world: World, rays: Rays, calibrated: str = "mbes") -> tuple[Array
     sign = np.einsum("ni,ni->n", normal, NORMALS[family])  # tops and bottoms turn together
     for k, plane in enumerate(NORMALS):
         rows = family == k
-        turns = here[rows] @ np.linalg.svd(plane[None])[2][1:].T
+        turns = (here[rows] - world.centres_m[k]) @ np.linalg.svd(plane[None])[2][1:].T
         of_x[rows, 6 + 3 * k : 9 + 3 * k] = sign[rows, None] * np.column_stack([turns, np.ones(len(turns))])
     ends = [world.placed(rays, rays.points_m + moved, none, none) for moved in np.moveaxis(rays.noise_m, 2, 0)]
     if calibrated == "laser":
         of_x = np.hstack([of_x[:, :6], normal, np.cross(here, normal)])
+    else:
+        of_x = np.hstack([of_x, derivatives(world, rays, of_x[:, 6:])])
     variance = sum(np.einsum("ni,ni->n", normal, end - here) ** 2 for end in ends)
     return of_x, pose, rays.clean / variance
 
 
-def bound(scenario: Scenario, seed: int) -> Array:
-    """Return the bound (6, 6): rotation about body x, y, z in rad and lever arm in m, as in calibration.json."""
-    world = World(scenario, seed)
+def bound(scenario: Scenario, seed: int, biases: bool = True, segment: Segment = DEFAULTS) -> Array:
+    """Return the bound (6, 6): rotation about body x, y, z in rad and lever arm in m, as in calibration.json.
+
+    ``biases``: whether the estimator allows for biases within the default sigmas; ``segment``: limits of labelling.
+    """
+    world = World(scenario, seed, segment)
     rays = [world.laser(k) for k in world.movement.passes] + [world.mbes(k) for k in world.movement.passes]
-    return _bound(scenario, rays, [equations(world, part) for part in rays], np.zeros(18))
+    information = _information(scenario, rays, [equations(world, part) for part in rays])
+    if not biases:
+        return _inverse(information[:18, :18])[:6, :6]
+    known = np.r_[np.zeros(18), sigmas() ** -2.0]
+    inverse = _inverse(information + np.diag(known))
+    return np.asarray(inverse @ information @ inverse)[:6, :6]
 
 
 def laser_bound(scenario: Scenario, seed: int, plumb_deg: float) -> Array:
@@ -95,24 +109,27 @@ def laser_bound(scenario: Scenario, seed: int, plumb_deg: float) -> Array:
     """
     world = World(scenario, seed)
     rays = [world.laser(k) for k in world.movement.passes]
-    prior_information = np.r_[np.zeros(9), [np.radians(plumb_deg) ** -2.0] * 2, 0.0]
-    return _bound(scenario, rays, [equations(world, part, "laser") for part in rays], prior_information)
+    plumb = np.r_[np.zeros(9), [np.radians(plumb_deg) ** -2.0] * 2, 0.0]
+    information = _information(scenario, rays, [equations(world, part, "laser") for part in rays])
+    return _inverse(information + np.diag(plumb))[:6, :6]
 
 
-def _bound(
-    scenario: Scenario, rays: list[Rays], equations: list[tuple[Array, Array, Array]], prior_information: Array
-) -> Array:
-    """Return the bound (6, 6); ``prior_information`` (x,) is 1 / variance of each unknown in x."""
+def _information(scenario: Scenario, rays: list[Rays], equations: list[tuple[Array, Array, Array]]) -> Array:
+    """Return the information N (x, x) of the rays about x."""
     of_x, of_pose, weight = (np.concatenate([part[i] for part in equations]) for i in range(3))
-    normal = of_x.T @ (weight[:, None] * of_x) + np.diag(prior_information)
+    normal = np.asarray(of_x.T @ (weight[:, None] * of_x))
     of_errors, prior = ins_errors(scenario, np.concatenate([part.t_ns for part in rays]) / NS, of_pose)
     if of_errors.shape[1]:
         inner = csc_matrix(of_errors.T @ diags(weight) @ of_errors + prior)
         across = of_errors.T @ (weight[:, None] * of_x)
         factors = splu(inner, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         normal -= across.T @ factors.solve(across)
-    scale = 1 / np.sqrt(np.diag(normal))
-    return np.asarray(scale[:, None] * np.linalg.inv(scale[:, None] * normal * scale) * scale)[:6, :6]
+    return normal
+
+
+def _inverse(matrix: Array) -> Array:
+    scale = 1 / np.sqrt(np.diag(matrix))
+    return np.asarray(scale[:, None] * np.linalg.inv(scale[:, None] * matrix * scale) * scale)
 
 
 def ins_errors(scenario: Scenario, seconds: Array, of_pose: Array) -> tuple[csr_matrix, csr_matrix]:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pipeline.config.pool import Segment
+from pipeline.config.session import Laser
 from pipeline.gps_time import NS
 from pipeline.simulation.beams import directions_in_mbes, fan_angles, swing_rad, transmit_tilts_rad
 from pipeline.simulation.echoes import UPWARD_RAD
 from pipeline.simulation.laser import scan_directions
 from pipeline.simulation.mbes import CLOCK_RATE_ERROR
-from pipeline.simulation.mesh import build_mesh
+from pipeline.simulation.mesh import Mesh, build_mesh
 from pipeline.simulation.motion import Movement, R_level_from_body
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
 from pipeline.simulation.random_streams import generator
@@ -26,8 +27,10 @@ from pipeline.simulation.site import Site
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SETTINGS = Segment()
+DEFAULTS = Segment()
 NORMALS = np.array([[-1, 0, 0], [-0.5**0.5, -(0.5**0.5), 0], [-0.5**0.5, 0.5**0.5, 0], [0, 0, 1]])  # of the families
+LASER_BEAM_M = float(Laser.model_fields["beam_m"].default)
+BEFORE_M = 0.001  # what stands nearer than the plane by more is before it
 SMALL_TILT = np.cos(np.radians(5.0))
 
 
@@ -68,7 +71,8 @@ def _ray(angle_rad: Array, tilt_rad: Array) -> Array:
 class World:
     """The truth of a simulated session."""
 
-    def __init__(self, scenario: Scenario, seed: int) -> None:
+    def __init__(self, scenario: Scenario, seed: int, segment: Segment = DEFAULTS) -> None:
+        self.segment = segment
         self.scenario, self.movement, self.seed = scenario, Movement(scenario, seed), seed
         self.site = Site(scenario.target.origin, scenario.azimuth_deg)
         mesh = build_mesh(scenario.target, scenario.surroundings)
@@ -80,14 +84,22 @@ class World:
         for surface, name in zip(mesh.surfaces, mesh.names, strict=True):
             if name in ("floor", "back_wall"):
                 self.family[surface] = -1
+        family = self.family[mesh.surfaces]
+        self.centres_m = np.array([self._middle(mesh, family == k) for k in range(len(NORMALS))])
+
+    @staticmethod
+    def _middle(mesh: Mesh, triangles: NDArray[np.bool_]) -> Array:
+        """Return the mean (3,) of the corners of the faces with these triangles."""
+        corners = np.unique(mesh.triangles[triangles])
+        return np.asarray(mesh.vertices_m[corners].mean(axis=0))
 
     def hits(self, sensor: str, k: int, t_ns: Integers, rays: Array) -> tuple[Array, Integers, Array]:
         """Return range, plane and sine of elevation of each ray or beam (n,).
 
         Plane -1 marks a ray that stage segment would not label. The stage's settings require the whole footprint and a
-        margin on one face, no grazing incidence, and a distance from the water line. The edges are not widened by the
-        angle noise of a beam, nor by what keeps a beam's side lobes from inner corners (``segment.side_lobe_widths``),
-        so that the bound takes more rays than the stage labels.
+        margin on one face, no grazing incidence, and a distance from the water line. A beam keeps a distance from inner
+        corners, where something stands before the face's plane (``segment.side_lobe_widths``). The edges are not
+        widened by the angle noise of a beam, so that the bound takes more rays than the stage labels.
 
         Parameters
         ----------
@@ -111,24 +123,36 @@ class World:
         slant = np.einsum("ni,ni->n", normal, axis)
         reached = np.where(np.isfinite(ranges), ranges, 0.0)
         hit = start + reached[:, None] * axis
-        good = (plane >= 0) & (self.family[plane] >= 0) & (-slant > np.sin(np.radians(SETTINGS.min_grazing_deg)))
+        good = (plane >= 0) & (self.family[plane] >= 0) & (-slant > np.sin(np.radians(self.segment.min_grazing_deg)))
+        highest_m = self.scenario.target.water_level_m - self.segment.water_margin_m
         above = (hit[:, 2] - self.scenario.target.water_level_m) * (1 if sensor == "laser" else -1)
-        rows = np.flatnonzero(good & (above > SETTINGS.water_margin_m))
+        rows = np.flatnonzero(good & (above > self.segment.water_margin_m))
         away = (reached * slant)[rows, None]
         reach = away / np.einsum("ni,nmi->nm", normal[rows], directions[rows, 1:])
         widths = start[rows, None] + reach[..., None] * directions[rows, 1:] - hit[rows, None]  # half axes on the plane
         level = np.cross(normal[rows], np.where(np.abs(normal[rows, 2:]) > 0.5, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
         level /= np.linalg.norm(level, axis=1)[:, None]
+        spot = LASER_BEAM_M / 2 / -slant[rows, None] if sensor == "laser" else 0.0  # half its length on the plane
+        margin = np.maximum(self.segment.margin_m, spot)
         inside = np.ones(len(rows), dtype=bool)
         for turn in np.arange(8) * np.pi / 4:  # each edge of the target is normal to one of these directions
             outward = np.cos(turn) * level + np.sin(turn) * np.cross(normal[rows], level)
             rim = np.einsum("nm,nmi->ni", np.sign(np.einsum("nmi,ni->nm", widths, outward)), widths)
-            toward = hit[rows] + rim + SETTINGS.margin_m * outward - start[rows]
+            toward = hit[rows] + rim + margin * outward - start[rows]
             toward /= np.linalg.norm(toward, axis=1)[:, None]
             inside &= self.caster.cast(start[rows], toward)[1] == plane[rows]
+            if sensor == "mbes":
+                beside = hit[rows] + 2 * self.segment.side_lobe_widths * rim
+                inside &= ~self._corner_beside(start[rows], beside) & (beside[:, 2] < highest_m)
         plane_on_target = np.full(len(plane), -1)
         plane_on_target[rows[inside]] = plane[rows[inside]]
         return reached, plane_on_target, axis[:, 2]
+
+    def _corner_beside(self, start: Array, beside: Array) -> NDArray[np.bool_]:
+        """Return whether something stands between the head at ``start`` (n, 3) and points of a plane."""
+        away = np.linalg.norm(beside - start, axis=1)
+        ranges, _ = self.caster.cast(start, (beside - start) / away[:, None])
+        return np.asarray(ranges < away - BEFORE_M)
 
     def laser(self, k: int) -> Rays:
         """Return the laser's rays on the target in pass ``k``."""

@@ -179,7 +179,8 @@ def faces_on_surfaces(faces: Sequence[Face], state: State) -> Faces:
 def surfaces_of_laser(target: TargetModel, planes: pd.DataFrame) -> tuple[ObservedSurface, ...]:
     """Return the surface of each family from the laser's planes.
 
-    A family is as designed if it is horizontal, lies in several planes, or has no plane of the laser.
+    A family is as designed if it is horizontal, lies in several planes, or has no plane of the laser. The centre of a
+    surface, about which its wet part turns, is the designed one, brought onto the laser's plane.
 
     Parameters
     ----------
@@ -194,12 +195,14 @@ def surfaces_of_laser(target: TargetModel, planes: pd.DataFrame) -> tuple[Observ
         for family in target.families
         if family.one_plane and not family.level and (ALL_PASSES, family.name) in found
     }
-    return tuple(
-        ObservedSurface.at(surface.family, measured[surface.family].normal, measured[surface.family].centroid_m)
-        if surface.family in measured
-        else surface
-        for surface in designed_surfaces(target)
-    )
+    surfaces = []
+    for surface in designed_surfaces(target):
+        plane = measured.get(surface.family)
+        if plane is not None:
+            off_m = plane.normal @ (surface.centre_m - plane.centroid_m)
+            surface = ObservedSurface.at(surface.family, plane.normal, surface.centre_m - off_m * plane.normal)
+        surfaces.append(surface)
+    return tuple(surfaces)
 
 
 def sensor_sigmas(sensor: PointNoise) -> SensorSigmas:
