@@ -89,11 +89,8 @@ ERROR_SOURCES = (  # the first beginning that fits counts
         "wet", "wet faces against dry ones", "target",
         "the target was built and surveyed once",
     ),
-    ErrorSource("rotation", "fixed angles", "laser_mount", "kept at the coarse mount where the laser is calibrated"),
-    ErrorSource(
-        "lever_arm", "fixed components of the lever arm", "laser_mount",
-        "kept at the coarse mount where the laser is calibrated",
-    ),
+    ErrorSource("rotation", "the coarse mount", "laser_mount", "an observation where the laser is calibrated"),
+    ErrorSource("lever_arm", "the coarse mount", "laser_mount", "as its angles"),
 )  # fmt: skip
 UNKNOWN = ErrorSource("", "", "session", "not in the table: then its own, for which no two sessions need be alike")
 

@@ -18,7 +18,6 @@ from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
 from pipeline.maths.adjustment.solution import (
     ParameterTest,
-    Solution,
     prior_parameter_tests,
     single_parameter_tests,
     weakest_direction,
@@ -73,7 +72,7 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
     If the data leave a direction open, the mount's values and both covariances are NaN.
     """
     state, solution = adjustment.state, adjustment.solution
-    numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, even if it is fixed
+    numbers = solution.estimated
     random = solution.noise_covariance(numbers)
     total = solution.total_covariance(problem.consider, numbers)
     values = state.deviation_from(problem.model.coarse)[numbers]
@@ -83,7 +82,7 @@ def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple
         {
             "unknown": [state.names[k] for k in numbers],
             "value": values,
-            "sigma": np.sqrt(np.diag(random)),
+            "sigma": np.sqrt(np.maximum(np.diag(random), 0.0)),  # rounding, where prior information is all
             "sigma_total": np.sqrt(np.diag(total)),
         }
     )
@@ -102,7 +101,7 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
         "between_dof": between.dof,
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
-        "weakest": "" if solution.deficiency else _weakest(solution),
+        "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]),
         **{f"test_{name}": test[name] for name in ("statistic", "dof", "limit", "passed")},
         "reason": _no_result(solution.deficiency) if solution.deficiency else "",
     }
@@ -111,12 +110,6 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
 
 def _no_result(deficiency: int) -> str:
     return f"the data leave {plural(deficiency, 'direction')} of the unknowns open"
-
-
-def _weakest(solution: Solution) -> str:
-    """Return the weakest direction of the mount in words; empty if a mount parameter is fixed."""
-    is_whole = np.all(solution.estimated[:N_MOUNT] == np.arange(N_MOUNT))
-    return weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]) if is_whole else ""
 
 
 def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
@@ -140,17 +133,19 @@ def _single_parameter_table(
 ) -> pd.DataFrame:
     """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
 
-    The parameters are fixed, or estimated with a value known beforehand, or named in adjust.free.
+    The parameters are fixed, or estimated with a value known beforehand (those of a laser's coarse mount among them),
+    or named in adjust.free.
     """
     state, solution, equations = adjustment.state, adjustment.solution, adjustment.equations
     consider, known, mount = problem.consider, problem.prior.known_parameters, np.arange(N_MOUNT)
-    known = known[known >= N_MOUNT]
     found = single_parameter_tests(equations.normal, equations.right, solution, consider)
-    deviation = state.deviation_from(problem.model.coarse) + solution.step
-    found += prior_parameter_tests(solution, deviation, consider, known)
-    tests, effects = {test.parameter: test for test in found}, np.zeros((N_MOUNT, state.size))
+    effects = np.zeros((N_MOUNT, state.size))
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
-    effects[:, known] = solution.prior_effects(mount)[:, np.searchsorted(solution.estimated, known)]
+    if problem.prior.parameters is not None:
+        deviation = state.deviation_from(problem.prior.parameters.known) + solution.step
+        found += prior_parameter_tests(solution, deviation, consider, known)
+        effects[:, known] = solution.prior_effects(mount, known)
+    tests = {test.parameter: test for test in found}
     by_name, rows = estimate.set_index("unknown"), []
     on_surfaces = range(state.surface_slice.start, state.surface_slice.stop)
     freed = np.setdiff1d(solution.estimated, [*mount, *on_surfaces, *known]).tolist()

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.cause_words import words_of
 
 SIGNIFICANT = 4.0  # sigmas: by chance one of 16 000 parameters, so one of 400 sessions with forty parameters each
@@ -52,10 +53,11 @@ class EstimatedParameter:
 def suspected_causes(freed: pd.DataFrame) -> list[SuspectedCause]:
     """Return the suspected causes from table ``freed``, the one with the largest value over sigma first.
 
-    There are none unless the residuals contradict at least one fixed parameter.
+    There are none unless the residuals contradict at least one fixed parameter. A coarse mount that is an observation
+    is judged by itself (:mod:`~pipeline.report.coarse_mount`).
     """
-    fixed = freed[~freed["estimated"]].to_dict("records")
-    if not any(_is_significant(row) for row in fixed):
+    fixed = freed[~freed["estimated"] & ~freed["unknown"].isin(MOUNT_NAMES)].to_dict("records")
+    if not any(is_significant(row) for row in fixed):
         return []
     causes = [
         SuspectedCause(words_of(row), abs(row["value"]) / row["sigma"])
@@ -74,11 +76,12 @@ def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:
             sigma_total=row["sigma"],
             unit=UNITS[row["unknown"]],
             words=words_of(row),
-            is_significant=_is_significant(row),
+            is_significant=is_significant(row),
         )
         for row in freed[freed["estimated"] & np.isfinite(freed["sigma"])].to_dict("records")
     ]
 
 
-def _is_significant(row: Mapping[Any, Any]) -> bool:
+def is_significant(row: Mapping[Any, Any]) -> bool:
+    """Return whether an estimate of table ``freed`` is farther from zero than noise and all a-priori errors explain."""
     return bool(abs(row["value"]) > SIGNIFICANT * row["expected"])

@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.adjustment.laser_design import coarse_covariance, required_sigmas
+from pipeline.adjustment.laser_design import coarse_mount
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
-from pipeline.config.stage_settings import laser_calibration, settings_by_name, stage_config
+from pipeline.config.stage_settings import LaserPrior, narrow, settings_by_name, stage_config
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
-from pipeline.maths.adjustment.solution import parameters_to_fix
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario
@@ -141,32 +140,17 @@ def test_what_a_fine_calibration_held_keeps_its_surveyed_sigma() -> None:
     assert np.sqrt(np.diag(result["laser"]["covariance_total"]))[3:] == pytest.approx([0.002] * 3)
 
 
-def test_the_worst_is_held_first_and_what_is_left_is_surer() -> None:
-    normal = np.diag([1e8, 1e8, 1e8, 1e6, 1e6, 1e6]).astype(float)
-    normal[3, 4] = normal[4, 3] = 0.999999999e6  # x and y nearly the same
-    held = parameters_to_fix(normal, range(6), np.repeat([1e-3, 0.005], 3))
-    assert len(held) == 1
-    assert next(iter(held)) in (3, 4)
-    assert parameters_to_fix(np.diag([1e8] * 3 + [1e6] * 3), range(6), np.repeat([1e-3, 0.005], 3)) == {}
-
-
 def test_what_is_calibrated_is_the_sonar_or_the_laser() -> None:
-    """Without a sonar the verdict's limits go with ``laser_fit``; with one a changed limit adjusts nothing anew."""
+    """Without a sonar the prior information of ``laser_fit`` counts; limits of the verdict adjust nothing anew."""
     session = made(OFF, seed=2)
     both = parse(SessionConfig, session.session, "session")
     alone = both.model_copy(update={"mbes": None})
     pool = parse(PoolConfig, session.pool | {"verdict": WIDE}, "pool")
     of_sonar, of_laser = (stage_config(adjust.Config, settings_by_name(pool, given)) for given in (both, alone))
-    assert of_sonar.calibration is both.mbes
-    assert of_sonar.laser_fit is None
-    assert of_laser.calibration == laser_calibration(pool)
-    assert (of_laser.calibration.max_sigma_deg, of_laser.calibration.max_sigma_m) == tuple(WIDE.values())
-
-
-def test_bounds_are_the_stricter_of_verdict_and_coarse() -> None:
-    config = parse(PoolConfig, made(OFF, seed=2).pool, "pool")
-    bounds = required_sigmas(np.diag([1e-8] * 3 + [1.0] * 3), laser_calibration(config))
-    assert bounds == pytest.approx([0.5e-4] * 3 + [0.005] * 3)
+    assert (of_sonar.mbes, of_sonar.laser_fit) == (both.mbes, None)
+    assert (of_laser.mbes, of_laser.laser_fit) == (None, narrow(LaserPrior, pool.laser_fit))
+    usual = parse(PoolConfig, session.pool | {"laser_fit": {"hold_share": 0.9}}, "pool")
+    assert stage_config(adjust.Config, settings_by_name(usual, alone)) == of_laser
 
 
 def test_the_dock_gives_the_lasers_angles_as_well() -> None:

@@ -15,13 +15,20 @@ which contains its own Q_ii.
 
 N contains prior information as well (:mod:`~pipeline.maths.adjustment.pseudo_observations`): N = N_points + P. Of the
 covariance C, the part C P C is due to errors of the prior information, so that the noise of the points alone gives
-C - C P C. Let a parameter i have a value known beforehand, with the sigma q, P_ii = 1 / q². An error h of that value
-changes the parameters by C_·i h / q². Without this prior information the parameter would have the value and the
-variance
+C - C P C. Let parameters have values known beforehand, with the covariance Q, P = Q⁻¹. Errors h of these values change
+the parameters by C P h. With any F for which F Fᵀ = P, C F Fᵀ C is their part C P C of the covariance: the columns of
+C F are effects of independent errors. Here F = D R^(1/2), D the roots of the diagonal of P and D R D = P; without
+correlations, this is the effect C_·i / q of one sigma q of each value.
 
-    x_i / (1 - C_ii / q²),      C_ii / (1 - C_ii / q²),
+The solution deviates by d from these values, which is their misclosure. It has the covariance Q - C, and the test of
+one pseudo-observation (Baarda 1968, "A testing procedure for use in geodetic networks") gives the error that value i
+would have if it alone were wrong, with its variance if all a-priori errors hold:
 
-and its test compares this value with 0 ± q, the variances and those of the other errors added.
+    (P d)_i / W_ii,      1 / W_ii,      W = P (Q - C) P = P - P C P.
+
+1 / P_ii of this variance are due to the value itself, the rest to the points and the other values. For independent
+values, W_ii = (1 - C_ii / q²) / q², and the parameter would be d_i / (1 - C_ii / q²) without its prior information.
+Errors x_h of the fixed parameters change d by S x_h, and so this value by (P S x_h)_i / W_ii.
 
 (An error of one parameter shows in the values of all that look alike. In a trial, ranges
 seemed wrong by 7 mm because those on horizontal faces were, within their own sigma.)
@@ -39,7 +46,6 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
 KNOWN_SHARE = 1e-6  # least share of the information that counts
-VAGUE = 10.0  # rad or m: prior sigma that stands for no prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
 
@@ -103,16 +109,22 @@ class Solution:
         C = self.covariance
         return self._among(C - C @ self.prior @ C, self.estimated if numbers is None else np.asarray(numbers))
 
-    def prior_effects(self, numbers: Integers) -> Array:
-        """Return the change (k, f) of parameters (k,) by one sigma of each estimated one's value known beforehand.
+    def prior_effects(self, numbers: Integers, known: Integers) -> Array:
+        """Return the change C F (k, m) of parameters by independent errors, of one sigma, of values known beforehand.
 
-        Zero for those without one. The values known beforehand are independent.
+        Parameters
+        ----------
+        numbers : (k,) array
+            Parameters, estimated.
+        known : (m,) array
+            All parameters with a value known beforehand, estimated.
         """
-        rows = np.zeros((len(numbers), len(self.estimated)))
-        for row, number in enumerate(np.asarray(numbers).tolist()):
-            if number in self.estimated:
-                rows[row] = self.covariance[int(np.searchsorted(self.estimated, number))]
-        return rows * np.sqrt(np.diag(self.prior))
+        rows, columns = (np.searchsorted(self.estimated, chosen) for chosen in (numbers, known))
+        P = self.prior[np.ix_(columns, columns)]
+        scale = np.sqrt(np.diag(P))
+        values, vectors = np.linalg.eigh(P / np.outer(scale, scale))
+        root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        return np.asarray(self.covariance[np.ix_(rows, columns)] @ (scale[:, None] * root))
 
     def _among(self, covariance: Array, chosen: Integers) -> Array:
         """Return the part (k, k) of a covariance (f, f) of the estimated parameters; zero for fixed ones."""
@@ -237,51 +249,23 @@ def prior_parameter_tests(
     deviation : (u,) array
         Deviations from the values known beforehand, after the solution's step.
     consider : ConsiderErrors
-        A-priori errors of the fixed parameters, and of these.
+        A-priori errors of the fixed parameters.
     numbers : (k,) array
-        The parameters; the values known beforehand are independent.
+        All parameters with a value known beforehand.
     """
-    S = solution.sensitivity_of(numbers)
-    others = np.einsum("ij,jk,ik->i", S, consider.covariance(solution.fixed), S)
-    places, tests = np.searchsorted(solution.estimated, numbers), []
-    for number, place, of_others in zip(numbers.tolist(), places.tolist(), others.tolist(), strict=True):
-        variance, information = float(solution.covariance[place, place]), float(solution.prior[place, place])
-        share = 1 - variance * information  # of the information on it that is due to the points
-        if share > KNOWN_SHARE:
-            expected = float(np.sqrt(variance / share + 1 / information + of_others / share**2))
-            value = float(deviation[number]) / share
-            tests.append(ParameterTest(number, value, float(np.sqrt(variance / share)), expected))
+    places = np.searchsorted(solution.estimated, numbers)
+    P, C = (matrix[np.ix_(places, places)] for matrix in (solution.prior, solution.covariance))
+    W, misclosure = P - P @ C @ P, P @ deviation[numbers]
+    effects = P @ solution.sensitivity_of(numbers)
+    others = np.einsum("ij,jk,ik->i", effects, consider.covariance(solution.fixed), effects)
+    tests = []
+    for k, number in enumerate(numbers.tolist()):
+        information, own = float(W[k, k]), float(P[k, k])
+        if information > KNOWN_SHARE * own:
+            expected = float(np.sqrt(1 / information + others[k] / information**2))
+            sigma = float(np.sqrt(max(1 / information - 1 / own, 0.0)))
+            tests.append(ParameterTest(number, float(misclosure[k]) / information, sigma, expected))
     return tests
-
-
-def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) -> dict[int, float]:
-    """Return the mount parameters to fix, and the sigma that each would have had if it were estimated.
-
-    The worst parameter is fixed, and the rest is solved again: without one of a correlated pair the second can usually
-    be estimated.
-
-    Parameters
-    ----------
-    normal : (u, u) array
-        Normal matrix of all parameters.
-    estimated : sequence of int
-        Parameters that are to be estimated.
-    required : (6,) array
-        Sigmas required of the mount parameters.
-    """
-    fixed: dict[int, float] = {}
-    while len(fixed) < N_MOUNT:
-        left = [number for number in estimated if number not in fixed]
-        prior = np.zeros(len(normal))
-        prior[left] = VAGUE**-2
-        solution = solve(normal + np.diag(prior), np.zeros(len(normal)), left)
-        mount = [k for k in range(N_MOUNT) if k not in fixed]
-        sigma = np.sqrt(np.diag(solution.covariance))[: len(mount)]
-        worst = int(np.argmax(sigma / required[mount]))
-        if sigma[worst] <= required[mount[worst]]:
-            break
-        fixed[mount[worst]] = float(sigma[worst])
-    return fixed
 
 
 def correlated_pair(covariance: Array) -> tuple[int, int, float] | None:
