@@ -134,7 +134,8 @@ def _single_parameter_table(
     """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
 
     The parameters are fixed, or estimated with a value known beforehand (those of a laser's coarse mount among them),
-    or named in adjust.free.
+    or named in adjust.free. Where values known beforehand correlate, the effects are of independent errors instead,
+    whose squares have the same sum.
     """
     state, solution, equations = adjustment.state, adjustment.solution, adjustment.equations
     consider, known, mount = problem.consider, problem.prior.known_parameters, np.arange(N_MOUNT)

@@ -45,7 +45,7 @@ class ShareOfCoarseMount:
             f"{_with_sigmas(values)} {words}"
             for values, words in (
                 (self.above_limit, "above the verdict's limits"),
-                (self.unimproved, "not clearly better than the coarse mount, on which the value mostly rests"),
+                (self.unimproved, "not clearly better than the coarse mount, on which much of the value rests"),
             )
             if values
         ]
