@@ -144,16 +144,16 @@ def calibration_problem(session: SessionData, inputs: Inputs, config: Config) ->
     if config.mbes is not None:
         problem = sonar_problem(session, mount_of(config.mbes.mount), {"laser": laser, "mbes": config.mbes})
         state = problem.model.coarse
-        errors = sonar_errors(state.names, laser, config.mbes, as_built, session.target.depth_m)
+        errors = sonar_errors(problem.model.names, laser, config.mbes, as_built, session.target.depth_m)
         known = known_parameters(state, errors, config.adjust.free)
         return replace(problem, prior=replace(problem.prior, parameters=known), consider=errors)
     assert config.laser_fit is not None
     pose = target_frame(inputs.target_pose), float(np.radians(inputs.target_pose["azimuth_correction_deg"].iloc[0]))
     problem = laser_problem(session, mount_of(laser.mount), laser, config.laser_fit, surveyed_displacement(*pose))
-    state, coarse = problem.model.coarse, problem.prior.parameters
+    coarse = problem.prior.parameters
     assert coarse is not None
-    errors = laser_consider(state.names, laser, coarse.covariance, as_built)
-    known = known_parameters(state, errors, config.adjust.free)
+    errors = laser_consider(problem.model.names, laser, coarse.covariance, as_built)
+    known = known_parameters(problem.model.coarse, errors, config.adjust.free)
     both = coarse if known is None else coarse.with_independent(known)
     return replace(problem, prior=replace(problem.prior, parameters=both), consider=errors)
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import pandas as pd
 
-from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
+from pipeline.adjustment.ins_drift import drift_model, pose_noise
 from pipeline.adjustment.laser_design import laser_problem, surveyed_displacement
 from pipeline.adjustment.problem import CalibrationProblem, SessionData, designed_surfaces, sonar_problem
 from pipeline.adjustment.provisional import design_without_place, sample_near_target, with_adjusted_sample
@@ -43,6 +43,7 @@ from pipeline.config.stage_settings import (
 )
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
+from pipeline.maths.adjustment.drift_likelihood import EXACT
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.mount import mount_of
 from pipeline.target.design import target_of
@@ -157,7 +158,7 @@ def provisional_problem(context: LabellingContext, noise: PoseNoise, config: Con
         trajectory=context.trajectory,
         laser_lever_arm_m=context.laser.lever_arm_body_m,
         noise=noise,
-        drift=drift_prior(config.ins.drift_within),
+        drift=EXACT,
         as_built=config.as_built,
     )
     if config.mbes is not None:

@@ -22,7 +22,8 @@ TIMES = (1, 3)  # the expected size, and thrice
 SHAPE = frozenset({"residuals_by_face", "length_off_design", "angle_off_design", "target_beyond_search"})
 DRIFTS = frozenset({"ins_drift_above_settings", "ins_drift_between_passes"})
 GEOMETRY = frozenset({"sigma_above_limit", "no_parameter_estimable", "no_result"})
-WET_WALL = frozenset({"P2", "wet_P2_shift", "wet_P2_turn_1", "wet_P2_turn_2"})
+BOWS = ("wet_P1_bow", "wet_P2_bow", "wet_P3_bow")
+WET_WALL = frozenset({"P2", "wet_P2_shift", "wet_P2_turn_1", "wet_P2_turn_2", "wet_P2_bow"})
 TRUE_PROFILE = [[0.0, 1502.0], [1.5, 1501.5], [2.0, 1499.5], [5.0, 1499.0]]  # a warm layer of 1.5 to 2 m, 0.6 °C
 
 
@@ -227,7 +228,9 @@ EFFECTS = (
         "time_constant_s": 30.0}}}, *DRIFTS),
     _effect("INS: steps of {:g} mm at full seconds", 3, lambda size: {"ins": DRIFT | {"gnss_step_m": size / 1000}}),
     _effect("wet wall bowed by {:g} mm", 3, _faces("P2", bow_m=-1e-3), *WET_WALL),
-    _effect("all wet vertical faces bowed by {:g} mm", 3, _faces("P1", "P2", "P3", bow_m=-1e-3), "residuals_by_face"),
+    _effect(
+        "all wet vertical faces bowed by {:g} mm", 3, _faces("P1", "P2", "P3", bow_m=-1e-3), "residuals_by_face", *BOWS
+    ),
     _effect("P3-1 under water {:g} mm off", 20, _faces("P3-1", shift_m=1e-3), "P3-1"),
     _effect("P3-1-top {:g} mm too high", 20, _faces("P3-1-top", shift_m=1e-3), "P3-1-top"),
     _effect("P1-2 under water turned by {:g}°", 0.3, _faces("P1-2", turn_deg=[1.0, 0.0]), "P1-2"),

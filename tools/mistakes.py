@@ -43,8 +43,9 @@ def named_first(reason_codes: list[str], artefacts: Mapping[str, Any]) -> frozen
         All tables of the session.
     """
     from pipeline.adjustment.pattern_tests import OF_PASSES
+    from pipeline.config.pool import Adjust
     from pipeline.report.reason_codes import ReasonCode
-    from pipeline.report.suspected_causes import SIGNIFICANT
+    from pipeline.report.suspected_causes import significance_limit
 
     local = {
         ReasonCode.RESIDUALS_BY_FACE, ReasonCode.RESIDUALS_STEP, ReasonCode.RESIDUALS_BY_PING,
@@ -53,10 +54,10 @@ def named_first(reason_codes: list[str], artefacts: Mapping[str, Any]) -> frozen
     first = next(iter(reason_codes), "")
     if ReasonCode.SUSPECTED_CAUSE in reason_codes and not local & set(reason_codes):
         freed = artefacts["adjust/freed"]
-        beyond = freed["value"].abs() > SIGNIFICANT * freed["expected"]
+        beyond = freed["value"].abs() > significance_limit(freed, Adjust().test_level) * freed["expected"]
         causes = freed[~freed["estimated"] & beyond]
         parameter = str(causes.loc[(causes["value"].abs() / causes["sigma"]).idxmax(), "unknown"])
-        return frozenset({parameter, *parameter.split("_")})
+        return frozenset({parameter, parameter.removeprefix("face_"), *parameter.split("_")})
     if first == ReasonCode.RESIDUALS_BY_FACE:
         patterns = artefacts["adjust/patterns"]
         patterns = patterns[~patterns["by"].isin(OF_PASSES)]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, Runs, interval_sums, merged
+from pipeline.maths.adjustment.interval_sums import IntervalSums, Runs, merged
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, histogram, robust_scale
 from pipeline.maths.adjustment.weighting import Weighting, rescaled, scatter, shrunk_factors
@@ -74,14 +74,6 @@ def _accumulate_batch(
     observations, weighting = model.linearise(sensor, batch, values), values.weighting
     robust, weight = weighting.weights(observations)
     normalised = weighting.normalised(observations)
-    points = LinearisedPoints(
-        record=observations.record,
-        surface=observations.surface,
-        share=observations.share,
-        features=observations.features_at_adjusted(weight),
-        weight=weight,
-        v_m=observations.v_m,
-    )
     groups = {}
     for surface in Runs.of(observations.surface).starts.tolist():
         rows = observations.surface == observations.surface[surface]
@@ -93,7 +85,7 @@ def _accumulate_batch(
             reduced=int(np.sum(w < 1)) - cut,
             histogram=histogram(normalised[rows]),
         )
-    return interval_sums(points), groups
+    return observations.sums(weight), groups
 
 
 def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: CurrentValues) -> Accumulation:

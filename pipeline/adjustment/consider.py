@@ -1,11 +1,13 @@
 """A-priori errors of parameters: systematic errors, which enter the total covariance.
 
-The points tell something of errors of the wet faces, of biases that go with the incidence, and of the transmitter's
-place. These parameters are estimated; their a-priori sigma is prior information (:func:`known_parameters`). All others
-are fixed. This module provides only the errors. pipeline/maths/adjustment/solution.py computes the total covariance
-C + S Q Sᵀ: ``ConsiderErrors.covariance`` returns Q, and ``Solution.total_covariance`` the sum.
+The points tell something of errors of the wet faces, of biases that go with the incidence, of the transmitter's place,
+and of a sound speed that changes with depth. These parameters are estimated; their a-priori sigma is prior information
+(:func:`known_parameters`). All others are fixed. This module provides only the errors. The module
+pipeline/maths/adjustment/solution.py computes the total covariance C + S Q Sᵀ: ``ConsiderErrors.covariance`` returns Q,
+and ``Solution.total_covariance`` the sum.
 """
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,7 +24,9 @@ from pipeline.maths.mount_parameters import N_MOUNT
 Array = NDArray[np.float64]
 LEAST_SPAN_M = 0.1  # smallest depth and smallest span that count
 LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
-ESTIMATED_WITH_PRIOR = ("wet_", "mbes_incidence", "mbes_level_range", "laser_incidence", "projector_")  # beginnings
+ESTIMATED_WITH_PRIOR = (  # beginnings of the names
+    "wet_", "mbes_incidence", "mbes_level_range", "laser_incidence", "projector_", "sound_speed_gradient",
+)  # fmt: skip
 
 
 def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
@@ -74,9 +78,9 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
     sigmas |= {"laser_range": laser.range_bias_sigma_m, "laser_latency": laser.latency_sigma_s}
     sigmas["laser_incidence"] = laser.incidence_bias_sigma_m
     lean = float(np.radians(as_built.angle_sigma_deg))
-    for name in names:
-        if name.startswith("wet_"):
-            sigmas[name] = as_built.offset_sigma_m if name.endswith("_shift") else lean
+    of_wet = {"turn_1": lean, "turn_2": lean, "shift": as_built.offset_sigma_m, "bow": as_built.bow_sigma_m}
+    sigmas |= {name: as_built.face_sigma_m for name in names if name.startswith("face_")}
+    sigmas |= {name: sigma for name in names for end, sigma in of_wet.items() if re.fullmatch(f"wet_.*_{end}", name)}
     blocks = []
     if covariance is not None and LASER_MOUNT[0] in names:
         blocks = [(np.array([names.index(name) for name in LASER_MOUNT]), np.array(covariance))]

@@ -89,6 +89,14 @@ ERROR_SOURCES = (  # the first beginning that fits counts
         "wet", "wet faces against dry ones", "target",
         "the target was built and surveyed once",
     ),
+    ErrorSource(
+        "face_", "single faces", "target",
+        "as the wet faces",
+    ),
+    ErrorSource(
+        "surfaces_", "the target's design: directions, distances, parallel faces", "target",
+        "as the wet faces",
+    ),
     ErrorSource("rotation", "the coarse mount", "laser_mount", "an observation where the laser is calibrated"),
     ErrorSource("lever_arm", "the coarse mount", "laser_mount", "as its angles"),
 )  # fmt: skip

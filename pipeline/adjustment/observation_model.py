@@ -18,7 +18,8 @@ from pipeline.maths.adjustment.design_matrix import (
     sensor_noise,
     sonar_point_design,
 )
-from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
+from pipeline.maths.adjustment.face_shifts import Faces
+from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums, LinearisedPoints, Runs, interval_sums
 from pipeline.maths.adjustment.normal_equations import RecordErrors, residual_shift
 from pipeline.maths.adjustment.parameters import LASER_FEATURES, MBES_FEATURES, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
@@ -26,7 +27,7 @@ from pipeline.maths.adjustment.weighting import Weighting, common_variance
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-N_FEATURES = {"laser": N_MOVED + len(LASER_FEATURES), "mbes": N_MOVED + len(MBES_FEATURES)}
+N_FEATURES = {"laser": N_MOVED + len(LASER_FEATURES), "mbes": N_MOVED + len(MBES_FEATURES) + 1}  # with the bow
 
 
 @dataclass(frozen=True)
@@ -115,21 +116,43 @@ class Observations:
         noise = sensor_noise(self.v_m, weight, Runs.of(self.record, self.surface), self.common_m)
         return np.concatenate([self.features[:1], self.features[1:] - self.slopes * noise])
 
+    def sums(self, weight: Array, by_face: bool = False) -> IntervalSums:
+        """Return the sums of each interval and surface; ``weight`` (n,).
+
+        ``by_face``: of each interval and face, with the number of the face in place of that of its surface.
+        """
+        points = LinearisedPoints(
+            record=self.record,
+            surface=self.points["face"].astype(np.int64) if by_face else self.surface,
+            share=self.share,
+            features=self.features_at_adjusted(weight),
+            weight=weight,
+            v_m=self.v_m,
+        )
+        return interval_sums(points)
+
 
 @dataclass(frozen=True)
 class ObservationModel:
     """Model that turns a batch of labelled points into observations.
 
-    body: motion of the body, target frame; surface_of_face (f,): number of each face's surface; height_of_face (f,) m:
-    distance of each face from its surface, along the normal; coarse: the state from which the adjustment starts;
-    sigmas: standard deviations of each sensor that observes.
+    body: motion of the body, target frame; faces: the surface of each face; height_of_face (f,) m: distance of each
+    face from its surface, along the normal; coarse: the state from which the adjustment starts; sigmas: standard
+    deviations of each sensor that observes; wet_heights_m: z of the faces' lower end and of the water's surface, target
+    frame.
     """
 
     body: BodyMotion
-    surface_of_face: Integers
+    faces: Faces
     height_of_face: Array
     coarse: State
     sigmas: Mapping[str, SensorSigmas]
+    wet_heights_m: tuple[float, float]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters, and of the shifts of single faces."""
+        return (*self.coarse.names, *self.faces.parameters)
 
     def linearise(self, sensor: str, batch: Batch, values: CurrentValues) -> Observations:
         """Return the observations of a batch. Their v is without the drift and without the mean of the noise.
@@ -194,7 +217,7 @@ class ObservationModel:
 
     def _ordered(self, batch: Batch) -> tuple[Batch, Integers]:
         """Return the batch ordered by surface, and on each surface by time, with the numbers (n,) of the surfaces."""
-        t_ns, surface = batch["t_ns"], self.surface_of_face[batch["face"]]
+        t_ns, surface = batch["t_ns"], self.faces.surface[batch["face"]]
         ascending = bool(np.all(t_ns[1:] >= t_ns[:-1]))
         order = np.argsort(surface.astype(np.int16), kind="stable") if ascending else np.lexsort((t_ns, surface))
         return {name: column[order] for name, column in batch.items()}, surface[order]
@@ -235,5 +258,14 @@ class ObservationModel:
         r = np.einsum("kin,in->kn", axes_mbes, points_m) + lever_arm
         v = r[2] + pings.spread(positions @ axes[2]) - batch.surface.distance_m
         v = v - self.height_of_face[batch.points["face"]]
-        soundings = SoundingsOnSurface(points_m=points_m, axes=axes_mbes, up=up, r=r, v_m=v)
+        lowest_m, water_m = self.wet_heights_m
+        soundings = SoundingsOnSurface(
+            points_m=points_m,
+            axes=axes_mbes,
+            up=up,
+            r=r,
+            v_m=v,
+            height=(axes[:, 2] @ r + pings.spread(positions[:, 2]) - lowest_m) / (water_m - lowest_m),
+            depth_m=water_m - lowest_m,
+        )
         return LinearisedBatch(r, v, sonar_point_design(soundings, self.sigmas["mbes"]))

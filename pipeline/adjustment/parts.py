@@ -1,7 +1,8 @@
 """Calibrations from parts of the session: without one pass, from one half of the passes, from near or far passes alone.
 
-The parts need no further reading of the points: the sums of their intervals are solved again, at the final values and
-with the final weights. A calibration that hangs on one pass, or that changes with time or distance, shows here.
+The parts need no further reading of the points: they are solved at the final values and with the final weights. White
+noise is eliminated once for all, because no error of a record reaches from one pass into another. A calibration that
+hangs on one pass, or that changes with time or distance, shows here.
 """
 
 from collections.abc import Iterator
@@ -10,15 +11,18 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.catalogue.results import PARTS
+from pipeline.maths.adjustment.normal_equations import reduced_by_group
 from pipeline.maths.adjustment.parts import Deviation, deviation
 from pipeline.maths.adjustment.solution import solve
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 
+Integers = NDArray[np.int64]
 APART_M = 0.5  # near and far passes differ by at least this distance
 
 
@@ -72,21 +76,28 @@ def _deviations(
     whole = adjustment.solution
     if whole.deficiency:
         return
-    body = problem.model.body
+    last, noise = adjustment.last, adjustment.drift_figures.noise
     starts, ends = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
-    pass_of_record = pass_of(body.trajectory.t_ns, starts, ends)
+    pass_of_record = pass_of(problem.model.body.trajectory.t_ns, starts, ends).astype(np.int64)
+    of_sensor = {sensor: _passes_of(sums.record, pass_of_record) for sensor, sums in last.linearisation.sums.items()}
+    records = adjustment.accumulation.records
+    group = np.zeros(len(last.drift.knots.record) - 1, dtype=np.int64)
+    group[last.drift.knots.interval_of(records)] = 1 + _passes_of(records, pass_of_record)
+    reduced = reduced_by_group(last.linearisation, last.drift.knots, noise.white, group)
     for part in parts_of(passes):
-        inside = np.isin(pass_of_record, part.passes)
-        sums = {
-            sensor: sums.selected(np.flatnonzero(inside[sums.record] | inside[sums.record + 1]))
-            for sensor, sums in adjustment.accumulation.sums.items()
-        }
-        if not all(len(of_sensor) for of_sensor in sums.values()):
+        if not all(np.isin(seen, part.passes).any() for seen in of_sensor.values()):
             continue
-        equations = adjustment.equations_of(sums)
+        groups = [1 + number for number in part.passes if number < len(reduced.others) - 1]
+        equations = last.equations(noise, reduced=reduced.of(groups))
         solution = solve(equations.normal, equations.right, whole.estimated.tolist())
         if not solution.deficiency:
             yield part, deviation(solution, whole, problem.consider, np.arange(N_MOUNT))
+
+
+def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:
+    """Return the pass of each interval, by the record (g,) before it, or by the next one if that lies in no pass."""
+    before, after = pass_of_record[record], pass_of_record[record + 1]
+    return np.where(before >= 0, before, after)
 
 
 def _row(part: Part, difference: Deviation) -> dict[str, Any]:

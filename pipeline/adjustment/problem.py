@@ -17,11 +17,13 @@ from pipeline.artefacts.from_tables import laser_planes
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.design_matrix import SensorSigmas
 from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftPrior
+from pipeline.maths.adjustment.face_shifts import Faces
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, ParameterPrior, Prior
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.target.face import Face
 from pipeline.maths.target.model import TargetModel
 from pipeline.mount import Mounted
 
@@ -150,16 +152,26 @@ def problem_at(
     noise : mapping of PointNoise
         Settings of each sensor that observes.
     """
-    number = {surface.family: k for k, surface in enumerate(state.surfaces)}
     faces, as_built = session.target.faces, session.as_built.faces
     model = ObservationModel(
         body=BodyMotion.of(session.trajectory, session.laser_lever_arm_m),
-        surface_of_face=np.array([number[face.family] for face in faces]),
+        faces=faces_on_surfaces(faces, state),
         height_of_face=np.array([face.offset_m + face.sense * as_built.get(face.name, 0.0) for face in faces]),
         coarse=state,
         sigmas={sensor: sensor_sigmas(settings) for sensor, settings in noise.items()},
+        wet_heights_m=session.target.wet_heights_m,
     )
     return CalibrationProblem(model, prior, ConsiderErrors(np.zeros(state.size)))
+
+
+def faces_on_surfaces(faces: Sequence[Face], state: State) -> Faces:
+    """Return for each face the number of its family's surface, and whether both look the same way."""
+    number = {surface.family: k for k, surface in enumerate(state.surfaces)}
+    return Faces(
+        names=tuple(face.name for face in faces),
+        surface=np.array([number[face.family] for face in faces]),
+        sense=np.array([face.sense for face in faces]),
+    )
 
 
 def surfaces_of_laser(target: TargetModel, planes: pd.DataFrame) -> tuple[ObservedSurface, ...]:

@@ -16,6 +16,7 @@ from pipeline.artefacts.catalogue.results import PATTERNS
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
+from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
 from pipeline.maths.adjustment.residual_means import (
@@ -44,11 +45,15 @@ PassMeans = Mapping[tuple[str, int, int], BinMean]  # key: sensor, surface, pass
 
 @dataclass(frozen=True)
 class ResidualStatistics:
-    """Mean residuals by sensor, surface and pass; table ``patterns``, means by all bins; table ``residuals``."""
+    """Mean residuals by sensor, surface and pass; table ``patterns``, means by all bins; table ``residuals``.
+
+    sums_by_face: by sensor, the sums of each interval and face at the adjusted values.
+    """
 
     pass_means: PassMeans
     patterns: pd.DataFrame
     residuals: pd.DataFrame
+    sums_by_face: Mapping[str, IntervalSums]
 
     def passes_of(self, sensor: str) -> list[int]:
         """Return the numbers of the passes in which a sensor has points."""
@@ -92,15 +97,21 @@ def residual_statistics(
     pass_means: dict[tuple[str, int, int], BinMean] = {}
     patterns: list[Row] = []
     samples: list[Batch] = []
+    sums_by_face: dict[str, IntervalSums] = {}
     families = [surface.family for surface in adjustment.state.surfaces]
     for sensor, stream in streams.items():
         step = sampling_step(adjustment.accumulation.observations(sensor))
         thinning = _Thinning(round(settings.moment_s * NS), step)
         pieces: dict[str, list[ResidualSums]] = {}
-        for sums_by_variable, sample in stream.fold(_batch, problem.model, sensor, adjustment.values, thinning):
+        by_face = []
+        for sums_by_variable, of_faces, sample in stream.fold(
+            _batch, problem.model, sensor, adjustment.values, thinning
+        ):
             samples.append(sample)
+            by_face.append(of_faces)
             for variable, sums in sums_by_variable.items():
                 pieces.setdefault(variable, []).append(sums)
+        sums_by_face[sensor] = merged(by_face)
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
             if variable == "pass":
@@ -109,16 +120,19 @@ def residual_statistics(
             patterns += [_row(variable, sensor, families[mean.key[0]], mean) for mean in tested_means(sums, compared)]
     patterns += _drift_rows(problem, adjustment, passes)
     return ResidualStatistics(
-        pass_means, _patterns_table(patterns, settings.test_tolerance_m), residuals_table(samples)
+        pass_means=pass_means,
+        patterns=_patterns_table(patterns, settings.test_tolerance_m),
+        residuals=residuals_table(samples),
+        sums_by_face=sums_by_face,
     )
 
 
 def _batch(
     batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues, thinning: _Thinning
-) -> tuple[dict[str, ResidualSums], Batch]:
-    """Return the sums of one batch by variable, and a sample of its residuals."""
+) -> tuple[dict[str, ResidualSums], IntervalSums, Batch]:
+    """Return the sums of one batch by variable, its sums by interval and face, and a sample of its residuals."""
     observations, weighting = model.linearise(sensor, batch, values), values.weighting
-    robust, _ = weighting.weights(observations)
+    robust, weight = weighting.weights(observations)
     # weights without robust reduction: a bin with large residuals must show, not lose its weight
     plain = observations.sigma_m * np.sqrt(weighting.factors_of(sensor, observations.surface))
     normalised = np.where(robust > 0, np.abs(weighting.normalised(observations)), 0.0)
@@ -135,7 +149,7 @@ def _batch(
         )
         sums[variable] = residual_sums(residuals)
     thinned = {name: column[:: thinning.step] for name, column in batch.items()}
-    return sums, residual_sample(model, sensor, thinned, values)
+    return sums, observations.sums(weight, by_face=True), residual_sample(model, sensor, thinned, values)
 
 
 def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, Array | Integers]]:

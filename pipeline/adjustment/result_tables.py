@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.adjustment.face_errors import FinalSolution, final_solution
 from pipeline.adjustment.ins_drift import drift_figures_table
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.noise_tables import groups_table, sigma_check
@@ -16,12 +17,8 @@ from pipeline.adjustment.residual_statistics import ResidualStatistics
 from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
-from pipeline.maths.adjustment.solution import (
-    ParameterTest,
-    prior_parameter_tests,
-    single_parameter_tests,
-    weakest_direction,
-)
+from pipeline.maths.adjustment.parameter_tests import ParameterTest, prior_parameter_tests, single_parameter_tests
+from pipeline.maths.adjustment.solution import Solution, weakest_direction
 from pipeline.maths.adjustment.weighting import scatter
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
@@ -52,11 +49,12 @@ def result_tables(
         Level of the test of the passes.
     """
     t_ns = problem.model.body.trajectory.t_ns
-    estimate, random, total = _estimate(problem, adjustment)
+    final = final_solution(problem, adjustment, statistics.sums_by_face)
+    estimate, random, total = _estimate(problem, final)
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
-        "freed": _single_parameter_table(problem, adjustment, estimate),
+        "freed": _single_parameter_table(problem, final, estimate),
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
         "drift": _drift_table(adjustment, t_ns),
@@ -66,23 +64,23 @@ def result_tables(
     }
 
 
-def _estimate(problem: CalibrationProblem, adjustment: MountAdjustment) -> tuple[pd.DataFrame, Array, Array]:
+def _estimate(problem: CalibrationProblem, final: FinalSolution) -> tuple[pd.DataFrame, Array, Array]:
     """Return the table of mount and estimated parameters, and their random and total covariance.
 
     If the data leave a direction open, the mount's values and both covariances are NaN.
     """
-    state, solution = adjustment.state, adjustment.solution
+    solution = final.solution
     numbers = solution.estimated
     random = solution.noise_covariance(numbers)
     total = solution.total_covariance(problem.consider, numbers)
-    values = state.deviation_from(problem.model.coarse)[numbers]
+    values = final.deviation[numbers]
     if solution.deficiency:
         values[:N_MOUNT], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
     table = pd.DataFrame(
         {
-            "unknown": [state.names[k] for k in numbers],
+            "unknown": [final.names[k] for k in numbers],
             "value": values,
-            "sigma": np.sqrt(np.maximum(np.diag(random), 0.0)),  # rounding, where prior information is all
+            "sigma": np.sqrt(np.maximum(np.diag(random), 0.0)),  # of a parameter that the points do not show: rounding
             "sigma_total": np.sqrt(np.diag(total)),
         }
     )
@@ -128,39 +126,48 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
     )
 
 
-def _single_parameter_table(
-    problem: CalibrationProblem, adjustment: MountAdjustment, estimate: pd.DataFrame
-) -> pd.DataFrame:
+def _single_parameter_table(problem: CalibrationProblem, final: FinalSolution, estimate: pd.DataFrame) -> pd.DataFrame:
     """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
 
     The parameters are fixed, or estimated with a value known beforehand (those of a laser's coarse mount among them),
     or named in adjust.free. Where values known beforehand correlate, the effects are of independent errors instead,
     whose squares have the same sum.
     """
-    state, solution, equations = adjustment.state, adjustment.solution, adjustment.equations
-    consider, known, mount = problem.consider, problem.prior.known_parameters, np.arange(N_MOUNT)
+    solution, equations, consider = final.solution, final.equations, problem.consider
+    mount, known = np.arange(N_MOUNT), problem.prior.known_parameters
     found = single_parameter_tests(equations.normal, equations.right, solution, consider)
-    effects = np.zeros((N_MOUNT, state.size))
+    found += prior_parameter_tests(solution, final.from_known, consider, known)
+    tests, effects = {test.parameter: test for test in found}, np.zeros((N_MOUNT, len(final.names)))
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
-    if problem.prior.parameters is not None:
-        deviation = state.deviation_from(problem.prior.parameters.known) + solution.step
-        found += prior_parameter_tests(solution, deviation, consider, known)
-        effects[:, known] = solution.prior_effects(mount, known)
-    tests = {test.parameter: test for test in found}
+    effects[:, known] = solution.prior_effects(mount, known)
     by_name, rows = estimate.set_index("unknown"), []
-    on_surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    freed = np.setdiff1d(solution.estimated, [*mount, *on_surfaces, *known]).tolist()
+    surfaces = problem.model.coarse.surface_slice
+    freed = np.setdiff1d(solution.estimated, [*mount, *range(surfaces.start, surfaces.stop), *known]).tolist()
     for number in [*sorted([*solution.fixed.tolist(), *known.tolist()]), *freed]:
-        name, considered = state.names[number], consider.sigmas[number]
+        name, considered = final.names[number], consider.sigmas[number]
         test = tests.get(number, ParameterTest(number, np.nan, np.nan, np.nan))
         if number in freed:
-            parameter = by_name.loc[name]
-            sigma = parameter["sigma_total"]
-            test = ParameterTest(number, parameter["value"], sigma, float(np.hypot(sigma, considered)))
+            sigma = by_name.loc[name, "sigma_total"]
+            test = ParameterTest(number, by_name.loc[name, "value"], sigma, float(np.hypot(sigma, considered)))
         row: dict[str, Any] = {"unknown": name, "estimated": number in freed, "considered": considered}
         row |= {"value": test.value, "sigma": test.sigma, "expected": test.expected}
         rows.append(row | {f"effect_{axis}": effects[k, number] for k, axis in enumerate(MOUNT_NAMES)})
-    return pd.DataFrame(rows)
+    return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces)])
+
+
+def _surface_rows(solution: Solution, surfaces: slice) -> list[dict[str, Any]]:
+    """Return rows of table ``freed`` with the effects of errors in what is known of the surfaces beforehand."""
+    group = np.arange(surfaces.start, surfaces.stop)
+    if solution.deficiency or not np.all(np.isin([*range(N_MOUNT), *group], solution.estimated)):
+        return []
+    effects = solution.group_effects(np.arange(N_MOUNT), group)
+    if not np.any(effects):
+        return []
+    none = {"estimated": False, "considered": 1.0, "value": np.nan, "sigma": np.nan, "expected": np.nan}
+    return [
+        {"unknown": f"surfaces_{name}"} | none | {f"effect_{axis}": of[k] for k, axis in enumerate(MOUNT_NAMES)}
+        for name, of in zip(MOUNT_NAMES, effects.T, strict=True)
+    ]
 
 
 def _surfaces_table(adjustment: MountAdjustment, statistics: ResidualStatistics) -> pd.DataFrame:

@@ -13,11 +13,13 @@ from pipeline.config.target import Origin, Target
 
 
 class AsBuilt(Model):
-    """The target as surveyed: offsets of faces from the design, and sigmas of the wet faces against the dry ones."""
+    """The target as surveyed: offsets of faces from the design, and how far they may still be wrong (sigmas)."""
 
     faces: dict[str, Annotated[float, Field(ge=-0.05, le=0.05)]] = Field(default_factory=dict)  # m outward, by name
-    offset_sigma_m: SigmaM = 0.001
-    angle_sigma_deg: SigmaDeg = 0.005
+    face_sigma_m: SigmaM = 0.0005  # of each face
+    offset_sigma_m: SigmaM = 0.001  # of a family's wet faces against the dry ones
+    angle_sigma_deg: SigmaDeg = 0.01
+    bow_sigma_m: SigmaM = 0.001
 
 
 class TargetPlace(Model):

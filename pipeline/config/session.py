@@ -94,7 +94,7 @@ class Laser(Model):
     mount_covariance: Covariance | None = None  # takes precedence over mount_sigma
     range_sigma_m: RangeSigma = 0.005
     range_bias_sigma_m: SigmaM = 0.002  # common to all ranges
-    incidence_bias_sigma_m: SigmaM = 0.0004  # of ranges at 45° incidence against 0°, growing like 1 / cos i - 1
+    incidence_bias_sigma_m: SigmaM = 0.001  # of ranges at 45° incidence against 0°, growing like 1 / cos i - 1
     angle_sigma_deg: SigmaDeg = 0.003
     beam_m: Annotated[float, Field(ge=0, le=0.1)] = 0.01  # diameter of the beam at the target
     latency_s: Latency = 0.0
@@ -141,11 +141,11 @@ class Mbes(Model):
     sound_speed_sigma_m_s: Annotated[float, Field(ge=0, le=100)] = 0.2
     sound_speed_gradient_sigma_1_s: Annotated[float, Field(ge=0, le=10)] = 0.1  # (m/s)/m, as with 0.03 °C per metre
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
-    projector_sigma_m: SigmaM = 0.003  # of its place, each axis
+    projector_sigma_m: SigmaM = 0.005  # of its place, each axis
     range_sigma_m: RangeSigma = 0.008
     range_bias_sigma_m: SigmaM = 0.002  # common to all detections
-    incidence_bias_sigma_m: SigmaM = 0.001  # at 45° incidence against 0°, growing like 1 / cos i - 1
-    level_bias_sigma_m: SigmaM = 0.005  # common to all detections on horizontal faces
+    incidence_bias_sigma_m: SigmaM = 0.003  # at 45° incidence against 0°, growing like 1 / cos i - 1
+    level_bias_sigma_m: SigmaM = 0.010  # common to all detections on horizontal faces
     angle_sigma_deg: SigmaDeg = 0.06
     beam_deg: tuple[BeamWidth, BeamWidth] = (0.5, 1.0)  # width across track, along track
     latency_s: Latency = 0.0

@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from pipeline.config.mount import Covariance, Mount, MountOrigin
 from pipeline.config.pool import PoolConfig
 from pipeline.config.quantities import Model
-from pipeline.config.session import Drift, DriftWithin, SessionConfig, White
+from pipeline.config.session import Drift, SessionConfig, White
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -66,10 +66,9 @@ class LaserPoints(Model):
 
 
 class InsErrors(Model):
-    """The INS's errors: its drift, where the drift's figures come from and how well they are known; its white noise."""
+    """The INS's errors: its drift, where the drift's figures come from; its white noise."""
 
     drift: Drift
-    drift_within: DriftWithin
     drift_from: str
     white: White
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import known_parameters, sonar_errors
 from pipeline.adjustment.iteration import estimated_columns
+from pipeline.adjustment.problem import faces_on_surfaces
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
 from pipeline.config.pool import PoolConfig, VerdictLimits
@@ -107,9 +108,11 @@ class _Adjustment:
 
     def accuracy(self, passes: Sequence[Pass]) -> Accuracy:
         """Return the predicted accuracy of a calibration from these passes."""
-        predicted = predict(self.setting, passes, self.turn_s)
-        normal = predicted.normal + self.prior
-        solution = solve(normal, np.zeros(len(normal)), self.free, self.prior)
+        predicted = predict(self.setting, passes, self.turn_s, single_faces=True)
+        assert predicted.with_faces is not None
+        prior = np.pad(self.prior, (0, len(predicted.with_faces) - len(self.prior)))
+        normal = predicted.with_faces + prior
+        solution = solve(normal, np.zeros(len(normal)), self.free, prior)
         random = solution.noise_covariance()[:N_MOUNT, :N_MOUNT]
         total = solution.total_covariance(self.considered)[:N_MOUNT, :N_MOUNT]
         if solution.deficiency:
@@ -158,9 +161,11 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     """
     setting = setting_of(plan, pool, session)
     depth = setting.model.depth_m
-    considered = sonar_errors(setting.state.names, session.laser, session.sonar, pool.as_built, depth)
+    faces = faces_on_surfaces(setting.model.faces, setting.state)
+    names = (*setting.state.names, *faces.parameters)
+    considered = sonar_errors(names, session.laser, session.sonar, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
-    free, prior = estimated_columns(setting.state, pool.adjust.free), np.zeros_like(np.diag(considered.sigmas))
+    free, prior = estimated_columns(setting.state, pool.adjust.free), np.zeros((setting.state.size, setting.state.size))
     known = known_parameters(setting.state, considered, pool.adjust.free)
     if known is not None:
         free, prior = sorted({*free, *known.numbers.tolist()}), known.pseudo_observations(setting.state).normal

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.ins_drift import pose_noise
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
-from pipeline.adjustment.problem import sensor_sigmas
+from pipeline.adjustment.problem import faces_on_surfaces, sensor_sigmas
 from pipeline.config.plan import Pass
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.body_motion import BodyMotion
-from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
+from pipeline.maths.adjustment.face_shifts import equations_with_faces
+from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
 from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations
 from pipeline.maths.geometry.rotations import rotation_from_attitude
 from pipeline.maths.geometry.trajectory import Trajectory
@@ -34,7 +35,10 @@ PAUSE_S = 5.0  # a longer time without points interrupts the knots of the drift
 
 @dataclass(frozen=True)
 class PassSums:
-    """Predicted data of one pass: interval sums by sensor, trajectory, points (f,) on the faces by sensor, time (s)."""
+    """Predicted data of one pass: trajectory, points (f,) on the faces by sensor, time (s).
+
+    sums: by sensor, those of each interval and face.
+    """
 
     sums: dict[str, IntervalSums]
     trajectory: Trajectory
@@ -44,15 +48,24 @@ class PassSums:
 
 @dataclass(frozen=True)
 class PredictedPasses:
-    """Prediction for passes: normal matrix (u, u) of all parameters; points by sensor and face, and time, by pass."""
+    """Prediction for passes: normal matrix (u, u) of all parameters; points by sensor and face, and time, by pass.
+
+    with_faces (u + f, u + f): the normal matrix with the shifts of single faces after all others; None if they are left
+    out.
+    """
 
     normal: Array
+    with_faces: Array | None
     points: list[dict[str, Array]]
     seconds: list[float]
 
 
 def predict(
-    setting: PredictionSetting, passes: Sequence[Pass], turn_s: float = 0.0, phases: int = PHASES
+    setting: PredictionSetting,
+    passes: Sequence[Pass],
+    turn_s: float = 0.0,
+    phases: int = PHASES,
+    single_faces: bool = False,
 ) -> PredictedPasses:
     """Return the prediction for passes that are sailed one after the other.
 
@@ -69,32 +82,35 @@ def predict(
         Time between two passes (s).
     phases : int
         Number of phases of the unrest.
+    single_faces : bool
+        Whether the shifts of single faces are parameters, too.
     """
-    averaged = []
+    normals, averaged, size = [], [], setting.state.size
     for phase in range(phases):
         sums = [_pass_sums(setting, planned, phase * APART + number) for number, planned in enumerate(passes)]
-        averaged.append((_normal(setting, sums, turn_s), sums))
-    _, first = averaged[0]
+        normals.append(_normal(setting, sums, turn_s, single_faces))
+        averaged.append(sums)
+    first, normal = averaged[0], np.asarray(np.mean(normals, axis=0))
     points = [
-        {sensor: np.mean([sums[k].points[sensor] for _, sums in averaged], axis=0) for sensor in first[k].points}
+        {sensor: np.mean([sums[k].points[sensor] for sums in averaged], axis=0) for sensor in first[k].points}
         for k in range(len(passes))
     ]
-    normal = np.asarray(np.mean([normal for normal, _ in averaged], axis=0))
-    return PredictedPasses(normal, points, [sums.seconds for sums in first])
+    with_faces = normal if single_faces else None
+    return PredictedPasses(normal[:size, :size], with_faces, points, [sums.seconds for sums in first])
 
 
 def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSums:
     """Return the sums of one pass; ``number`` sets the phases of the boat's unrest."""
     seconds = planned.seconds(setting.half_length_m)
     trajectory = _trajectory(setting, planned, seconds, number)
-    families = {surface.family: k for k, surface in enumerate(setting.state.surfaces)}
     faces = setting.model.faces
     observation_model = ObservationModel(
         body=_body(setting, trajectory),
-        surface_of_face=np.array([families[face.family] for face in faces]),
+        faces=faces_on_surfaces(faces, setting.state),
         height_of_face=np.array([face.offset_m for face in faces]),
         coarse=setting.state,
         sigmas={"laser": sensor_sigmas(setting.laser), "mbes": sensor_sigmas(setting.mbes)},
+        wet_heights_m=setting.model.wet_heights_m,
     )
     caster = ClosestSurface(setting.model)
     sums: dict[str, IntervalSums] = {}
@@ -102,15 +118,8 @@ def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSu
     for rays, each in (laser_rays(setting, seconds), sonar_rays(setting, seconds)):
         batch = label_rays(setting, caster, trajectory, rays)
         observations = observation_model.linearise(rays.sensor, batch, CurrentValues(setting.state))
-        points = LinearisedPoints(
-            record=observations.record,
-            surface=observations.surface,
-            share=observations.share,
-            features=observations.features,
-            weight=each / observations.sigma_m**2,
-            v_m=np.zeros(len(observations.v_m)),
-        )
-        sums[rays.sensor] = interval_sums(points)
+        true = replace(observations, v_m=np.zeros_like(observations.v_m))  # as if the points were free from errors
+        sums[rays.sensor] = true.sums(each / observations.sigma_m**2, by_face=True)
         on_face = np.bincount(batch["face"].astype(np.int64), minlength=len(faces))
         counts[rays.sensor] = each * on_face.astype(np.float64)
     return PassSums(sums, trajectory, counts, seconds)
@@ -120,8 +129,12 @@ def _body(setting: PredictionSetting, trajectory: Trajectory) -> BodyMotion:
     return BodyMotion.of(trajectory, mount_of(setting.laser.mount).lever_arm_body_m)
 
 
-def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: float) -> Array:
-    """Return the normal matrix (u, u) of passes sailed one after the other. The drift goes on between them."""
+def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: float, single_faces: bool) -> Array:
+    """Return the normal matrix (u, u) of passes sailed one after the other. The drift goes on between them.
+
+    ``single_faces``: with the shifts of single faces after all others.
+    """
+    faces = faces_on_surfaces(setting.model.faces, setting.state)
     starts = np.cumsum([0.0, *(sailed.seconds + turn_s for sailed in passes[:-1])])
     lengths = [len(sailed.trajectory.t_ns) for sailed in passes]
     firsts = np.cumsum([0, *lengths[:-1]])
@@ -136,12 +149,20 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
         )
         for sensor in passes[0].sums
     }
+    size = setting.state.size + (len(faces.names) if single_faces else 0)
     record = np.unique(np.concatenate([of_sensor.record for of_sensor in sums.values()]))
     if not len(record):
-        return np.zeros((setting.state.size, setting.state.size))
+        return np.zeros((size, size))
     noise = pose_noise(setting.ins.drift, setting.ins.white)
     drift = body.zero_drift(record, noise, PAUSE_S)
-    return normal_equations(Linearisation(sums, setting.state, body, drift), drift, noise).normal
+    linearisation = Linearisation(sums, setting.state, body, drift)
+    if single_faces:
+        return equations_with_faces(linearisation, faces, drift, noise).normal
+    by_surface = {
+        sensor: merged([replace(of_sensor, surface=faces.surface[of_sensor.surface])])
+        for sensor, of_sensor in sums.items()
+    }
+    return normal_equations(replace(linearisation, sums=by_surface), drift, noise).normal
 
 
 def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Array:

@@ -71,19 +71,25 @@ def words_of(row: Mapping[Any, Any]) -> str:
     if name.startswith("laser_rotation"):
         angle = size_words(np.degrees(value), np.degrees(sigma), "°")
         return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
+    if name.startswith("face_"):
+        shift = size_words(1e3 * value, 1e3 * sigma, "mm")
+        face = name.removeprefix("face_")
+        return f"the target: face {face} stands out by {shift}; survey it, and give it in as_built.faces"
     if name.startswith("laser_lever_arm"):
         return f"laser.mount: {name[-1]}_m should be {size_words(1e3 * value, 1e3 * sigma, 'mm')} more"
     return _words_of_wet_faces(name, value, sigma)
 
 
 def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
-    """Return in words a turn (rad) or shift (m) of a family's wet faces against its dry ones."""
+    """Return in words a turn (rad), shift or bow (m) of a family's wet faces against its dry ones."""
     family, _, kind = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
     faces = FACES_OF_FAMILY.get(family, f"of {family}")
     if kind.startswith("turn"):
         angle = size_words(np.degrees(value), np.degrees(sigma), "°")
         return f"the target: its wet faces {faces} are turned by {angle} against the dry ones"
     shift = size_words(1e3 * value, 1e3 * sigma, "mm")
+    if kind == "bow":
+        return f"the target: its wet faces {faces} are bowed outward, by {shift} at half depth; survey them"
     verb = "lie higher" if family == "H" else "stand off"
     return f"the target: its wet faces {faces} {verb} by {shift}; check its shape in the config, and its survey"
 

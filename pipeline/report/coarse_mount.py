@@ -14,7 +14,7 @@ from pipeline.config.pool import VerdictLimits
 from pipeline.maths.mount_parameters import MOUNT_NAMES, MOUNT_WORDS, PARAMETERS
 from pipeline.report.cause_words import size_words
 from pipeline.report.reason_codes import ReasonCode, Statement
-from pipeline.report.suspected_causes import SIGNIFICANT, is_significant
+from pipeline.report.suspected_causes import significance_limit
 
 REMEDY = (
     "a surveyed target (laser_fit.origin_sigma_m, azimuth_sigma_deg), more passes at other distances, or a less "
@@ -91,7 +91,7 @@ def share_of_coarse_mount(
     return ShareOfCoarseMount(above_limit, unimproved)
 
 
-def contradicted_coarse_mount(freed: pd.DataFrame) -> Iterator[Statement]:
+def contradicted_coarse_mount(freed: pd.DataFrame, level: float) -> Iterator[Statement]:
     """Yield a reason if the points contradict the coarse mount: a value without its observation is far from it.
 
     One wrong value can make others look wrong. The one farthest off, in sigmas, comes first.
@@ -99,9 +99,12 @@ def contradicted_coarse_mount(freed: pd.DataFrame) -> Iterator[Statement]:
     Parameters
     ----------
     freed : table of the single-parameter tests
+    level : level of all these tests together
     """
+    limit = significance_limit(freed, level)
     rows = freed[freed["unknown"].isin(MOUNT_NAMES) & ~freed["estimated"]].to_dict("records")
-    wrong = sorted((row for row in rows if is_significant(row)), key=lambda row: -abs(row["value"]) / row["expected"])
+    off = [row for row in rows if abs(row["value"]) > limit * row["expected"]]
+    wrong = sorted(off, key=lambda row: -abs(row["value"]) / row["expected"])
     if not wrong:
         return
     first, *others = wrong
@@ -112,7 +115,7 @@ def contradicted_coarse_mount(freed: pd.DataFrame) -> Iterator[Statement]:
     else:
         move = f"moved by {size_words(1e3 * first['value'], 1e3 * first['sigma'], 'mm')} along body {'xyz'[place - 3]}"
     names = ", ".join(MOUNT_WORDS[MOUNT_NAMES.index(row["unknown"])] for row in others)
-    also = f"; beyond {SIGNIFICANT:g} as well: {names}" if others else ""
+    also = f"; beyond the limit of {limit:.1f} as well: {names}" if others else ""
     words = (
         f"the points contradict the coarse mount: by them it should be {move}, {times:.1f} times what its sigma and "
         f"noise allow{also}; what rests on it is wrong, too: check it, or state how uncertain it is "

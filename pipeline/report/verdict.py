@@ -14,12 +14,12 @@ The limits are defined at these places (paths from ``pipeline/``):
 * the mount from parts of the session: ``test_level`` of class ``Adjust``, ``APART_M`` of adjustment/parts.py, and
   ``SAME`` of maths/adjustment/parts.py;
 * drift of the INS, beside deviating residuals or a suspected cause: ``MAX_DRIFT_RATIO`` of drift_check.py;
-* suspected causes, and estimates off their settings: ``SIGNIFICANT`` of suspected_causes.py;
+* suspected causes, estimates off their settings, a contradicted coarse mount of the laser: ``test_level`` of class
+  ``Adjust``;
 * total sigmas, and difference of a patent's form from the adjustment: ``max_sigma_deg`` and ``max_sigma_m`` of class
   ``VerdictLimits`` of config/pool.py;
 * no mount parameter of the laser good enough: ``hold_share`` of class ``LaserFit`` of config/pool.py, and the limits of
   the total sigmas;
-* coarse mount of the laser that the points contradict: ``SIGNIFICANT`` of suspected_causes.py;
 * result and convergence of a patent's form: classes ``FitPlanes``, ``AngleIterate`` and ``Offsets`` of config/pool.py.
 
 Warnings do not reject. Their limits are the ``MAX_...`` constants of warnings.py, as_built.py and cast_checks.py,
@@ -45,7 +45,7 @@ from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.residual_tests import deviations
 from pipeline.report.residual_words import ResidualTests
-from pipeline.report.suspected_causes import estimated_parameters, suspected_causes
+from pipeline.report.suspected_causes import estimated_parameters, significance_limit, suspected_causes
 
 NEARLY_AS_WELL = 2.0  # sigmas: a cause whose value over sigma is smaller by no more is named beside the first
 MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
@@ -114,8 +114,8 @@ def rejections(
     reasons += _too_few_soundings(evidence.cells)
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
-    reasons += _estimates_off_settings(evidence.freed)
-    reasons += contradicted_coarse_mount(evidence.freed)
+    reasons += _estimates_off_settings(evidence.freed, criteria.test_level)
+    reasons += contradicted_coarse_mount(evidence.freed, criteria.test_level)
     if len(criteria.held) == len(PARAMETERS):
         words = "no mount parameter is good enough: none is within its limit and better than the coarse mount"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
@@ -135,7 +135,7 @@ def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: State
         tolerance_m=criteria.tolerance_m,
     )
     deviating = deviations(tests, criteria.test_level)
-    causes = _suspected_cause(evidence.freed, any(deviation.is_local for deviation in deviating))
+    causes = _suspected_cause(evidence.freed, criteria.test_level, any(deviation.is_local for deviation in deviating))
     reasons = [deviation.statement for deviation in deviating]
     if (deviating or causes) and drift_check is not None:
         reasons.append(drift_check)
@@ -156,13 +156,13 @@ def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
     ]
 
 
-def _suspected_cause(freed: pd.DataFrame, local: bool) -> list[Statement]:
-    """Return a reason with the fixed parameter that explains the residuals best, and the number of the others.
+def _suspected_cause(freed: pd.DataFrame, level: float, local: bool) -> list[Statement]:
+    """Return a reason with the parameter that explains the residuals best, and the number of the others.
 
     Others that explain them nearly as well are named, too. ``local``: another reason names a face, step, pass or ping,
     which may be the cause instead.
     """
-    causes = suspected_causes(freed)
+    causes = suspected_causes(freed, level)
     if not causes:
         return []
     first = causes[0]
@@ -175,7 +175,7 @@ def _suspected_cause(freed: pd.DataFrame, local: bool) -> list[Statement]:
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 
 
-def _estimates_off_settings(freed: pd.DataFrame) -> list[Statement]:
+def _estimates_off_settings(freed: pd.DataFrame, level: float) -> list[Statement]:
     """Return a reason for each parameter of ``adjust.free`` that differs significantly from its setting.
 
     The mount is right only together with this estimate, and the survey has the same error.
@@ -187,5 +187,5 @@ def _estimates_off_settings(freed: pd.DataFrame) -> list[Statement]:
             "settings and in the survey, and run again",
         )
         for parameter in estimated_parameters(freed)
-        if parameter.is_significant
+        if parameter.normalised > significance_limit(freed, level)
     ]

@@ -10,7 +10,8 @@ from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.mount import MountSigma
 from pipeline.config.pool import Adjust, AsBuilt
 from pipeline.config.session import Drift, Ins, White
-from pipeline.maths.adjustment.solution import ConsiderErrors, single_parameter_tests, solve
+from pipeline.maths.adjustment.parameter_tests import single_parameter_tests
+from pipeline.maths.adjustment.solution import ConsiderErrors, solve
 from tests.support.effort import often
 from tests.support.forward_points import (
     LASER,

@@ -269,12 +269,12 @@ def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
     ]
     assert shown[-7:] == [
         ["", "", "range_bias_sigma_m", "0.002", "default"],
-        ["", "", "incidence_bias_sigma_m", "0.001", "default"],
-        ["", "", "level_bias_sigma_m", "0.005", "default"],
+        ["", "", "incidence_bias_sigma_m", "0.003", "default"],
+        ["", "", "level_bias_sigma_m", "0.01", "default"],
         ["", "", "angle_sigma_deg", "0.09", "session"],
         ["", "", "beam_deg", "0.4, 1.5", "preset"],
         ["", "", "projector_offset_m", "–", "default"],
-        ["", "", "projector_sigma_m", "0.003", "default"],
+        ["", "", "projector_sigma_m", "0.005", "default"],
     ]
     assert len(shown) == 20
     assert "<b>\"O'Brien" not in html

@@ -25,6 +25,7 @@ FIRST_STAGE: dict[str, tuple[object, str]] = {  # by key: another value, and the
     "laser.beam_m": (0.02, "segment"),
     "laser.mount_sigma": ({"angle_deg": 0.006}, "adjust"),
     "ins.white": ({"position_m": 0.003}, "segment"),
+    "ins.drift_within": ({"sigmas": 3.0}, "adjust"),
 }
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 
 from pipeline.adjustment.pattern_tests import passes_test, pattern_tests
 from pipeline.config.pool import VerdictLimits
@@ -135,14 +136,29 @@ def test_both_sensors_off_together_is_the_ins():
         assert ("drift of the INS" in reason.words) == (laser < 0)
 
 
-def test_both_sides_of_four_sigmas():
-    """Noise and all a-priori sigmas count together."""
-    near, far = ({"value": value, "sigma": 3e-4, "expected": 5e-4} for value in (1.99e-3, 2.01e-3))
+def test_both_sides_of_the_limit_of_one_parameter():
+    """Noise and all a-priori sigmas count together; a normal deviate exceeds 3.29 with the chance 0.001."""
+    near, far = ({"value": value, "sigma": 3e-4, "expected": 5e-4} for value in (3.28 * 5e-4, 3.30 * 5e-4))
     assert judged(evidence(freed=near)) == []
     assert codes(judged(evidence(freed=far))) == [ReasonCode.SUSPECTED_CAUSE]
 
 
-@pytest.mark.parametrize(("value", "expected"), [(1.99e-3, []), (2.01e-3, [ReasonCode.ESTIMATE_OFF_SETTINGS])])
+def test_the_limit_is_for_all_parameters_together():
+    """Of 87 parameters one exceeds 4.39 with the chance 0.001 = 1 - (1 - p)^87; those not determined do not count."""
+    limit = norm.isf((1 - 0.999 ** (1 / 87)) / 2)
+    others = [{"unknown": f"face_{k}", "value": 0.0, "sigma": 1e-4, "expected": 1e-4} for k in range(86)]
+    others += [{"unknown": "face_unseen", "value": np.nan, "sigma": np.nan, "expected": np.nan}]
+    for share, expected in ((0.99, []), (1.01, [ReasonCode.SUSPECTED_CAUSE])):
+        one = {"unknown": "face_P1-3", "value": share * limit * 1e-4, "sigma": 1e-4, "expected": 1e-4}
+        table = pd.DataFrame([one, *others]).assign(estimated=False)
+        reasons = judged(replace(evidence(), freed=table))
+        assert codes(reasons) == expected
+        assert all("face P1-3 stands out by +0.4 ± 0.1 mm" in reason.words for reason in reasons)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"), [(3.28 * 5e-4, []), (3.30 * 5e-4, [ReasonCode.ESTIMATE_OFF_SETTINGS])]
+)
 def test_what_was_freed_and_is_not_as_the_session_says(value, expected):
     freed = {"unknown": "mbes_latency", "estimated": True, "value": value} | CLOCK
     assert codes(judged(evidence(freed=freed))) == expected

@@ -157,6 +157,7 @@ def test_every_parameter_of_the_adjustment_is_declared() -> None:
     surfaces = [ObservedSurface.at("P1", np.array([-1.0, 0, 0]), np.zeros(3))]
     state = State.at(np.eye(3), np.zeros(3), surfaces)
     names = [*state.names[N_MOUNT : state.surface_slice.start], *state.names[state.surface_slice.stop :]]
+    names += ["face_P1-3", "surfaces_rotation_x"]
     assert all(source_of(name) in ERROR_SOURCES for name in names)
     assert {source_of(name) for name in [*names, *state.names[:N_MOUNT]]} == set(ERROR_SOURCES)
     assert {source_of(name).owner for name in names} == set(OWNERS)

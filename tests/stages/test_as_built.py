@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,12 +21,45 @@ def result(found):
 
 
 def test_tops_and_bottoms_that_are_built_too_high_lift_the_sonar(noisy, noisy_found):
+    """If all of them are known exactly. Else a part of the 5 mm is taken for an error of the survey, or of ranges."""
     faces = noisy_found["segment/faces"]
     wet = faces[(faces["family"] == "H") & (faces["distance_m"] * faces["normal_z_target_1"] < 0)]
     higher = {row.name: 0.005 * row.normal_z_target_1 for row in wet.itertuples(index=False)}
-    found = calibrated(noisy, pool={"as_built": {"faces": higher}})
-    plain, lifted = (result(one)["mbes"]["lever_arm_m"] for one in (noisy_found, found))
+    exact = dict.fromkeys(("face_sigma_m", "offset_sigma_m", "angle_sigma_deg", "bow_sigma_m"), 0.0)
+    biases = ("level_bias_sigma_m", "incidence_bias_sigma_m", "projector_sigma_m", "sound_speed_gradient_sigma_1_s")
+    without = noisy.session["mbes"] | dict.fromkeys(biases, 0.0)
+    session = replace(noisy, session=noisy.session | {"mbes": without})
+    plain, lifted = (
+        result(calibrated(session, pool={"as_built": survey}))["mbes"]["lever_arm_m"]
+        for survey in (exact, exact | {"faces": higher})
+    )
     np.testing.assert_allclose(np.subtract(lifted, plain), [0, 0, 0.005], atol=2e-4)
+    unsure = result(calibrated(noisy, pool={"as_built": {"faces": higher}}))["mbes"]["lever_arm_m"]
+    assert 0.001 < unsure[2] - result(noisy_found)["mbes"]["lever_arm_m"][2] < 0.0045
+
+
+@pytest.mark.parametrize("name", often(["P1-7-bottom"], ["P1-7-bottom", "P3-6", "P1-2"]))
+def test_a_face_said_to_stand_out_has_that_shift_to_take_back(noisy, noisy_found, name):
+    """Outward, whichever way it looks; the survey's own sigma is 0.5 mm, so the reason names this face."""
+    found = calibrated(noisy, pool={"as_built": {"faces": {name: 0.008}}})
+    before, after = (one["adjust/freed"].set_index("unknown").loc[f"face_{name}"] for one in (noisy_found, found))
+    assert after["value"] - before["value"] == pytest.approx(-0.008, abs=0.0008)
+    causes = [words for words in result(found)["reasons"] if words.startswith("likely cause")]
+    assert any(f"face {name} stands out by -" in words for words in causes)
+
+
+def test_a_wet_wall_pushed_back_by_the_water_is_found_and_allowed_for(errors_of):
+    """Bowed by 4 mm, four of its sigmas. Without the parameter, x is wrong by a millimetre and more."""
+    fault = {"face_faults": [{"faces": ["P2"], "part": "wet", "bow_m": -0.004}]}
+    session = made({"surroundings": fault}, seed=4)
+    found = calibrated(session)
+    bow = found["adjust/freed"].set_index("unknown").loc["wet_P2_bow"]
+    assert bow["value"] == pytest.approx(-0.004, abs=4 * bow["sigma"])
+    assert bow["sigma"] < 0.0008
+    fixed = calibrated(session, pool={"as_built": {"bow_sigma_m": 0.0}})
+    x, x_fixed = (errors_of(result(one)["mbes"], session.truth)[3] for one in (found, fixed))
+    assert abs(x) < 3
+    assert abs(x - x_fixed) > 0.7
 
 
 @pytest.mark.parametrize("name", often(["P1-4-top"], ["P3-6", "P1-4-top"]))

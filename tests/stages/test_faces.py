@@ -1,5 +1,6 @@
 """Targets by their faces, through all stages: other shapes calibrate, and the patent's is one of them."""
 
+import functools
 import json
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,7 @@ from pipeline.artefacts.streams import Stream
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.session import simulate_session
+from pipeline.simulation.session import SimulatedSession, simulate_session
 from tests.support.places import errors, sigmas
 from tests.support.roots import SCENARIOS
 from tests.support.simulated import THIN, calibrated, made, merged
@@ -43,11 +44,17 @@ def test_the_patents_target_by_its_faces_gives_what_its_letters_give() -> None:
         assert same(value, by_faces[name]), name
 
 
-@pytest.mark.parametrize(("name", "front"), [("dock", "fronts"), ("caisson", "left")])
-def test_other_targets_calibrate(name: str, front: str) -> None:
+@functools.lru_cache(maxsize=1)
+def of_scenario(name: str) -> tuple[SimulatedSession, dict[str, Any]]:
+    """A session of a scenario, and every artefact of it. Nobody changes them."""
     content = merged(read_yaml(SCENARIOS / f"{name}.yaml"), THIN)
     session = simulate_session(parse(Scenario, content, name), 3)
-    found = calibrated(session)
+    return session, calibrated(session)
+
+
+@pytest.mark.parametrize(("name", "front"), [("dock", "fronts"), ("caisson", "left")])
+def test_other_targets_calibrate(name: str, front: str) -> None:
+    session, found = of_scenario(name)
     result = json.loads(found["report/calibration.json"])
     assert result["verdict"] == "accepted", result["reasons"]
     assert np.all(np.abs(errors(result["mbes"], session.truth)) < 4 * sigmas(result["mbes"]))
@@ -59,8 +66,7 @@ def test_other_targets_calibrate(name: str, front: str) -> None:
 
 
 def test_a_wet_foot_is_parallel_to_its_wall_and_seen_by_the_sonar_alone() -> None:
-    content = merged(read_yaml(SCENARIOS / "caisson.yaml"), THIN)
-    found = calibrated(simulate_session(parse(Scenario, content, "caisson"), 3), "adjust")
+    _, found = of_scenario("caisson")
     surfaces = found["adjust/surfaces"].set_index("family")
     normals = surfaces[[f"normal_{axis}_target_1" for axis in "xyz"]]
     for wall, foot in (("left", "toe-left"), ("right", "toe-right")):

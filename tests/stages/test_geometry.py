@@ -1,5 +1,6 @@
 """What a session's geometry cannot tell, through all stages: refused or warned, each with its sentence."""
 
+import functools
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +11,7 @@ import pytest
 
 from pipeline.artefacts.streams import MemoryPart, Stream
 from tests.support.effort import often
-from tests.support.simulated import calibrated, made
+from tests.support.simulated import calibrated, made, through
 
 WAVES = ("surge", "sway", "heave", "roll", "pitch", "heading")
 STILL = {"motion": {name: {"amplitude": 0.0, "period_s": 5.0} for name in WAVES}}
@@ -38,6 +39,12 @@ def seeing(*families: str) -> Callable[[str, Any], Any]:
 ALL = ("P1", "P2", "P3", "H")
 
 
+@functools.lru_cache(maxsize=4)
+def labelled(scenario: str, seed: int) -> dict[str, Any]:
+    """The artefacts up to the labels, of a scenario as JSON. Nobody changes them."""
+    return calibrated(made(json.loads(scenario), seed=seed), "segment")
+
+
 @pytest.mark.parametrize(
     ("scenario", "families", "accepted", "gap"),
     [
@@ -51,7 +58,8 @@ ALL = ("P1", "P2", "P3", "H")
 )
 def test_gaps(scenario: dict[str, Any], families: tuple[str, ...], accepted: bool | None, gap: str) -> None:
     """None: whatever the sigmas say, but warned, and with what it comes to."""
-    result = json.loads(calibrated(made(scenario, seed=9), changed=seeing(*families))["report/calibration.json"])
+    found = calibrated(made(scenario, seed=9), changed=seeing(*families), known=labelled(json.dumps(scenario), 9))
+    result = json.loads(found["report/calibration.json"])
     if accepted is not None:
         assert (result["verdict"] == "accepted") == accepted
     assert gap in result["geometry"]["advice"]
@@ -90,7 +98,8 @@ def test_what_is_wrong_is_found_by_the_simulators_own_sign(
     unknown: str, scenario: dict[str, Any], laser: dict[str, float], value: float
 ) -> None:
     """Named first of all causes, and of the size that was put in: within 10 %, for it is first order."""
-    found = calibrated(made(scenario, seed=7), laser=laser)
+    known = {} if laser else labelled(json.dumps(scenario), 7)
+    found = calibrated(made(scenario, seed=7), laser=laser, known=known)
     row = found["adjust/freed"].set_index("unknown").loc[unknown]
     assert abs(row["value"] - value) < 0.1 * abs(value) + 3 * row["sigma"]
     assert abs(row["value"]) > 10 * row["sigma"]
@@ -114,8 +123,10 @@ def test_an_ins_that_drifts_three_times_as_far_is_named_before_any_mount() -> No
 
 def test_what_is_freed_is_found_said_and_to_be_corrected(errors_of: Any) -> None:
     """The same 20 ms with the latency free: the mount is right, and still nobody shall sail with that clock."""
-    session = made({"mbes": {"latency_s": 0.02}}, seed=7)
-    found = calibrated(session, pool={"adjust": {"free": ["mbes_latency"]}})
+    late = {"mbes": {"latency_s": 0.02}}
+    session = made(late, seed=7)
+    known = through("georeference", labelled(json.dumps(late), 7))
+    found = calibrated(session, pool={"adjust": {"free": ["mbes_latency"]}}, known=known)
     result = json.loads(found["report/calibration.json"])
     one = result["free"]["mbes_latency"]
     assert one["unit"] == "s"

@@ -36,9 +36,9 @@ def test_with_the_true_lever_arm_it_converges_to_the_stretch_of_its_matrix_and_s
     assert rows["angle_P2_deg"].iloc[-1] < np.degrees(t**2 / 4)
 
 
-def test_above_the_stall_it_is_converged(quiet):
+def test_above_the_stall_it_is_converged(quiet_found):
     """With the usual threshold, and with the coarse lever arm, which the text leaves as it is."""
-    angles = calibrated(quiet, "angle_iterate")["angle_iterate/literal_angles"].iloc[0]
+    angles = quiet_found["angle_iterate/literal_angles"].iloc[0]
     assert angles["converged"]
     assert 1 <= angles["iterations"] <= 10
 

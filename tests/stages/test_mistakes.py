@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from pipeline.config.yaml_models import parse
-from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, SURFACE_PARAMETERS
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, WET_PARAMETERS
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.simulation.face_faults import face_of_polygon
 from pipeline.simulation.mesh import build_mesh
@@ -16,7 +16,7 @@ from tools.campaigns import THIN
 from tools.mistake_kinds import EFFECTS, MISTAKES
 from tools.mistakes import named_first
 
-WET = {f"wet_{family}_{name}" for family in ("P1", "P2", "P3", "H") for name in SURFACE_PARAMETERS}
+WET = {f"wet_{family}_{name}" for family in ("P1", "P2", "P3", "H") for name in WET_PARAMETERS}
 PARAMETERS = {*MBES_PARAMETERS, *LASER_PARAMETERS, *WET}
 
 

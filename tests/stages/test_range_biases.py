@@ -11,7 +11,7 @@ from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.artefacts.streams import MemoryPart, Stream, point_array
 from pipeline.simulation.session import SimulatedSession
 from tests.support.effort import often
-from tests.support.simulated import calibrated
+from tests.support.simulated import calibrated, through
 
 Law = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of the incidence (n,) rad and |n_z| (n,) of the face
 
@@ -59,9 +59,16 @@ def recorded_too_long(session: SimulatedSession, bias_m: float, law: Law) -> Cal
     ][: often(1, 2)],
 )
 def test_a_bias_is_found_named_and_estimated_if_it_is_freed(
-    noisy: SimulatedSession, errors_of: Any, unknown: str, law: Law, bias_m: float, words: str
+    noisy: SimulatedSession,
+    noisy_found: dict[str, Any],
+    errors_of: Any,
+    unknown: str,
+    law: Law,
+    bias_m: float,
+    words: str,
 ) -> None:
-    found = calibrated(noisy, changed=recorded_too_long(noisy, bias_m, law))
+    known = through("segment", noisy_found)
+    found = calibrated(noisy, changed=recorded_too_long(noisy, bias_m, law), known=known)
     row = found["adjust/freed"].set_index("unknown").loc[unknown]
     assert abs(row["value"] + bias_m) < 0.1 * abs(bias_m) + 3 * row["sigma"]
     result = json.loads(found["report/calibration.json"])
@@ -69,7 +76,8 @@ def test_a_bias_is_found_named_and_estimated_if_it_is_freed(
     assert words in cause.split("nearly as well")[0]
     tied = abs(errors_of(result["mbes"], noisy.truth)[5])
     assert tied > 9  # mm of z
-    freed = calibrated(noisy, changed=recorded_too_long(noisy, bias_m, law), pool={"adjust": {"free": [unknown]}})
+    pool, known = {"adjust": {"free": [unknown]}}, through("georeference", noisy_found)  # segment, too, adjusts with it
+    freed = calibrated(noisy, changed=recorded_too_long(noisy, bias_m, law), pool=pool, known=known)
     result = json.loads(freed["report/calibration.json"])
     one = result["free"][unknown]
     assert one["unit"] == "m"

@@ -11,7 +11,7 @@ from pipeline.config.mount import Mount
 from pipeline.errors import RawDataError
 from pipeline.mount import mount_of, setting_change
 from tests.support.effort import often
-from tests.support.simulated import QUIET, calibrated, made
+from tests.support.simulated import QUIET, calibrated, made, through
 
 NS = 1_000_000_000
 
@@ -189,8 +189,9 @@ def test_a_head_mounted_the_other_way_round_changes_by_the_short_way():
     assert abs(turned["pitch_deg"]) <= 90
 
 
-def test_sigma_limits_reject_and_name_the_parameter(noisy):
-    found = calibrated(noisy, pool={"verdict": {"max_sigma_deg": 1e-4, "max_sigma_m": 1e-6}})
+def test_sigma_limits_reject_and_name_the_parameter(noisy, noisy_found):
+    limits = {"verdict": {"max_sigma_deg": 1e-4, "max_sigma_m": 1e-6}}
+    found = calibrated(noisy, pool=limits, known=through("adjust", noisy_found))
     result = json.loads(found["report/calibration.json"])
     assert result["verdict"] == "rejected"
     assert sum("sigma of" in reason for reason in result["reasons"]) == 6

@@ -1,5 +1,6 @@
 """Points of both sensors by a forward model of its own, their errors, and their adjustment."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from pipeline.config.mount import Mount
 from pipeline.config.pool import Adjust
 from pipeline.config.session import Drift, Ins, Laser, Mbes, White
 from pipeline.maths.adjustment.body_motion import BodyMotion
+from pipeline.maths.adjustment.face_shifts import Faces
 from pipeline.maths.adjustment.parameters import ObservedSurface, State
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.trajectory import Trajectory
@@ -31,6 +33,7 @@ FACES = (  # family, normal, a point on it, height above the family's plane
     ("H", (0.0, 0.0, 1.0), (0.5, 1.8, -1.5), -1.5),
     ("H", (0.0, 0.0, 1.0), (0.5, -1.8, 1.0), 1.0),
 )
+MBES_ONLY = 3  # number of the face that the sonar alone sees
 MOUNT = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0}
 LASER = Laser(files=["x"], format="las", mount=Mount(**MOUNT), angle_sigma_deg=0.003)
 MBES = Mbes(files=["x"], format="r2sonic", mount=Mount(**MOUNT))
@@ -66,9 +69,18 @@ def drift_of(rng: np.random.Generator, t: np.ndarray, drift: Drift) -> np.ndarra
 
 
 def made(
-    seed: int, ins: Ins = QUIET, sensors: float = 1.0, latency_s: float = 0.0, faster: float = 0.0
+    seed: int,
+    ins: Ins = QUIET,
+    sensors: float = 1.0,
+    latency_s: float = 0.0,
+    faster: float = 0.0,
+    shifted: Mapping[int, float] = {},
 ) -> tuple[dict[str, Stream], ObservationModel]:
-    """Points of both sensors; the sonar's clock late by ``latency_s``, the sound faster than recorded by a share."""
+    """Points of both sensors; the sonar's clock late by ``latency_s``, the sound faster than recorded by a share.
+
+    ``shifted``: distances (m) by which faces stand off their place, along the normal.
+    """
+    stands_off = np.array([shifted.get(k, 0.0) for k in range(len(FACES))])
     rng = np.random.default_rng(seed)
     t = np.r_[np.arange(0, SECONDS, 1 / RATE), SECONDS + GAP + np.arange(0, SECONDS, 1 / RATE)]
     p, T = motion(t)
@@ -88,7 +100,7 @@ def made(
         T = place(moment)
         origin = np.array([np.interp(moment, t, column) for column in p.T]).T + T.apply(lever)
         normal = np.array([one[1] for one in FACES])[face]
-        distance = np.sum(normal * (np.array([one[2] for one in FACES])[face] - origin), axis=1)
+        distance = np.sum(normal * (np.array([one[2] for one in FACES])[face] - origin), axis=1) + stands_off[face]
         slant = np.sum(normal * T.apply(rays @ R.T), axis=1)
         ranges = distance / slant
         return rays * np.where((ranges > 1.5) & (ranges < 14) & (np.abs(slant) > 0.09), ranges, np.nan)[:, None]
@@ -125,10 +137,11 @@ def made(
     coarse = Rotation.from_rotvec(np.radians([2.5, -2.0, 2.2])).as_matrix()
     model = ObservationModel(
         BodyMotion.of(trajectory, LASER_LEVER),
-        np.array([numbers[family] for family, *_ in FACES]),
+        Faces(tuple(f"{k}" for k in range(len(FACES))), np.array([numbers[f] for f, *_ in FACES]), np.ones(len(FACES))),
         np.array([height for *_, height in FACES]),
         State.at(coarse @ R_TRUE, LEVER_TRUE + np.array([0.2, -0.25, 0.22]), surfaces),
         {"laser": sensor_sigmas(LASER), "mbes": sensor_sigmas(MBES)},
+        (-4.0, 0.0),
     )
     return {"laser": Stream((MemoryPart("l", laser),)), "mbes": Stream((MemoryPart("m", mbes),))}, model
 

@@ -13,6 +13,7 @@ from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate_session
+from stages import ORDER
 from stages.in_memory import calibrate_in_memory
 
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 4000.0}, "mbes": {"ping_rate_hz": 10.0}}
@@ -59,9 +60,10 @@ def calibrated(
     raw: Mapping[str, Mapping[str, np.ndarray]] | None = None,
     laser: Mapping[str, float] | None = None,
     changed: Callable[[str, Any], Any] = lambda _, value: value,
+    known: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Every artefact; ``pool``, ``mount`` and ``laser`` change the pool's target, the coarse sonar mount, and by how
-    much the laser's mount is wrong."""
+    much the laser's mount is wrong; the stages of the artefacts in ``known`` are not run again."""
     settings, design = copy.deepcopy(session.session), copy.deepcopy(session.pool)
     settings["mbes"]["mount"].update(mount or {})
     for key, value in (laser or {}).items():
@@ -70,5 +72,11 @@ def calibrated(
         design.setdefault(key, {}).update(value) if isinstance(value, dict) else design.update({key: value})
     columns = {"ins": session.ins, "laser": session.laser, "mbes": session.mbes, **(raw or {})}
     return calibrate_in_memory(
-        parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until, changed
+        parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until, changed, known
     )
+
+
+def through(last: str, artefacts: Mapping[str, Any]) -> dict[str, Any]:
+    """The artefacts of the stages up to this one: for a calibration that differs from it later alone."""
+    stages = ORDER[: ORDER.index(last) + 1]
+    return {key: value for key, value in artefacts.items() if key.partition("/")[0] in stages}

@@ -77,12 +77,14 @@ DRIFT_FIGURES = Artefact(
     ),
 )
 FREED = Artefact(
-    "adjust", "freed", "table", "single-parameter test of each fixed parameter, and the effect of its error",
+    "adjust", "freed", "table", "single-parameter test of each additional parameter, and the effect of its error",
     (
-        Column("unknown", TEXT, "", "parameter of a sensor, or of a family's wet faces"),
+        Column("unknown", TEXT, "", "parameter of a sensor, of a family's wet faces, or shift of a face (face_NAME); "
+               "surfaces_...: errors in what is known of the surfaces beforehand, without a test"),
         Column("estimated", BOOL, "", "named in adjust.free: value and total sigma are those of the solution"),
-        Column("considered", F64, "rad, m, s, 1 or 1/s", "its a-priori sigma, as a consider parameter"),
-        Column("value", F64, "rad, m, s, 1 or 1/s", "its estimate, if it alone were estimated (NaN: not determined)"),
+        Column("considered", F64, "rad, m, s, 1 or 1/s", "its a-priori sigma"),
+        Column("value", F64, "rad, m, s, 1 or 1/s",
+               "its estimate from the points alone, without its a-priori sigma (NaN: not determined)"),
         Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of this estimate"),
         Column("expected", F64, "rad, m, s, 1 or 1/s", "its standard deviation if all a-priori errors hold"),
         *(

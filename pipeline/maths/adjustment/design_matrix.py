@@ -44,7 +44,9 @@ ds/dt = c + g D makes the path longer by -g d_z ρ² / 2c. The ray bends away fr
 (g / c)(e_z - d_z d), so that the point moves by (g ρ² / 2c)(e_z - 2 d_z d), first order in g. A transmitter that sits
 at o + δ, not at o, from the receiver makes the range of the same path longer by δ · (x - o) / (L - o · d)
 (:func:`~pipeline.maths.sonar.soundings.points_in_mbes`, differentiated by o). With L = 2 ρ this is δ · d / 2 but for
-the share |o| / ρ, which is neglected. So the features of its components are n · d d_k / 2, d in frame mbes.
+the share |o| / ρ, which is neglected. So the features of its components are n · d d_k / 2, d in frame mbes. A bow of
+the wet faces by 1 m moves the surface by the feature 4 h (1 - h), h the point's height above the faces' lower end as a
+share of the depth D there; with e it changes by 4 (1 - 2 h) (up · d) / (D n · d).
 
 **An interval.** With q = (1, α, β, …), α = t1 · r, β = t2 · r, every derivative of v = n · (X - c) - shift is q times a
 column of C or K. The column is the same for the whole interval (:mod:`pipeline.maths.adjustment.interval_sums`). With
@@ -76,7 +78,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
-from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
+from pipeline.maths.adjustment.parameters import FEATURES, N_SURFACE, N_WET, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE
 from pipeline.maths.mount_parameters import N_MOUNT
 from pipeline.maths.sonar.soundings import across_beam
@@ -141,7 +143,8 @@ class SoundingsOnSurface:
 
     points_m (3, n), in the sonar's frame; axes (3, 3, n): the surface's t1, t2, n (axis k, component i, point n) in the
     sonar's frame; up (3, n): the target frame's z axis, in the sonar's frame; r (3, n): vectors from the body to the
-    points, m, surface axes; v_m (n,): distances from the surface.
+    points, m, surface axes; v_m (n,): distances from the surface; height (n,): heights above the lower end of the wet
+    faces, as a share of its depth ``depth_m``.
     """
 
     points_m: Array
@@ -149,13 +152,15 @@ class SoundingsOnSurface:
     up: Array
     r: Array
     v_m: Array
+    height: Array
+    depth_m: float
 
 
 def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> PointDesign:
-    """Return the design of soundings, F = 10; see the module's docstring for each formula.
+    """Return the design of soundings, F = 11; see the module's docstring for each formula.
 
     The features q = (1, α, β, …) multiply the rows of :func:`parameter_design`. Those beyond β are the derivatives of v
-    by ``MBES_FEATURES`` of :mod:`~pipeline.maths.adjustment.parameters`.
+    by ``MBES_FEATURES`` of :mod:`~pipeline.maths.adjustment.parameters`, and the form of a bow.
     """
     points_m, axes, r = soundings.points_m, soundings.axes, soundings.r
     x, y, z = points_m
@@ -174,9 +179,10 @@ def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> P
     up_of_normal = np.einsum("in,in->n", soundings.up, axes[2])
     gradient = (up_of_normal - 2 * up_of_ray * ray[2]) * range_m**2 / (2 * SPEED_M_S)
     projector, zero = points_m * (ray[2] / (2 * range_m)), np.zeros_like(x)
-    features = np.stack([np.ones_like(x), r[0], r[1], ray[2], speed, gradient, steering, *projector])
+    bow, bent = 4 * soundings.height * (1 - soundings.height), 4 * (1 - 2 * soundings.height) / soundings.depth_m
+    features = np.stack([np.ones_like(x), r[0], r[1], ray[2], speed, gradient, steering, *projector, bow])
     by_range = [ray[0], ray[1], zero, speed / range_m, 2 * gradient / range_m, steering / range_m, zero, zero, zero]
-    return PointDesign(mean, np.sqrt(variance), features, np.stack(by_range) / slant)
+    return PointDesign(mean, np.sqrt(variance), features, np.stack([*by_range, bent * up_of_ray]) / slant)
 
 
 def _curvature(normal: Array, p: Array, c: Array) -> Array:
@@ -274,15 +280,16 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     design[:, 1, turn], design[:, 2, turn] = -(second @ T), first @ T
     design[:, 0, arm] = plane.normal @ T
     # latency, parameters with a feature of their own, and biases of ranges that go with the surface
-    latency = N_SURFACE + N_MOUNT
+    latency, further = N_SURFACE + N_MOUNT, len(FEATURES[observed.sensor])
     design[:, :N_MOVED, latency] = -poses.rates @ pose_design([plane], np.zeros(1, dtype=np.int64))[0].T
-    for further in range(observed.features - N_MOVED):
-        design[:, N_MOVED + further, latency + 1 + further] = 1.0
-    incidence = latency + 1 + observed.features - N_MOVED
+    for number in range(further):
+        design[:, N_MOVED + number, latency + 1 + number] = 1.0
+    incidence = latency + 1 + further
     design[:, [0, N_MOVED], incidence] = -1 / AT_45_DEG
     if observed.sensor == "mbes" and plane.level:
         design[:, N_MOVED, incidence + 1] = 1.0
-    # the wet faces turn and shift like the surface
+    # the wet faces turn and shift like the surface, and bow
     if observed.sensor == "mbes":
-        design[:, :, -N_SURFACE:] = design[:, :, :N_SURFACE]
+        design[:, :, -N_WET:-1] = design[:, :, :N_SURFACE]
+        design[:, -1, -1] = 0.0 if plane.level else -1.0
     return design

@@ -76,9 +76,29 @@ class ReducedIntervals:
     log_determinant: float
 
 
+@dataclass(frozen=True)
+class ReducedGroups:
+    """As :class:`ReducedIntervals`, with the sums by group of spans, so that each group can be left out.
+
+    group (j,): number of each span's group; others (h, u + 1, u + 1) and log_determinant (h,) by group.
+    """
+
+    spans: Array
+    others: Array
+    log_determinant: Array
+    group: Integers
+
+    def of(self, groups: Sequence[int]) -> ReducedIntervals:
+        """Return the normal equations of the spans in these groups alone."""
+        numbers = np.asarray(groups, dtype=np.int64)
+        inside = np.isin(self.group, numbers)
+        spans = self.spans if inside.all() else np.where(inside[:, None, None], self.spans, 0.0)
+        return ReducedIntervals(spans, self.others[numbers].sum(axis=0), float(self.log_determinant[numbers].sum()))
+
+
 def eliminate_white_noise(
-    sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array
-) -> ReducedIntervals:
+    sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array, group: Integers
+) -> ReducedGroups:
     """Return the normal equations, with the white noise of single records eliminated span by span.
 
     Parameters
@@ -91,49 +111,53 @@ def eliminate_white_noise(
         Times of the INS records, and knots.
     white : (6,) array
         Standard deviations of a record's noise, m and rad.
+    group : (j,) array
+        Number of the group of each span, from 0.
     """
     knots = times.knots
-    spans = len(knots.record) - 1
+    spans, groups = len(group), int(group.max(initial=0)) + 1
     width = n_parameters + 2 * N_POSE + 1
     rows, sides = slice(n_parameters, width - 1), [*range(n_parameters), width - 1]  # the knots; x and v
-    by_span, others = np.zeros((spans, 2 * N_POSE, width)), np.zeros((n_parameters + 1, n_parameters + 1))
+    by_span, others = np.zeros((spans, 2 * N_POSE, width)), np.zeros((groups, n_parameters + 1, n_parameters + 1))
     located = [(source, knots.interval_of(source.record)) for source in sources]
-    log_determinant = 0.0
-    for first in range(0, spans, SIDE_BY_SIDE):
-        last = min(first + SIDE_BY_SIDE, spans)
-        chain = _RecordChain.empty((first, last), width, knots, bool(np.any(white > 0)))
+    log_determinant = np.zeros(groups)
+    seen = np.unique(np.concatenate([span for _, span in located]))  # spans with an interval; the others add nothing
+    for first in range(0, len(seen), SIDE_BY_SIDE):
+        together = seen[first : first + SIDE_BY_SIDE]
+        chain = _RecordChain.empty(together, width, knots, bool(np.any(white > 0)))
         for source, span in located:
-            low, high = np.searchsorted(span, [first, last])
+            low, high = np.searchsorted(span, [together[0], together[-1] + 1])
             if high > low:
                 chain.add(source.linearised(slice(int(low), int(high))), span[low:high], times)
-        log_determinant += chain.eliminate(white)
-        by_span[first:last] = chain.normal[:, rows]
-        others += chain.normal.sum(axis=0)[np.ix_(sides, sides)]
-    return ReducedIntervals(by_span, others, log_determinant)
+        of_blocks = chain.eliminate(white)
+        by_span[together] = chain.normal[:, rows]
+        for number in np.unique(group[together]).tolist():
+            inside = group[together] == number
+            log_determinant[number] += of_blocks[inside].sum()
+            others[number] += chain.normal[inside].sum(axis=0)[np.ix_(sides, sides)]
+    return ReducedGroups(by_span, others, log_determinant, group)
 
 
 @dataclass(frozen=True)
 class _RecordChain:
     """Normal equations of spans side by side (j) and their records in order (l); y = (x, knot before, knot after, v).
 
-    normal (j, y, y); blocks of a record: own (j, l, 6, 6): with itself, ahead (j, l, 6, 6): with the next record,
-    border (j, l, 6, y): with y.
+    spans (j,): their numbers, ascending; normal (j, y, y); blocks of a record: own (j, l, 6, 6): with itself, ahead
+    (j, l, 6, 6): with the next record, border (j, l, 6, y): with y.
     """
 
-    first: int
+    spans: Integers
     normal: Array
     own: Array
     ahead: Array
     border: Array
 
     @classmethod
-    def empty(cls, spans: tuple[int, int], width: int, knots: Knots, with_records: bool) -> "_RecordChain":
-        first, last = spans
-        count = last - first
-        steps = np.diff(knots.record[first : last + 1])[knots.inner[first:last]]
+    def empty(cls, spans: Integers, width: int, knots: Knots, with_records: bool) -> "_RecordChain":
+        count, steps = len(spans), (knots.record[spans + 1] - knots.record[spans])[knots.inner[spans]]
         length = int(steps.max(initial=0)) + 1 if with_records else 0
         return cls(
-            first=first,
+            spans=spans,
             normal=np.zeros((count, width, width)),
             own=np.zeros((count, length, N_POSE, N_POSE)),
             ahead=np.zeros((count, length, N_POSE, N_POSE)),
@@ -146,15 +170,15 @@ class _RecordChain:
         width = self.normal.shape[1]
         columns = np.concatenate([intervals.columns, np.arange(width - 2 * N_POSE - 1, width)])
         whole = _with_knots(intervals, span, times)
-        normal, right = sums.normal, sums.right[:, :, None]
-        by_feature = np.concatenate([normal @ whole, right], axis=2)  # features by (x, knots, v)
-        by_unknown = np.swapaxes(whole, 1, 2)
-        of_v = np.concatenate([by_unknown @ right, sums.squares[:, None, None]], axis=1)
-        square = np.concatenate([by_unknown @ by_feature[:, :, :-1], np.swapaxes(of_v[:, :-1], 1, 2)], axis=1)
-        square = np.concatenate([square, of_v], axis=2)
+        normal = sums.normal
+        by_feature = np.concatenate([normal @ whole, sums.right[:, :, None]], axis=2)  # features by (x, knots, v)
         starts = np.flatnonzero(np.diff(span, prepend=-1))
-        j = span - self.first
-        self.normal[np.ix_(j[starts], columns, columns)] += np.add.reduceat(square, starts, axis=0)
+        j = np.searchsorted(self.spans, span)
+        square = np.zeros((len(starts), len(columns), len(columns)))
+        square[:, :-1] = _sum_of_products(whole, by_feature, starts)
+        square[:, -1, :-1] = square[:, :-1, -1]
+        square[:, -1, -1] = np.add.reduceat(sums.squares, starts)
+        self.normal[np.ix_(j[starts], columns, columns)] += square
         if not self.own.shape[1]:
             return
         later = np.concatenate([sums.swept @ whole, sums.right_swept[:, :, None]], axis=2)
@@ -175,27 +199,48 @@ class _RecordChain:
             border_line[place + offset] += spread
         ahead_line[place] += KT @ (swept - twice) @ K  # sums with (1 - s) s
 
-    def eliminate(self, white: Array) -> float:
-        """Eliminate the white noise of the records from ``normal``, in place; return the sum of log det of its blocks.
+    def eliminate(self, white: Array) -> Array:
+        """Eliminate the white noise of the records from ``normal``, in place; return the spans' log det (j,).
 
         The unknowns are the noise divided by its standard deviations ``white``. So their prior is the unit matrix, and
         a standard deviation of zero is no special case.
         """
-        both, log_determinant = white[:, None] * white, 0.0
-        carried_own: Array | None = None
-        carried_border: Array | None = None
-        for step in range(self.own.shape[1]):
-            block = self.own[:, step] * both + np.eye(N_POSE)
-            border = self.border[:, step] * white[:, None]
-            if carried_own is not None and carried_border is not None:
-                block, border = block - carried_own, border - carried_border
-            log_determinant += float(np.sum(np.linalg.slogdet(block)[1]))
-            ahead = self.ahead[:, step] * both
-            solved = np.linalg.solve(block, np.concatenate([ahead, border], axis=2))
-            back = np.swapaxes(ahead, 1, 2)
-            carried_own, carried_border = back @ solved[:, :, :N_POSE], back @ solved[:, :, N_POSE:]
-            self.normal[...] -= np.swapaxes(border, 1, 2) @ solved[:, :, N_POSE:]
-        return log_determinant
+        count, length, _, width = self.border.shape
+        if not length:
+            return np.zeros(count)
+        own, ahead = (blocks * (white[:, None] * white) for blocks in (self.own, self.ahead))
+        own += np.eye(N_POSE)
+        border = self.border * white[:, None]
+        solved = np.empty_like(border)
+        for step in range(length):
+            inverse = np.linalg.inv(own[:, step])
+            solved[:, step] = inverse @ border[:, step]
+            if step + 1 < length:
+                back = np.swapaxes(ahead[:, step], 1, 2)
+                own[:, step + 1] -= back @ inverse @ ahead[:, step]
+                border[:, step + 1] -= back @ solved[:, step]
+        lines = (count, length * N_POSE, width)  # one product for all records of a span
+        self.normal[...] -= np.swapaxes(border.reshape(lines), 1, 2) @ solved.reshape(lines)
+        return np.asarray(np.sum(np.linalg.slogdet(own)[1], axis=1))
+
+
+def _sum_of_products(left: Array, right: Array, starts: Integers) -> Array:
+    """Return Σ leftᵀ right (s, a, b) over each run of matrices (g, F, a) and (g, F, b); starts (s,) of the runs.
+
+    The matrices of a run stand one below the other, so that there is one product a run: it needs a third of the time of
+    one product a matrix and their sums.
+    """
+    count, features = left.shape[:2]
+    lengths = np.diff(starts, append=count)
+    longest = int(lengths.max(initial=0))
+    run = np.repeat(np.arange(len(starts)), lengths)
+    place = run * longest + np.arange(count) - starts[run]
+    stacked = []
+    for matrices in (left, right):
+        filled = np.zeros((len(starts) * longest, features, matrices.shape[2]))
+        filled[place] = matrices
+        stacked.append(filled.reshape(len(starts), longest * features, -1))
+    return np.asarray(np.swapaxes(stacked[0], 1, 2) @ stacked[1])
 
 
 def _with_knots(intervals: LinearisedIntervals, span: Integers, times: TimeAxis) -> Array:

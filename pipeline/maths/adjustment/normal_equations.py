@@ -31,6 +31,7 @@ from pipeline.maths.adjustment.design_matrix import SensorOnSurface, parameter_d
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
 from pipeline.maths.adjustment.eliminate_white_noise import (
     LinearisedIntervals,
+    ReducedGroups,
     ReducedIntervals,
     TimeAxis,
     eliminate_white_noise,
@@ -106,10 +107,8 @@ class SurfaceIntervals:
         return LinearisedIntervals(sums, design[:, :, kept], np.searchsorted(self.selected, columns[kept]), pose)
 
 
-def normal_equations(
-    linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise, selected: Integers | None = None
-) -> NormalEquations:
-    """Return the normal equations of all parameters, or of the selected ones.
+def normal_equations(linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise) -> NormalEquations:
+    """Return the normal equations of all parameters.
 
     Parameters
     ----------
@@ -119,10 +118,8 @@ def normal_equations(
         The drift with which the observations were taken.
     noise : PoseNoise
         Standard deviations of the pose errors.
-    selected : (s,) array, optional
-        Parameters, ascending.
     """
-    return eliminate_drift(reduced_intervals(linearisation, drift.knots, noise.white, selected), noise, drift)
+    return eliminate_drift(reduced_intervals(linearisation, drift.knots, noise.white), noise, drift)
 
 
 def reduced_intervals(
@@ -141,9 +138,24 @@ def reduced_intervals(
     selected : (s,) array, optional
         Parameters, ascending; all by default.
     """
+    return reduced_by_group(linearisation, knots, white, np.zeros(len(knots.inner), dtype=np.int64), selected).of([0])
+
+
+def reduced_by_group(
+    linearisation: Linearisation, knots: Knots, white: Array, group: Integers, selected: Integers | None = None
+) -> ReducedGroups:
+    """Return the normal equations of parameters and knots, with sums by group of spans.
+
+    Parameters
+    ----------
+    linearisation, knots, white, selected
+        As for :func:`reduced_intervals`.
+    group : (k - 1,) array
+        Number of the group of the span after each knot but the last, from 0.
+    """
     sources = list(linearisation.by_surface(selected))
     n_parameters = linearisation.state.size if selected is None else len(selected)
-    return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white)
+    return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white, group)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:

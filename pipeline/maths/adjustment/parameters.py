@@ -9,7 +9,8 @@
 * the laser's: ε, λ, latency, range and incidence, with the same meaning;
 * each surface's: two turns of the normal (rad) and a shift (m), shared by both sensors;
 * each surface's part under water: two further turns and a shift, by which the wet faces as built differ from the dry
-  ones.
+  ones, and a bow (m along the normal, a parabola in height: the most at half depth, nothing at the water and at the
+  lower end), as the load of the water bends walls; horizontal faces have no bow.
 
 A run that calibrates the laser has no sonar: the mount parameters are the laser's, and no face is wet.
 
@@ -36,12 +37,15 @@ Sensor = Literal["mbes", "laser"]
 PROJECTOR_PARAMETERS = ("projector_x", "projector_y", "projector_z")
 MBES_FEATURES = ("mbes_range", "sound_speed", "sound_speed_gradient", "steering_speed", *PROJECTOR_PARAMETERS)
 LASER_FEATURES = ("laser_range",)  # as MBES_FEATURES: the parameters whose derivative is a feature of its own
+FEATURES: dict[str, tuple[str, ...]] = {"mbes": MBES_FEATURES, "laser": LASER_FEATURES}
 MBES_PARAMETERS = (*MOUNT_NAMES, "mbes_latency", *MBES_FEATURES, "mbes_incidence", "mbes_level_range")
 OF_LASER = ("laser_latency", *LASER_FEATURES, "laser_incidence")
 LASER_PARAMETERS = (*(f"laser_{name}" for name in MOUNT_NAMES), *OF_LASER)
 CALIBRATED_LASER_PARAMETERS = (*MOUNT_NAMES, *OF_LASER)
 SURFACE_PARAMETERS = ("turn_1", "turn_2", "shift")
 N_SURFACE = len(SURFACE_PARAMETERS)
+WET_PARAMETERS = (*SURFACE_PARAMETERS, "bow")
+N_WET = len(WET_PARAMETERS)
 
 
 @dataclass(frozen=True)
@@ -146,9 +150,10 @@ class State:
         """Names of all parameters, in their order."""
         families = [surface.family for surface in self.surfaces]
         of_surfaces = [f"{family}_{name}" for family in families for name in SURFACE_PARAMETERS]
+        of_wet = [f"wet_{family}_{name}" for family in families for name in WET_PARAMETERS]
         if self.calibrated == "laser":
             return (*CALIBRATED_LASER_PARAMETERS, *of_surfaces)
-        return (*MBES_PARAMETERS, *LASER_PARAMETERS, *of_surfaces, *(f"wet_{name}" for name in of_surfaces))
+        return (*MBES_PARAMETERS, *LASER_PARAMETERS, *of_surfaces, *of_wet)
 
     @property
     def _n_sensor_parameters(self) -> tuple[int, int]:
@@ -178,7 +183,8 @@ class State:
         on_surface = self.surface_columns(surface)
         if sensor != self.calibrated:
             return np.concatenate([on_surface, np.arange(own, both)])
-        wet = on_surface + N_SURFACE * len(self.surfaces) if sensor == "mbes" else on_surface[:0]
+        first = self.surface_slice.stop + N_WET * surface
+        wet = np.arange(first, first + N_WET if sensor == "mbes" else first)
         return np.concatenate([on_surface, np.arange(own), wet])
 
     def additional_values(self) -> Array:

@@ -22,14 +22,15 @@ the effective number of slots. Of the drift, only its continuity from slot to sl
 than a slot do not show.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations
+from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
+from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
+from pipeline.maths.adjustment.normal_equations import Linearisation, reduced_by_group
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import PseudoObservations
 from pipeline.maths.mount_parameters import N_MOUNT
@@ -70,7 +71,7 @@ def score_check(
     estimated : (f,) array
         The estimated parameters, ascending.
     """
-    slots = [normal_equations(part, own, noise, estimated) for part, own in _slots(linearisation, drift)]
+    slots = _slots(linearisation, drift, noise, estimated)
     normals, rights = np.array([slot.normal for slot in slots]), np.array([slot.right for slot in slots])
     N = normals.sum(axis=0) + prior.normal[np.ix_(estimated, estimated)]
     b = rights.sum(axis=0) + prior.right[estimated]
@@ -98,18 +99,32 @@ def largest_ratio(dof: float, level: float) -> float:
     return float(chdtri(dof, level)) / dof
 
 
-def _slots(linearisation: Linearisation, drift: DriftEstimate) -> Iterator[tuple[Linearisation, DriftEstimate]]:
-    """Yield the sums and the drift of each slot, from knot to knot. Slots end at gaps between observations."""
-    knots, first, last = drift.knots, 0, len(drift.knots.inner) - 1
+def _slots(
+    linearisation: Linearisation, drift: DriftEstimate, noise: PoseNoise, estimated: Integers
+) -> list[NormalEquations]:
+    """Return the normal equations of each slot, whose drift starts anew."""
+    spans, knots = _spans_of_slots(drift.knots), drift.knots
+    group = np.full(len(knots.inner), len(spans))  # a span between two passes is in no slot
+    for number, (first, last) in enumerate(spans):
+        group[first:last] = number
+    reduced = reduced_by_group(linearisation, knots, noise.white, group, estimated)
+    slots = []
+    for number, (first, last) in enumerate(spans):
+        own = Knots(knots.record[first : last + 1], knots.seconds[first : last + 1], knots.inner[first:last])
+        of_slot = ReducedIntervals(
+            reduced.spans[first:last], reduced.others[number], float(reduced.log_determinant[number])
+        )
+        slots.append(eliminate_drift(of_slot, noise, DriftEstimate(own, drift.values[first : last + 1])))
+    return slots
+
+
+def _spans_of_slots(knots: Knots) -> list[tuple[int, int]]:
+    """Return the first span of each slot, and the one after its last. Slots end at gaps between observations."""
+    slots, first, last = [], 0, len(knots.inner) - 1
     for span in np.flatnonzero(knots.inner).tolist():
         if span == last or not knots.inner[span + 1] or knots.seconds[span + 1] - knots.seconds[first] >= SLOT_S:
-            places = slice(first, span + 2)
-            own = Knots(knots.record[places], knots.seconds[places], knots.inner[first : span + 1])
-            sums = {
-                sensor: whole.selected(np.arange(*np.searchsorted(whole.record, own.record[[0, -1]])))
-                for sensor, whole in linearisation.sums.items()
-            }
-            yield replace(linearisation, sums=sums), DriftEstimate(own, drift.values[places])
+            slots.append((first, span + 1))
             first = span + 1
         if span < last and not knots.inner[span + 1]:
             first = span + 2
+    return slots

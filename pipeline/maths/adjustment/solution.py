@@ -1,17 +1,9 @@
-"""Solution of the normal equations N x + b = 0: step, rank, covariance; effects of fixed parameters, and their tests.
+"""Solution of the normal equations N x + b = 0: step, rank, covariance; effects of fixed parameters.
 
 Some parameters are *estimated* (f), the others *fixed* (h) at their values. With S = -N_ff⁻¹ N_fh,
 
     x_f = -N_ff⁻¹ b_f,     C = N_ff⁻¹,     dx_f = S x_h for an error x_h of the fixed ones,
     C_total = C + S Q Sᵀ,  Q the covariance of the consider parameters (Gelb 1974, 7.5 "consider" filter).
-
-If one fixed parameter i were estimated together with f, its value would be -(b_h + Sᵀ b_f)_i / M_ii with
-M = N_hh + N_hf S, and its sigma M_ii^(-1/2). Errors x_h of the fixed parameters change the values by M x_h / M_ii. So
-if all a-priori errors hold, a value has the variance
-
-    1 / M_ii + (M Q M)_ii / M_ii²,
-
-which contains its own Q_ii.
 
 N contains prior information as well (:mod:`~pipeline.maths.adjustment.pseudo_observations`): N = N_points + P. Of the
 covariance C, the part C P C is due to errors of the prior information, so that the noise of the points alone gives
@@ -19,19 +11,6 @@ C - C P C. Let parameters have values known beforehand, with the covariance Q, P
 the parameters by C P h. With any F for which F Fᵀ = P, C F Fᵀ C is their part C P C of the covariance: the columns of
 C F are effects of independent errors. Here F = D R^(1/2), D the roots of the diagonal of P and D R D = P; without
 correlations, this is the effect C_·i / q of one sigma q of each value.
-
-The solution deviates by d from these values, which is their misclosure. It has the covariance Q - C, and the test of
-one pseudo-observation (Baarda 1968, "A testing procedure for use in geodetic networks") gives the error that value i
-would have if it alone were wrong, with its variance if all a-priori errors hold:
-
-    (P d)_i / W_ii,      1 / W_ii,      W = P (Q - C) P = P - P C P.
-
-1 / P_ii of this variance are due to the value itself, the rest to the points and the other values. For independent
-values, W_ii = (1 - C_ii / q²) / q², and the parameter would be d_i / (1 - C_ii / q²) without its prior information.
-Errors x_h of the fixed parameters change d by S x_h, and so this value by (P S x_h)_i / W_ii.
-
-(An error of one parameter shows in the values of all that look alike. In a trial, ranges
-seemed wrong by 7 mm because those on horizontal faces were, within their own sigma.)
 """
 
 from collections.abc import Sequence
@@ -45,7 +24,6 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
-KNOWN_SHARE = 1e-6  # least share of the information that counts
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
 
@@ -126,6 +104,26 @@ class Solution:
         root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
         return np.asarray(self.covariance[np.ix_(rows, columns)] @ (scale[:, None] * root))
 
+    def group_effects(self, numbers: Integers, group: Integers) -> Array:
+        """Return k changes (k, k) of parameters (k,) by independent errors in the prior information of a group.
+
+        They are the columns of the symmetric root of E = (C P C)_kk, P restricted to the group, in units of the
+        parameters' sigmas. Of all roots of E it is the one that changes least with E. So effects of two sessions with
+        the same prior information and nearly the same geometry are nearly equal, column by column.
+
+        Parameters
+        ----------
+        numbers : (k,) array
+            Estimated parameters.
+        group : (g,) array
+            Estimated parameters, whose prior information is not connected with that of others.
+        """
+        rows, places = np.searchsorted(self.estimated, numbers), np.searchsorted(self.estimated, group)
+        sigma = np.sqrt(np.diag(self.covariance)[rows])
+        by_group = self.covariance[np.ix_(rows, places)] / sigma[:, None]
+        values, vectors = np.linalg.eigh(by_group @ self.prior[np.ix_(places, places)] @ by_group.T)
+        return np.asarray(sigma[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
     def _among(self, covariance: Array, chosen: Integers) -> Array:
         """Return the part (k, k) of a covariance (f, f) of the estimated parameters; zero for fixed ones."""
         part = np.zeros((len(chosen), len(chosen)))
@@ -188,84 +186,6 @@ def solve(normal: Array, right: Array, estimated: Sequence[int], prior: Array | 
         condition=float(largest / values[0]) if values[0] > 0 else np.inf,
         deficiency=int(is_open.sum()),
     )
-
-
-@dataclass(frozen=True)
-class ParameterTest:
-    """Value and sigma that a parameter would have without what is known of it: if it were not fixed, or had no prior.
-
-    expected: standard deviation of the value if all a-priori errors hold.
-    """
-
-    parameter: int
-    value: float
-    sigma: float
-    expected: float
-
-
-def single_parameter_tests(
-    normal: Array, right: Array, solution: Solution, consider: ConsiderErrors
-) -> list[ParameterTest]:
-    """Return the single-parameter test of each fixed parameter.
-
-    Parameters that the observations cannot determine beside the estimated ones are left out.
-
-    Parameters
-    ----------
-    normal : (u, u) array
-        Normal matrix N of all parameters.
-    right : (u,) array
-        Right side b.
-    solution : Solution
-        Solution of these normal equations.
-    consider : ConsiderErrors
-        A-priori errors of the fixed parameters.
-    """
-    fixed, S = solution.fixed, solution.sensitivity
-    M = normal[np.ix_(fixed, fixed)] + normal[np.ix_(fixed, solution.estimated)] @ S
-    values = -(right[fixed] + S.T @ right[solution.estimated])
-    a_priori = np.einsum("ij,jk,ik->i", M, consider.covariance(fixed), M)
-    tests = []
-    for place, number in enumerate(fixed.tolist()):
-        information = float(M[place, place])
-        if information > RANK_TOLERANCE * max(float(normal[number, number]), 1e-300):
-            value, variance = float(values[place]) / information, 1 / information
-            expected = float(np.sqrt(variance + a_priori[place] / information**2))
-            tests.append(ParameterTest(number, value, float(np.sqrt(variance)), expected))
-    return tests
-
-
-def prior_parameter_tests(
-    solution: Solution, deviation: Array, consider: ConsiderErrors, numbers: Integers
-) -> list[ParameterTest]:
-    """Return the single-parameter test of each estimated parameter with a value known beforehand.
-
-    Parameters that the points cannot determine are left out.
-
-    Parameters
-    ----------
-    solution : Solution
-        Solution of the normal equations.
-    deviation : (u,) array
-        Deviations from the values known beforehand, after the solution's step.
-    consider : ConsiderErrors
-        A-priori errors of the fixed parameters.
-    numbers : (k,) array
-        All parameters with a value known beforehand.
-    """
-    places = np.searchsorted(solution.estimated, numbers)
-    P, C = (matrix[np.ix_(places, places)] for matrix in (solution.prior, solution.covariance))
-    W, misclosure = P - P @ C @ P, P @ deviation[numbers]
-    effects = P @ solution.sensitivity_of(numbers)
-    others = np.einsum("ij,jk,ik->i", effects, consider.covariance(solution.fixed), effects)
-    tests = []
-    for k, number in enumerate(numbers.tolist()):
-        information, own = float(W[k, k]), float(P[k, k])
-        if information > KNOWN_SHARE * own:
-            expected = float(np.sqrt(1 / information + others[k] / information**2))
-            sigma = float(np.sqrt(max(1 / information - 1 / own, 0.0)))
-            tests.append(ParameterTest(number, float(misclosure[k]) / information, sigma, expected))
-    return tests
 
 
 def correlated_pair(covariance: Array) -> tuple[int, int, float] | None:

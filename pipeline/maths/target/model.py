@@ -19,6 +19,7 @@ from pipeline.maths.target.face import HORIZONTAL_COSINE, Face
 
 Array = NDArray[np.float64]
 
+LEAST_DEPTH_M = 0.1
 ROLES = ("P1", "P2", "P3")  # roles of families in the patent's steps
 
 
@@ -64,6 +65,11 @@ class TargetModel:
     parallel: tuple[tuple[str, str], ...]
     water_level_m: float
     repeats_m: float | None
+
+    @property
+    def wet_heights_m(self) -> tuple[float, float]:
+        """Z of the target's lower end and of the water's surface; a target out of the water has a depth of 0.1 m."""
+        return self.water_level_m - max(self.depth_m, LEAST_DEPTH_M), self.water_level_m
 
     @property
     def depth_m(self) -> float:

@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from pipeline.adjustment.error_sources import ERROR_SOURCES, OWNERS, source_of
 from pipeline.config.session import SessionConfig
 from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 
 Row = Mapping[str, Any]
-Array = NDArray[np.float64]
 
 
 def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) -> Iterator[Row]:
@@ -21,8 +19,7 @@ def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: Sess
     A contribution is the root of the sum of squares of the effects of the source's parameters. For an angle, it is the
     contribution to the rotation about the body's axis. The squares of all contributions add up to the square of the
     total sigma. If the laser's mount has a covariance, its parameters correlate. They are then one source, and its
-    square is the square of the total sigma minus the squares of all other contributions. So is that of the target's
-    sigmas where the laser is calibrated.
+    square is the square of the total sigma minus the squares of all other contributions.
 
     Parameters
     ----------
@@ -39,12 +36,11 @@ def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: Sess
     source = tests["unknown"].map(lambda name: source_of(name).words)
     present = [one.words for one in ERROR_SOURCES if (source == one.words).any()]
     squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for words in present}
-    if session.calibrated == "laser":
-        squares = {"the target as designed and surveyed": _left(total, noise, squares), **squares}
-    elif session.laser.mount_covariance is not None:
+    if session.calibrated == "mbes" and session.laser.mount_covariance is not None:
         of_mount = {one.words for one in ERROR_SOURCES if one.owner == "laser_mount"}
         others = {words: square for words, square in squares.items() if words not in of_mount}
-        squares = {OWNERS["laser_mount"]: _left(total, noise, others), **others}
+        left = total**2 - noise**2 - np.sum(list(others.values()), axis=0)
+        squares = {OWNERS["laser_mount"]: np.maximum(left, 0.0), **others}
     for words, of_source in {"noise (the random sigma)": noise**2, **squares}.items():
         yield {
             "name": words,
@@ -53,11 +49,6 @@ def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: Sess
                 for sigma, unit in ((np.sqrt(of_source[place]), unit) for _, place, _, unit in PARAMETERS)
             ],
         }
-
-
-def _left(total: Array, noise: Array, squares: Mapping[str, Array]) -> Array:
-    """Return the squares (6,) of what noise and other contributions leave of the total sigmas (6,)."""
-    return np.asarray(np.maximum(total**2 - noise**2 - np.sum(list(squares.values()), axis=0), 0.0))
 
 
 def slot_checks(estimate: pd.DataFrame) -> list[str]:

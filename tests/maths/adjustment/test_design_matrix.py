@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.design_matrix import SensorOnSurface, parameter_design, pose_design
 from pipeline.maths.adjustment.parameters import (
-    LASER_FEATURES,
     LASER_PARAMETERS,
     MBES_FEATURES,
     MBES_PARAMETERS,
@@ -30,6 +29,7 @@ SURFACES = tuple(
 P, VELOCITY, TURNING = np.array([-5.0, 1.0, 0.2]), np.array([0.1, 0.5, -0.05]), np.array([0.02, -0.01, 0.03])
 R_LASER, T = Rotation.random(2, random_state=9).as_matrix()
 LASER_LEVER = np.array([0.2, 0.5, 1.1])
+FORM = np.linspace(0.2, 0.9, 7)  # of a bow, at the points
 
 
 def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.ndarray) -> Any:
@@ -54,6 +54,8 @@ def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.nd
     one = state.surfaces[surface]
     if sensor == "mbes":
         one = one.updated(*(other[f"wet_{one.family}_{name}"] for name in ("turn_1", "turn_2", "shift")))
+        bow = 0.0 if one.family == "H" else other[f"wet_{one.family}_bow"]
+        return (X - one.centre_m) @ one.normal - one.shift_m - bow * FORM
     return (X - one.centre_m) @ one.normal - one.shift_m
 
 
@@ -70,8 +72,9 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     r = (x @ mount.T + lever) @ T.T
     ray = x @ mount.T @ T.T / np.linalg.norm(x, axis=1, keepdims=True)
     q = np.vstack([np.ones(7), one.tangents @ r.T, ray @ one.normal])
-    features = 3 + len(LASER_FEATURES if sensor == "laser" else MBES_FEATURES)
-    q = np.vstack([q, np.zeros((features - 4, 7))])  # the sonar's others are tested where they are made
+    if sensor == "mbes":  # the sonar's other features are tested where they are made
+        q = np.vstack([q, np.zeros((len(MBES_FEATURES) - 1, 7)), FORM])
+    features = len(q)
     poses = BodyPoses(P[None], T[None], np.concatenate([VELOCITY, TURNING])[None])
     C = parameter_design(state, SensorOnSurface(sensor, lever, surface, features), poses)[0]
     K = pose_design(SURFACES, np.array([surface]))[0]
@@ -110,7 +113,7 @@ def test_the_common_variance_is_the_scatter_of_points_under_noisy_records() -> N
 
 def test_a_state_moves_each_unknown_by_its_name() -> None:
     state = State.at(np.eye(3), np.zeros(3), SURFACES)
-    assert len(set(state.names)) == state.size == len(MBES_PARAMETERS) + len(LASER_PARAMETERS) + 6 * len(SURFACES)
+    assert len(set(state.names)) == state.size == len(MBES_PARAMETERS) + len(LASER_PARAMETERS) + 7 * len(SURFACES)
     step = np.arange(1, state.size + 1) * 1e-4
     moved = state.updated(step)
     values = dict(zip(state.names, moved.additional_values(), strict=True))

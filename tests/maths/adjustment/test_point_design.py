@@ -24,6 +24,7 @@ AXES = np.vstack([tangents_of(NORMAL), NORMAL])
 R_TARGET_FROM_MBES = Rotation.from_euler("ZXY", np.radians([12.0, 2.0, -48.0])).as_matrix()
 LEVER = np.array([0.4, -0.3, -1.9])
 SIGMAS = SensorSigmas(0.02, 0.002)
+LOWEST_M, DEPTH_M = -12.0, 11.0
 
 
 def beams(angles: np.ndarray, ranges: np.ndarray, tilts: np.ndarray | float = 0.0) -> np.ndarray:
@@ -38,7 +39,13 @@ def seen(points: np.ndarray) -> PointDesign:
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
     r = AXES @ (R_TARGET_FROM_MBES @ points + LEVER[:, None])
-    return sonar_point_design(SoundingsOnSurface(points, in_mbes, up, r, np.zeros(n)), SIGMAS)
+    soundings = SoundingsOnSurface(points, in_mbes, up, r, np.zeros(n), heights_of(points), DEPTH_M)
+    return sonar_point_design(soundings, SIGMAS)
+
+
+def heights_of(points: np.ndarray) -> np.ndarray:
+    """Heights (n,) above the lower end of the wet faces, as a share of the depth."""
+    return np.asarray((R_TARGET_FROM_MBES[2] @ points + LEVER[2] - LOWEST_M) / DEPTH_M)
 
 
 ANGLES, RANGES = np.radians([-60.0, -20.0, 0.0, 25.0, 55.0]), np.array([7.0, 5.0, 4.0, 6.0, 9.0])
@@ -82,8 +89,9 @@ def test_beams_that_look_up_have_the_features_of_those_that_look_down() -> None:
     axes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], 5, axis=2)
     turned = np.einsum("kin,ij->kjn", axes, flip)
     up, r = np.repeat([[0.0], [0.0], [1.0]], 5, axis=1), np.zeros((3, 5))
-    found = sonar_point_design(SoundingsOnSurface(points, axes, up, r, np.zeros(5)), SIGMAS)
-    expected = sonar_point_design(SoundingsOnSurface(flip @ points, turned, flip @ up, r, np.zeros(5)), SIGMAS)
+    found = sonar_point_design(SoundingsOnSurface(points, axes, up, r, np.zeros(5), r[0], DEPTH_M), SIGMAS)
+    flipped = SoundingsOnSurface(flip @ points, turned, flip @ up, r, np.zeros(5), r[0], DEPTH_M)
+    expected = sonar_point_design(flipped, SIGMAS)
     place = [N_MOVED + MBES_FEATURES.index(name) for name in PROJECTOR_PARAMETERS]
     expected.features[place] = flip @ expected.features[place]  # along the axes of the sonar
     np.testing.assert_allclose(found.features, expected.features, atol=1e-12)
@@ -119,6 +127,15 @@ def test_the_speed_at_the_arrays_turns_the_beams_and_leaves_the_ranges(tilts: np
     slope = NORMAL @ R_TARGET_FROM_MBES @ (ends[0] - ends[1]) / (2 * step)
     np.testing.assert_allclose(feature("steering_speed", tilts), slope, atol=1e-8)
     assert np.ptp(slope) > 5  # the same for all would be a shift
+
+
+def test_a_bow_is_a_parabola_between_the_water_and_the_lower_end() -> None:
+    """The height of each point is known: 0, a quarter, half and all of the depth."""
+    heights = np.array([0.0, 0.25, 0.5, 1.0, 0.75])
+    drop = LOWEST_M + heights * DEPTH_M - LEVER[2]
+    rays = beams(ANGLES, np.ones(5))
+    points = rays * drop / (R_TARGET_FROM_MBES[2] @ rays)
+    np.testing.assert_allclose(seen(points).features[-1], [0.0, 0.75, 1.0, 0.0, 0.75], atol=1e-12)
 
 
 def along_paths(rays: np.ndarray, paths: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -193,7 +210,7 @@ def test_beams_that_stray_from_their_recorded_angle_do_not_turn_a_grazed_face() 
     points = beams(angles, ranges)
     axes = np.repeat(np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])[:, :, None], points.shape[1], axis=2)
     v = points[2] + depth
-    soundings = SoundingsOnSurface(points, axes, axes[2], points, v)
+    soundings = SoundingsOnSurface(points, axes, axes[2], points, v, 0 * v, DEPTH_M)
     _, sigma, q, slopes = sonar_point_design(soundings, SensorSigmas(0.01, 0.002))
     assert sigma == pytest.approx(np.full(len(v), np.std(v)), rel=0.25)
 
@@ -225,7 +242,7 @@ def test_a_stray_axis_meets_the_surface_further_away_on_average(tilts: np.ndarra
     in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
     v = 0.05 * NORMAL @ R_TARGET_FROM_MBES @ beams(ANGLES, np.ones(5), tilts)
-    soundings = SoundingsOnSurface(points, in_mbes, up, AXES @ (R_TARGET_FROM_MBES @ points), v)
+    soundings = SoundingsOnSurface(points, in_mbes, up, AXES @ (R_TARGET_FROM_MBES @ points), v, 0 * v, DEPTH_M)
     again = sonar_point_design(soundings, SIGMAS)
     np.testing.assert_allclose(again.sigma_m, sigma, rtol=1e-12)
 

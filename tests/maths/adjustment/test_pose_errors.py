@@ -8,7 +8,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.eliminate_drift import eliminate_drift
-from pipeline.maths.adjustment.eliminate_white_noise import LinearisedIntervals, TimeAxis, eliminate_white_noise
+from pipeline.maths.adjustment.eliminate_white_noise import (
+    LinearisedIntervals,
+    ReducedIntervals,
+    TimeAxis,
+    eliminate_white_noise,
+)
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums, merged
 from pipeline.maths.adjustment.pose_errors import (
     LARGEST_SPACING_S,
@@ -59,6 +64,11 @@ def sources(rng: np.random.Generator, records: np.ndarray) -> tuple[list[Source]
             rows.append((one, whole, np.vstack([pose, np.zeros((FEATURES - 3, SIX))]), q, s, v, w))
         found.append(Source(merged(pieces), design, columns, pose))
     return found, rows
+
+
+def whole_of(found: list[Source], times: TimeAxis, white: np.ndarray) -> ReducedIntervals:
+    """All spans in one group."""
+    return eliminate_white_noise(found, UNKNOWNS, times, white, np.zeros(len(times.knots.inner), dtype=int)).of([0])
 
 
 def dense(rows: list[Any], knots: Knots, seconds: np.ndarray, noise: PoseNoise, current: np.ndarray) -> Any:
@@ -112,7 +122,7 @@ def test_elimination_is_the_dense_solution(white: float) -> None:
     knots = place_knots(np.unique(np.concatenate([one.record for one in found])), seconds, 1.0, 2.0)
     noise = PoseNoise(white * np.array([1, 1, 1, 0.5, 0.5, 0]), np.array([0.3, 0.3, 0.2, 0.1, 0.1, 0]), 4.0)
     current = rng.normal(size=(len(knots.record), SIX)) * noise.drift
-    reduced = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), noise.white)
+    reduced = whole_of(found, TimeAxis(seconds, knots), noise.white)
     ours = eliminate_drift(reduced, noise, DriftEstimate(knots, current))
     step = -np.linalg.solve(ours.normal, ours.right)
 
@@ -142,12 +152,37 @@ def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.Mon
     found, _ = sources(rng, np.arange(199))
     knots = place_knots(np.unique(np.concatenate([one.record for one in found])), seconds, 0.5, 2.0)
     white = np.full(SIX, 0.4)
-    whole = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), white)
+    whole = whole_of(found, TimeAxis(seconds, knots), white)
     monkeypatch.setattr("pipeline.maths.adjustment.eliminate_white_noise.SIDE_BY_SIDE", 3)
-    parts = eliminate_white_noise(found, UNKNOWNS, TimeAxis(seconds, knots), white)
+    parts = whole_of(found, TimeAxis(seconds, knots), white)
     np.testing.assert_allclose(parts.spans, whole.spans, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(parts.others, whole.others, rtol=1e-12, atol=1e-12)
     assert parts.log_determinant == pytest.approx(whole.log_determinant)
+
+
+def test_a_group_of_spans_is_the_same_as_its_intervals_alone() -> None:
+    rng = np.random.default_rng(5)
+    seconds = np.r_[np.arange(31), 90 + np.arange(31)] / RATE_HZ
+    found, _ = sources(rng, np.r_[np.arange(30), 31 + np.arange(30)])
+    records = np.unique(np.concatenate([one.record for one in found]))
+    knots, white = place_knots(records, seconds, 1.0, 2.0), np.full(SIX, 0.4)
+    times = TimeAxis(seconds, knots)
+    second = (knots.record[:-1] >= 31).astype(np.int64)
+    groups = eliminate_white_noise(found, UNKNOWNS, times, white, second)
+    for number, inside in enumerate((lambda record: record < 31, lambda record: record >= 31)):
+        some = [
+            Source(one.sums.selected(rows), one.design[rows], one.columns, one.pose)
+            for one in found
+            for rows in [np.flatnonzero(inside(one.record))]
+        ]
+        alone, group = whole_of(some, times, white), groups.of([number])
+        np.testing.assert_allclose(group.spans, alone.spans, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(group.others, alone.others, rtol=1e-12, atol=1e-12)
+        assert group.log_determinant == pytest.approx(alone.log_determinant)
+    both, whole = groups.of([0, 1]), whole_of(found, times, white)
+    np.testing.assert_allclose(both.spans, whole.spans, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(both.others, whole.others, rtol=1e-12, atol=1e-12)
+    assert both.log_determinant == pytest.approx(whole.log_determinant)
 
 
 def test_knots_keep_to_the_passes() -> None:

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
+from pipeline.maths.adjustment.parameter_tests import prior_parameter_tests, single_parameter_tests
 from pipeline.maths.adjustment.solution import (
     CORRELATION_LIMIT,
     ConsiderErrors,
     correlated_pair,
-    prior_parameter_tests,
-    single_parameter_tests,
     solve,
     weakest_direction,
 )

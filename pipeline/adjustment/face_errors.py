@@ -1,0 +1,70 @@
+"""The solution with the shifts of single faces: their errors for the total covariance, and a test of each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.adjustment.iteration import MountAdjustment
+from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.face_shifts import equations_with_faces
+from pipeline.maths.adjustment.interval_sums import IntervalSums
+from pipeline.maths.adjustment.ping_noise import with_ping_noise
+from pipeline.maths.adjustment.solution import Solution, solve
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FinalSolution:
+    """The adjusted values' solution, with the shifts of single faces as fixed parameters after all others.
+
+    names (u,): of all parameters; deviation (u,): their estimates, zero for the fixed ones; from_known (u,): deviations
+    from the values known beforehand, where there are such; equations, solution: of them.
+    """
+
+    names: tuple[str, ...]
+    deviation: Array
+    from_known: Array
+    equations: NormalEquations
+    solution: Solution
+
+
+def final_solution(
+    problem: CalibrationProblem, adjustment: MountAdjustment, sums_by_face: Mapping[str, IntervalSums]
+) -> FinalSolution:
+    """Return the solution with the shifts of single faces.
+
+    Parameters
+    ----------
+    problem : CalibrationProblem
+        Model, prior information and consider errors of the calibration.
+    adjustment : MountAdjustment
+        The adjusted values.
+    sums_by_face : mapping of IntervalSums
+        Sums by interval and face at these values, by sensor.
+    """
+    faces, last, noise = problem.model.faces, adjustment.last, adjustment.drift_figures.noise
+    sums = dict(sums_by_face)
+    if adjustment.ping is not None:
+        on_surface = replace(sums["mbes"], surface=faces.surface[sums["mbes"].surface])
+        surfaces = last.linearisation.state.surfaces
+        with_pings = with_ping_noise(on_surface, adjustment.ping, surfaces, problem.prior.noise.white)
+        sums["mbes"] = replace(with_pings, surface=sums["mbes"].surface)
+    linearisation = replace(last.linearisation, sums=sums)
+    equations, prior = equations_with_faces(linearisation, faces, last.drift, noise), last.prior
+    count, state, coarse = len(faces.names), adjustment.state, problem.model.coarse
+    known = coarse if problem.prior.parameters is None else problem.prior.parameters.known
+    of_prior = np.pad(prior.normal, (0, count))
+    equations = replace(
+        equations, normal=equations.normal + of_prior, right=equations.right + np.pad(prior.right, (0, count))
+    )
+    return FinalSolution(
+        names=problem.model.names,
+        deviation=np.pad(state.deviation_from(coarse), (0, count)),
+        from_known=np.pad(state.deviation_from(known), (0, count)),
+        equations=equations,
+        solution=solve(equations.normal, equations.right, adjustment.solution.estimated.tolist(), of_prior),
+    )
