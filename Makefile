@@ -113,6 +113,8 @@ montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.mistakes --seeds 27
 	$(PY) -m tools.residual_tests
 	$(PY) -m tools.laser
+	$(PY) -m tools.laser_pairs
+	$(PY) -m tools.stress
 	$(PY) -m tools.accuracy
 	$(PY) -m tools.patent_forms docs/patent.md
 

@@ -23,6 +23,7 @@ from pipeline.config.yaml_models import parse
 from pipeline.results.pages.rendering import drawing_style, picture
 from pipeline.simulation.scenario import Scenario
 from tools.bound import bound
+from tools.campaign_statistics import means_in_standard_errors, nse_band
 from tools.campaigns import CAMPAIGNS, FOLDER, Campaign, path_of, scenario_of
 from tools.session_rows import NAMES, UNITS
 
@@ -96,8 +97,7 @@ class Result:
     @property
     def band(self) -> tuple[float, float]:
         """99 % band of the mean normalised squared error."""
-        low, high = chi2.ppf([0.005, 0.995], len(NAMES) * self.count) / self.count
-        return float(low), float(high)
+        return nse_band(self.count)
 
     def rows(self) -> list[list[str]]:
         """Return the rows of the table: a heading, then rows with a value for each mount parameter."""
@@ -106,16 +106,14 @@ class Result:
         def line(name: str, values: Array, sign: str = "") -> list[str]:
             return [name, *(f"{value:{sign}.{digits}f}" for value, digits in zip(values, figures, strict=True))]
 
-        spread = self.rms / np.sqrt(self.count)
-        mean = np.mean(self.errors, axis=0)
         low, high = self.band
         head = f"**{self.campaign.name}**: {self.count} sessions, {self.accepted} accepted, mean NSE "
         head += f"{self.nse.mean():.2f} ({low:.2f}–{high:.2f})"
         both = zip(self.ratio, self.ratio_below, strict=True)
         return [
             [head, *[""] * len(NAMES)],
-            line("mean error", mean, "+"),
-            ["the same in its own sigmas", *(f"{value:+.1f}" for value in mean / spread)],
+            line("mean error", np.mean(self.errors, axis=0), "+"),
+            ["the same in its own sigmas", *(f"{value:+.1f}" for value in means_in_standard_errors(self.errors))],
             line("RMS error", self.rms),
             line("mean sigma", np.sqrt(np.mean(self.sigmas**2, axis=0))),
             line("Cramér–Rao bound", self.bound),

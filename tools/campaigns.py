@@ -105,16 +105,21 @@ def path_of(campaign: Campaign) -> Path:
 
 
 def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
-    """Return the scenario of a session: the campaign's with thinned laser points, coarse and systematic errors."""
-    signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
-    sizes = (COARSE_DEG,) * 3 + (COARSE_M,) * 3
-    coarse = {key: sign * size for key, sign, size in zip(SETTINGS, signs, sizes, strict=True)}
+    """Return the scenario of a session: the campaign's, thinned where it says nothing, coarse and systematic errors."""
+    coarse = {"coarse_error": coarse_error(number, COARSE_DEG, COARSE_M)}
     merged: dict[str, Any] = {"name": campaign.name}
     drawn = systematic_errors(campaign.first_seed + number) if campaign.own_errors else {}
-    for part in (campaign.scenario, THIN, {"mbes": {"coarse_error": coarse}}, drawn):
+    for part in (THIN, campaign.scenario, {"mbes": coarse}, drawn):
         for key, value in part.items():
-            merged[key] = merged.get(key, {}) | value
+            merged[key] = merged.get(key, {}) | value if isinstance(value, dict) else value
     return merged
+
+
+def coarse_error(number: int, size_deg: float, size_m: float) -> dict[str, float]:
+    """Return the errors of a coarse mount: of one size on every axis, their signs by the bits of a session's number."""
+    signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
+    sizes = (size_deg,) * 3 + (size_m,) * 3
+    return {key: sign * size for key, sign, size in zip(SETTINGS, signs, sizes, strict=True)}
 
 
 def systematic_errors(seed: int) -> dict[str, Any]:

@@ -5,16 +5,14 @@ labels, and with those that the target's pose, the mount and the poses of its tw
 motion, the same points and the same white noise of the INS. For each mount parameter the program prints the root mean
 square of the difference of both results, in sigmas. Rows go to runs/montecarlo/labels.parquet.
 
-    python -m tools.labels [--sessions 50] [--jobs 2]
+    python -m tools.labels [--sessions 50] [--jobs 2] [--resume]
 """
 
 import argparse
 from dataclasses import replace
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.artefacts.schema import Artefact
@@ -24,6 +22,7 @@ from pipeline.run.stage_protocol import declared
 from pipeline.target.labelled_points import LabellingContext, label_batch
 from stages import segment
 from stages.in_memory import calibrate_in_memory
+from tools.campaign_files import collect_rows
 from tools.campaigns import CAMPAIGNS, FOLDER, TASKS_OF_A_WORKER
 from tools.session_rows import NAMES, session_in_memory, simulated
 
@@ -85,11 +84,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=50, help="number of sessions; default: 50")
     parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign of the same program")
     options = parser.parse_args()
-    with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-        rows = pd.DataFrame(list(pool.imap(row_of, range(options.sessions))))
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    rows.to_parquet(FOLDER / "labels.parquet", index=False)
+    path, numbers = FOLDER / "labels.parquet", range(options.sessions)
+    rows = collect_rows(path, row_of, numbers, options.jobs, options.resume, TASKS_OF_A_WORKER)
     accepted, by_twin = rows["accepted"].sum(), rows["accepted_by_twin"].sum()
     print(f"{len(rows)} sessions; accepted: {accepted}, by the twins' labels: {by_twin}")
     nse, by_twin = rows["nse"].mean(), rows["nse_by_twin"].mean()

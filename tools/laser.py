@@ -5,7 +5,7 @@ of 0.3° and 3 cm on every axis, which the pool's config states, and the laser i
 the laser's mount with its covariance and calibrates the sonar. The errors of the sonar's mount are then compared with a
 total covariance whose only consider parameters are those of the laser's mount.
 
-    python -m tools.laser [--sessions 240] [--first 0] [--jobs 2] [--rows docs/accuracy/laser.parquet]
+    python -m tools.laser [--sessions 240] [--first 0] [--jobs 2] [--rows docs/accuracy/laser.parquet] [--resume]
 """
 
 import argparse
@@ -17,14 +17,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
-from tools.campaigns import DRIFT
-from tools.session_rows import errors_of
+from pipeline.maths.mount_parameters import SETTINGS
+from tools.campaign_files import collect_rows
+from tools.campaign_statistics import nse_band
+from tools.campaigns import DRIFT, FOLDER
+from tools.session_rows import NAMES, UNITS, error_columns
 
 Array = NDArray[np.float64]
-NAMES = ("pitch", "roll", "yaw", "x", "y", "z")  # about body x, y, z; lever arm
-UNITS = np.r_[[np.pi / 180] * 3, [1e-3] * 3]
+ROWS = FOLDER / "laser.parquet"
+TASKS_OF_A_WORKER = 8  # two sessions each
 FIRST_SEED, SECOND_SEED = 40_000, 50_000
 PLUMB_DEG = 0.001
 COARSE_DEG, COARSE_M = 0.3, 0.03  # sigmas of the coarse mount
@@ -33,21 +35,19 @@ FIT = {  # the target is as designed
     "coarse_sigma_deg": COARSE_DEG, "coarse_sigma_m": COARSE_M,
 }  # fmt: skip
 WIDE = {"max_sigma_deg": 1.0, "max_sigma_m": 1.0}
-SURE = {"range_bias_sigma_m": 0.0, "latency_sigma_s": 0.0, "incidence_bias_sigma_m": 0.0}
-SURE_OF_SONAR = dict.fromkeys(
-    ("sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s", "level_bias_sigma_m", "projector_sigma_m"), 0.0
-)
+SURE = ("range_bias_sigma_m", "incidence_bias_sigma_m", "latency_sigma_s")
+SURE_OF_MBES = ("level_bias_sigma_m", "projector_sigma_m", "sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s")
 BOUNDS = 12  # sessions over which the bound is averaged
 
 
 def scenario_of(number: int) -> dict[str, Any]:
     """Return the scenario of one session, with its coarse errors."""
-    errors = np.repeat([COARSE_DEG, COARSE_M], 3) * np.random.default_rng([FIRST_SEED, number]).normal(size=6)
-    error = dict(zip(("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m"), errors.tolist(), strict=True))
+    sizes = np.repeat([COARSE_DEG, COARSE_M], 3)
+    errors = sizes * np.random.default_rng([FIRST_SEED, number]).normal(size=6)  # not the simulator's numbers
     return {
         "name": "laser",
         "ins": DRIFT,
-        "laser": {"point_rate_hz": 5000.0, "coarse_error": error},
+        "laser": {"point_rate_hz": 5000.0, "coarse_error": dict(zip(SETTINGS, errors.tolist(), strict=True))},
         "mbes": {"ping_rate_hz": 10.0},
     }
 
@@ -84,32 +84,21 @@ def session_row(number: int) -> dict[str, Any]:
     scenario = parse(Scenario, scenario_of(number), "laser")
     made = simulate_session(scenario, FIRST_SEED + number)
     alone = {name: value for name, value in made.session.items() if name != "mbes"}
-    alone["laser"] = alone["laser"] | SURE
+    alone["laser"] = alone["laser"] | dict.fromkeys(SURE, 0.0)
     result = calibrate(alone, made.pool | {"laser_fit": FIT}, made)
-    block, total = result["laser"], np.array(result["laser"]["covariance_total"])
-    error = errors_of(np.array(block["R_body_from_laser"]), np.array(block["lever_arm_m"]), made.truth, "laser")
+    block = result["laser"]
     row: dict[str, Any] = {"number": number, "accepted": result["verdict"] == "accepted"}
     row |= {"held": " ".join(result["held"]), "rests_on_coarse": " ".join(result["rests_on_coarse"])}
-    row |= _columns("laser", error, total)
+    row |= error_columns(block, made.truth, "laser", "laser_")
     # the sonar, in another session, from the laser's result
     made = simulate_session(parse(Scenario, scenario_of(number), "laser"), SECOND_SEED + number)
     session = dict(made.session)
-    session["laser"] = session["laser"] | SURE | {"mount": block["mount"], "mount_covariance": total.tolist()}
-    session["mbes"] = session["mbes"] | SURE | SURE_OF_SONAR
+    found = {"mount": block["mount"], "mount_covariance": block["covariance_total"]}
+    session["laser"] = session["laser"] | dict.fromkeys(SURE, 0.0) | found
+    session["mbes"] = session["mbes"] | dict.fromkeys(SURE + SURE_OF_MBES, 0.0)
     pool = made.pool | {"as_built": {"offset_sigma_m": 0.0, "angle_sigma_deg": 0.0}, "verdict": WIDE}
     sonar = calibrate(session, pool, made)["mbes"]
-    error = errors_of(np.array(sonar["R_body_from_mbes"]), np.array(sonar["lever_arm_m"]), made.truth)
-    row |= _columns("sonar", error, np.array(sonar["covariance_total"]))
-    without = np.sqrt(np.diag(sonar["covariance"])) / UNITS
-    return row | {f"sonar_random_{name}": value for name, value in zip(NAMES, without, strict=True)}
-
-
-def _columns(sensor: str, error: Array, covariance: Array) -> dict[str, float]:
-    sigma = np.sqrt(np.diag(covariance))
-    row = {f"{sensor}_nse": float(error @ np.linalg.solve(covariance, error))}
-    for k, name in enumerate(NAMES):
-        row |= {f"{sensor}_error_{name}": error[k] / UNITS[k], f"{sensor}_sigma_{name}": sigma[k] / UNITS[k]}
-    return row
+    return row | error_columns(sonar, made.truth, prefix="sonar_")
 
 
 def laser_bound_of(number: int) -> Array:
@@ -126,7 +115,7 @@ def laser_bound_of(number: int) -> Array:
 def report(table: pd.DataFrame, bound: Array) -> str:
     """Return the README's table: RMS errors, the bound and the total sigmas, and the laser's verdicts."""
     n = len(table)
-    low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
+    low, high = nse_band(n)
     least = np.sqrt(np.diag(bound)) / UNITS
     lines = ["| | pitch ° | roll ° | yaw ° | x mm | y mm | z mm |", "|---|---:|---:|---:|---:|---:|---:|"]
 
@@ -138,19 +127,19 @@ def report(table: pd.DataFrame, bound: Array) -> str:
         return np.array([np.sqrt(np.mean(table[f"{stem}_{name}"] ** 2)) for name in NAMES])
 
     def head(sensor: str) -> None:
-        nse = table[f"{sensor}_nse"].mean()
+        nse = table[f"{sensor}_nse_total"].mean()
         lines.append(f"| **{sensor}**: {n} sessions, mean NSE {nse:.2f} ({low:.2f}–{high:.2f}) |  |  |  |  |  |  |")
 
     head("laser")
     line("RMS error", rms("laser_error"))
-    line("RMS of the total sigmas", rms("laser_sigma"))
+    line("RMS of the total sigmas", rms("laser_total"))
     line("Cramér–Rao bound, with the coarse mount", least)
     line("RMS ÷ bound", rms("laser_error") / least, 2)
     head("sonar")
     line("RMS error", rms("sonar_error"))
-    line("RMS of the total sigmas", rms("sonar_sigma"))
-    line("the same without the laser's covariance", rms("sonar_random"))
-    line("RMS error ÷ RMS total sigma", rms("sonar_error") / rms("sonar_sigma"), 2)
+    line("RMS of the total sigmas", rms("sonar_total"))
+    line("the same without the laser's covariance", rms("sonar_sigma"))
+    line("RMS error ÷ RMS total sigma", rms("sonar_error") / rms("sonar_total"), 2)
     lines.append("")
     lines.append(f"{int(table['accepted'].sum())} accepted.")
     for column, words in (("held", "Not good enough"), ("rests_on_coarse", "Resting on the coarse mount")):
@@ -165,20 +154,16 @@ def main() -> None:
     parser.add_argument("--sessions", type=int, default=240, help="count of numbers, two sessions each; default: 240")
     parser.add_argument("--first", type=int, default=0, help="first number; default: 0")
     parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
-    parser.add_argument(
-        "--rows", type=Path, default=Path("runs/montecarlo/laser.parquet"), help="Parquet file of the rows"
-    )
+    parser.add_argument("--rows", type=Path, default=ROWS, help=f"Parquet file of the rows; default: {ROWS}")
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign of the same program")
     parser.add_argument("--report", action="store_true", help="print the table of an existing file of rows")
     options = parser.parse_args()
     numbers = range(options.first, options.first + options.sessions)
-    with get_context("spawn").Pool(options.jobs, maxtasksperchild=8) as pool:
-        if not options.report:
-            options.rows.parent.mkdir(parents=True, exist_ok=True)
-            rows: list[dict[str, Any]] = []
-            for row in pool.imap(session_row, numbers):
-                rows.append(row)
-                pd.DataFrame(rows).to_parquet(options.rows, index=False)
+    if options.report:
         table = pd.read_parquet(options.rows)
+    else:
+        table = collect_rows(options.rows, session_row, numbers, options.jobs, options.resume, TASKS_OF_A_WORKER)
+    with get_context("spawn").Pool(options.jobs) as pool:
         bound = np.mean(pool.map(laser_bound_of, table["number"].tolist()[:BOUNDS]), axis=0)
     print(report(table, np.asarray(bound)))
 

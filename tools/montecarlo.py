@@ -3,36 +3,39 @@
 For each campaign the program prints the errors of the six mount parameters, the number of accepted sessions, and the
 mean normalised squared error with its 99 % band; the expectation of the latter is 6 if the covariance is right. Seeds
 are fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and the signs of these
-errors go through all 64 combinations. Each session is a row of a file in runs/montecarlo/, which is CSV during the
-campaign and Parquet at its end. ``tools.accuracy`` makes the README's table and an HTML page from these files.
+errors go through all 64 combinations. Each session is a row of a file in runs/montecarlo/ (``tools.campaign_files``).
+``tools.accuracy`` makes the README's table and an HTML page from these files, ``tools.stress`` the table of the
+campaigns under noise that the settings do not describe (``tools.stress_campaigns``).
 
     python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2] [--resume]
+    python -m tools.montecarlo --seeds 8030 9012
 """
 
 import argparse
 import time
-from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import chi2
 
-from tools.campaigns import CAMPAIGNS, FOLDER, TASKS_OF_A_WORKER, Campaign, path_of
+from tools.campaign_files import collect_rows
+from tools.campaign_statistics import statistics_of
+from tools.campaigns import TASKS_OF_A_WORKER, Campaign, path_of
 from tools.session_pairs import pairs_report
 from tools.session_rows import NAMES, session_row
+from tools.stress_campaigns import ALL, campaign_of
 
 
 def report(campaign: Campaign, table: pd.DataFrame) -> str:
     """Return the summary of a campaign in five lines."""
-    n = len(table)
-    low, high = (float(q) / n for q in chi2.ppf([0.005, 0.995], 6 * n))
-    mean = table["nse"].mean()
-    verdict = "inside" if low <= mean <= high else "OUTSIDE"
-    agreement = f"; mean normalised squared error {mean:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}"
+    statistics = statistics_of(table)
+    low, high = statistics.band
+    verdict = "inside" if statistics.in_band else "OUTSIDE"
+    agreement = f"; mean normalised squared error {statistics.nse:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}"
     if campaign.own_errors:  # which its covariance from noise does not have
         agreement = ""
     lines = [
-        f"{campaign.name}: {n} sessions, {int(table['accepted'].sum())} accepted{agreement}",
+        f"{campaign.name}: {statistics.sessions} sessions, {statistics.accepted} accepted{agreement}",
         f"  {'':16}" + "".join(f"{name:>10}" for name in NAMES) + "     (degrees, millimetres)",
     ]
     for word, values in (
@@ -46,8 +49,20 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
+def session_report(row: dict[str, Any]) -> str:
+    """Return a session's verdict, its normalised squared errors, and its errors in sigmas."""
+    errors = ", ".join(f"{name} {row[f'error_{name}'] / row[f'sigma_{name}']:+.1f}" for name in NAMES)
+    lines = [
+        f"{row['campaign']}, seed {row['seed']}: {'accepted' if row['accepted'] else 'rejected'}; normalised squared "
+        f"error {row['nse']:.2f}, by the total covariance {row['nse_total']:.2f}",
+        f"  errors in random sigmas: {errors}",
+        *(f"  {word}: {row[word]}" for word in ("reasons", "warnings") if row[word]),
+    ]
+    return "\n".join(lines)
+
+
 def main() -> None:
-    """Simulate and calibrate the campaigns, write their rows and print a summary of each."""
+    """Simulate and calibrate the campaigns, write their rows and print a summary of each; or single sessions."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "--only", nargs="*", metavar="NAME", help="campaigns to run, by the beginning of their names; default: all"
@@ -57,21 +72,24 @@ def main() -> None:
     parser.add_argument(
         "--resume", action="store_true", help="continue campaigns that were interrupted; the program must be the same"
     )
+    parser.add_argument(
+        "--seeds", nargs="+", type=int, metavar="SEED", help="the sessions of these seeds alone; no row is written"
+    )
     options = parser.parse_args()
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    for campaign in CAMPAIGNS:
+    if options.seeds:
+        try:
+            tasks = [campaign_of(seed) for seed in options.seeds]
+        except LookupError as error:
+            parser.error(str(error))
+        for task in tasks:
+            print(session_report(session_row(task)), flush=True)
+        return
+    for campaign in ALL:
         if options.only and not any(campaign.name.startswith(name) for name in options.only):
             continue
         started = time.monotonic()
-        path = path_of(campaign).with_suffix(".csv")
-        done = len(pd.read_csv(path)) if options.resume and path.is_file() else 0
-        tasks = [(campaign, number) for number in range(done, max(2, round(campaign.sessions * options.share)))]
-        with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-            # each row is written at once, so that an interruption loses none
-            for number, row in enumerate(pool.imap(session_row, tasks), start=done):
-                pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
-        table = pd.read_csv(path)
-        table.to_parquet(path_of(campaign), index=False)
+        tasks = [(campaign, number) for number in range(max(2, round(campaign.sessions * options.share)))]
+        table = collect_rows(path_of(campaign), session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)
         words = [report(campaign, table), *([pairs_report(campaign, table)] if campaign.pairs else [])]
         print("\n".join(words), f"\n  ({time.monotonic() - started:.0f} s)\n", flush=True)
 

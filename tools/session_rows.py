@@ -97,21 +97,49 @@ def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
 
 def _row(campaign: Campaign, calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:
     block = calibration["methods"]["adjustment"]
-    covariance = np.array(block["covariance"])
-    error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), truth)
     row: dict[str, Any] = {
         "accepted": calibration["verdict"] == "accepted",
         "reasons": "; ".join(calibration["reasons"]),
+        "warnings": " ".join(calibration["warning_codes"]),
     }
-    row["nse"] = float(error @ np.linalg.solve(covariance, error))
-    sigma = np.sqrt(np.diag(covariance))
-    for k, name in enumerate(NAMES):
-        row |= {f"error_{name}": error[k] / UNITS[k], f"sigma_{name}": sigma[k] / UNITS[k]}
+    row |= error_columns(block, truth)
+    covariance = np.array(block["covariance"]) if block["covariance"] else np.full((6, 6), np.nan)
     row |= {f"covariance_{i}{k}": covariance[i, k] for i in range(6) for k in range(i + 1)}
     if campaign.pairs:  # what poolcal diff reads
         read = {"methods": {"adjustment": block}, "systematic": calibration["systematic"]}
         row["calibration"] = json.dumps(read | {"limits": calibration["limits"]})
     return row
+
+
+def error_columns(
+    block: Mapping[str, Any], truth: Mapping[str, Any], sensor: str = "mbes", prefix: str = ""
+) -> dict[str, float]:
+    """Return columns of a mount: errors, random and total sigmas, and its normalised squared errors by both.
+
+    Parameters
+    ----------
+    block
+        The mount's block of calibration.json. Without a result all columns are NaN.
+    truth
+        Content of the session's truth.json.
+    sensor
+        "mbes" or "laser".
+    prefix
+        Beginning of the columns' names.
+    """
+    error, random, total = np.full(6, np.nan), np.eye(6) * np.nan, np.eye(6) * np.nan
+    if block["covariance"] is not None and block["covariance_total"] is not None:
+        error = errors_of(np.array(block[f"R_body_from_{sensor}"]), np.array(block["lever_arm_m"]), truth, sensor)
+        random, total = np.array(block["covariance"]), np.array(block["covariance_total"])
+    row = {f"{prefix}nse{end}": _squared(error, C) for end, C in (("", random), ("_total", total))}
+    columns = {"error": error, "sigma": np.sqrt(np.diag(random)), "total": np.sqrt(np.diag(total))}
+    for k, name in enumerate(NAMES):
+        row |= {f"{prefix}{kind}_{name}": float(values[k] / UNITS[k]) for kind, values in columns.items()}
+    return row
+
+
+def _squared(error: Array, covariance: Array) -> float:
+    return float(error @ np.linalg.solve(covariance, error))
 
 
 def session_row(task: tuple[Campaign, int]) -> dict[str, Any]:

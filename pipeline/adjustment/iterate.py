@@ -1,6 +1,6 @@
 """Values during the iteration of the adjustment: normal equations at them, a step from them, figures of the noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures, DriftPrior, drift_figures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
 from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
-from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.normal_equations import Linearisation, reduced_intervals, updated_sums
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import Prior, PseudoObservations, all_pseudo_observations
@@ -29,10 +28,6 @@ class Iterate:
     linearisation: Linearisation
     drift: DriftEstimate
     priors: Sequence[Prior]
-
-    def of(self, sums: Mapping[str, IntervalSums]) -> "Iterate":
-        """Return the same values for other sums, linearised at them."""
-        return replace(self, linearisation=replace(self.linearisation, sums=sums))
 
     def reduced(self, white: Array, selected: Integers | None = None) -> ReducedIntervals:
         """Return the normal equations before the drift is eliminated; ``white`` (6,): sigmas of a record's noise."""

@@ -15,7 +15,6 @@ from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
-from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
@@ -96,10 +95,6 @@ class MountAdjustment:
     converged: bool
     iterations: int
     last: Iterate
-
-    def equations_of(self, sums: Mapping[str, IntervalSums]) -> NormalEquations:
-        """Return the normal equations of all parameters, with the prior information, from a part of the sums."""
-        return self.last.of(sums).equations(self.drift_figures.noise)
 
     @property
     def values(self) -> CurrentValues:

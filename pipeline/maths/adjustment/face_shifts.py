@@ -77,8 +77,9 @@ def equations_with_faces(
     """
     count = linearisation.state.size + len(faces.names)
     times = TimeAxis(linearisation.body.seconds, drift.knots)
-    reduced = eliminate_white_noise(list(_by_face(linearisation, faces)), count, times, noise.white)
-    return eliminate_drift(reduced, noise, drift)
+    together = np.zeros(len(drift.knots.inner), dtype=np.int64)
+    reduced = eliminate_white_noise(list(_by_face(linearisation, faces)), count, times, noise.white, together)
+    return eliminate_drift(reduced.of([0]), noise, drift)
 
 
 def _by_face(linearisation: Linearisation, faces: Faces) -> Iterator[_FaceIntervals]:

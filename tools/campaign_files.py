@@ -1,0 +1,65 @@
+"""The rows of a campaign on disk: a line of JSON each during the campaign, a Parquet file at its end."""
+
+import json
+from collections.abc import Callable, Sequence
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pandas as pd
+
+Task = TypeVar("Task")
+
+
+def collect_rows(
+    path: Path,
+    row_of: Callable[[Task], dict[str, Any]],
+    tasks: Sequence[Task],
+    jobs: int,
+    resume: bool,
+    tasks_of_a_worker: int,
+) -> pd.DataFrame:
+    """Return a campaign's rows, computed by worker processes, and write them.
+
+    Each row is written as soon as it and all before it are there, so that an interruption loses only what was being
+    computed. The rows are the same for any number of workers and of interruptions.
+
+    Parameters
+    ----------
+    path
+        The Parquet file. During the campaign the rows stand beside it, with the suffix .jsonl.
+    row_of
+        Function that computes the row of a task; of a module, because workers import it. Its values are numbers and
+        text.
+    tasks
+        A task for each row.
+    jobs
+        Number of workers.
+    resume
+        Keep the rows that an interrupted campaign has left, which must have had the same tasks, and compute the others.
+    tasks_of_a_worker
+        After so many a worker is replaced by a new process.
+    """
+    lines = path.with_suffix(".jsonl")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = _whole_rows(lines) if resume else []
+    lines.write_text("".join(map(_line, rows)), "utf-8")
+    if tasks[len(rows) :]:
+        with get_context("spawn").Pool(jobs, maxtasksperchild=tasks_of_a_worker) as pool:
+            for row in pool.imap(row_of, tasks[len(rows) :]):
+                rows.append(row)
+                with lines.open("a", encoding="utf-8") as file:
+                    file.write(_line(row))
+    table = pd.DataFrame(rows[: len(tasks)])
+    table.to_parquet(path, index=False)
+    return table
+
+
+def _line(row: dict[str, Any]) -> str:
+    return json.dumps(row) + "\n"
+
+
+def _whole_rows(lines: Path) -> list[dict[str, Any]]:
+    """Return the rows that were written to their end; none if there is no file."""
+    text = lines.read_text("utf-8") if lines.is_file() else ""
+    return [json.loads(line) for line in text[: text.rfind("\n") + 1].splitlines()]
