@@ -166,7 +166,7 @@ def test_a_coarse_mount_that_the_points_contradict_is_refused_and_named() -> Non
     for name, error in zip(("rotation_x", "rotation_y"), wrong, strict=False):
         row = rows.loc[name]
         assert abs(row["value"] - error) < 4 * row["sigma"], name
-        assert row["expected"] == pytest.approx(np.hypot(row["sigma"], 1e-3), rel=0.02)
+        assert np.hypot(row["sigma"], 1e-3) <= row["expected"] < 1.1e-3  # with the systematic errors
     (reason,) = result["reasons"]
     first = max(("rotation_x", "rotation_y"), key=lambda name: abs(rows.loc[name, "value"]))
     size = f"turned by {np.degrees(rows.loc[first, 'value']):+.3f} ± "
