@@ -34,6 +34,7 @@ FIT = {  # the target is as designed
     "face_sigma_deg": 0.001, "plumb_sigma_deg": PLUMB_DEG, "face_sigma_m": 0.0002,
     "coarse_sigma_deg": COARSE_DEG, "coarse_sigma_m": COARSE_M,
 }  # fmt: skip
+AS_DESIGNED = dict.fromkeys(("face_sigma_m", "offset_sigma_m", "angle_sigma_deg", "bow_sigma_m"), 0.0)
 WIDE = {"max_sigma_deg": 1.0, "max_sigma_m": 1.0}
 SURE = ("range_bias_sigma_m", "incidence_bias_sigma_m", "latency_sigma_s")
 SURE_OF_MBES = ("level_bias_sigma_m", "projector_sigma_m", "sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s")
@@ -85,7 +86,7 @@ def session_row(number: int) -> dict[str, Any]:
     made = simulate_session(scenario, FIRST_SEED + number)
     alone = {name: value for name, value in made.session.items() if name != "mbes"}
     alone["laser"] = alone["laser"] | dict.fromkeys(SURE, 0.0)
-    result = calibrate(alone, made.pool | {"laser_fit": FIT}, made)
+    result = calibrate(alone, made.pool | {"laser_fit": FIT, "as_built": AS_DESIGNED}, made)
     block = result["laser"]
     row: dict[str, Any] = {"number": number, "accepted": result["verdict"] == "accepted"}
     row |= {"held": " ".join(result["held"]), "rests_on_coarse": " ".join(result["rests_on_coarse"])}
@@ -96,7 +97,7 @@ def session_row(number: int) -> dict[str, Any]:
     found = {"mount": block["mount"], "mount_covariance": block["covariance_total"]}
     session["laser"] = session["laser"] | dict.fromkeys(SURE, 0.0) | found
     session["mbes"] = session["mbes"] | dict.fromkeys(SURE + SURE_OF_MBES, 0.0)
-    pool = made.pool | {"as_built": {"offset_sigma_m": 0.0, "angle_sigma_deg": 0.0}, "verdict": WIDE}
+    pool = made.pool | {"as_built": AS_DESIGNED, "verdict": WIDE}
     sonar = calibrate(session, pool, made)["mbes"]
     return row | error_columns(sonar, made.truth, prefix="sonar_")
 
