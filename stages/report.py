@@ -34,6 +34,7 @@ from pipeline.report.part_checks import parts_block
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sensor_report import SensorReport
 from pipeline.report.sonar_report import SonarSettings, sonar_report
+from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.systematic_errors import systematic_block
 from pipeline.report.verdict import Criteria, rejections
 from pipeline.report.warnings import geometry_gaps, target_off_origin, unexpected_noise
@@ -99,6 +100,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *uneven_noise(inputs.groups),
         *correlated_beams(inputs.groups),
         *sigmas_too_small(inputs.estimate, config.adjust.test_level),
+        *errors_allowed_for(inputs.freed, config.adjust.test_level),
         *target_off_origin(target),
         *(check for check in [drift_check] if check is not None and check not in (NO_DRIFT, *reasons)),
         *(check for check in [figures_disagree(inputs.drift_figures, source)] if check is not None),

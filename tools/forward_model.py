@@ -86,7 +86,8 @@ class World:
 
         Plane -1 marks a ray that stage segment would not label. The stage's settings require the whole footprint and a
         margin on one face, no grazing incidence, and a distance from the water line. The edges are not widened by the
-        angle noise of a beam, so that the bound takes a few more rays than the stage labels.
+        angle noise of a beam, nor by what keeps a beam's side lobes from inner corners (``segment.side_lobe_widths``),
+        so that the bound takes more rays than the stage labels.
 
         Parameters
         ----------

@@ -200,6 +200,10 @@ EFFECTS = (
     _effect("sonar: noise × {:g} at 45°", 2, _mbes("incidence_noise")),
     _effect("sonar: near field, aperture {:g} m", 0.19, lambda size: {"mbes": {"aperture_m": [size, size / 2]}}),
     _effect("sonar: {:g} of beams near corners by a side lobe", 0.1, _mbes("side_lobe_share")),
+    _effect(
+        "sonar: ranges near corners drawn {:g} of the way to the corner's", 0.3,
+        _mbes("side_lobe_pull", side_lobe_share=1.0),
+    ),
     _effect("sonar: {:g} of beams near the water line by an image", 0.3, _mbes("image_share")),
     _effect("transmitter {:g} mm to starboard", 20, _projector(0), "projector_x"),
     _effect("transmitter {:g} mm forward", 119, _projector(1), "projector_y"),

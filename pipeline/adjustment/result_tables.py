@@ -149,7 +149,8 @@ def _single_parameter_table(problem: CalibrationProblem, final: FinalSolution, e
         if number in freed:
             sigma = by_name.loc[name, "sigma_total"]
             test = ParameterTest(number, by_name.loc[name, "value"], sigma, float(np.hypot(sigma, considered)))
-        row: dict[str, Any] = {"unknown": name, "estimated": number in freed, "considered": considered}
+        row: dict[str, Any] = {"unknown": name, "estimated": number in freed}
+        row |= {"known": number in known, "considered": considered}
         row |= {"value": test.value, "sigma": test.sigma, "expected": test.expected}
         rows.append(row | {f"effect_{axis}": effects[k, number] for k, axis in enumerate(MOUNT_NAMES)})
     return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces)])
@@ -163,7 +164,7 @@ def _surface_rows(solution: Solution, surfaces: slice) -> list[dict[str, Any]]:
     effects = solution.group_effects(np.arange(N_MOUNT), group)
     if not np.any(effects):
         return []
-    none = {"estimated": False, "considered": 1.0, "value": np.nan, "sigma": np.nan, "expected": np.nan}
+    none = {"estimated": False, "known": False, "considered": 1.0, "value": np.nan, "sigma": np.nan, "expected": np.nan}
     return [
         {"unknown": f"surfaces_{name}"} | none | {f"effect_{axis}": of[k] for k, axis in enumerate(MOUNT_NAMES)}
         for name, of in zip(MOUNT_NAMES, effects.T, strict=True)

@@ -32,7 +32,7 @@ SETTINGS: Mapping[Sensor, tuple[str, ...]] = {  # keys that a preset may set and
     "laser": ("range_sigma_m", "range_bias_sigma_m", "incidence_bias_sigma_m", "angle_sigma_deg", "beam_m"),
     "mbes": (
         "range_sigma_m", "range_bias_sigma_m", "incidence_bias_sigma_m", "level_bias_sigma_m", "angle_sigma_deg",
-        "beam_deg", "projector_offset_m", "projector_sigma_m",
+        "beam_deg", "frequency_hz", "aperture_m", "focused", "projector_offset_m", "projector_sigma_m",
     ),
 }
 MOST_PRESETS = 1000  # most files that are read for a message

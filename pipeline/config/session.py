@@ -9,7 +9,9 @@ from pipeline.config.mount import Covariance, Mount, MountOrigin, MountSigma
 from pipeline.config.quantities import (
     BeamWidth,
     Depth,
+    Frequency,
     Latency,
+    Length,
     Lever,
     Model,
     RangeSigma,
@@ -148,6 +150,9 @@ class Mbes(Model):
     level_bias_sigma_m: SigmaM = 0.010  # common to all detections on horizontal faces
     angle_sigma_deg: SigmaDeg = 0.06
     beam_deg: tuple[BeamWidth, BeamWidth] = (0.5, 1.0)  # width across track, along track
+    frequency_hz: Frequency = 400_000.0  # at which beam_deg holds
+    aperture_m: tuple[Length, Length] | None = None  # of the receiver, the transmitter; null: by beam_deg, frequency_hz
+    focused: tuple[bool, bool] = (True, False)  # in the near field: reception, transmission
     latency_s: Latency = 0.0
     latency_sigma_s: SigmaS = 0.0005
 

@@ -50,6 +50,9 @@ class SonarBeams(Model):
 
     mount: Mount
     beam_deg: tuple[float, float]
+    frequency_hz: float
+    aperture_m: tuple[float, float] | None
+    focused: tuple[bool, bool]
     angle_sigma_deg: float
     range_sigma_m: float
 

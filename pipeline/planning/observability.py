@@ -73,7 +73,7 @@ def geometry_advice(
     solution : Solution
         Solution of these normal equations.
     """
-    determined = _Determined(normal, solution.estimated.tolist())
+    determined = _Determined(normal, solution)
     gaps, sigma = _gaps(coverage), determined.sigmas()
     pair = None if solution.deficiency else correlated_pair(solution.covariance[:N_MOUNT, :N_MOUNT])
     if not (gaps or np.any(sigma > WANTED)):
@@ -85,24 +85,34 @@ def geometry_advice(
 
 @dataclass(frozen=True)
 class _Determined:
-    """Information from the passes: normal matrix (u, u), and the numbers of the estimated parameters."""
+    """Information from the passes: normal matrix (u, u), with prior information, and its solution."""
 
     normal: Array
-    free: list[int]
+    solution: Solution
 
     def sigmas(self) -> Array:
-        """Return the sigmas of the mount parameters (6,), rad and m.
+        """Return the sigmas of the mount parameters (6,) from noise alone, rad and m: further passes make them smaller.
 
         Every parameter has the prior sigma :data:`VAGUE`, so the sigmas are finite even if a direction is open.
         """
-        prior = np.zeros(len(self.normal))
-        prior[self.free] = VAGUE**-2
-        known = solve(self.normal + np.diag(prior), np.zeros(len(self.normal)), self.free)
-        return np.asarray(np.sqrt(np.diag(known.covariance))[:N_MOUNT])
+        vague = np.zeros(len(self.normal))
+        vague[self.solution.estimated] = VAGUE**-2
+        return _noise_sigmas(self._solved(np.diag(vague)))
 
     def with_passes(self, further: Array) -> Solution:
         """Return the solution with the normal matrix of further passes added."""
-        return solve(self.normal + further, np.zeros(len(self.normal)), self.free)
+        return self._solved(further)
+
+    def _solved(self, more: Array) -> Solution:
+        estimated, size = self.solution.estimated, len(self.normal)
+        prior = np.zeros((size, size))
+        prior[np.ix_(estimated, estimated)] = self.solution.prior
+        return solve(self.normal + more, np.zeros(size), estimated.tolist(), prior)
+
+
+def _noise_sigmas(solution: Solution) -> Array:
+    """Return the sigmas (6,) of the mount parameters from noise alone, rad and m."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(solution.noise_covariance()), 0.0))[:N_MOUNT])
 
 
 def _gaps(coverage: Coverage) -> list[str]:
@@ -139,7 +149,7 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
         after = determined.with_passes(TWICE * predict(setting, [planned], phases=1).normal)
         if after.deficiency:
             continue
-        sigma = np.sqrt(np.diag(after.covariance))[:N_MOUNT]
+        sigma = _noise_sigmas(after)
         worst = float(np.max(sigma / WANTED))
         if best is None or worst < best[0]:
             best = worst, distance, float(sigma[parameter])

@@ -74,6 +74,7 @@ class ReasonCode(StrEnum):
     PASS_WITHOUT_LASER = "pass_without_laser", "in some passes the sonar alone saw the target"
     LENGTH_OFF_DESIGN = "length_off_design", "b or e of the target is measured otherwise than designed"
     ANGLE_OFF_DESIGN = "angle_off_design", "an angle between faces is measured otherwise than designed"
+    ERROR_ALLOWED_FOR = "error_allowed_for", "a systematic error within its a-priori sigma shows, and is allowed for"
     CAST_OF_ANOTHER_TIME = "cast_of_another_time", "the cast was taken long before or after the soundings"
     CAST_OF_ANOTHER_PLACE = "cast_of_another_place", "the cast was taken far away"
     CAST_OFF_HEAD_SPEED = "cast_off_head_speed", "the cast disagrees with the sound speed recorded at the head"

@@ -19,6 +19,7 @@ import pandas as pd
 from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.cause_words import words_of
+from pipeline.report.reason_codes import ReasonCode, Statement
 
 UNITS = {"sound_speed": "1"} | dict.fromkeys(("mbes_latency", "laser_latency"), "s")
 UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence"), "m")
@@ -73,6 +74,19 @@ def suspected_causes(freed: pd.DataFrame, level: float) -> list[SuspectedCause]:
         if abs(row["value"]) > limit * row["sigma"]
     ]
     return sorted(causes, key=lambda cause: -cause.normalised)
+
+
+def errors_allowed_for(freed: pd.DataFrame, level: float) -> list[Statement]:
+    """Return a warning for each known parameter that certainly is not zero, but within its a-priori sigma.
+
+    The mount allows for such an error. The survey has it as well, unless it is corrected there.
+    """
+    limit = significance_limit(freed, level)
+    return [
+        Statement(ReasonCode.ERROR_ALLOWED_FOR, f"the mount allows for this, the survey does not yet: {words_of(row)}")
+        for row in freed[freed["known"]].to_dict("records")
+        if limit * row["sigma"] < abs(row["value"]) <= limit * row["expected"]
+    ]
 
 
 def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:

@@ -44,7 +44,8 @@ class CornerEchoes:
         """Return the paths, some replaced by the path to a strong corner that a side lobe hears.
 
         A corner is within reach if its line passes the beam's axis at less than ``side_lobe_widths`` beam widths,
-        counted across and along track in the widths there. Of several the nearest, in widths, is heard.
+        counted across and along track in the widths there. Of several the nearest, in widths, is heard. Where the
+        echoes of face and corner are as one, its middle lies ``side_lobe_pull`` of the way to the corner's range.
         """
         dice = self.random["side_lobe"].random(paths.shape)
         ping, beam = np.nonzero(np.isfinite(paths) & (dice < self.scenario.side_lobe_share))
@@ -65,7 +66,7 @@ class CornerEchoes:
             rows, distance = self._seen(rows, points, distance, start)
             nearest[rows], heard[rows] = off[rows], distance
         result = paths.copy()
-        result[ping, beam] = heard
+        result[ping, beam] = ranges + self.scenario.side_lobe_pull * (heard - ranges)
         return result
 
     def _seen(

@@ -56,6 +56,7 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     if scenario.declare_sigmas:
         laser_block |= _sigmas(laser.range_sigma_m, laser.angle_sigma_deg)
         mbes_block |= _sigmas(mbes.range_sigma_m, mbes.angle_sigma_deg) | {"beam_deg": list(mbes.beam_deg)}
+        mbes_block["focused"] = [aperture == 0 for aperture in mbes.aperture_m]
     name = f"{scenario.start_utc[:10]}_{scenario.name}"
     return {"name": name, "ins": ins_block, "laser": laser_block, "mbes": mbes_block}
 

@@ -59,6 +59,7 @@ class MbesScenario(Model):
     corner_reach_m: NotNegative = 0.1
     side_lobe_share: Share = 0.0  # of the beams near an inner corner: they get its range through a side lobe
     side_lobe_widths: NotNegative = 2.0  # how near, in beam widths
+    side_lobe_pull: Share = 1.0  # and if both echoes are as one: this share of the way from the face's range to it
     outlier_share: Share = 0.02  # of the beams: they get a random range
     surface_share: Share = 0.04  # of the beams above 30° below the horizon: they get the water surface's range
     image_share: Share = 0.0  # of the beams to image_depth_m or less below the water: back by way of the surface

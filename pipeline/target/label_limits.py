@@ -39,7 +39,8 @@ def sonar_limits(settings: Segment, water_level_m: float, gate_m: float) -> Labe
         Largest distance from the plane of the face.
     """
     highest_m = water_level_m - settings.water_margin_m
-    return replace(_common(settings, gate_m), highest_m=highest_m, seen="wet")
+    half_widths = 2 * settings.side_lobe_widths
+    return replace(_common(settings, gate_m), highest_m=highest_m, seen="wet", corner_factor=half_widths)
 
 
 def _common(settings: Segment, gate_m: float) -> LabelSettings:

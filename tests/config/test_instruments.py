@@ -267,14 +267,17 @@ def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
         ["laser", "–", "range_sigma_m", "0.006", "session"],
         ["mbes", FOREIGN, "range_sigma_m", "0.02", "preset, unverified"],
     ]
-    assert shown[-7:] == [
+    assert shown[-10:] == [
         ["", "", "range_bias_sigma_m", "0.002", "default"],
         ["", "", "incidence_bias_sigma_m", "0.003", "default"],
         ["", "", "level_bias_sigma_m", "0.01", "default"],
         ["", "", "angle_sigma_deg", "0.09", "session"],
         ["", "", "beam_deg", "0.4, 1.5", "preset"],
+        ["", "", "frequency_hz", "400000", "default"],
+        ["", "", "aperture_m", "–", "default"],
+        ["", "", "focused", "yes, no", "default"],
         ["", "", "projector_offset_m", "–", "default"],
         ["", "", "projector_sigma_m", "0.005", "default"],
     ]
-    assert len(shown) == 20
+    assert len(shown) == 23
     assert "<b>\"O'Brien" not in html

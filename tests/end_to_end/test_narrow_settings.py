@@ -13,6 +13,7 @@ FIRST_STAGE: dict[str, tuple[object, str]] = {  # by key: another value, and the
     "mbes.mount": ({"x_m": 0.37}, "georeference"),
     "laser.mount": ({"x_m": 0.37}, "georeference"),
     "mbes.beam_deg": ([0.6, 1.1], "segment"),
+    "mbes.focused": ([True, False], "segment"),
     "mbes.angle_sigma_deg": (0.07, "segment"),
     "mbes.range_sigma_m": (0.009, "segment"),
     "mbes.range_bias_sigma_m": (0.003, "adjust"),

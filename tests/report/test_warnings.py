@@ -8,6 +8,7 @@ from pipeline.report.cast_checks import cast_warnings
 from pipeline.report.drift_check import check_ins_drift, figures_disagree
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode
+from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
 from tests.support.evidence import (
     FIGURES,
@@ -21,6 +22,25 @@ from tests.support.evidence import (
     gaps,
     groups,
 )
+
+
+@pytest.mark.parametrize(
+    ("value", "known", "expected"),
+    [
+        (3.28e-4, True, []),  # of one parameter the limit is 3.29 sigmas
+        (3.30e-4, True, [ReasonCode.ERROR_ALLOWED_FOR]),
+        (-3.28e-2, True, [ReasonCode.ERROR_ALLOWED_FOR]),
+        (3.30e-2, True, []),  # beyond its a-priori sigma too: a reason, and no warning
+        (3.30e-4, False, []),
+    ],
+)
+def test_an_error_that_the_mount_allows_for(value, known, expected):
+    row = {"unknown": "projector_z", "estimated": False, "known": known}
+    table = pd.DataFrame([row | {"value": value, "sigma": 1e-4, "expected": 1e-2}])
+    found = errors_allowed_for(table, 0.001)
+    assert codes(found) == expected
+    place = "higher" if value > 0 else "lower"
+    assert all("the survey does not yet: the transmitter sits" in one.words and place in one.words for one in found)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
 from pipeline.report.drift_check import check_ins_drift, figures_disagree
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.verdict import rejections
 from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
 from tests.support.evidence import (
@@ -42,6 +43,7 @@ IN_TURN = replace(ADJUSTED, method="patent_alternating")
 OF_LASER = replace(ADJUSTED, search=replace(SEARCH, sensor="laser", max_angle_deg=1.5, max_lever_arm_m=float("inf")))
 SHAPE = {"b_m": 3.0, "e_m": 0.5, "corner_deg": {"P1": 45.0, "P3": 45.0}, "lean_deg": {"P1": 0.0, "P2": 0.0, "P3": 0.0}}
 FILES = pd.DataFrame({"sound_speed_low_m_s": [1504.1], "sound_speed_high_m_s": [1504.1]})
+PROJECTOR = {"unknown": "projector_z", "known": True, "value": 0.119, "sigma": 0.005, "expected": 0.06}
 CAST = ((0.0, 1500.0), (5.0, 1501.0))
 USED = CastUsed(
     file="1.svp", sha256="0" * 64, kind="text", number=1, casts=1, taken="2026-05-09 05:00:00", place_deg=(36.0, 120.0),
@@ -108,6 +110,11 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         ReasonCode.INS_DRIFT_OFF_FIGURES,
         "the INS drifts otherwise than ins.drift says: 2.0 times as far in position and 1.0 times as far in attitude, "
         "with a time constant of 10 s, not 200 s; the sigmas count with that, but look for the cause in the INS",
+    ),
+    (
+        lambda: errors_allowed_for(pd.DataFrame([PROJECTOR]), 0.001),
+        ReasonCode.ERROR_ALLOWED_FOR,
+        "the mount allows for this, the survey does not yet: the transmitter sits 119 ± 5 mm higher than mbes.proj",
     ),
     (
         lambda: geometry_gaps(gaps("one pass alone"), SIGMA),

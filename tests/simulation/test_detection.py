@@ -121,6 +121,9 @@ def test_a_side_lobe_hears_the_corner(one_pass: Pass) -> None:
     assert range_m(strong, 74.0, -2.4) == pytest.approx(corner, abs=1e-3)  # late by a decimetre
     for angle_deg, y_m in ((60.0, 0.0), (-30.0, 0.0), (74.0, -2.0), (65.0, -1.45)):  # far from any, or it is hidden
         assert range_m(strong, angle_deg, y_m) == range_m(plain, angle_deg, y_m)
+    drawn = one_pass(**dense, side_lobe_share=1.0, side_lobe_pull=0.25)
+    own, full = range_m(plain, 74.0, -2.4), range_m(strong, 74.0, -2.4)
+    assert range_m(drawn, 74.0, -2.4) == pytest.approx(own + 0.25 * (full - own), abs=1e-6)  # both echoes are as one
     narrow = one_pass(**dense, side_lobe_share=1.0, side_lobe_widths=0.5)
     assert range_m(narrow, 74.0, -2.4) == range_m(plain, 74.0, -2.4)
 

@@ -64,7 +64,8 @@ def evidence(
             "count": [5000, 400, count],
         }
     )
-    nothing = {"unknown": "sound_speed", "estimated": False, "expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4}
+    nothing = {"unknown": "sound_speed", "estimated": False, "known": False}
+    nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     geometry = [("remedy", "two more passes at 3 m would do")]
     tables: dict[str, Any] = {field.name: pd.DataFrame() for field in fields(Evidence)}

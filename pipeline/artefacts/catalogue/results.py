@@ -82,6 +82,7 @@ FREED = Artefact(
         Column("unknown", TEXT, "", "parameter of a sensor, of a family's wet faces, or shift of a face (face_NAME); "
                "surfaces_...: errors in what is known of the surfaces beforehand, without a test"),
         Column("estimated", BOOL, "", "named in adjust.free: value and total sigma are those of the solution"),
+        Column("known", BOOL, "", "estimated with its a-priori sigma as prior information"),
         Column("considered", F64, "rad, m, s, 1 or 1/s", "its a-priori sigma"),
         Column("value", F64, "rad, m, s, 1 or 1/s",
                "its estimate from the points alone, without its a-priori sigma (NaN: not determined)"),

@@ -22,6 +22,8 @@ class TargetBeams:
     half_widths
         Vectors of the half widths of finite beams, across and along, (n, 3) each, for one metre of range: tan(half
         width) · unit vector normal to the ray.
+    near_m
+        Ranges, across and along, within which a beam is as wide as there: its array's near field.
     stray
         The beam may stray by this many times the half width across.
     """
@@ -29,6 +31,7 @@ class TargetBeams:
     directions: Array
     ranges_m: Array
     half_widths: tuple[Array, ...] = ()
+    near_m: tuple[float, ...] = (0.0, 0.0)
     stray: float = 0.0
 
     @classmethod
@@ -38,9 +41,10 @@ class TargetBeams:
 
     def corners(self, rows: NDArray[np.int64]) -> Iterator[Array]:
         """Yield rays (n, 3) along each of the four corners of these beams; across, the corners include the stray."""
+        wider = [np.maximum(1.0, near / self.ranges_m[rows])[:, None] for near in self.near_m]
         across, along = (width[rows] for width in self.half_widths)
         for side, end in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
-            yield self.directions[rows] + side * (1 + self.stray) * across + end * along
+            yield self.directions[rows] + side * (wider[0] + self.stray) * across + end * wider[1] * along
 
     def spreads(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> tuple[Array, ...]:
         """Return the half axes, (n, 3) m each, of the footprints on a plane.
@@ -58,7 +62,14 @@ class TargetBeams:
         reached_m
             Ranges (n,) at which the rays meet the plane.
         """
-        directions = self.directions[rows]
-        slant, reached = (directions @ normal)[:, None], reached_m[:, None]
-        halves = [width[rows] for width in self.half_widths]
-        return tuple(reached * (h - directions * ((h @ normal)[:, None] / slant)) for h in halves)
+        halves = zip(self.half_widths, self.near_m, strict=False)
+        return tuple(self._moved(rows, normal, np.maximum(reached_m, near), half) for half, near in halves)
+
+    def stray_on(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> Array:
+        """Return the vectors (n, 3) m by which footprints on a plane may stray; parameters as of ``spreads``."""
+        return self._moved(rows, normal, self.stray * reached_m, self.half_widths[0])
+
+    def _moved(self, rows: NDArray[np.int64], normal: Array, times: Array, half_widths: Array) -> Array:
+        """Return how far on a plane (n, 3) the rays meet it if they turn by some half widths (n,) m."""
+        directions, h = self.directions[rows], times[:, None] * half_widths[rows]
+        return np.asarray(h - directions * ((h @ normal) / (directions @ normal))[:, None])

@@ -1,6 +1,6 @@
 """A face of the target: a convex planar polygon, its edges, and the lines along which it meets other faces."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ class Face:
         The sensors that use the face: "dry" (the laser alone), "wet" (the sonar alone) or "both".
     creases_m
         Lines (2, 3) within the face along which another face meets it.
+    outer_edges
+        Whether each edge, from its corner to the next, is an outer corner of the target: another face turns away from
+        this one along the whole edge. Any other edge may be an inner corner.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Face:
     offset_m: float = 0.0
     seen: str = "both"
     creases_m: tuple[Array, ...] = ()
+    outer_edges: tuple[bool, ...] = ()
 
     @property
     def level(self) -> bool:
@@ -66,13 +70,19 @@ class Face:
         return inward, np.sum(inward * self.vertices_m, axis=1)
 
     def clearance(
-        self, points_m: Array, *spreads_m: Array, margin_m: float = 0.0, stray_m: Array | None = None
+        self,
+        points_m: Array,
+        *spreads_m: Array,
+        margin_m: float = 0.0,
+        stray_m: Array | None = None,
+        corner_factor: float = 0.0,
     ) -> Array:
         """Return the smallest distance (n,) of points in the plane from the polygon's edges, + inside.
 
         Each point stands for its footprint, the parallelogram point ± spread_1 ± spread_2: its extent counts in the
         direction across each edge. From every edge the margin is kept besides, or the stray of the footprint across
-        the edge if that is larger. A crease counts along its length as an edge on both sides.
+        the edge if that is larger. From an edge that may be an inner corner, the distance is at least the footprint's
+        extent times a factor. A crease counts along its length as such an edge on both sides.
 
         Parameters
         ----------
@@ -84,17 +94,21 @@ class Face:
             Margin from every edge.
         stray_m
             Vectors (n, 3) by which the footprints may stray.
+        corner_factor
+            How many extents of the footprint an inner corner must be off.
         """
 
-        def reach(axis: Array) -> Array | float:
+        def reach(axis: Array, outer: bool = False) -> Array:
             """Return the extent of the footprint with its margin along a unit vector (3,)."""
             spread = sum((np.abs(half_axis @ axis) for half_axis in spreads_m), start=np.zeros(1))
-            return spread + (margin_m if stray_m is None else np.maximum(np.abs(stray_m @ axis), margin_m))
+            edge = spread + (margin_m if stray_m is None else np.maximum(np.abs(stray_m @ axis), margin_m))
+            return edge if outer else np.maximum(edge, corner_factor * spread)
 
         inward, offsets = self.inward_edges()
         smallest = np.full(len(points_m), np.inf)
-        for normal, offset in zip(inward, offsets, strict=True):
-            np.minimum(smallest, points_m @ normal - offset - reach(normal), out=smallest)
+        outer_edges = self.outer_edges or (False,) * len(offsets)
+        for normal, offset, outer in zip(inward, offsets, outer_edges, strict=True):
+            np.minimum(smallest, points_m @ normal - offset - reach(normal, outer), out=smallest)
         for start, end in self.creases_m:
             half = np.linalg.norm(end - start) / 2
             along = (end - start) / (2 * half)
@@ -103,6 +117,17 @@ class Face:
             aside, beyond = np.abs(away @ across) - reach(across), np.abs(away @ along) - half - reach(along)
             np.minimum(smallest, np.maximum(aside, beyond), out=smallest)
         return smallest
+
+    def mirrored(self) -> "Face":
+        """Return the face with left and right exchanged, y -> -y; its corners run the other way round."""
+        flip = np.array([1.0, -1.0, 1.0])
+        return replace(
+            self,
+            normal=self.normal * flip,
+            vertices_m=self.vertices_m[::-1] * flip,
+            creases_m=tuple(line * flip for line in self.creases_m),
+            outer_edges=(*self.outer_edges[-2::-1], *self.outer_edges[-1:]),
+        )
 
     def meets(self, other: "Face") -> Array | None:
         """Return the line (2, 3) along which another face meets this one within its edges; None if there is none."""
@@ -117,6 +142,17 @@ class Face:
         line = ends[0] + np.linspace(0, 1, 41)[:, None] * (ends[1] - ends[0])
         inside = np.flatnonzero(self.clearance(line) > SAME_CORNER_M)
         return None if len(inside) < 2 else np.array([line[inside[0]], line[inside[-1]]])
+
+    def turns_away(self, other: "Face") -> Array:
+        """Return for each edge (k,) whether another face has the whole edge and makes an outer corner there.
+
+        Both ends lie on the other face, and each face's middle lies behind the other's plane.
+        """
+        on_plane = np.abs(self.vertices_m @ other.normal - other.distance_m) < TOUCH_M
+        on_face = on_plane & (other.clearance(self.vertices_m) > -SAME_CORNER_M)
+        behind = other.vertices_m.mean(axis=0) @ self.normal - self.distance_m < -TOUCH_M
+        behind &= self.vertices_m.mean(axis=0) @ other.normal - other.distance_m < -TOUCH_M
+        return np.asarray(on_face & np.roll(on_face, -1) & behind)
 
     def cells(self, step_m: float) -> tuple[Array, float]:
         """Return the centres (n, 3) m of cells with sides of about ``step_m`` on the face, and the area of each in m².

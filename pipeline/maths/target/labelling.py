@@ -36,6 +36,9 @@ class LabelSettings:
         Heights in the target frame between which points count, with their whole footprints.
     spot_m
         Half the diameter of beams without half widths of their own, which are round and equally wide at all ranges.
+    corner_factor
+        How many half widths a beam's axis must be off what is much louder than a face: an inner corner, or the image of
+        the target in the water's surface, beyond the heights.
     seen
         Faces to use: "dry" (those that the laser uses), "wet" (those that the sonar uses), or "both" (all).
     """
@@ -46,6 +49,7 @@ class LabelSettings:
     lowest_m: float = -np.inf
     highest_m: float = np.inf
     spot_m: float = 0.0
+    corner_factor: float = 1.0
     seen: str = "both"
 
 
@@ -124,10 +128,12 @@ class _Candidates:
         steep &= face.clearance(self.points_m[rows] - away[:, None] * plane.axis) >= settings.margin_m / 2
         if beams.half_widths:
             rows, away, on_plane, cosine = rows[steep], away[steep], on_plane[steep], cosine[steep]
-            spreads = beams.spreads(rows, face.normal, reached[steep])
-            stray_m = beams.stray * spreads[0]
-            clear = face.clearance(on_plane, *spreads, margin_m=settings.margin_m, stray_m=stray_m) >= 0
-            height, half = on_plane[:, 2], sum(np.abs(spread[:, 2]) for spread in spreads)
+            reached = reached[steep]
+            spreads = beams.spreads(rows, face.normal, reached)
+            stray_m = beams.stray_on(rows, face.normal, reached)
+            limits = {"margin_m": settings.margin_m, "corner_factor": settings.corner_factor}
+            clear = face.clearance(on_plane, *spreads, stray_m=stray_m, **limits) >= 0
+            height, half = on_plane[:, 2], settings.corner_factor * sum(np.abs(spread[:, 2]) for spread in spreads)
             clear &= (height + half < settings.highest_m) & (height - half > settings.lowest_m)
         else:
             half_length = settings.spot_m / np.maximum(cosine, MOST_SLANTED)
@@ -162,7 +168,8 @@ def label_points(
     A point belongs to a face if it lies within the gate of the face's plane, and its ray meets the front of the face at
     the smallest grazing angle or more, and its whole footprint lies within the polygon and between the heights. The
     footprint is taken at the point in which the ray meets the plane. From the polygon's edges it keeps the margin, or
-    the beam's stray if that is larger. If several faces qualify, the one with the nearest plane is taken.
+    the beam's stray if that is larger. From edges that may be inner corners the beam's axis also keeps some half
+    widths: a side lobe may hear them. If several faces qualify, the one with the nearest plane is taken.
 
     The point in which the ray meets the plane does not depend on the measured range; nor does the footprint there. With
     the measured point instead, a range too long would move it into a grazed face at one edge and out at the other. The

@@ -105,9 +105,7 @@ class TargetModel:
 
     def mirrored(self) -> "TargetModel":
         """Return the target with left and right exchanged: y -> -y."""
-        flip = np.array([1.0, -1.0, 1.0])
-        faces = [replace(f, normal=f.normal * flip, vertices_m=f.vertices_m[::-1] * flip) for f in self.faces]
-        return replace(self, faces=tuple(faces))
+        return replace(self, faces=tuple(face.mirrored() for face in self.faces))
 
     @property
     def symmetric(self) -> bool:

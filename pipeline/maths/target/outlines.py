@@ -87,7 +87,7 @@ def build_target(
             seen=outline.seen,
         )
         faces.append(face)
-    faces = _with_creases(faces)
+    faces = _with_corners(faces)
     pairs = [
         (by_face[relation.faces[0]].name, by_face[other].name)
         for relation in relations
@@ -98,19 +98,21 @@ def build_target(
     return TargetModel(tuple(faces), names_in_order(families), parallel, water_level_m, repeats_m)
 
 
-def _with_creases(faces: Sequence[Face]) -> list[Face]:
-    """Return the faces with their creases, the lines along which other faces meet them.
+def _with_corners(faces: Sequence[Face]) -> list[Face]:
+    """Return the faces with their creases, the lines along which other faces meet them, and their outer edges.
 
     Only faces whose bounding boxes touch are tried.
     """
     low = np.array([face.vertices_m.min(axis=0) for face in faces]) - TOUCH_M
     high = np.array([face.vertices_m.max(axis=0) for face in faces]) + TOUCH_M
     touch = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=2)
-    creased = []
-    for face, others in zip(faces, touch, strict=True):
-        lines = [face.meets(faces[number]) for number in np.flatnonzero(others).tolist()]
-        creased.append(replace(face, creases_m=tuple(line for line in lines if line is not None)))
-    return creased
+    found = []
+    for face, touching in zip(faces, touch, strict=True):
+        others = [faces[number] for number in np.flatnonzero(touching).tolist()]
+        creases_m = tuple(line for line in map(face.meets, others) if line is not None)
+        outer = np.any([face.turns_away(other) for other in others], axis=0)
+        found.append(replace(face, creases_m=creases_m, outer_edges=tuple(outer.tolist())))
+    return found
 
 
 def _plane(outline: Outline) -> tuple[Array, float]:

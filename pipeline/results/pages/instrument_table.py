@@ -51,4 +51,6 @@ def _at(start: Any, key: str) -> Any:
 def _shown(value: float | tuple[float, ...] | None) -> str:
     if value is None:
         return "–"
-    return ", ".join(f"{number:g}" for number in (value if isinstance(value, tuple) else (value,)))
+    words = {True: "yes", False: "no"}
+    numbers = value if isinstance(value, tuple) else (value,)
+    return ", ".join(words[number] if isinstance(number, bool) else f"{number:g}" for number in numbers)

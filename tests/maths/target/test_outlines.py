@@ -62,6 +62,23 @@ def test_a_face_that_meets_another_leaves_a_crease_in_it() -> None:
     assert clear[1] == pytest.approx(0.02)
 
 
+def test_where_two_faces_make_an_outer_corner() -> None:
+    """The cope lies on top of the wall; the step stands out of its foot, and the wall ends there in an inner corner."""
+    wall = Outline("wall", [(0, 1, -3), (0, -1, -3), (0, -1, 2), (0, 1, 2)])
+    cope = Outline("cope", [(0, 1, 2), (0, -1, 2), (1, -1, 2), (1, 1, 2)])
+    step = Outline("step", [(-1, 1, -3), (-1, -1, -3), (0, -1, -3), (0, 1, -3)])
+    short = Outline("short", [(0, 1, 2), (0, 0, 2), (1, 0, 2), (1, 1, 2)])  # half of the wall's edge is its own
+    model = build_target([wall, cope, step], [], 0.0, None)
+    assert [face.outer_edges for face in model.faces] == [
+        (False, False, True, False), (True, False, False, False), (False, False, False, False),
+    ]  # fmt: skip
+    ends = build_target([wall, short], [], 0.0, None).faces
+    assert (ends[0].outer_edges[2], ends[1].outer_edges[0]) == (False, True)
+    turned = model.mirrored().faces[1]  # its corners run the other way round
+    assert turned.outer_edges == (False, False, True, False)
+    assert turned.vertices_m[[2, 3]].tolist() == [[0, 1, 2], [0, -1, 2]]
+
+
 def test_the_patents_target_has_no_creases_and_the_families_of_old() -> None:
     model = by_letters(8.0, 3.0, 1.0, 0.5)
     assert [one.name for one in model.families] == ["P1", "P2", "P3", "H"]
