@@ -12,12 +12,7 @@ import pandas as pd
 from pipeline.adjustment.consider import known_parameters, sonar_errors
 from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
-from pipeline.adjustment.laser_design import (
-    fixed_parameters_table,
-    laser_consider,
-    laser_problem,
-    surveyed_displacement,
-)
+from pipeline.adjustment.laser_design import laser_consider, laser_problem, surveyed_displacement
 from pipeline.adjustment.parts import parts_table
 from pipeline.adjustment.problem import CalibrationProblem, SessionData, sonar_problem, surfaces_of_laser
 from pipeline.adjustment.residual_statistics import ResidualStatistics, residual_statistics
@@ -46,7 +41,7 @@ from pipeline.artefacts.from_tables import target_frame, trajectory_in_target
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
 from pipeline.config.session import Drift, Ins, Laser, Mbes
-from pipeline.config.stage_settings import LaserCalibration
+from pipeline.config.stage_settings import LaserPrior
 from pipeline.config.target import Target
 from pipeline.mount import mount_of
 from pipeline.planning.session_geometry import geometry_table, sailed_plan
@@ -66,13 +61,7 @@ class Config:
     ins: Ins
     laser: Laser
     mbes: Mbes | None
-    laser_fit: LaserCalibration | None
-
-    @property
-    def calibration(self) -> Mbes | LaserCalibration:
-        """The settings of the calibration: ``mbes`` or ``laser_fit``, whichever is not None."""
-        (calibration,) = (block for block in (self.mbes, self.laser_fit) if block is not None)
-        return calibration
+    laser_fit: LaserPrior | None
 
 
 @dataclass(frozen=True)
@@ -158,18 +147,21 @@ def calibration_problem(session: SessionData, inputs: Inputs, config: Config) ->
         errors = sonar_errors(problem.model.names, laser, config.mbes, as_built, session.target.depth_m)
         known = known_parameters(state, errors, config.adjust.free)
         return replace(problem, prior=replace(problem.prior, parameters=known), consider=errors)
-    calibration = config.calibration
-    assert isinstance(calibration, LaserCalibration)
+    assert config.laser_fit is not None
     pose = target_frame(inputs.target_pose), float(np.radians(inputs.target_pose["azimuth_correction_deg"].iloc[0]))
-    problem = laser_problem(session, mount_of(laser.mount), laser, calibration, surveyed_displacement(*pose))
-    names = problem.model.names
-    return replace(problem, consider=laser_consider(names, laser, calibration, as_built))
+    problem = laser_problem(session, mount_of(laser.mount), laser, config.laser_fit, surveyed_displacement(*pose))
+    coarse = problem.prior.parameters
+    assert coarse is not None
+    errors = laser_consider(problem.model.names, laser, coarse.covariance, as_built)
+    known = known_parameters(problem.model.coarse, errors, config.adjust.free)
+    both = coarse if known is None else coarse.with_independent(known)
+    return replace(problem, prior=replace(problem.prior, parameters=both), consider=errors)
 
 
 def weak_geometry(
     inputs: Inputs, config: Config, drift: Drift, adjustment: MountAdjustment, statistics: ResidualStatistics
 ) -> pd.DataFrame:
-    """Return table ``geometry``: the laser's parameters that were fixed, or the weaknesses of the sonar's passes.
+    """Return table ``geometry``: the weaknesses of the sonar's passes; empty if the laser is calibrated.
 
     Parameters
     ----------
@@ -183,7 +175,7 @@ def weak_geometry(
         Numbers of soundings by surface and pass.
     """
     if config.mbes is None:
-        return fixed_parameters_table(adjustment.fixed_mount)
+        return pd.DataFrame(columns=[column.name for column in GEOMETRY.columns])
     passes = inputs.passes.set_index("pass").loc[statistics.passes_of("mbes")]
     surfaces = enumerate(adjustment.state.surfaces)
     soundings = {surface.family: statistics.count("mbes", number) for number, surface in surfaces}

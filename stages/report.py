@@ -10,7 +10,7 @@ from pipeline.adjustment.error_sources import stated_of
 from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.pool import Adjust, AsBuilt, Method, Segment, VerdictLimits
+from pipeline.config.pool import Adjust, AsBuilt, LaserFit, Method, Segment, VerdictLimits
 from pipeline.config.session import Calibrated, Ins, Laser, Mbes
 from pipeline.config.target import Target
 from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
@@ -52,6 +52,7 @@ class Config:
     laser: Laser
     mbes: Mbes | None
     calibrated: Calibrated
+    laser_fit: LaserFit | None
     segment: Segment
     adjust: Adjust
     verdict: VerdictLimits
@@ -112,7 +113,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "schema": SCHEMA,
         "session": config.name,
         "verdict": verdict,
-        "verdict_in_words": verdict_in_words(verdict, inputs.fixed),
+        "verdict_in_words": verdict_in_words(verdict, report.held),
         **statement_lists("reason", reasons),
         **statement_lists("warning", warnings),
         "limits": config.verdict.model_dump(),
@@ -145,7 +146,8 @@ def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str
     """Return the parts of the report that depend on the calibrated sensor; ``passes``: as in calibration.json."""
     sensor = config.sensor
     if isinstance(sensor, Laser):
-        return laser_report(sensor, evidence, config.segment)
+        assert config.laser_fit is not None
+        return laser_report(sensor, evidence, config.segment, config.verdict, config.laser_fit)
     settings = SonarSettings(
         mbes=sensor, segment=config.segment, method=config.result, sides=config.target.sides
     )
@@ -170,4 +172,5 @@ def _criteria(config: Config, report: SensorReport) -> Criteria:
         search=report.search,
         shape=config.target.shape,
         sides=report.sides,
+        held=report.held,
     )

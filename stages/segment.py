@@ -36,8 +36,8 @@ from pipeline.config.stage_settings import (
     AdjustIteration,
     FacesAsBuilt,
     InsErrors,
-    LaserCalibration,
     LaserPoints,
+    LaserPrior,
     PassGaps,
     SonarBeams,
 )
@@ -71,7 +71,7 @@ class Config:
     ins: InsErrors
     laser: LaserPoints
     mbes: SonarBeams | None
-    laser_fit: LaserCalibration | None
+    laser_fit: LaserPrior | None
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import pandas as pd
 from tools.campaign_statistics import HEAD, markdown_row, statistics_of
 from tools.campaigns import FOLDER, path_of
 from tools.laser import ROWS
+from tools.session_rows import NAMES
 from tools.stress_campaigns import STRESS
 
 WORDS = "the laser's own calibration"
@@ -28,7 +29,11 @@ def table_of(folder: Path) -> str:
     lines = [HEAD, "|---" + "|---:" * (HEAD.count("|") - 2) + "|"]
     for name, path, prefix in [*sources, (WORDS, folder / ROWS.name, "laser_")]:
         if path.is_file():
-            lines.append(markdown_row(name, statistics_of(pd.read_parquet(path), prefix)))
+            table = pd.read_parquet(path)
+            if prefix:  # the error of the coarse mount is in the total sigmas alone
+                totals = {f"{prefix}sigma_{axis}": table[f"{prefix}total_{axis}"] for axis in NAMES}
+                table = table.assign(**totals, **{f"{prefix}nse": table[f"{prefix}nse_total"]})
+            lines.append(markdown_row(name, statistics_of(table, prefix)))
     return "\n".join(lines) + "\n"
 
 

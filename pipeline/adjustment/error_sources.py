@@ -97,11 +97,8 @@ ERROR_SOURCES = (  # the first beginning that fits counts
         "surfaces_", "the target's design: directions, distances, parallel faces", "target",
         "as the wet faces",
     ),
-    ErrorSource("rotation", "fixed angles", "laser_mount", "kept at the coarse mount where the laser is calibrated"),
-    ErrorSource(
-        "lever_arm", "fixed components of the lever arm", "laser_mount",
-        "kept at the coarse mount where the laser is calibrated",
-    ),
+    ErrorSource("rotation", "the coarse mount", "laser_mount", "an observation where the laser is calibrated"),
+    ErrorSource("lever_arm", "the coarse mount", "laser_mount", "as its angles"),
 )  # fmt: skip
 UNKNOWN = ErrorSource("", "", "session", "not in the table: then its own, for which no two sessions need be alike")
 

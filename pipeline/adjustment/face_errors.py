@@ -21,12 +21,13 @@ Array = NDArray[np.float64]
 class FinalSolution:
     """The adjusted values' solution, with the shifts of single faces as fixed parameters after all others.
 
-    names (u,): of all parameters; deviation (u,): their estimates, zero for the fixed ones; equations, solution: of
-    them.
+    names (u,): of all parameters; deviation (u,): their estimates, zero for the fixed ones; from_known (u,): deviations
+    from the values known beforehand, where there are such; equations, solution: of them.
     """
 
     names: tuple[str, ...]
     deviation: Array
+    from_known: Array
     equations: NormalEquations
     solution: Solution
 
@@ -54,14 +55,16 @@ def final_solution(
         sums["mbes"] = replace(with_pings, surface=sums["mbes"].surface)
     linearisation = replace(last.linearisation, sums=sums)
     equations, prior = equations_with_faces(linearisation, faces, last.drift, noise), last.prior
-    count = len(faces.names)
+    count, state, coarse = len(faces.names), adjustment.state, problem.model.coarse
+    known = coarse if problem.prior.parameters is None else problem.prior.parameters.known
     of_prior = np.pad(prior.normal, (0, count))
     equations = replace(
         equations, normal=equations.normal + of_prior, right=equations.right + np.pad(prior.right, (0, count))
     )
     return FinalSolution(
         names=problem.model.names,
-        deviation=np.pad(adjustment.state.deviation_from(problem.model.coarse), (0, count)),
+        deviation=np.pad(state.deviation_from(coarse), (0, count)),
+        from_known=np.pad(state.deviation_from(known), (0, count)),
         equations=equations,
         solution=solve(equations.normal, equations.right, adjustment.solution.estimated.tolist(), of_prior),
     )

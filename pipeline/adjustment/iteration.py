@@ -19,7 +19,7 @@ from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate
-from pipeline.maths.adjustment.solution import Solution, parameters_to_fix, solve
+from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
     Scatter,
@@ -80,8 +80,7 @@ class MountAdjustment:
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
     sonar or a solution); drift_figures: the figures of the drift, which the solution has; equations: normal equations
-    of all parameters, also of the fixed ones; fixed_mount: the mount parameters that had to be fixed, each with the
-    sigma that it would have had (rad or m); last: the values of the final solution.
+    of all parameters, also of the fixed ones; last: the values of the final solution.
     """
 
     state: State
@@ -93,7 +92,6 @@ class MountAdjustment:
     drift_figures: DriftFigures
     equations: NormalEquations
     solution: Solution
-    fixed_mount: Mapping[int, float]
     converged: bool
     iterations: int
     last: Iterate
@@ -168,7 +166,7 @@ def adjust_mount(
         figures = last.drift_figures(noise, prior.drift, estimated, reduced)
         for closing in range(CLOSING_STEPS):
             last, solution = last.stepped(figures.noise, estimated, None if closing else reduced)
-            converged = weighted.settled and _is_small(solution, estimated, CONVERGED)
+            converged = weighted.settled and _is_small(solution, CONVERGED)
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
@@ -184,7 +182,6 @@ def adjust_mount(
         drift_figures=figures,
         equations=equations,
         solution=solution,
-        fixed_mount=weighted.fixed_mount,
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
         last=last,
@@ -197,7 +194,6 @@ class _WeightedIteration:
 
     last: Iterate
     estimated: Integers
-    fixed_mount: Mapping[int, float]
     weighting: Weighting
     accumulation: Accumulation
     settled: bool
@@ -213,21 +209,15 @@ def _weighted_iteration(
     state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free))
-    fixed: dict[int, float] = {}
     for iteration in range(1, settings.max_iterations + 1):
         # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
         start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.priors)
-        # fix the mount parameters whose sigma would be larger than required
-        if iteration == 1 and prior.required_sigmas is not None:
-            normal = start.equations(prior.noise).normal
-            fixed = parameters_to_fix(normal, estimated.tolist(), prior.required_sigmas)
-            estimated = np.setdiff1d(estimated, np.array(list(fixed), dtype=np.int64))
         # solve and step
         stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0
-        settled = weighting.robust is not None and _is_small(solution, estimated, SETTLED)
+        settled = weighting.robust is not None and _is_small(solution, SETTLED)
         if deficient or (settled and iteration >= LEAST_PASSES):
             break
         # from the next reading on reduce the weights of outliers
@@ -239,7 +229,6 @@ def _weighted_iteration(
     return _WeightedIteration(
         last=start if deficient else stepped,
         estimated=estimated,
-        fixed_mount=fixed,
         weighting=weighting,
         accumulation=accumulation,
         settled=settled,
@@ -248,11 +237,8 @@ def _weighted_iteration(
     )
 
 
-
-
-def _is_small(solution: Solution, estimated: Integers, limits: StepLimits) -> bool:
+def _is_small(solution: Solution, limits: StepLimits) -> bool:
     """Return whether the step of each estimated mount parameter is within the limits."""
-    mount = np.flatnonzero(estimated < N_MOUNT)
-    sigma = np.sqrt(np.diag(solution.covariance))[mount]
-    absolute = np.repeat([limits.rad, limits.m], 3)[estimated[mount]]
-    return bool(np.all(np.abs(solution.step[mount]) <= np.maximum(limits.sigmas * sigma, absolute)))
+    sigma = np.sqrt(np.diag(solution.covariance))[:N_MOUNT]
+    absolute = np.repeat([limits.rad, limits.m], 3)
+    return bool(np.all(np.abs(solution.step[:N_MOUNT]) <= np.maximum(limits.sigmas * sigma, absolute)))

@@ -1,10 +1,12 @@
-"""The calibration of the laser: its points lie on the target's planes, as designed and, if known, as surveyed."""
+"""The calibration of the laser: its points lie on the target's planes, as designed and, if known, as surveyed.
 
-from collections.abc import Mapping, Sequence
+The coarse mount enters as an observation with its covariance (:class:`ParameterPrior`).
+"""
+
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import laser_errors
@@ -16,22 +18,28 @@ from pipeline.adjustment.problem import (
     designed_planes,
     problem_at,
 )
-from pipeline.config.mount import Covariance, MountOrigin
-from pipeline.config.pool import AsBuilt, LaserFit
+from pipeline.config.mount import Covariance, Mount, MountOrigin
+from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser
-from pipeline.config.stage_settings import LaserCalibration
+from pipeline.config.stage_settings import LaserPrior
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.pseudo_observations import DesignPrior
+from pipeline.maths.adjustment.pseudo_observations import DesignPrior, ParameterPrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.maths.target.model import TargetFrame, TargetModel
-from pipeline.mount import Mounted
+from pipeline.mount import Mounted, mount_of
 
 Array = NDArray[np.float64]
+LEAST = np.repeat([1e-8, 1e-7], 3)  # rad and m: sigmas that even an exact coarse mount has
 
 
 class CoarseLaser(PointNoise, Protocol):
     """Settings of a laser that is calibrated: its noise, and what is known of its coarse mount."""
+
+    @property
+    def mount(self) -> Mount:
+        """The mount."""
+        ...
 
     @property
     def mount_covariance(self) -> Covariance | None:
@@ -45,9 +53,12 @@ class CoarseLaser(PointNoise, Protocol):
 
 
 def laser_problem(
-    session: SessionData, mount: Mounted, laser: CoarseLaser, calibration: LaserCalibration, set_up: Array
+    session: SessionData, mount: Mounted, laser: CoarseLaser, settings: LaserPrior, set_up: Array
 ) -> CalibrationProblem:
     """Return the problem of calibrating the laser against the target's design. No fixed parameter has an error yet.
+
+    The coarse mount is an observation of all six mount parameters, so that each is estimated, and has the sigma that
+    it and the points give together.
 
     Parameters
     ----------
@@ -57,22 +68,24 @@ def laser_problem(
         The laser's mount, at which the adjustment starts.
     laser : CoarseLaser
         The session's laser.
-    calibration : LaserCalibration
+    settings : LaserPrior
         Sigmas of the target and of the coarse mount.
     set_up : (6,) array
         The surveyed displacement of the target, from :func:`surveyed_displacement`.
     """
     state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, session.surfaces, "laser")
-    required = required_sigmas(coarse_covariance(laser, calibration), calibration)
-    # the figures of the drift stay as given: corrected by likelihood they made the sigmas of pitch and roll too small
-    prior = PriorInformation(session.noise, design_prior(session.target, set_up, calibration), required)
+    coarse, covariance = coarse_mount(laser, settings)
+    known = State.at(coarse.R_body_from_sensor, coarse.lever_arm_body_m, session.surfaces, "laser")
+    prior = PriorInformation(
+        noise=session.noise,  # its drift stays as given: corrected by likelihood it made pitch and roll too certain
+        surfaces=design_prior(session.target, set_up, settings),
+        parameters=ParameterPrior(np.arange(N_MOUNT), covariance, known),
+    )
     return problem_at(session, state, prior, {"laser": laser})
 
 
-def laser_consider(
-    names: Sequence[str], laser: Laser, calibration: LaserCalibration, as_built: AsBuilt
-) -> ConsiderErrors:
-    """Return the a-priori errors for a calibration of the laser. A fixed mount parameter has the coarse mount's error.
+def laser_consider(names: Sequence[str], laser: Laser, coarse: Array, as_built: AsBuilt) -> ConsiderErrors:
+    """Return the a-priori errors for a calibration of the laser; its mount has those of the coarse mount.
 
     Parameters
     ----------
@@ -80,14 +93,13 @@ def laser_consider(
         Names of all parameters.
     laser : Laser
         The session's laser.
-    calibration : LaserCalibration
-        Sigmas of the coarse mount.
+    coarse : (6, 6) array
+        Covariance of the coarse mount.
     as_built : AsBuilt
         Sigmas of the wet faces against the dry ones.
     """
-    coarse, errors = coarse_covariance(laser, calibration), laser_errors(names, laser, as_built)
-    sigmas = np.concatenate([np.sqrt(np.diag(coarse)), errors.sigmas[N_MOUNT:]])
-    return ConsiderErrors(sigmas, [(np.arange(N_MOUNT), coarse)])
+    errors = laser_errors(names, laser, as_built)
+    return ConsiderErrors(np.concatenate([np.sqrt(np.diag(coarse)), errors.sigmas[N_MOUNT:]]))
 
 
 def surveyed_displacement(frame: TargetFrame, azimuth_correction_rad: float) -> Array:
@@ -103,7 +115,7 @@ def surveyed_displacement(frame: TargetFrame, azimuth_correction_rad: float) -> 
     return np.array([*frame.shift_m, 0.0, 0.0, azimuth_correction_rad])
 
 
-def design_prior(target: TargetModel, set_up: Array, settings: LaserFit) -> DesignPrior:
+def design_prior(target: TargetModel, set_up: Array, settings: LaserPrior) -> DesignPrior:
     """Return the prior information about the target, in its frame: the design, and the surveyed place if it is known.
 
     Parameters
@@ -112,7 +124,7 @@ def design_prior(target: TargetModel, set_up: Array, settings: LaserFit) -> Desi
         The design.
     set_up : (6,) array
         The surveyed displacement of the target.
-    settings : LaserFit
+    settings : LaserPrior
         Sigmas of the target's faces and of the survey.
     """
     place = settings.origin_sigma_m
@@ -127,38 +139,21 @@ def design_prior(target: TargetModel, set_up: Array, settings: LaserFit) -> Desi
     )
 
 
-def coarse_covariance(laser: CoarseLaser, settings: LaserFit) -> Array:
-    """Return the covariance (6, 6) of the coarse mount, rad and m: the session's, or by sigmas of the pool's config.
+def coarse_mount(laser: CoarseLaser, settings: LaserPrior) -> tuple[Mounted, Array]:
+    """Return the coarse mount and its covariance (6, 6), rad and m: the session's, or by sigmas of the pool's config.
 
-    After an earlier calibration of the laser, the session's covariance counts only for the parameters that this
-    calibration fixed. The others are to be estimated anew, so they have the sigmas of the pool's config.
+    A mount from an earlier calibration of the laser is no coarse mount: with the same passes, its information would
+    count twice. Its source names the coarse mount from which that calibration started. Where an older version did not
+    write this, the covariance counts only for the parameters that it fixed at the coarse mount; the others have the
+    sigmas of the pool's config.
     """
     sigma = np.repeat([np.radians(settings.coarse_sigma_deg), settings.coarse_sigma_m], 3)
-    configured = np.diag(sigma**2)
-    if laser.mount_covariance is None:
-        return configured
-    surveyed, origin = np.array(laser.mount_covariance), laser.mount_origin
-    if origin is None or origin.method == "coarse":
-        return surveyed
-    kept = [place for name, place, *_ in PARAMETERS if name in origin.held]
-    configured[np.ix_(kept, kept)] = surveyed[np.ix_(kept, kept)]
-    return configured
-
-
-def required_sigmas(coarse: Array, settings: LaserCalibration) -> Array:
-    """Return the largest sigmas (6,), rad and m, with which mount parameters are estimated, not fixed.
-
-    They are the verdict's limits, or a share of the sigmas of the coarse mount, covariance (6, 6), if that is less.
-    """
-    limits = np.repeat([np.radians(settings.max_sigma_deg), settings.max_sigma_m], 3)
-    return np.asarray(np.minimum(limits, settings.hold_share * np.sqrt(np.diag(coarse))))
-
-
-def fixed_parameters_table(fixed: Mapping[int, float]) -> pd.DataFrame:
-    """Return table ``geometry``: the fixed mount parameters, each with the sigma that it would have had."""
-    rows = [
-        ("held", name, float(np.degrees(fixed[place])) if unit == "deg" else fixed[place])
-        for name, place, _, unit in PARAMETERS
-        if place in fixed
-    ]
-    return pd.DataFrame(rows, columns=["kind", "words", "sigma"])
+    covariance, origin, mount, stated = np.diag(sigma**2), laser.mount_origin, laser.mount, laser.mount_covariance
+    if origin is not None and origin.coarse is not None:
+        mount, stated = origin.coarse.mount, origin.coarse.covariance
+    if stated is not None:
+        surveyed, kept = np.array(stated), list(range(N_MOUNT))
+        if origin is not None and origin.method == "fine" and origin.coarse is None:
+            kept = [place for name, place, *_ in PARAMETERS if name in origin.held]
+        covariance[np.ix_(kept, kept)] = surveyed[np.ix_(kept, kept)]
+    return mount_of(mount), covariance + np.diag(LEAST**2)

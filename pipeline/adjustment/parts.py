@@ -65,17 +65,16 @@ def parts_table(problem: CalibrationProblem, adjustment: MountAdjustment, passes
     passes : DataFrame
         Table passes.
     """
-    rows = [_row(part, mount, difference) for part, mount, difference in _deviations(problem, adjustment, passes)]
+    rows = [_row(part, difference) for part, difference in _deviations(problem, adjustment, passes)]
     return pd.DataFrame(rows, columns=[column.name for column in PARTS.columns])
 
 
 def _deviations(
     problem: CalibrationProblem, adjustment: MountAdjustment, passes: pd.DataFrame
-) -> Iterator[tuple[Part, Integers, Deviation]]:
-    """Yield the deviation of each part that determines all parameters, with the numbers of its mount parameters."""
+) -> Iterator[tuple[Part, Deviation]]:
+    """Yield the deviation of each part that determines all parameters."""
     whole = adjustment.solution
-    mount = whole.estimated[whole.estimated < N_MOUNT]
-    if whole.deficiency or not len(mount):
+    if whole.deficiency:
         return
     last, noise = adjustment.last, adjustment.drift_figures.noise
     starts, ends = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
@@ -92,7 +91,7 @@ def _deviations(
         equations = last.equations(noise, reduced=reduced.of(groups))
         solution = solve(equations.normal, equations.right, whole.estimated.tolist())
         if not solution.deficiency:
-            yield part, mount, deviation(solution, whole, problem.consider, mount)
+            yield part, deviation(solution, whole, problem.consider, np.arange(N_MOUNT))
 
 
 def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:
@@ -101,11 +100,11 @@ def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:
     return np.where(before >= 0, before, after)
 
 
-def _row(part: Part, mount: Integers, difference: Deviation) -> dict[str, Any]:
+def _row(part: Part, difference: Deviation) -> dict[str, Any]:
     row: dict[str, Any] = {"part": part.name, "passes": " ".join(map(str, part.passes))}
     row |= {"normalised": difference.normalised, "dof": difference.dof}
     for name, number, _, unit in PARAMETERS:
-        place, scale = np.flatnonzero(mount == number), float(np.degrees(1.0)) if unit == "deg" else 1.0
+        scale = float(np.degrees(1.0)) if unit == "deg" else 1.0
         for kind, values in (("change", difference.change), ("sigma", difference.sigma)):
-            row[f"{kind}_{name}"] = scale * values[place].item() if len(place) else np.nan
+            row[f"{kind}_{name}"] = scale * float(values[number])
     return row

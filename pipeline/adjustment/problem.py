@@ -64,15 +64,13 @@ class SurveyedFaces(Protocol):
 class PriorInformation:
     """Prior information.
 
-    noise: white noise and drift of the recorded poses; surfaces: pseudo-observations of the surfaces; required_sigmas
-    (6,) rad and m: a mount parameter that would have a larger sigma is fixed (None: all are estimated); drift: how well
+    noise: white noise and drift of the recorded poses; surfaces: pseudo-observations of the surfaces; drift: how well
     the figures of the drift in ``noise`` are known; parameters: the values known beforehand of parameters that are
     estimated.
     """
 
     noise: PoseNoise
     surfaces: Prior | None = None
-    required_sigmas: Array | None = None
     drift: DriftPrior = EXACT
     parameters: ParameterPrior | None = None
 

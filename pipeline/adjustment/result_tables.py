@@ -18,10 +18,7 @@ from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
 from pipeline.maths.adjustment.parameter_tests import ParameterTest, prior_parameter_tests, single_parameter_tests
-from pipeline.maths.adjustment.solution import (
-    Solution,
-    weakest_direction,
-)
+from pipeline.maths.adjustment.solution import Solution, weakest_direction
 from pipeline.maths.adjustment.weighting import scatter
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
@@ -73,7 +70,7 @@ def _estimate(problem: CalibrationProblem, final: FinalSolution) -> tuple[pd.Dat
     If the data leave a direction open, the mount's values and both covariances are NaN.
     """
     solution = final.solution
-    numbers = np.union1d(np.arange(N_MOUNT), solution.estimated)  # the mount, even if it is fixed
+    numbers = solution.estimated
     random = solution.noise_covariance(numbers)
     total = solution.total_covariance(problem.consider, numbers)
     values = final.deviation[numbers]
@@ -102,7 +99,7 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
         "between_dof": between.dof,
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
-        "weakest": "" if solution.deficiency else _weakest(solution),
+        "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]),
         **{f"test_{name}": test[name] for name in ("statistic", "dof", "limit", "passed")},
         "reason": _no_result(solution.deficiency) if solution.deficiency else "",
     }
@@ -111,12 +108,6 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
 
 def _no_result(deficiency: int) -> str:
     return f"the data leave {plural(deficiency, 'direction')} of the unknowns open"
-
-
-def _weakest(solution: Solution) -> str:
-    """Return the weakest direction of the mount in words; empty if a mount parameter is fixed."""
-    is_whole = np.all(solution.estimated[:N_MOUNT] == np.arange(N_MOUNT))
-    return weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]) if is_whole else ""
 
 
 def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
@@ -138,16 +129,17 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
 def _single_parameter_table(problem: CalibrationProblem, final: FinalSolution, estimate: pd.DataFrame) -> pd.DataFrame:
     """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
 
-    The parameters are fixed, or estimated with a value known beforehand, or named in adjust.free.
+    The parameters are fixed, or estimated with a value known beforehand (those of a laser's coarse mount among them),
+    or named in adjust.free. Where values known beforehand correlate, the effects are of independent errors instead,
+    whose squares have the same sum.
     """
     solution, equations, consider = final.solution, final.equations, problem.consider
     mount, known = np.arange(N_MOUNT), problem.prior.known_parameters
-    known = known[known >= N_MOUNT]
     found = single_parameter_tests(equations.normal, equations.right, solution, consider)
-    found += prior_parameter_tests(solution, final.deviation, consider, known)
+    found += prior_parameter_tests(solution, final.from_known, consider, known)
     tests, effects = {test.parameter: test for test in found}, np.zeros((N_MOUNT, len(final.names)))
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
-    effects[:, known] = solution.prior_effects(mount)[:, np.searchsorted(solution.estimated, known)]
+    effects[:, known] = solution.prior_effects(mount, known)
     by_name, rows = estimate.set_index("unknown"), []
     surfaces = problem.model.coarse.surface_slice
     freed = np.setdiff1d(solution.estimated, [*mount, *range(surfaces.start, surfaces.stop), *known]).tolist()

@@ -36,7 +36,7 @@ MARKER = re.compile("([\U000f0000-\U0010fffd])\\1*")
 TEXT_BLOCK = ("|", ">")
 TAGS = {str: "tag:yaml.org,2002:str", float: "tag:yaml.org,2002:float", dict: "tag:yaml.org,2002:map",
         list: "tag:yaml.org,2002:seq"}  # fmt: skip
-DIGITS = {"mount_covariance": ".9e"}  # with a decimal point, because YAML reads 1e-06 as text
+DIGITS = dict.fromkeys(("mount_covariance", "covariance"), ".9e")  # with a decimal point: YAML reads 1e-06 as text
 
 
 def edit_mounts(text: str, blocks: Mapping[str, Content], path: Path) -> str:
@@ -207,8 +207,9 @@ def _changed(node: Node, value: Any, key: str) -> Node:
     """Return the node with a new value; in a mapping or a block list each entry keeps its place and its comment."""
     if isinstance(node, MappingNode) and isinstance(value, dict):
         there = {name.value for name, _ in node.value}
-        node.value = [(name, _changed(old, value[name.value], key)) for name, old in node.value if name.value in value]
-        node.value += [(ScalarNode(TAGS[str], name), _new(value[name], key)) for name in value if name not in there]
+        kept = [(name, old) for name, old in node.value if name.value in value]
+        node.value = [(name, _changed(old, value[name.value], name.value)) for name, old in kept]
+        node.value += [(ScalarNode(TAGS[str], name), _new(value[name], name)) for name in value if name not in there]
         return node
     if isinstance(node, SequenceNode) and isinstance(value, list) and len(node.value) == len(value):
         is_matrix = isinstance(value[0], list)
@@ -223,7 +224,7 @@ def _changed(node: Node, value: Any, key: str) -> Node:
 def _new(value: Any, key: str) -> Node:
     """Return a node with a value of the key; a matrix becomes a list of rows, one per line."""
     if isinstance(value, dict):
-        pairs = [(ScalarNode(TAGS[str], name), _new(entry, key)) for name, entry in value.items()]
+        pairs = [(ScalarNode(TAGS[str], name), _new(entry, name)) for name, entry in value.items()]
         return MappingNode(TAGS[dict], pairs, flow_style=True)
     if isinstance(value, list):
         matrix = bool(value) and isinstance(value[0], list)

@@ -82,8 +82,13 @@ def mount_block(mounted: Mounted, covariance: Array, origin: Content) -> Content
     return {
         "mount": mount,
         "mount_origin": origin | {"mount": mount},
-        "mount_covariance": [[float(f"{value:.9e}") for value in row] for row in covariance.tolist()],
+        "mount_covariance": written_covariance(covariance),
     }
+
+
+def written_covariance(covariance: Array) -> list[list[float]]:
+    """Return a covariance with numbers rounded as they will be written."""
+    return [[float(f"{value:.9e}") for value in row] for row in covariance.tolist()]
 
 
 def write_mounts(folder: Path, text: str, content: Content, blocks: Mapping[str, Content]) -> str:

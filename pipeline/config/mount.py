@@ -39,6 +39,13 @@ Covariance = Annotated[  # of (ε about body x, y, z; lever arm x, y, z), R_true
 ]
 
 
+class CoarseMount(Model):
+    """The coarse mount from which a fine calibration started; covariance None: the sigmas are in the pool's config."""
+
+    mount: Mount
+    covariance: Covariance | None = None
+
+
 class MountOrigin(Model):
     """The source of a mount, which poolcal writes beside the mount."""
 
@@ -47,7 +54,8 @@ class MountOrigin(Model):
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     date: Annotated[str, Field(pattern="^[0-9]{4}-[0-9]{2}-[0-9]{2}$")]
     software: Annotated[str, Field(max_length=100)]
-    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # mount parameters that a fine calibration kept fixed
+    held: tuple[Annotated[str, Field(max_length=10)], ...] = ()  # mount parameters for which it was not good enough
+    coarse: CoarseMount | None = None  # with which the next calibration starts: no data count twice
     mount: Mount | None = None  # the mount as written: mount_covariance belongs to this mount only
 
 

@@ -128,7 +128,7 @@ class LaserFit(Model):
     azimuth_sigma_deg: SigmaDeg | None = None  # of target.azimuth_deg; null: not surveyed
     coarse_sigma_deg: SigmaDeg = 0.5  # of each coarse angle, without laser.mount_covariance
     coarse_sigma_m: SigmaM = 0.05
-    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # of its coarse sigma; a less certain one is fixed
+    hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # of its coarse sigma: above, it rests on the coarse mount
 
 
 class VerdictLimits(Model):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
 from pydantic import BaseModel
 
 from pipeline.config.mount import Covariance, Mount, MountOrigin
-from pipeline.config.pool import LaserFit, PoolConfig
+from pipeline.config.pool import PoolConfig
 from pipeline.config.quantities import Model
 from pipeline.config.session import Drift, SessionConfig, White
 
@@ -98,11 +98,16 @@ class PassGaps(Model):
     max_gap_s: float
 
 
-class LaserCalibration(LaserFit):
-    """Settings of a calibration of the laser itself: ``laser_fit``, and the verdict's limits of the sigmas."""
+class LaserPrior(Model):
+    """Prior information for a calibration of the laser itself: sigmas of the target and of the coarse mount."""
 
-    max_sigma_deg: float
-    max_sigma_m: float
+    face_sigma_deg: float
+    face_sigma_m: float
+    plumb_sigma_deg: float
+    origin_sigma_m: float | None
+    azimuth_sigma_deg: float | None
+    coarse_sigma_deg: float
+    coarse_sigma_m: float
 
 
 def narrow(model: type[M], block: BaseModel) -> M:
@@ -121,16 +126,8 @@ def settings_by_name(pool: PoolConfig, session: SessionConfig) -> dict[str, Any]
         "target_place": pool.target_place,
         "recordings": session.recordings,
         "calibrated": session.calibrated,
-        "laser_fit": laser_calibration(pool) if session.calibrated == "laser" else None,
+        "laser_fit": pool.laser_fit if session.calibrated == "laser" else None,
     }
-
-
-def laser_calibration(pool: PoolConfig) -> LaserCalibration:
-    """Return the settings of a calibration of the laser itself, from the pool's settings."""
-    limits = pool.verdict
-    return LaserCalibration(
-        **pool.laser_fit.model_dump(), max_sigma_deg=limits.max_sigma_deg, max_sigma_m=limits.max_sigma_m
-    )
 
 
 def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:

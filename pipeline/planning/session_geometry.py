@@ -62,7 +62,7 @@ def geometry_table(
     )
     advice = geometry_advice(setting, coverage, normal, solution)
     rows = [("gap", words) for words in advice.gaps] + ([("remedy", advice.remedy)] if advice.remedy else [])
-    return pd.DataFrame(rows, columns=["kind", "words"]).assign(sigma=np.nan)
+    return pd.DataFrame(rows, columns=["kind", "words"])
 
 
 def _measured(value: float, usual: float) -> float:

@@ -60,23 +60,23 @@ def words_of(row: Mapping[Any, Any]) -> str:
     name, value, sigma = str(row["unknown"]), float(row["value"]), float(row["sigma"])
     if name in WORDS:
         scale, unit, words = WORDS[name]
-        return words.format(_size(scale * value, scale * sigma, unit))
+        return words.format(size_words(scale * value, scale * sigma, unit))
     if name in PLACES:
         farther = PLACES[name][int(value < 0)]
-        size = _size(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
+        size = size_words(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
         return (
             f"the transmitter sits {size} {farther} than mbes.projector_offset_m says (null: where the receiver is), "
             "in the sonar's own axes: measure it at the head, or find out to which point the head reduces its ranges"
         )
     if name.startswith("laser_rotation"):
-        angle = _size(np.degrees(value), np.degrees(sigma), "°")
+        angle = size_words(np.degrees(value), np.degrees(sigma), "°")
         return f"laser.mount: it should be turned by {angle} about body {name[-1]} ({AXES[name[-1]]} of the boat)"
     if name.startswith("face_"):
-        shift = _size(1e3 * value, 1e3 * sigma, "mm")
+        shift = size_words(1e3 * value, 1e3 * sigma, "mm")
         face = name.removeprefix("face_")
         return f"the target: face {face} stands out by {shift}; survey it, and give it in as_built.faces"
     if name.startswith("laser_lever_arm"):
-        return f"laser.mount: {name[-1]}_m should be {_size(1e3 * value, 1e3 * sigma, 'mm')} more"
+        return f"laser.mount: {name[-1]}_m should be {size_words(1e3 * value, 1e3 * sigma, 'mm')} more"
     return _words_of_wet_faces(name, value, sigma)
 
 
@@ -85,16 +85,16 @@ def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
     family, _, kind = name.removeprefix("wet_").replace("_turn_", "_turn ").rpartition("_")
     faces = FACES_OF_FAMILY.get(family, f"of {family}")
     if kind.startswith("turn"):
-        angle = _size(np.degrees(value), np.degrees(sigma), "°")
+        angle = size_words(np.degrees(value), np.degrees(sigma), "°")
         return f"the target: its wet faces {faces} are turned by {angle} against the dry ones"
-    shift = _size(1e3 * value, 1e3 * sigma, "mm")
+    shift = size_words(1e3 * value, 1e3 * sigma, "mm")
     if kind == "bow":
         return f"the target: its wet faces {faces} are bowed outward, by {shift} at half depth; survey them"
     verb = "lie higher" if family == "H" else "stand off"
     return f"the target: its wet faces {faces} {verb} by {shift}; check its shape in the config, and its survey"
 
 
-def _size(value: float, sigma: float, unit: str) -> str:
+def size_words(value: float, sigma: float, unit: str) -> str:
     """Return a value and its sigma as text, with as many decimals as the first digit of the sigma has."""
     digits = max(0, -int(np.floor(np.log10(max(sigma, 1e-9)))))
     gap = "" if unit == "°" else " "

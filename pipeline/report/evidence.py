@@ -47,9 +47,3 @@ class Evidence:
     groups: Annotated[pd.DataFrame, GROUPS]
     summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
     corrections: Annotated[pd.DataFrame | None, CORRECTIONS] = None
-
-    @property
-    def fixed(self) -> dict[str, float]:
-        """Mount parameters that the adjustment fixed, each with the sigma that it would have had (degrees or m)."""
-        rows = self.geometry[self.geometry["kind"] == "held"]
-        return dict(zip(rows["words"].tolist(), rows["sigma"].tolist(), strict=True))

@@ -9,15 +9,15 @@ from pipeline.report.reason_codes import ReasonCode, Statement
 
 
 def sigmas_above_limit(
-    sigmas: Mapping[str, float] | None, limits: VerdictLimits, fixed: Collection[str]
+    sigmas: Mapping[str, float] | None, limits: VerdictLimits, held: Collection[str]
 ) -> list[Statement]:
-    """Return a reason for each estimated mount parameter whose total sigma is above its limit.
+    """Return a reason for each mount parameter whose total sigma is above its limit.
 
     Parameters
     ----------
     sigmas : total sigmas by setting, degrees and m; None if the adjustment has none
     limits : limits of the total sigmas
-    fixed : names of the parameters that were fixed
+    held : names of the parameters that may be above it
     """
     if sigmas is None:
         return [Statement(ReasonCode.NO_COVARIANCE, "the adjustment has no covariance")]
@@ -29,7 +29,7 @@ def sigmas_above_limit(
             f"{bounds[unit][0]:g}{bounds[unit][1]}",
         )
         for name, place, key, unit in PARAMETERS
-        if name not in fixed and not sigmas[key] <= bounds[unit][0]
+        if name not in held and not sigmas[key] <= bounds[unit][0]
     ]
 
 

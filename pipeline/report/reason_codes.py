@@ -32,7 +32,8 @@ class ReasonCode(StrEnum):
     NO_RESULT = "no_result", "the adjustment has no result"
     NOT_CONVERGED = "not_converged", "the adjustment did not converge"
     TOO_FEW_SOUNDINGS = "too_few_soundings", "a family of faces has too few soundings for its labels to be trusted"
-    NO_PARAMETER_ESTIMABLE = "no_parameter_estimable", "all six mount parameters had to be fixed"
+    NO_PARAMETER_ESTIMABLE = "no_parameter_estimable", "no mount parameter of the laser is good enough"
+    COARSE_MOUNT_CONTRADICTED = "coarse_mount_contradicted", "the points contradict the laser's coarse mount"
     NO_COVARIANCE = "no_covariance", "the adjustment has no covariance"
     SIGMA_ABOVE_LIMIT = "sigma_above_limit", "the total sigma of a mount parameter is above verdict's limit"
     ESTIMATE_OFF_SETTINGS = "estimate_off_settings", "a parameter of adjust.free is significantly not as configured"
@@ -88,12 +89,12 @@ class Statement:
     words: str
 
 
-def verdict_in_words(verdict: str, fixed: Collection[str] = ()) -> str:
-    """Return the verdict in words; ``fixed``: mount parameters that an accepted calibration did not estimate.
+def verdict_in_words(verdict: str, held: Collection[str] = ()) -> str:
+    """Return the verdict in words; ``held``: mount parameters for which an accepted calibration is not good enough.
 
     >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
     ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
     """
-    if verdict != "accepted" or not fixed:
+    if verdict != "accepted" or not held:
         return verdict
-    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in fixed)}"
+    return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in held)}"

@@ -1,6 +1,6 @@
 """The parts of a report that depend on which sensor is calibrated."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,6 +24,7 @@ class SensorReport:
     methods : blocks of calibration.json by method; the adjustment is always among them
     method : the method that is the result
     search : the search for its provisional mount
+    held : mount parameters of a laser that are not good enough
     sides : name of the setting of the target's left and right, in words
     advice : weaknesses of the geometry and their remedy, in words
     result_keys : keys of calibration.json that follow ``result``
@@ -40,6 +41,7 @@ class SensorReport:
     sides: str
     advice: str
     result_keys: Mapping[str, Any]
+    held: Collection[str] = ()
     data_keys: Mapping[str, Any] = field(default_factory=dict)
     instruments: Mapping[str, Laser | Mbes] = field(default_factory=dict)
     pass_warnings: tuple[Statement, ...] = ()

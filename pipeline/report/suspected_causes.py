@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.maths.adjustment.mean_tests import joint_limit
+from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.cause_words import words_of
 from pipeline.report.reason_codes import ReasonCode, Statement
 
@@ -60,9 +61,11 @@ def significance_limit(freed: pd.DataFrame, level: float) -> float:
 def suspected_causes(freed: pd.DataFrame, level: float) -> list[SuspectedCause]:
     """Return the suspected causes from table ``freed``, the one with the largest value over sigma first.
 
-    There are none unless the residuals contradict at least one parameter that ``adjust.free`` does not name.
+    There are none unless the residuals contradict at least one parameter that ``adjust.free`` does not name. A coarse
+    mount that is an observation is judged by itself (:mod:`~pipeline.report.coarse_mount`).
     """
-    limit, tested = significance_limit(freed, level), freed[~freed["estimated"]].to_dict("records")
+    limit = significance_limit(freed, level)
+    tested = freed[~freed["estimated"] & ~freed["unknown"].isin(MOUNT_NAMES)].to_dict("records")
     if not any(abs(row["value"]) > limit * row["expected"] for row in tested):
         return []
     causes = [

@@ -14,10 +14,11 @@ The limits are defined at these places (paths from ``pipeline/``):
 * the mount from parts of the session: ``test_level`` of class ``Adjust``, ``APART_M`` of adjustment/parts.py, and
   ``SAME`` of maths/adjustment/parts.py;
 * drift of the INS, beside deviating residuals or a suspected cause: ``MAX_DRIFT_RATIO`` of drift_check.py;
-* suspected causes, and estimates off their settings: ``test_level`` of class ``Adjust``;
+* suspected causes, estimates off their settings, a contradicted coarse mount of the laser: ``test_level`` of class
+  ``Adjust``;
 * total sigmas, and difference of a patent's form from the adjustment: ``max_sigma_deg`` and ``max_sigma_m`` of class
   ``VerdictLimits`` of config/pool.py;
-* all six mount parameters of the laser fixed: ``hold_share`` of class ``LaserFit`` of config/pool.py, and the limits of
+* no mount parameter of the laser good enough: ``hold_share`` of class ``LaserFit`` of config/pool.py, and the limits of
   the total sigmas;
 * result and convergence of a patent's form: classes ``FitPlanes``, ``AngleIterate`` and ``Offsets`` of config/pool.py.
 
@@ -27,7 +28,7 @@ planning/observability.py.
 ``MAX_DRIFT_M`` and ``SAME_STEP_DEG`` of residual_words.py only change the words of a reason.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,6 +38,7 @@ from pipeline.config.pool import Method, VerdictLimits
 from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.ambiguities import MountSearch, ambiguities
+from pipeline.report.coarse_mount import contradicted_coarse_mount
 from pipeline.report.evidence import Evidence
 from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit
 from pipeline.report.part_checks import disagreeing_parts
@@ -62,6 +64,7 @@ class Criteria:
     search : the search for the provisional mount
     shape : names of the settings of the target's shape, in words
     sides : name of the setting of the target's left and right, in words
+    held : mount parameters of a laser that need not be good enough, as long as others are
     """
 
     limits: VerdictLimits
@@ -71,6 +74,7 @@ class Criteria:
     search: MountSearch
     shape: str
     sides: str = "the target's left and right"
+    held: Collection[str] = ()
 
 
 def rejections(
@@ -111,10 +115,11 @@ def rejections(
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
     reasons += _estimates_off_settings(evidence.freed, criteria.test_level)
-    if len(evidence.fixed) == len(PARAMETERS):
-        words = "no mount parameter can be estimated: this target and these passes determine none within its limit"
+    reasons += contradicted_coarse_mount(evidence.freed, criteria.test_level)
+    if len(criteria.held) == len(PARAMETERS):
+        words = "no mount parameter is good enough: none is within its limit and better than the coarse mount"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
-    reasons += sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, evidence.fixed)
+    reasons += sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held)
     if criteria.method != "adjustment" and evidence.corrections is not None:
         row = evidence.corrections.set_index("method").loc[criteria.method]
         reasons += patent_reasons(criteria.method, row, methods, criteria.limits)

@@ -16,20 +16,20 @@ SIGMAS_IN_WORDS = {
         "total: with the systematic errors of the laser's mount, ranges, sound speed, clocks, target. Use the total.",
     ),
     "laser": (
-        "sigma: the random part, from the noise of the laser and the INS and the target's own uncertainty.",
-        "total: with the systematic errors of ranges, clock and fixed parameters. Use the total.",
+        "sigma: the random part, from the noise of the laser and the INS.",
+        "total: with the uncertainty of target and coarse mount, and the errors of ranges and clock. Use the total.",
     ),
 }
 
 
 def summary(calibration: Mapping[str, Any]) -> str:
     """Return the result as text for the screen, from the content of calibration.json."""
-    fixed = calibration.get("held", {})
-    verdict, colon, estimated = verdict_in_words(calibration["verdict"], fixed).partition(": ")
-    lines = [f"{calibration['session']}: {verdict.upper()}{colon}{estimated}"]
+    held = calibration.get("held", {})
+    verdict, colon, good = verdict_in_words(calibration["verdict"], held).partition(": ")
+    lines = [f"{calibration['session']}: {verdict.upper()}{colon}{good}"]
     rejected = calibration["verdict"] == "rejected"
     lines += [f"  because {reason}" for reason in calibration["reasons"]]
-    lines += [f"  not estimated, fixed at the coarse value: {', '.join(fixed)}"] if colon else []
+    lines += [f"  not good enough: {', '.join(held)}"] if colon else []
     lines += [f"  warning: {warning}" for warning in calibration["warnings"]]
     sensor = calibration.get("calibrated", "mbes")
     lines += ["", *_mount_table(calibration, sensor)]
@@ -51,7 +51,7 @@ def summary(calibration: Mapping[str, Any]) -> str:
 
 def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
     """Return the text lines of the mount's table: coarse and calibrated values, their differences and sigmas."""
-    block, coarse, fixed = calibration[sensor], calibration["coarse"]["mount"], calibration.get("held", {})
+    block, coarse = calibration[sensor], calibration["coarse"]["mount"]
     rows = []
     for parameter, _, key, unit_of_setting in PARAMETERS:
         unit = "°" if unit_of_setting == "deg" else unit_of_setting
@@ -62,8 +62,6 @@ def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
         sigma, sigma_total = (
             f"{block[name][key]:.4f} {unit}" if block[name] else "-" for name in ("sigma_mount", "sigma_mount_total")
         )
-        if parameter in fixed:
-            change, sigma = "fixed", "-"
         rows.append((parameter, f"{coarse[key]:.4f} {unit}", total, change, sigma, sigma_total))
     computed = "computed" if calibration["verdict"] == "rejected" else "calibrated"
     result = f"(result: {calibration['result']})"

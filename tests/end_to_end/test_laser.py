@@ -44,7 +44,7 @@ def mount(place: Place) -> dict[str, float]:
 
 def test_the_mount_found_goes_into_the_session_and_from_there_into_the_sonars_total(laser: Place) -> None:
     truth = json.loads(laser.template.with_name("session.truth.json").read_text())["laser"]["mount"]
-    before = (laser.session / "session.yaml").read_bytes()
+    before, coarse = (laser.session / "session.yaml").read_bytes(), mount(laser)
     told = calibrate(laser)
     assert told.status == 0, told.err + told.out
     assert "laser mount" in told.out
@@ -58,6 +58,14 @@ def test_the_mount_found_goes_into_the_session_and_from_there_into_the_sonars_to
     assert (given.mount_origin.method, given.mount_origin.held) == ("fine", ())
     block = json.loads((laser.run / "report" / "calibration.json").read_text())["laser"]
     np.testing.assert_allclose(given.mount_covariance, block["covariance_total"], rtol=1e-8)
+    assert given.mount_origin.coarse is not None
+    assert given.mount_origin.coarse.mount.model_dump() == coarse
+    assert given.mount_origin.coarse.covariance is None
+    assert calibrate(laser, "--no-write").status == 0  # the same passes again: their information does not count twice
+    again = json.loads((laser.run / "report" / "calibration.json").read_text())["laser"]
+    sigma = np.sqrt(np.diag(block["covariance_total"]))
+    np.testing.assert_allclose(np.sqrt(np.diag(again["covariance_total"])), sigma, rtol=0.01)
+    assert np.all(np.abs(np.subtract(again["lever_arm_m"], block["lever_arm_m"])) < 0.1 * sigma[3:])
     sonar = Place(laser.session, laser.folder / "sonar")
     sonar.folder.mkdir()
     sonar.mend()
@@ -75,7 +83,7 @@ def test_nothing_is_written_where_it_is_only_looked_at_or_rejected(laser: Place)
     laser.edit_config("verdict", max_sigma_deg=1e-6, max_sigma_m=1e-7)
     told = calibrate(laser)
     assert told.status == 1
-    assert "no mount parameter can be estimated" in told.out
+    assert "no mount parameter is good enough" in told.out
     assert (laser.session / "session.yaml").read_bytes() == before
     assert not (laser.session / "session.1.yaml").exists()
 
@@ -116,12 +124,19 @@ def test_its_page_and_recordings_show_the_laser_alone(laser: Place) -> None:
     found = ", ".join(name for name in ("roll", "pitch", "yaw", "x", "y", "z") if name not in held)
     assert (result["verdict"], result["verdict_in_words"]) == ("accepted", f"accepted in part: {found}")
     for said in (told.out, text(read(laser.run, "report"), "/tables/summary")):
-        assert f": ACCEPTED IN PART: {found}\n  not estimated, fixed at the coarse value: {', '.join(held)}\n" in said
+        assert f": ACCEPTED IN PART: {found}\n  not good enough: {', '.join(held)}\n" in said
     (shown,) = [attributes["class"] for attributes in page.named("span") if attributes.get("class") in BADGES]
     assert shown == "part"
     assert f"accepted in part: {found}" in page.text
-    assert f"Not estimated, but fixed at the coarse value: {', '.join(held)}." in page.text
-    assert "fixed at the coarse value" in page.text
+    assert f"Not good enough: {', '.join(held)}." in page.text
+    assert "above the verdict's limits" in page.text
+    rows = page.table("", "roll, °", "pitch, °", "yaw, °", "x, mm", "y, mm", "z, mm")
+    sources = {row[0] for row in rows}
+    assert {"the target's design: directions, distances, parallel faces", "the coarse mount"} <= sources
+    sigma = result["laser"]["sigma_total"]
+    expected = np.r_[np.array(sigma["rotation_vector_deg"])[[1, 0, 2]], 1000 * np.array(sigma["lever_arm_m"])]
+    parts = np.array([row[1:] for row in rows], dtype=float)
+    np.testing.assert_allclose(np.sqrt((parts**2).sum(axis=0)), expected, rtol=0.01, atol=0.0002)
     for word in ("Three ways", "Agreement of the planes", "soundings on"):
         assert word not in page.text
     assert sorted(path.stem for path in laser.run.glob("*/*.rrd")) == sorted(STAGES)

@@ -11,7 +11,8 @@ from pipeline.adjustment.pattern_tests import passes_test, pattern_tests
 from pipeline.config.pool import VerdictLimits
 from pipeline.config.session import Drift
 from pipeline.maths.adjustment.mean_tests import joint_limit
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
+from pipeline.report.coarse_mount import share_of_coarse_mount
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.verdict import rejections
@@ -21,6 +22,7 @@ from tests.support.evidence import (
     OFF,
     PASS_3,
     SEARCH,
+    SIGMA,
     codes,
     drift,
     evidence,
@@ -68,11 +70,46 @@ def test_sigmas_are_held_to_both_limits():
     assert [reason.words.split(" is ")[0] for reason in reasons] == ["total sigma of yaw", "total sigma of lever arm y"]
 
 
-def test_what_is_fixed_needs_no_sigma_but_all_six_are_too_many():
+def test_a_laser_may_be_good_enough_in_part_but_not_in_none():
     narrow = replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=LIMITS[1][0], max_sigma_m=LIMITS[1][1]))
-    assert judged(evidence(fixed=["yaw", "y"]), narrow) == []
+    assert judged(evidence(), replace(narrow, held=["yaw", "y"])) == []
     everything = [name for name, *_ in PARAMETERS]
-    assert codes(judged(evidence(fixed=everything), narrow)) == [ReasonCode.NO_PARAMETER_ESTIMABLE]
+    assert judged(evidence(), replace(narrow, held=everything[1:])) == []
+    assert codes(judged(evidence(), replace(narrow, held=everything))) == [ReasonCode.NO_PARAMETER_ESTIMABLE]
+
+
+@pytest.mark.parametrize("value", [-3.30e-3, -3.28e-3, 3.28e-3, 3.30e-3])
+def test_a_coarse_mount_is_contradicted_from_the_limit_of_all_tests_on(value):
+    """3.29 sigmas of a single test; it is then the reason, and no likely cause of residuals."""
+    freed = {"unknown": "rotation_z", "value": value, "sigma": 1e-4, "expected": 1e-3}
+    expected = [ReasonCode.COARSE_MOUNT_CONTRADICTED] if abs(value) > 3.29e-3 else []
+    assert codes(judged(evidence(freed=freed))) == expected
+
+
+def test_of_a_contradicted_coarse_mount_the_value_farthest_off_comes_first():
+    wrong = [("rotation_z", 0.005), ("lever_arm_y", -0.009), ("rotation_x", 0.0035)]
+    row = {"estimated": False, "sigma": 5e-4, "expected": 1e-3}
+    freed = pd.DataFrame([row | {"unknown": name, "value": value} for name, value in wrong])
+    (reason,) = judged(replace(evidence(), freed=freed))
+    assert "moved by -9.0 ± 0.5 mm along body y, 9.0 times" in reason.words
+    assert "; beyond the limit of 3.6 as well: yaw; " in reason.words
+
+
+@pytest.mark.parametrize(
+    ("sigma_deg", "coarse_deg", "above", "unimproved"),
+    [(0.049, 0.1, False, False), (0.051, 0.103, True, False), (0.049, 0.097, False, True), (0.051, 0.1, True, True)],
+)
+def test_a_value_is_good_within_its_limit_and_well_below_its_coarse_sigma(sigma_deg, coarse_deg, above, unimproved):
+    """Both sides of a limit of 0.05° and of half the coarse sigma, about body z; all others are good."""
+    total = dict.fromkeys(MOUNT_NAMES, 1e-6) | {"rotation_z": np.radians(sigma_deg)}
+    coarse = dict.fromkeys(MOUNT_NAMES, 1.0) | {"rotation_z": np.radians(coarse_deg)}
+    estimate = pd.DataFrame({"unknown": list(total), "sigma_total": list(total.values())})
+    freed = pd.DataFrame({"unknown": list(coarse), "considered": list(coarse.values())})
+    share = share_of_coarse_mount(SIGMA | {"yaw_deg": sigma_deg}, estimate, freed, VerdictLimits(), 0.5)
+    assert (list(share.above_limit), list(share.unimproved)) == (["yaw"] * above, ["yaw"] * unimproved)
+    assert share.held == ({"yaw": sigma_deg} if above or unimproved else {})
+    assert [words in share.advice for words in ("above the verdict", "than the coarse mount")] == [above, unimproved]
+    assert share_of_coarse_mount(None, estimate, freed, VerdictLimits(), 0.5).held == {}
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 from pipeline.config.pool import VerdictLimits
 from pipeline.config.references import CastUsed
 from pipeline.config.session import Drift, Mbes
+from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import deviations_from_design
 from pipeline.report.calibration_document import statement_lists
 from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
@@ -63,6 +64,11 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         ),
         ReasonCode.NO_COVARIANCE,
         "the adjustment has no covariance",
+    ),
+    (
+        lambda: judged(evidence(), replace(ADJUSTED, held=[name for name, *_ in PARAMETERS])),
+        ReasonCode.NO_PARAMETER_ESTIMABLE,
+        "no mount parameter is good enough: none is within its limit and better than the coarse mount",
     ),
     (
         lambda: judged(evidence(), replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=0.0059, max_sigma_m=1.0))),

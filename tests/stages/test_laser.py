@@ -1,4 +1,4 @@
-"""The laser's own calibration through its stages: results, fixed parameters, refusals."""
+"""The laser's own calibration through its stages: results, what rests on the coarse mount, refusals."""
 
 import json
 from typing import Any
@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.adjustment.laser_design import coarse_covariance, required_sigmas
+from pipeline.adjustment.laser_design import coarse_mount
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
-from pipeline.config.stage_settings import laser_calibration, settings_by_name, stage_config
+from pipeline.config.stage_settings import LaserPrior, narrow, settings_by_name, stage_config
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
-from pipeline.maths.adjustment.solution import parameters_to_fix
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.mount import Mounted, mount_of
 from pipeline.simulation.scenario import Scenario
@@ -72,25 +71,23 @@ def test_a_mount_wrong_by_three_tenths_of_a_degree_and_3_cm_comes_back(drift: di
         assert np.all(np.abs(error) < np.r_[[np.radians(0.01)] * 3, [0.01] * 3])  # of 0.3° and 3 cm
 
 
-def test_what_cannot_be_given_is_held_at_its_coarse_value_and_named() -> None:
+def test_what_the_session_determines_badly_is_estimated_and_named() -> None:
     session = made(OFF, DRIFT, seed=2)
-    found = calibrated(session, laser_fit=EXACT)
-    result = result_of(found)
-    assert result["verdict"] == "accepted", result["reasons"]
-    assert list(result["held"]) == ["yaw", "x", "y", "z"]
-    assert 0.05 < result["held"]["yaw"] < 0.2
-    assert all(0.005 < result["held"][name] < 0.05 for name in "xyz")
+    result = result_of(calibrated(session, laser_fit=EXACT))
+    assert result["verdict_in_words"] == "accepted in part: roll, pitch", result["reasons"]
+    block = result["laser"]
+    sigmas = block["sigma_mount_total"]
+    assert result["held"] == {"yaw": sigmas["yaw_deg"]} | {name: sigmas[f"{name}_m"] for name in "xyz"}
+    assert result["rests_on_coarse"] == []
     assert "yaw (±" in result["geometry"]["advice"]
-    coarse, total = session.session["laser"]["mount"], result["laser"]["mount"]
-    for key in ("x_m", "y_m", "z_m"):
-        assert total[key] == pytest.approx(coarse[key], abs=1e-12)
-    sigma = np.sqrt(np.diag(result["laser"]["covariance_total"]))
-    assert sigma[2] == pytest.approx(np.radians(0.5))
-    assert sigma[3:] == pytest.approx([0.05] * 3)
-    covariance = np.array(result["laser"]["covariance"])
-    assert not covariance[2:].any()
+    total, noise = (np.array(block[key]) for key in ("covariance_total", "covariance"))
+    sigma = np.sqrt(np.diag(total))
+    assert np.all(sigma[3:] > 0.005)
+    assert np.all(sigma < 0.5 * np.repeat([np.radians(0.5), 0.05], 3))  # of the coarse mount
     error = errors(result, session.truth)
-    assert np.all(np.abs(error[:2]) < 3.5 * sigma[:2])
+    assert error @ np.linalg.solve(total, error) < 22.5  # 99.9 % of six degrees of freedom
+    assert total[2, 4] < -0.15 * sigma[2] * sigma[4]  # all six with each other: yaw and y
+    assert np.linalg.eigvalsh(total - noise).min() > -1e-12
 
 
 def test_a_surveyed_target_and_a_steady_ins_give_all_six() -> None:
@@ -114,7 +111,10 @@ def test_a_surveyed_origin_that_is_wrong_is_seen_in_the_lever_arm() -> None:
 def test_a_target_out_of_plumb_within_its_sigma_keeps_the_errors_within_theirs() -> None:
     session = made(OFF, DRIFT, {"surroundings": {"tilt_deg": [0.03, -0.03]}}, seed=2)
     honest = result_of(calibrated(session, laser_fit={"plumb_sigma_deg": 0.03}))
-    assert np.all(np.abs(errors(honest, session.truth)[:2]) < 3.5 * np.sqrt(np.diag(honest["laser"]["covariance"]))[:2])
+    total, noise = (np.sqrt(np.diag(honest["laser"][key]))[:2] for key in ("covariance_total", "covariance"))
+    assert np.all(np.abs(errors(honest, session.truth)[:2]) < 3.5 * total)
+    assert np.all(total > np.radians(0.03))
+    assert np.all(noise < np.radians(0.02))  # the target's own sigmas are no noise
 
 
 def test_a_mount_far_off_is_refused() -> None:
@@ -123,50 +123,81 @@ def test_a_mount_far_off_is_refused() -> None:
     assert result["verdict"] == "rejected"
 
 
-def test_what_a_fine_calibration_held_keeps_its_surveyed_sigma() -> None:
-    session = made(OFF, DRIFT, seed=2)
-    six = np.diag([1e-6, 1e-6, 1e-6, 4e-6, 4e-6, 4e-6]).tolist()
-    origin = {"file": "a", "sha256": "0" * 64, "date": "2026-05-12", "software": "poolcal"}
-    laser = parse(SessionConfig, session.session, "session").laser
-    fit = parse(PoolConfig, session.pool, "pool").laser_fit
-    for more, expected in (
+SIX = np.diag([1e-6, 1e-6, 1e-6, 4e-6, 4e-6, 4e-6])
+ORIGIN = {"file": "a", "sha256": "0" * 64, "date": "2026-05-12", "software": "poolcal"}
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
         ({"method": "coarse"}, [1e-6] * 3 + [4e-6] * 3),
         ({"method": "fine", "held": ["x", "y", "z"]}, [np.radians(0.5) ** 2] * 3 + [4e-6] * 3),
-    ):
-        content = laser.model_dump(mode="json") | {"mount_covariance": six, "mount_origin": origin | more}
-        told = parse(type(laser), content, "laser")
-        assert np.diag(coarse_covariance(told, fit)) == pytest.approx(expected)
-    result = result_of(calibrated(session, {"mount_covariance": six, "mount_origin": origin | {"method": "coarse"}}))
-    assert {"x", "y", "z"} <= set(result["held"])
-    assert np.sqrt(np.diag(result["laser"]["covariance_total"]))[3:] == pytest.approx([0.002] * 3)
+        ({"method": "fine", "held": ["x"], "coarse": True}, [9e-6] * 3 + [1e-6] * 3),
+        ({"method": "fine", "coarse": False}, [np.radians(0.5) ** 2] * 3 + [0.05**2] * 3),
+    ],
+    ids=["surveyed", "by an older version", "from a survey", "from the pool's sigmas"],
+)
+def test_no_data_count_twice_after_a_fine_calibration(more: dict[str, Any], expected: list[float]) -> None:
+    """The coarse mount is that of the survey, wherever the adjustment starts."""
+    session = made(OFF, DRIFT, seed=2)
+    laser = parse(SessionConfig, session.session, "session").laser
+    fit = narrow(LaserPrior, parse(PoolConfig, session.pool, "pool").laser_fit)
+    mount = laser.mount
+    if "coarse" in more:
+        mount = mount.model_copy(update={"z_m": 0.7})
+        covariance = {"covariance": np.diag(expected).tolist()} if more["coarse"] else {}
+        more = more | {"coarse": {"mount": mount.model_dump()} | covariance}
+    content = laser.model_dump(mode="json") | {"mount_covariance": SIX.tolist(), "mount_origin": ORIGIN | more}
+    mounted, found = coarse_mount(parse(type(laser), content, "laser"), fit)
+    assert mounted.settings() == pytest.approx(mount.model_dump())
+    assert np.diag(found) == pytest.approx(expected)
 
 
-def test_the_worst_is_held_first_and_what_is_left_is_surer() -> None:
-    normal = np.diag([1e8, 1e8, 1e8, 1e6, 1e6, 1e6]).astype(float)
-    normal[3, 4] = normal[4, 3] = 0.999999999e6  # x and y nearly the same
-    held = parameters_to_fix(normal, range(6), np.repeat([1e-3, 0.005], 3))
-    assert len(held) == 1
-    assert next(iter(held)) in (3, 4)
-    assert parameters_to_fix(np.diag([1e8] * 3 + [1e6] * 3), range(6), np.repeat([1e-3, 0.005], 3)) == {}
+def test_a_coarse_mount_that_the_points_contradict_is_refused_and_named() -> None:
+    """Wrong by 0.3° and stated with 0.057°; with its true sigma the same session is accepted (above)."""
+    session = made(OFF, DRIFT, seed=2)
+    given = {"mount_covariance": SIX.tolist(), "mount_origin": ORIGIN | {"method": "coarse"}}
+    found = calibrated(session, given, laser_fit=EXACT)
+    result = result_of(found)
+    assert result["reason_codes"] == ["coarse_mount_contradicted"]
+    rows = found["adjust/freed"].set_index("unknown")
+    coarse = mount_of(parse(SessionConfig, session.session, "session").laser.mount)
+    wrong = rotation_error(session.truth["laser"]["R_body_from_laser"], coarse.R_body_from_sensor)
+    for name, error in zip(("rotation_x", "rotation_y"), wrong, strict=False):
+        row = rows.loc[name]
+        assert abs(row["value"] - error) < 4 * row["sigma"], name
+        assert np.hypot(row["sigma"], 1e-3) <= row["expected"] < 1.1e-3  # with the systematic errors
+    (reason,) = result["reasons"]
+    first = max(("rotation_x", "rotation_y"), key=lambda name: abs(rows.loc[name, "value"]))
+    size = f"turned by {np.degrees(rows.loc[first, 'value']):+.3f} ± "
+    assert size in reason, reason
+
+
+def test_a_good_survey_is_hardly_improved_and_said_to_be_what_the_values_rest_on() -> None:
+    slight = {"laser": {"coarse_angle_deg": 0.03, "coarse_lever_m": 0.002}, "mbes": {"ping_rate_hz": 0.5}}
+    session = made(slight, DRIFT, seed=2)
+    given = {"mount_covariance": SIX.tolist(), "mount_origin": ORIGIN | {"method": "coarse"}}
+    result = result_of(calibrated(session, given, laser_fit=EXACT))
+    assert result["verdict_in_words"] == "accepted in part: roll, pitch", result["reasons"]
+    assert result["rests_on_coarse"] == list(result["held"]) == ["yaw", "x", "y", "z"]
+    assert "not clearly better than the coarse mount" in result["geometry"]["advice"]
+    sigma = np.sqrt(np.diag(result["laser"]["covariance_total"]))
+    assert np.all(sigma[3:] <= 0.002)
+    assert np.all(sigma[3:] > 0.0018)
+    assert np.all(np.abs(errors(result, session.truth)) < 3.5 * sigma)
 
 
 def test_what_is_calibrated_is_the_sonar_or_the_laser() -> None:
-    """Without a sonar the verdict's limits go with ``laser_fit``; with one a changed limit adjusts nothing anew."""
+    """Without a sonar the prior information of ``laser_fit`` counts; limits of the verdict adjust nothing anew."""
     session = made(OFF, seed=2)
     both = parse(SessionConfig, session.session, "session")
     alone = both.model_copy(update={"mbes": None})
     pool = parse(PoolConfig, session.pool | {"verdict": WIDE}, "pool")
     of_sonar, of_laser = (stage_config(adjust.Config, settings_by_name(pool, given)) for given in (both, alone))
-    assert of_sonar.calibration is both.mbes
-    assert of_sonar.laser_fit is None
-    assert of_laser.calibration == laser_calibration(pool)
-    assert (of_laser.calibration.max_sigma_deg, of_laser.calibration.max_sigma_m) == tuple(WIDE.values())
-
-
-def test_bounds_are_the_stricter_of_verdict_and_coarse() -> None:
-    config = parse(PoolConfig, made(OFF, seed=2).pool, "pool")
-    bounds = required_sigmas(np.diag([1e-8] * 3 + [1.0] * 3), laser_calibration(config))
-    assert bounds == pytest.approx([0.5e-4] * 3 + [0.005] * 3)
+    assert (of_sonar.mbes, of_sonar.laser_fit) == (both.mbes, None)
+    assert (of_laser.mbes, of_laser.laser_fit) == (None, narrow(LaserPrior, pool.laser_fit))
+    usual = parse(PoolConfig, session.pool | {"laser_fit": {"hold_share": 0.9}}, "pool")
+    assert stage_config(adjust.Config, settings_by_name(usual, alone)) == of_laser
 
 
 def test_the_dock_gives_the_lasers_angles_as_well() -> None:

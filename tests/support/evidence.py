@@ -42,7 +42,6 @@ def evidence(
     freed: Mapping[str, Any] | None = None,
     patterns: Sequence[Mapping[str, Any]] = ({},),
     parts: Mapping[str, Any] | None = None,
-    fixed: Sequence[str] = (),
     count: int = 500,
 ) -> Evidence:
     """Tables of a session that is accepted, with changes to their rows."""
@@ -68,7 +67,7 @@ def evidence(
     nothing = {"unknown": "sound_speed", "estimated": False, "known": False}
     nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
-    geometry = [("remedy", "two more passes at 3 m would do", 0.0)] + [("held", name, 0.1) for name in fixed]
+    geometry = [("remedy", "two more passes at 3 m would do")]
     tables: dict[str, Any] = {field.name: pd.DataFrame() for field in fields(Evidence)}
     part: dict[str, Any] = {"part": "without pass 2", "passes": "0 1 3", "normalised": 1.0, "dof": 6}
     for name in ("roll", "pitch", "yaw", "x", "y", "z"):
@@ -82,7 +81,7 @@ def evidence(
         "corrections": pd.DataFrame([row | dict(alternating or {})]),
         "summary": pd.DataFrame([summary_row | dict(summary or {})]),
         "cells": cells,
-        "geometry": pd.DataFrame(geometry, columns=["kind", "words", "sigma"]),
+        "geometry": pd.DataFrame(geometry, columns=["kind", "words"]),
         "freed": pd.DataFrame([nothing | dict(freed or {})]),
         "patterns": pd.DataFrame([pattern | {"normalised": 0.3} | dict(changes) for changes in patterns]),
     }

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.reason_codes import ReasonCode
 from tests.support.evidence import (
     OFF,
@@ -51,9 +50,15 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     ({"summary": {"converged": False}}, ReasonCode.NOT_CONVERGED, "the adjustment did not converge in 6 steps"),
     ({"count": -371}, ReasonCode.TOO_FEW_SOUNDINGS, "only 29 soundings lie on P2: too few to trust; sail so that"),
     (
-        {"fixed": [name for name, *_ in PARAMETERS]},
-        ReasonCode.NO_PARAMETER_ESTIMABLE,
-        "no mount parameter can be estimated: this target and these passes determine none within its limit",
+        {"freed": {"unknown": "rotation_z", "value": -0.0523, "sigma": 2e-3, "expected": 9e-3}},
+        ReasonCode.COARSE_MOUNT_CONTRADICTED,
+        "the points contradict the coarse mount: by them it should be turned by -3.0 ± 0.1° about body z (yaw), 5.8 "
+        "times what its sigma and noise allow; what rests on it is wrong, too: check it, or state how uncertain it is",
+    ),
+    (
+        {"freed": {"unknown": "lever_arm_x", "value": 0.3, "sigma": 0.02, "expected": 0.054}},
+        ReasonCode.COARSE_MOUNT_CONTRADICTED,
+        "by them it should be moved by +300 ± 20 mm along body x, 5.6 times what",
     ),
     (
         {"freed": {"unknown": "mbes_latency", "estimated": True, "value": 2.01e-3, "sigma": 3e-4, "expected": 5e-4}},

@@ -37,11 +37,10 @@ COVARIANCE = Artefact(
     ),
 )
 GEOMETRY = Artefact(
-    "adjust", "geometry", "table", "weaknesses of the passes, and a remedy; a laser's fixed mount parameters",
+    "adjust", "geometry", "table", "weaknesses of the passes, and a remedy; empty if the laser is calibrated",
     (
-        Column("kind", TEXT, "", "gap or remedy; held: a fixed mount parameter of a laser that is calibrated"),
-        Column("words", TEXT, "", "the gap or the remedy in words; held: name of the parameter"),
-        Column("sigma", F64, "deg or m", "held: standard deviation that an estimate would have had; else NaN"),
+        Column("kind", TEXT, "", "gap or remedy"),
+        Column("words", TEXT, "", "the gap or the remedy in words"),
     ),
 )
 PARTS = Artefact(
@@ -54,7 +53,7 @@ PARTS = Artefact(
         *(
             Column(f"{kind}_{name}", F64, "deg" if name in ("roll", "pitch", "yaw") else "m", words)
             for name in ("roll", "pitch", "yaw", "x", "y", "z")
-            for kind, words in (("change", "value of the part less that of the whole; NaN: the parameter is fixed"),
+            for kind, words in (("change", "value of the part less that of the whole"),
                                 ("sigma", "standard deviation of the change, with the consider parameters"))
         ),
     ),

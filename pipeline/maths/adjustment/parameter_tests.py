@@ -9,13 +9,17 @@ fixed parameters change the values by M x_h / M_ii. So if all a-priori errors ho
 which contains its own Q_ii. (An error of one parameter shows in the values of all that look alike. In a trial, ranges
 seemed wrong by 7 mm because those on horizontal faces were, within their own sigma.)
 
-A parameter i that is estimated with a value known beforehand, sigma q, has the estimate x_i and the variance C_ii.
-Without that prior information they would be
+Let parameters be estimated with values known beforehand, whose covariance is Q, P = Q⁻¹. The solution deviates by d
+from these values, their misclosure, with the covariance Q - C. The test of one pseudo-observation (Baarda 1968, "A
+testing procedure for use in geodetic networks") gives the error that value i would have if it alone were wrong, and
+the variance of that if all a-priori errors hold:
 
-    x_i / (1 - C_ii / q²),      C_ii / (1 - C_ii / q²),
+    (P d)_i / W_ii,      1 / W_ii,      W = P (Q - C) P = P - P C P.
 
-for information adds up: 1 / C_ii is that of the points, and 1 / q². This value is compared with 0 ± q; the errors of
-the fixed parameters add (S Q Sᵀ)_ii / (1 - C_ii / q²)² to its variance.
+1 / P_ii of this variance is due to the value itself, the rest to the points and the other values. For independent
+values with sigmas q, W_ii = (1 - C_ii / q²) / q², and the parameter would be d_i / (1 - C_ii / q²) without its prior
+information: information adds up. Errors x_h of the fixed parameters change d by S x_h, and so this by (P S x_h)_i /
+W_ii.
 """
 
 from dataclasses import dataclass
@@ -89,18 +93,20 @@ def prior_parameter_tests(
     deviation : (u,) array
         Deviations from the values known beforehand, after the solution's step.
     consider : ConsiderErrors
-        A-priori errors of the fixed parameters, and of these.
+        A-priori errors of the fixed parameters.
     numbers : (k,) array
-        The parameters; the values known beforehand are independent.
+        All parameters with a value known beforehand.
     """
-    S = solution.sensitivity_of(numbers)
-    others = np.einsum("ij,jk,ik->i", S, consider.covariance(solution.fixed), S)
-    places, tests = np.searchsorted(solution.estimated, numbers), []
-    for number, place, of_others in zip(numbers.tolist(), places.tolist(), others.tolist(), strict=True):
-        variance, information = float(solution.covariance[place, place]), float(solution.prior[place, place])
-        share = 1 - variance * information  # of the information on it that is due to the points
-        if share > KNOWN_SHARE:
-            expected = float(np.sqrt(variance / share + 1 / information + of_others / share**2))
-            value = float(deviation[number]) / share
-            tests.append(ParameterTest(number, value, float(np.sqrt(variance / share)), expected))
+    places = np.searchsorted(solution.estimated, numbers)
+    P, C = (matrix[np.ix_(places, places)] for matrix in (solution.prior, solution.covariance))
+    W, misclosure = P - P @ C @ P, P @ deviation[numbers]
+    effects = P @ solution.sensitivity_of(numbers)
+    others = np.einsum("ij,jk,ik->i", effects, consider.covariance(solution.fixed), effects)
+    tests = []
+    for k, number in enumerate(numbers.tolist()):
+        information, own = float(W[k, k]), float(P[k, k])
+        if information > KNOWN_SHARE * own:
+            expected = float(np.sqrt(1 / information + others[k] / information**2))
+            sigma = float(np.sqrt(max(1 / information - 1 / own, 0.0)))
+            tests.append(ParameterTest(number, float(misclosure[k]) / information, sigma, expected))
     return tests

@@ -50,7 +50,7 @@ def deviation(part: Solution, whole: Solution, consider: ConsiderErrors, mount: 
     consider : ConsiderErrors
         Errors of the fixed parameters, the same for both.
     mount : (m,) array
-        Numbers of the mount parameters that are estimated.
+        Numbers of the mount parameters.
     """
     change = part.step[mount] - whole.step[mount]
     Q = consider.covariance(whole.fixed)

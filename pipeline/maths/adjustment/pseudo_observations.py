@@ -37,6 +37,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
 
@@ -91,6 +92,14 @@ class ParameterPrior:
     numbers: Integers
     covariance: Array
     known: State
+
+    def with_independent(self, other: "ParameterPrior") -> "ParameterPrior":
+        """Return the prior information of these and of later parameters, whose errors are independent of these.
+
+        ``known`` of these must have the values of the others too.
+        """
+        numbers = np.concatenate([self.numbers, other.numbers])
+        return ParameterPrior(numbers, block_diag(self.covariance, other.covariance), self.known)
 
     def pseudo_observations(self, state: State) -> PseudoObservations:
         """Return the pseudo-observations of these values, at the current ones."""

@@ -7,8 +7,10 @@ Some parameters are *estimated* (f), the others *fixed* (h) at their values. Wit
 
 N contains prior information as well (:mod:`~pipeline.maths.adjustment.pseudo_observations`): N = N_points + P. Of the
 covariance C, the part C P C is due to errors of the prior information, so that the noise of the points alone gives
-C - C P C. Let a parameter i have a value known beforehand, with the sigma q, P_ii = 1 / q². An error h of that value
-changes the parameters by C_·i h / q².
+C - C P C. Let parameters have values known beforehand, with the covariance Q, P = Q⁻¹. Errors h of these values change
+the parameters by C P h. With any F for which F Fᵀ = P, C F Fᵀ C is their part C P C of the covariance: the columns of
+C F are effects of independent errors. Here F = D R^(1/2), D the roots of the diagonal of P and D R D = P; without
+correlations, this is the effect C_·i / q of one sigma q of each value.
 """
 
 from collections.abc import Sequence
@@ -22,7 +24,6 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, N_MOUNT
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 RANK_TOLERANCE = 1e-12  # eigenvalue of the scaled normal matrix, relative to the largest
-VAGUE = 10.0  # rad or m: prior sigma that stands for no prior information
 CORRELATION_LIMIT = float(np.sqrt(0.75))  # a correlation that doubles both sigmas
 
 
@@ -86,16 +87,22 @@ class Solution:
         C = self.covariance
         return self._among(C - C @ self.prior @ C, self.estimated if numbers is None else np.asarray(numbers))
 
-    def prior_effects(self, numbers: Integers) -> Array:
-        """Return the change (k, f) of parameters (k,) by one sigma of each estimated one's value known beforehand.
+    def prior_effects(self, numbers: Integers, known: Integers) -> Array:
+        """Return the change C F (k, m) of parameters by independent errors, of one sigma, of values known beforehand.
 
-        Zero for those without one. The values known beforehand are independent.
+        Parameters
+        ----------
+        numbers : (k,) array
+            Parameters, estimated.
+        known : (m,) array
+            All parameters with a value known beforehand, estimated.
         """
-        rows = np.zeros((len(numbers), len(self.estimated)))
-        for row, number in enumerate(np.asarray(numbers).tolist()):
-            if number in self.estimated:
-                rows[row] = self.covariance[int(np.searchsorted(self.estimated, number))]
-        return rows * np.sqrt(np.diag(self.prior))
+        rows, columns = (np.searchsorted(self.estimated, chosen) for chosen in (numbers, known))
+        P = self.prior[np.ix_(columns, columns)]
+        scale = np.sqrt(np.diag(P))
+        values, vectors = np.linalg.eigh(P / np.outer(scale, scale))
+        root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        return np.asarray(self.covariance[np.ix_(rows, columns)] @ (scale[:, None] * root))
 
     def group_effects(self, numbers: Integers, group: Integers) -> Array:
         """Return k changes (k, k) of parameters (k,) by independent errors in the prior information of a group.
@@ -179,36 +186,6 @@ def solve(normal: Array, right: Array, estimated: Sequence[int], prior: Array | 
         condition=float(largest / values[0]) if values[0] > 0 else np.inf,
         deficiency=int(is_open.sum()),
     )
-
-
-def parameters_to_fix(normal: Array, estimated: Sequence[int], required: Array) -> dict[int, float]:
-    """Return the mount parameters to fix, and the sigma that each would have had if it were estimated.
-
-    The worst parameter is fixed, and the rest is solved again: without one of a correlated pair the second can usually
-    be estimated.
-
-    Parameters
-    ----------
-    normal : (u, u) array
-        Normal matrix of all parameters.
-    estimated : sequence of int
-        Parameters that are to be estimated.
-    required : (6,) array
-        Sigmas required of the mount parameters.
-    """
-    fixed: dict[int, float] = {}
-    while len(fixed) < N_MOUNT:
-        left = [number for number in estimated if number not in fixed]
-        prior = np.zeros(len(normal))
-        prior[left] = VAGUE**-2
-        solution = solve(normal + np.diag(prior), np.zeros(len(normal)), left)
-        mount = [k for k in range(N_MOUNT) if k not in fixed]
-        sigma = np.sqrt(np.diag(solution.covariance))[: len(mount)]
-        worst = int(np.argmax(sigma / required[mount]))
-        if sigma[worst] <= required[mount[worst]]:
-            break
-        fixed[mount[worst]] = float(sigma[worst])
-    return fixed
 
 
 def correlated_pair(covariance: Array) -> tuple[int, int, float] | None:

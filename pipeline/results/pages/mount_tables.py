@@ -85,7 +85,7 @@ def part_rows(parts: Sequence[Row]) -> list[Row]:
 
 
 def parameter_rows(
-    table: pd.DataFrame, method: str, limits: VerdictLimits, fixed: Collection[str]
+    table: pd.DataFrame, method: str, limits: VerdictLimits, held: Collection[str]
 ) -> list[dict[str, Any]]:
     """Return one row for each mount parameter: values, sigmas, limit of the sigma, and 95 % interval.
 
@@ -97,8 +97,8 @@ def parameter_rows(
         The method of the result.
     limits
         The verdict's limits of the sigmas.
-    fixed
-        Names of the parameters that were not estimated.
+    held
+        Names of the parameters that are not good enough.
     """
     rows = table[table["method"] == method].to_dict("records")
     bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
@@ -106,7 +106,7 @@ def parameter_rows(
     return [
         {"name": row["parameter"], "words": f"{row['parameter']} ({POSITIVE[row['parameter']]})"}
         | {"limit": Quantity(bounds[row["unit"]], row["unit"])}
-        | {"sigma_in": "°" if row["unit"] == "deg" else "mm", "fixed": row["parameter"] in fixed}
+        | {"sigma_in": "°" if row["unit"] == "deg" else "mm", "held": row["parameter"] in held}
         | {key: Quantity(row[key], row["unit"]) for key in values}
         for row in rows
     ]

@@ -103,16 +103,16 @@ def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pict
 def _result_values(tables: Tables, result: Row, settings: Settings) -> Row:
     """Return the template's values about the mount and the target."""
     laser = settings.session.calibrated == "laser"
-    fixed = result.get("held", {})
+    held = result.get("held", {})
     passes, calibrations = tables.table(PASSES), tables.table(CALIBRATION)
     planes = [] if laser else plane_agreement_rows(tables)
     methods = [method for method in METHODS if method in result["methods"]]
     return {
-        "fixed": [] if result["reasons"] else list(fixed),
-        "verdict": verdict_in_words(result["verdict"], fixed),
+        "held": [] if result["reasons"] else list(held),
+        "verdict": verdict_in_words(result["verdict"], held),
         "run": tables.run.absolute().name,
         "date": str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
-        "parameters": parameter_rows(calibrations, result["result"], settings.pool.verdict, fixed),
+        "parameters": parameter_rows(calibrations, result["result"], settings.pool.verdict, held),
         "names": [name for name, *_ in PARAMETERS],
         "frame": tables.table(POOL_FRAME).to_dict("records")[0],
         "traced": not laser and settings.session.sonar.svp is not None,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment.parameter_tests import single_parameter_tests
+from pipeline.maths.adjustment.parameter_tests import prior_parameter_tests, single_parameter_tests
 from pipeline.maths.adjustment.solution import (
     CORRELATION_LIMIT,
     ConsiderErrors,
@@ -68,3 +68,70 @@ def test_a_tested_value_scatters_by_the_errors_of_all_that_look_alike() -> None:
     assert [one.parameter for one in tests] == [2, 3, 4]
     np.testing.assert_allclose(np.std(values, axis=0), [one.expected for one in tests], rtol=0.04)
     assert tests[1].expected > 3 * np.hypot(tests[1].sigma, 0.2)
+
+
+KNOWN = np.array([0, 1, 3])  # of six parameters; the second is correlated with the others
+FIXED = 5
+
+
+def known_beforehand(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a design (30, 6), which hardly tells 0 and 1 apart, the covariance of the known values, and P (6, 6)."""
+    design = rng.normal(size=(30, 6))
+    design[:, 1] = 0.95 * design[:, 0] + 0.1 * design[:, 1]
+    half = np.array([[0.3, 0.0, 0.0], [0.25, 0.2, 0.0], [-0.1, 0.3, 0.2]])
+    prior = np.zeros((6, 6))
+    prior[np.ix_(KNOWN, KNOWN)] = np.linalg.inv(half @ half.T)
+    return design, half @ half.T, prior
+
+
+def test_correlated_values_known_beforehand_are_tested_each_by_itself() -> None:
+    """Against the scatter over noise, errors of the known values, and one fixed parameter; and one value is wrong."""
+    rng = np.random.default_rng(7)
+    design, Q, prior = known_beforehand(rng)
+    normal, free = design.T @ design + prior, np.delete(np.arange(6), FIXED)
+    consider, root = ConsiderErrors(np.r_[np.zeros(5), 0.4]), np.linalg.cholesky(Q)
+    values, wrong = [], np.array([0.0, 0.7, 0.0])
+    for _ in range(4000):
+        v = rng.normal(size=30) + design[:, FIXED] * 0.4 * rng.normal()  # the truth is zero
+        known = root @ rng.normal(size=3) + wrong
+        right = -design.T @ v - prior[:, KNOWN] @ known
+        solution = solve(normal, right, free.tolist(), prior)
+        deviation = solution.step.copy()
+        deviation[KNOWN] -= known
+        tests = prior_parameter_tests(solution, deviation, consider, KNOWN)
+        values.append([one.value for one in tests])
+    assert [one.parameter for one in tests] == KNOWN.tolist()
+    np.testing.assert_allclose(np.std(values, axis=0), [one.expected for one in tests], rtol=0.04)
+    assert np.mean(values, axis=0)[1] == pytest.approx(-0.7, abs=4 * tests[1].expected / np.sqrt(4000))
+    own = 1 / np.diag(np.linalg.inv(Q))  # of a value if the others hold
+    without_fixed = prior_parameter_tests(solution, deviation, ConsiderErrors(np.zeros(6)), KNOWN)
+    squares = [one.expected**2 - one.sigma**2 for one in without_fixed]
+    np.testing.assert_allclose(squares, own, rtol=1e-9)
+
+
+def test_an_independent_value_is_tested_by_what_the_estimate_would_be_without_it() -> None:
+    rng = np.random.default_rng(8)
+    design, prior = rng.normal(size=(30, 6)), np.diag([4.0, 0.0, 0.0, 25.0, 0.0, 0.0])
+    right, two = rng.normal(size=6), np.array([0, 3])
+    whole = solve(design.T @ design + prior, right, range(6), prior)
+    tests = prior_parameter_tests(whole, whole.step, ConsiderErrors(np.zeros(6)), two)
+    for one in tests:
+        others = prior.copy()
+        others[one.parameter, one.parameter] = 0.0
+        without = solve(design.T @ design + others, right, range(6), others)
+        sigma = np.sqrt(without.covariance[one.parameter, one.parameter])
+        assert (one.value, one.sigma) == pytest.approx((without.step[one.parameter], sigma))
+
+
+def test_noise_and_errors_of_known_values_are_parts_of_the_covariance() -> None:
+    """The scatter over noise alone, and the squares of the effects of the known values, against their sum."""
+    rng = np.random.default_rng(9)
+    design, _, prior = known_beforehand(rng)
+    normal, everything = design.T @ design + prior, np.arange(6)
+    rights = -design.T @ rng.normal(size=(30, 20_000))
+    solution = solve(normal, rights[:, 0], everything.tolist(), prior)
+    scatter = np.cov(-solution.covariance @ rights)
+    noise, effects = solution.noise_covariance(), solution.prior_effects(everything, KNOWN)
+    size = np.sqrt(np.outer(np.diag(noise), np.diag(noise)))
+    np.testing.assert_allclose(scatter / size, noise / size, atol=0.04)
+    np.testing.assert_allclose(noise + effects @ effects.T, solution.covariance, atol=1e-12)
