@@ -21,6 +21,7 @@ from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.cause_words import words_of
 from pipeline.report.reason_codes import ReasonCode, Statement
 
+OF_HEAD = "projector_"  # beginning of the names of parameters that a survey with the head has as well
 UNITS = {"sound_speed": "1"} | dict.fromkeys(("mbes_latency", "laser_latency"), "s")
 UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence"), "m")
 
@@ -79,14 +80,15 @@ def suspected_causes(freed: pd.DataFrame, level: float) -> list[SuspectedCause]:
 def errors_allowed_for(freed: pd.DataFrame, level: float) -> list[Statement]:
     """Return a warning for each known parameter that certainly is not zero, but within its a-priori sigma.
 
-    The mount allows for such an error. The survey has it as well, unless it is corrected there.
+    The mount allows for such an error. Where it is the head's, the survey has it as well, unless it is corrected there.
     """
-    limit = significance_limit(freed, level)
-    return [
-        Statement(ReasonCode.ERROR_ALLOWED_FOR, f"the mount allows for this, the survey does not yet: {words_of(row)}")
-        for row in freed[freed["known"]].to_dict("records")
-        if limit * row["sigma"] < abs(row["value"]) <= limit * row["expected"]
-    ]
+    limit, warnings = significance_limit(freed, level), []
+    for row in freed[freed["known"] & ~freed["unknown"].isin(MOUNT_NAMES)].to_dict("records"):
+        if limit * row["sigma"] < abs(row["value"]) <= limit * row["expected"]:
+            survey = ", the survey does not yet" if row["unknown"].startswith(OF_HEAD) else ""
+            words = f"the mount allows for this{survey}: {words_of(row)}"
+            warnings.append(Statement(ReasonCode.ERROR_ALLOWED_FOR, words))
+    return warnings
 
 
 def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:

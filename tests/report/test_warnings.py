@@ -41,6 +41,13 @@ def test_an_error_that_the_mount_allows_for(value, known, expected):
     assert codes(found) == expected
     place = "higher" if value > 0 else "lower"
     assert all("the survey does not yet: the transmitter sits" in one.words and place in one.words for one in found)
+    of_target = errors_allowed_for(table.assign(unknown="wet_P2_shift"), 0.001)
+    assert all(one.words.startswith("the mount allows for this: the target: its wet faces") for one in of_target)
+
+
+def test_a_lasers_coarse_mount_may_be_as_far_off_as_its_sigma():
+    row = {"unknown": "rotation_x", "estimated": False, "known": True, "value": 5e-3, "sigma": 1e-4, "expected": 5e-3}
+    assert errors_allowed_for(pd.DataFrame([row]), 0.001) == []
 
 
 @pytest.mark.parametrize(
