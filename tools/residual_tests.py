@@ -116,10 +116,10 @@ def _pass_ranges(world: World) -> str:
 
 
 def _pass_shifted(world: World) -> str:
-    """Move the sonar 5 mm to starboard in one pass."""
+    """Move the sonar 8 mm to starboard in one pass."""
     number = world.number % 4
     rows = world.passes == number
-    shift = np.array(world.truth["mbes"]["R_body_from_mbes"]).T @ [0.005, 0.0, 0.0]
+    shift = np.array(world.truth["mbes"]["R_body_from_mbes"]).T @ [0.008, 0.0, 0.0]
     range_m = world.mbes["two_way_time_s"] * world.mbes["sound_speed_m_s"] / 2
     angle = world.mbes["angle_rad"]
     x, z = range_m * np.sin(angle) - shift[0], -range_m * np.cos(angle) - shift[2]  # of a sonar nearer to the wall
@@ -149,7 +149,7 @@ FAULTS: dict[str, Callable[[World], str]] = {
     "a slanted face 20 mm off": _face(SLANTED),
     "a top 20 mm too high": _face(TOPS),
     "ranges step by 10 mm at an angle": _step,
-    "one pass: sonar 5 mm farther": _pass_shifted,
+    "one pass: sonar 8 mm farther": _pass_shifted,
     "one pass: ranges 5 mm longer": _pass_ranges,
     "sectors: 0.254° within 15°": _sectors(15.0),
     "sectors: 0.254° within 30°": _sectors(30.0),

@@ -25,6 +25,7 @@ from pipeline.target.labelled_points import LabellingContext, label_batch
 ROUNDS = 2  # adjustments of the sample, the first without white noise; a third changes less than 0.1 % of the labels
 READ = 1_000_000  # about this many points of a stream are looked at
 SAMPLE = {"laser_pool": 60_000, "soundings_pool": 20_000}  # about this many of them near the target are used
+LEAST_KEPT = 0.8  # of the labelled points of each sensor, by an adjusted mount that is better
 BEYOND_M = 0.5  # a point farther outside the target's bounds is not near it
 BUILT_RAD, BUILT_M = float(np.radians(0.02)), 0.002  # sigmas of a family's direction and place against the design
 SENSOR = {"laser_labelled": "laser", "soundings_labelled": "mbes"}  # by the name of the labelled stream
@@ -76,7 +77,8 @@ def with_adjusted_sample(
 ) -> LabellingContext:
     """Return the context with mount and trajectory from the adjustment of a sample.
 
-    Where the adjustment has no solution, the context stays as it is; stage adjust then tells why.
+    Where the adjustment has no solution, the context stays as it is; stage adjust then tells why. So it does where the
+    adjusted mount loses a good part of the points: then they were too few to adjust by.
 
     Parameters
     ----------
@@ -91,19 +93,28 @@ def with_adjusted_sample(
     gap_s
         A longer time (s) without observations interrupts the knots of the drift.
     """
+    labelled = labelled_sample(sample, context)
+    if not all(_counts(labelled)):
+        return context  # stage segment tells why no point has a label
     for number in range(1, ROUNDS + 1):
-        labelled = labelled_sample(sample, context)
-        if not all(len(stream.parts) for stream in labelled.values()):
-            return context  # stage segment tells why no point has a label
         problem = problem_at(context)
         if number < ROUNDS:  # enough to label by: white noise of single records takes half the time
             noise = replace(problem.prior.noise, white=np.zeros(N_POSE))
             problem = replace(problem, prior=replace(problem.prior, noise=noise))
         adjustment = adjust_mount(problem, labelled, settings, gap_s)
         if not adjustment.converged:
+            continue
+        corrected = corrected_context(context, adjustment)
+        relabelled = labelled_sample(sample, corrected)
+        if any(now < LEAST_KEPT * before for now, before in zip(_counts(relabelled), _counts(labelled), strict=True)):
             return context
-        context = corrected_context(context, adjustment)
+        context, labelled = corrected, relabelled
     return context
+
+
+def _counts(labelled: Mapping[str, Stream]) -> list[int]:
+    """Return the number of labelled points of each sensor."""
+    return [sum(len(batch["t_ns"]) for batch in stream.batches()) for stream in labelled.values()]
 
 
 def labelled_sample(sample: Mapping[str, Batch], context: LabellingContext) -> dict[str, Stream]:

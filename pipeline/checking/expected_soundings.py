@@ -32,7 +32,9 @@ Array = NDArray[np.float64]
 RAN = 0.3  # share of a pass up to which the sonar counts as switched off
 POOR, NONE, FEWEST = 0.4, 0.15, 200  # found / expected below it: a look, a fault; fewest expected to judge
 SAMPLE_SIGMAS = 2.0
+FEWEST_SAMPLED = 20  # soundings expected in the sample, to judge: those of one stretch of a file lie on the same faces
 USUAL = "usual: 60 to 120 %"
+FEWEST_FAMILIES = 3  # by which a mount can be found
 NEAR_M = 0.35  # a sounding placed with the coarse mount counts for the nearest face within this distance
 PINGS, BEAMS = 400, 100_000  # pings that are cast as rays, and rows from which the beams' angles are taken
 FARTHEST_M = 100.0
@@ -48,6 +50,10 @@ class SoundingCounts:
     expected: Array
     found: Array
     each: float = 1.0
+
+    def enough(self, expected: Array) -> NDArray[np.bool_]:
+        """Return whether so many soundings are expected (…) that their absence in the sample tells something."""
+        return np.asarray(expected >= max(FEWEST, FEWEST_SAMPLED * self.each))
 
     def found_at_most(self, faces: NDArray[np.bool_]) -> float:
         """Return the largest number found on these faces (f,) that the sample leaves likely: two of its sigmas more."""
@@ -152,15 +158,20 @@ def _nearest_faces(track: InsTrack, sample: PointSample, model: TargetModel) -> 
 def faces_missed(model: TargetModel, counts: SoundingCounts) -> Iterator[Finding]:
     """Yield a finding for each half of the water, lower and upper, with far too few soundings on its faces.
 
-    If neither half has too few, yield one finding for all faces with almost no soundings.
+    If neither half has too few, yield one finding for all faces with almost no soundings. There is none if the sample
+    should have soundings on one or two families alone: a mount that is found by these may be wrong by degrees.
     """
+    families = np.array([face.family for face in model.faces])
+    seen = [bool(counts.enough(counts.expected[families == family].sum())) for family in sorted(set(families))]
+    if sum(seen) < min(FEWEST_FAMILIES, len(seen)):
+        return
     middle = [(face.vertices_m[:, 2].min() + face.vertices_m[:, 2].max()) / 2 for face in model.faces]
     deep = np.array(middle) < (model.water_level_m + model.bounds()[0][2]) / 2
     remedy = "turn the head, widen its sector, or check its range and gates"
     half_told = False
     for words, half in (("lower", deep), ("upper", ~deep)):
         expected, found = float(counts.expected[half].sum()), float(counts.found[half].sum())
-        if expected >= FEWEST and counts.found_at_most(half) < POOR * expected:
+        if counts.enough(np.array(expected)) and counts.found_at_most(half) < POOR * expected:
             half_told = True
             yield Finding(
                 "faces",
@@ -170,7 +181,7 @@ def faces_missed(model: TargetModel, counts: SoundingCounts) -> Iterator[Finding
                 "fault" if counts.found_at_most(half) < NONE * expected else "look",
             )
     at_most = np.array([counts.found_at_most(face) for face in np.eye(len(model.faces), dtype=bool)])
-    bare = (counts.expected >= FEWEST) & (at_most < NONE * counts.expected)
+    bare = counts.enough(counts.expected) & (at_most < NONE * counts.expected)
     if bare.any() and not half_told:
         barest = int(np.argmax(np.where(bare, counts.expected, 0.0)))
         others = f", and {plural(int(bare.sum()) - 1, 'other face')} likewise" if bare.sum() > 1 else ""

@@ -47,7 +47,7 @@ class Segment(Model):
     """Limits of the searches for the target and the provisional mount, and of labelling."""
 
     margin_m: NotNegative = 0.03  # to a face's edges, beyond the footprint's half extent
-    side_lobe_widths: Annotated[float, Field(ge=0.5, le=10)] = 1.5  # no sounding so near an inner corner, beam widths
+    side_lobe_widths: Annotated[float, Field(ge=0.5, le=10)] = 1.0  # no sounding so near an inner corner, beam widths
     gate_m: Positive = 0.05  # smallest gate round a face; widened to five times the robust scale
     water_margin_m: NotNegative = 0.10  # no point nearer than this to the water line is used
     min_grazing_deg: Annotated[float, Field(ge=0, lt=90)] = 5.0  # flatter rays are not used

@@ -64,13 +64,13 @@ def test_other_settings_are_named(undisturbed: tuple[Path, Told], again: Place) 
 
 def test_a_sonar_that_moved_is_found_and_named_another_day(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
     """A movement of what can be seen without a cast is told apart from the water's layers; the answer comes first."""
-    moved = {"roll_deg": -48.55, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.308, "y_m": 0.20, "z_m": -2.01}
+    moved = {"roll_deg": -48.55, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.316, "y_m": 0.20, "z_m": -2.01}
     run = run_of(simulate(tmp_path / "session", 2, mbes={"mount": moved, "ping_rate_hz": 8.0}))
     status, found = compared(undisturbed[0], run)
     assert (status, found["answer"]) == (1, "moved")
     rows = {row["parameter"]: row for row in found["parameters"]}
     assert rows["roll"]["difference"] == pytest.approx(0.25, abs=0.025)
-    assert rows["lever arm x"]["difference"] == pytest.approx(0.008, abs=0.0012)
+    assert rows["lever arm x"]["difference"] == pytest.approx(0.016, abs=0.003)
     assert [name for name, row in rows.items() if row["moved"]] == ["roll", "lever arm x"]
     assert "roll by +0.2" in found["sentence"]
     assert "lever arm x by +" in found["sentence"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.support.simulated import calibrated, made, through
+from tests.support.simulated import calibrated, made, through, without_biases
 from tools.campaigns import DRIFT, WHITE
 from tools.session_rows import errors_of
 
@@ -19,7 +19,7 @@ EXACT = {"sigmas": 1.0, "time_constant": 1.0}
 @pytest.fixture(scope="module")
 def judged():
     """calibration.json with the data counting, and with the session's figures taken as exact; and the errors."""
-    session = made({"ins": {"drift": TRUE}, "mbes": WHITE["mbes"]}, seed=5)
+    session = without_biases(made({"ins": {"drift": TRUE}, "mbes": WHITE["mbes"]}, seed=5))  # they would hide much
     found, known = [], None
     for more in ({}, {"drift_within": EXACT}):
         ins = session.session["ins"] | {"drift": STATED} | more

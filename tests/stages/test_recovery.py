@@ -10,6 +10,9 @@ import pytest
 from tests.support.effort import often
 from tests.support.simulated import QUIET, calibrated, made
 
+# What the model neglects (poses between two INS records, second orders) is some 0.01 mm. Biases that are allowed for
+# make more of it: up to 0.03 mm in z, a hundredth of its total sigma.
+EXACT_DEG, EXACT_MM = 3e-4, 0.05
 ORIGIN = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}
 
 
@@ -22,8 +25,8 @@ def test_without_noise_the_truth_comes_back_and_the_sequential_form_is_biased(qu
     assert result["verdict"] == "accepted", result["reasons"]
     for method in ("adjustment", "patent_alternating"):
         error = np.abs(errors_of(result["methods"][method], quiet.truth))
-        assert error[:3].max() < 1e-4, method  # degrees
-        assert error[3:].max() < 0.01, method  # millimetres
+        assert error[:3].max() < EXACT_DEG, method  # degrees
+        assert error[3:].max() < EXACT_MM, method  # millimetres
     sequential = np.abs(errors_of(result["methods"]["patent_sequential"], quiet.truth))
     # Angles found with a lever arm that is wrong by 8 cm: the yaw and Y are wrong on perfect data (method, trap 5.4).
     assert sequential[2] > 0.02
@@ -62,8 +65,8 @@ def test_other_pools(azimuth_deg, low_side, letters, errors_of):
     result = blocks(calibrated(session))
     assert result["verdict"] == "accepted", result["reasons"]
     error = np.abs(errors_of(result["methods"]["adjustment"], session.truth))
-    assert error[:3].max() < 1e-4
-    assert error[3:].max() < 0.01
+    assert error[:3].max() < EXACT_DEG
+    assert error[3:].max() < EXACT_MM
 
 
 @pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=6))[:: often(63, 9)])
@@ -99,8 +102,8 @@ def test_a_wrong_origin_and_azimuth_are_found_and_do_no_harm(errors_of):
     got = pose[["origin_x_pool_m", "origin_y_pool_m", "origin_z_pool_m"]].to_numpy(dtype=float)
     np.testing.assert_allclose(got, [*expected, -0.15], atol=2e-3)
     error = np.abs(errors_of(blocks(found)["methods"]["adjustment"], session.truth))
-    assert error[:3].max() < 1e-4
-    assert error[3:].max() < 0.01
+    assert error[:3].max() < EXACT_DEG
+    assert error[3:].max() < EXACT_MM
 
 
 def test_an_azimuth_left_open_is_estimated(errors_of):
@@ -112,7 +115,7 @@ def test_an_azimuth_left_open_is_estimated(errors_of):
     frame, pose = found["ingest/pool_frame"].iloc[0], found["segment/target_pose"].iloc[0]
     assert frame["azimuth_estimated"]
     assert frame["azimuth_deg"] + pose["azimuth_correction_deg"] == pytest.approx(137.0, abs=2e-3)
-    assert np.abs(errors_of(blocks(found)["methods"]["adjustment"], session.truth))[:3].max() < 1e-4
+    assert np.abs(errors_of(blocks(found)["methods"]["adjustment"], session.truth))[:3].max() < EXACT_DEG
 
 
 @pytest.mark.thorough
@@ -124,8 +127,8 @@ def test_wrong_sound_speed_is_put_right_in_range_and_steering(errors_of):
     assert wrong[1] > 0.1  # roll
     given = made(QUIET, speed, {"mbes": {"give_true_sound_speed": True}}, seed=8)
     right = np.abs(errors_of(blocks(calibrated(given))["methods"]["adjustment"], given.truth))
-    assert right[:3].max() < 1e-4
-    assert right[3:].max() < 0.01
+    assert right[:3].max() < EXACT_DEG
+    assert right[3:].max() < EXACT_MM
 
 
 def test_a_cast_puts_a_wrong_speed_at_the_head_right(errors_of):
@@ -137,8 +140,8 @@ def test_a_cast_puts_a_wrong_speed_at_the_head_right(errors_of):
     result = blocks(calibrated(dataclasses.replace(session, session=given)))
     right = np.abs(errors_of(result["methods"]["adjustment"], session.truth))
     assert result["verdict"] == "accepted", result["reasons"]
-    assert right[:3].max() < 1e-4
-    assert right[3:].max() < 0.01
+    assert right[:3].max() < EXACT_DEG
+    assert right[3:].max() < EXACT_MM
 
 
 def test_latency_is_subtracted(errors_of):
@@ -152,7 +155,7 @@ def test_latency_is_subtracted(errors_of):
     }
     error = np.abs(errors_of(blocks(calibrated(session, raw=raw))["methods"]["adjustment"], session.truth))
     assert error[:3].max() < 2e-4
-    assert error[3:].max() < 0.02
+    assert error[3:].max() < EXACT_MM
 
 
 @pytest.mark.thorough

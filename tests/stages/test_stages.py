@@ -176,8 +176,13 @@ def test_a_single_pass_is_weak_and_says_so(noisy, noisy_found):
     result = json.loads(calibrated(noisy, raw={"mbes": first})["report/calibration.json"])
     assert "one pass alone has soundings" in result["geometry"]["advice"]
     whole = json.loads(noisy_found["report/calibration.json"])
-    sigma, best = (np.array(one["mbes"]["sigma"]["rotation_vector_deg"]) for one in (result, whole))
-    assert (sigma > 1.5 * best).all()
+    (angles, arm), (best_angles, best_arm) = (
+        [np.array(one["mbes"]["sigma_total"][name]) for name in ("rotation_vector_deg", "lever_arm_m")]
+        for one in (result, whole)
+    )
+    assert (angles > 1.1 * best_angles).all()
+    assert (arm > 1.05 * best_arm).all()
+    assert angles[2] > 5 * best_angles[2]  # yaw: one distance does not tell it from y
 
 
 def test_a_head_mounted_the_other_way_round_changes_by_the_short_way():

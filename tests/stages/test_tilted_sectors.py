@@ -78,8 +78,8 @@ def test_without_noise_the_truth_comes_back_whatever_the_tilts(errors_of):
     result = result_of(quiet)
     assert result["verdict"] == "accepted", result["reasons"]
     error = np.abs(errors_of(result["methods"]["adjustment"], quiet.truth))
-    assert error[:3].max() < 1e-4
-    assert error[3:].max() < 0.01
+    assert error[:3].max() < 3e-4  # as tests/stages/test_recovery.py
+    assert error[3:].max() < 0.05
 
 
 @pytest.mark.parametrize("key", often(["sigma_mount"], ["sigma_mount", "sigma_mount_total"]))

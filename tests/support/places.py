@@ -138,10 +138,6 @@ def simulate(folder: Path, seed: int = 1, base: Path | None = None, **blocks: An
     path.write_text(yaml.safe_dump(scenario, allow_unicode=True), encoding="utf-8")
     told = poolcal("simulate", folder, "--scenario", path, "--seed", seed)
     assert told.status == 0, told.err
-    pool = folder / "pool.yaml"
-    content = yaml.safe_load(pool.read_text(encoding="utf-8"))
-    content["segment"] = {"side_lobe_widths": 0.5}  # so few pings need every sounding
-    pool.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
     return folder
 
 

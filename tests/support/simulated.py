@@ -4,6 +4,7 @@ import copy
 import functools
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,21 @@ def calibrated(
     columns = {"ins": session.ins, "laser": session.laser, "mbes": session.mbes, **(raw or {})}
     return calibrate_in_memory(
         parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until, changed, known
+    )
+
+
+def without_biases(session: SimulatedSession) -> SimulatedSession:
+    """The session, with the target, ranges by incidence, the sonar's transmitter and the water known exactly."""
+    survey = dict.fromkeys(("face_sigma_m", "offset_sigma_m", "angle_sigma_deg", "bow_sigma_m"), 0.0)
+    of_sonar = ("level_bias_sigma_m", "incidence_bias_sigma_m", "projector_sigma_m", "sound_speed_gradient_sigma_1_s")
+    known = {
+        "mbes": session.session["mbes"] | dict.fromkeys(of_sonar, 0.0),
+        "laser": session.session["laser"] | {"incidence_bias_sigma_m": 0.0},
+    }
+    return replace(
+        session,
+        session=session.session | known,
+        pool=session.pool | {"as_built": survey},
     )
 
 

@@ -85,7 +85,8 @@ class Solution:
     def noise_covariance(self, numbers: Integers | None = None) -> Array:
         """Return the covariance (k, k) C - C P C due to the noise of the points; zero for fixed parameters."""
         C = self.covariance
-        return self._among(C - C @ self.prior @ C, self.estimated if numbers is None else np.asarray(numbers))
+        noise = C - C @ self.prior @ C
+        return self._among((noise + noise.T) / 2, self.estimated if numbers is None else np.asarray(numbers))
 
     def prior_effects(self, numbers: Integers, known: Integers) -> Array:
         """Return the change C F (k, m) of parameters by independent errors, of one sigma, of values known beforehand.
