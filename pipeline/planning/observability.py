@@ -14,7 +14,7 @@ from pipeline.planning.setting import PredictionSetting
 
 Array = NDArray[np.float64]
 NEAR_M = 1.5  # distances that differ by less count as one
-WANTED_DEG, WANTED_M = 0.025, 0.0025  # a larger random sigma is worth another pass
+WANTED_DEG, WANTED_M = 0.025, 0.004  # a larger random sigma is worth another pass
 WANTED = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
 TWICE = 2  # number of further passes at such a distance

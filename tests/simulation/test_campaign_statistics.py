@@ -22,6 +22,7 @@ def rows(z: np.ndarray, prefix: str = "") -> pd.DataFrame:
     table = {f"{prefix}nse": (z**2).sum(axis=1), f"{prefix}nse_total": (z**2).sum(axis=1) / 4}
     for k, name in enumerate(NAMES):
         table |= {f"{prefix}error_{name}": z[:, k] * SIGMAS[k], f"{prefix}sigma_{name}": np.full(len(z), SIGMAS[k])}
+        table[f"{prefix}total_{name}"] = np.full(len(z), 2 * SIGMAS[k])
     return pd.DataFrame({"accepted": True} | table)
 
 
@@ -80,12 +81,12 @@ def test_sessions_without_a_result_and_rejected_ones_are_counted() -> None:
 
 def test_the_table_has_a_line_for_each_campaign_with_rows(tmp_path: Path) -> None:
     rows(drawn(1.0)).to_parquet(tmp_path / path_of(STRESS[1]).name)
-    rows(drawn(2.0), "laser_").to_parquet(tmp_path / "laser.parquet")
+    rows(drawn(4.0), "laser_").to_parquet(tmp_path / "laser.parquet")
     head, rule, *lines = table_of(tmp_path).splitlines()
     assert head == HEAD
     assert len({line.count("|") for line in (head, rule, *lines)}) == 1
     assert [line.split(" | ")[0] for line in lines] == ["| drift within 10 s", "| the laser's own calibration"]
-    assert "**24.00**" in lines[1]
+    assert "**24.00**" in lines[1]  # by its total sigmas, which are twice the random ones
 
 
 def block(error: np.ndarray, sigma: np.ndarray) -> dict[str, object]:
@@ -128,9 +129,9 @@ def test_two_results_of_the_laser_are_compared_where_asked() -> None:
 @pytest.mark.parametrize(("agreeing", "word"), [(186, "enough"), (185, "TOO FEW")])
 def test_ninety_three_of_a_hundred_pairs_must_agree(agreeing: int, word: str) -> None:
     probability = np.where(np.arange(200) < agreeing, 0.051, 0.049)
-    table = pd.DataFrame({"p_both": probability, "p_either": 1.0, "held_calm": "x y z", "held_rough": ""})
+    table = pd.DataFrame({"p_both": probability, "p_all": 1.0, "held_calm": "x y z", "held_rough": ""})
     table = table.assign(accepted_calm=True, accepted_rough=True, **{f"z_{name}": np.nan for name in NAMES})
-    assert f"estimated by both, jointly: {agreeing} of 200 agree, {agreeing / 2:.1f} %, {word} (93 %" in report(table)
+    assert f"good enough in both, jointly: {agreeing} of 200 agree, {agreeing / 2:.1f} %, {word} (93 %" in report(table)
 
 
 @pytest.mark.parametrize(("accepted", "reasons"), [(True, ""), (False, "wet P1 is turned")])

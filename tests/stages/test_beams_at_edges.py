@@ -115,6 +115,7 @@ def test_corner_rays_reach_the_footprints_corners(range_m: float, half_m: float)
     np.testing.assert_allclose(sorted(ray[2] for ray in met), [-high] * 2 + [high] * 2, atol=1e-4)
 
 
+@pytest.mark.thorough
 def test_a_session_with_loud_corners() -> None:
     """Within 1.5 widths of a corner each range is drawn halfway to the corner's: tops seem millimetres off.
 

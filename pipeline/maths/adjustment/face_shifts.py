@@ -75,14 +75,19 @@ def equations_with_faces(
     noise : PoseNoise
         Standard deviations of the pose errors.
     """
-    count = linearisation.state.size + len(faces.names)
-    times = TimeAxis(linearisation.body.seconds, drift.knots)
+    size, times = linearisation.state.size, TimeAxis(linearisation.body.seconds, drift.knots)
+    seen = np.unique(np.concatenate([sums.surface for sums in linearisation.sums.values()]))  # only these have a column
     together = np.zeros(len(drift.knots.inner), dtype=np.int64)
-    reduced = eliminate_white_noise(list(_by_face(linearisation, faces)), count, times, noise.white, together)
-    return eliminate_drift(reduced.of([0]), noise, drift)
+    sources = list(_by_face(linearisation, faces, seen))
+    reduced = eliminate_white_noise(sources, size + len(seen), times, noise.white, together)
+    equations = eliminate_drift(reduced.of([0]), noise, drift)
+    count, places = size + len(faces.names), np.concatenate([np.arange(size), size + seen])
+    normal, right = np.zeros((count, count)), np.zeros(count)
+    normal[np.ix_(places, places)], right[places] = equations.normal, equations.right
+    return replace(equations, normal=normal, right=right)
 
 
-def _by_face(linearisation: Linearisation, faces: Faces) -> Iterator[_FaceIntervals]:
+def _by_face(linearisation: Linearisation, faces: Faces, seen: Integers) -> Iterator[_FaceIntervals]:
     for sensor, sums in linearisation.sums.items():
         for face in np.unique(sums.surface).tolist():
             rows = np.flatnonzero(sums.surface == face)
@@ -94,4 +99,5 @@ def _by_face(linearisation: Linearisation, faces: Faces) -> Iterator[_FaceInterv
                 record=sums.record[rows],
                 selected=None,
             )
-            yield _FaceIntervals(on_surface, linearisation.state.size + face, float(faces.sense[face]))
+            column = linearisation.state.size + int(np.searchsorted(seen, face))
+            yield _FaceIntervals(on_surface, column, float(faces.sense[face]))
