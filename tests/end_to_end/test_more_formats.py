@@ -68,7 +68,7 @@ def soundings_as_gsf(simulated: SimulatedSession, path: Path) -> None:
     path.write_bytes(b"".join(records))
 
 
-@pytest.mark.parametrize("sonar", ["kmall", "gsf"])
+@pytest.mark.parametrize("sonar", ["gsf", pytest.param("kmall", marks=pytest.mark.thorough)])
 def test_e57_and_a_sonar_s_files(sonar: str, small: Path, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None:
     simulated = simulate_in_memory(load_scenario(small.with_name("session.scenario.yaml")), 1)
     place = Place(small, tmp_path)

@@ -47,7 +47,9 @@ def test_twice_does_nothing(done: Place, right: dict[str, str]) -> None:
     [
         ("segment", "margin_m", 0.04, "segment", "segment: segment.margin_m 0.03 -> 0.04"),
         ("verdict", "max_sigma_deg", 0.06, "report", "report: verdict.max_sigma_deg 0.05 -> 0.06"),
-        ("adjust", "robust_k0", 2.5, "segment", "segment: adjust.robust_k0 3.0 -> 2.5"),
+        pytest.param(
+            "adjust", "robust_k0", 2.5, "segment", "segment: adjust.robust_k0 3.0 -> 2.5", marks=pytest.mark.thorough
+        ),
         ("adjust", "moment_s", 0.2, "adjust", "adjust: adjust.moment_s 0.1 -> 0.2"),
         ("", "result", "patent_alternating", "report", "report: result adjustment -> patent_alternating"),
     ],
