@@ -208,6 +208,7 @@ def test_the_dock_gives_the_lasers_angles_as_well() -> None:
     assert np.all(np.abs(error) < 3.5 * sigma)
 
 
+@pytest.mark.thorough
 def test_the_sonars_total_takes_the_lasers_covariance_as_whole_calibrations_do() -> None:
     """It grows by (G v)(G v)ᵀ for a covariance v vᵀ; G v from calibrations with the laser moved by v and by -v.
 

@@ -94,6 +94,7 @@ def test_a_bias_within_its_sigma_is_found_and_allowed_for(
     assert any("the mount allows for this" in warning and words in warning for warning in result["warnings"])
 
 
+@pytest.mark.thorough
 @BIASES
 def test_a_bias_beyond_its_sigma_is_named_and_estimated_if_it_is_freed(
     noisy: SimulatedSession, noisy_found: Any, errors_of: Any, unknown: str, law: Law, bias_m: float, words: str
