@@ -24,12 +24,14 @@ class GroupStatistics:
     """Statistics of a group of observations.
 
     count: number of observations; cut: number of observations with the robust weight zero; reduced: number with a
-    robust weight between zero and one; histogram: counts of the normalised |v|.
+    robust weight between zero and one; information: number of those not cut, each counted by its weight near edges;
+    histogram: counts of the normalised |v|.
     """
 
     count: int
     cut: int
     reduced: int
+    information: float
     histogram: Array
 
     def __add__(self, other: "GroupStatistics") -> "GroupStatistics":
@@ -83,6 +85,7 @@ def _accumulate_batch(
             count=len(w),
             cut=cut,
             reduced=int(np.sum(w < 1)) - cut,
+            information=float(np.sum(observations.edge_weight[rows], where=w > 0)),
             histogram=histogram(normalised[rows]),
         )
     return observations.sums(weight), groups

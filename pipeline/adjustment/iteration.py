@@ -105,10 +105,10 @@ class MountAdjustment:
     def redundancy(self) -> float:
         """Expectation of the sum of squares: observations with a weight, prior information, less estimated parameters.
 
-        An observation counts as the part of its variance that robust weights leave. Pose errors do not count: each has
-        one pseudo-observation.
+        An observation counts as the part of its variance that its weights, robust and near edges, leave. Pose errors do
+        not count: each has one pseudo-observation.
         """
-        observations = sum(group.count - group.cut for group in self.accumulation.groups.values())
+        observations = sum(group.information for group in self.accumulation.groups.values())
         return self.weighting.kept * observations + self.last.prior.count - len(self.solution.estimated)
 
     @property

@@ -95,8 +95,8 @@ class Observations:
     sensor: the one that observed; points: columns of the points; record: INS record before each point; share: place of
     the point between this record and the next, from 0 to 1; surface: number of its surface; v_m: distance from the
     surface less mean_m, the mean of the noise; sigma_m: sigma of the sensor's noise in v; common_m: sigma of the INS's
-    white noise, common to the interval; features (F, n) and slopes (F - 1, n): see
-    :mod:`pipeline.maths.adjustment.design_matrix`.
+    white noise, common to the interval; edge_weight: weight by the distance from edges; features (F, n) and slopes
+    (F - 1, n): see :mod:`pipeline.maths.adjustment.design_matrix`.
     """
 
     sensor: str
@@ -108,6 +108,7 @@ class Observations:
     mean_m: Array
     sigma_m: Array
     common_m: Array
+    edge_weight: Array
     features: Array
     slopes: Array
 
@@ -127,6 +128,7 @@ class Observations:
             share=self.share,
             features=self.features_at_adjusted(weight),
             weight=weight,
+            count=np.where(weight > 0, self.edge_weight, 0.0),
             v_m=self.v_m,
         )
         return interval_sums(points)
@@ -205,6 +207,7 @@ class ObservationModel:
             mean_m=mean,
             sigma_m=sigma,
             common_m=np.sqrt(common),
+            edge_weight=np.asarray(points["edge_weight"], dtype=np.float64),
             features=features,
             slopes=slopes,
         )

@@ -143,7 +143,7 @@ def _batch(
             first=observations.surface,
             second=np.floor(column / WIDTHS.get(variable, 1.0)).astype(np.int64),
             slot=slot,
-            weight=1 / plain**2,
+            weight=observations.edge_weight / plain**2,
             v_m=observations.v_m,
             normalised=normalised,
         )

@@ -103,4 +103,4 @@ def label_rays(
     on = np.flatnonzero(labels.face >= 0)
     columns = {f"{axis}_{sensor}_m": own[on, k] for k, axis in enumerate("xyz")}
     columns |= {f"{axis}_target_m": points[on, k] for k, axis in enumerate("xyz")}
-    return columns | {"t_ns": t_ns[met][on], "face": labels.face[on]}
+    return columns | {"t_ns": t_ns[met][on], "face": labels.face[on], "edge_weight": labels.edge_weight[on]}

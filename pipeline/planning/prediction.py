@@ -119,7 +119,7 @@ def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSu
         batch = label_rays(setting, caster, trajectory, rays)
         observations = observation_model.linearise(rays.sensor, batch, CurrentValues(setting.state))
         true = replace(observations, v_m=np.zeros_like(observations.v_m))  # as if the points were free from errors
-        sums[rays.sensor] = true.sums(each / observations.sigma_m**2, by_face=True)
+        sums[rays.sensor] = true.sums(each * observations.edge_weight / observations.sigma_m**2, by_face=True)
         on_face = np.bincount(batch["face"].astype(np.int64), minlength=len(faces))
         counts[rays.sensor] = each * on_face.astype(np.float64)
     return PassSums(sums, trajectory, counts, seconds)

@@ -44,4 +44,5 @@ def sonar_limits(settings: Segment, water_level_m: float, gate_m: float) -> Labe
 
 
 def _common(settings: Segment, gate_m: float) -> LabelSettings:
-    return LabelSettings(gate_m, settings.margin_m, float(np.radians(settings.min_grazing_deg)))
+    grazing_rad = float(np.radians(settings.min_grazing_deg))
+    return LabelSettings(gate_m, settings.margin_m, grazing_rad, ramp_m=settings.edge_ramp_m)

@@ -1,7 +1,7 @@
 """Points of both sensors labelled by the faces of the target, batch by batch."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.beams import TargetBeams
-from pipeline.maths.target.labelling import Labels, hidden_in_part, label_points
+from pipeline.maths.target.labelling import Labels, label_points, weight_beside_shadows
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.near_planes import near_planes
 from pipeline.mount import Mounted, mount_of
@@ -114,7 +114,7 @@ def _label_laser(batch: Batch, context: LabellingContext) -> BatchResult:
     columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}
     columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
     columns |= xyz_columns("{}_target_m", placed.T)
-    columns["cos_incidence"] = labels.cos_incidence[on]
+    columns["cos_incidence"], columns["edge_weight"] = labels.cos_incidence[on], labels.edge_weight[on]
     counts = _counts("below or near the water line", dry, "near an edge", near, labels)
     return BatchResult({"laser_labelled": columns}, counts)
 
@@ -132,15 +132,32 @@ def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) 
     labels = label_points(model, points[near], beams, settings, planes)
     on = np.flatnonzero(labels.face >= 0)
     origins = trajectory.track_of_point(batch["t_ns"][near[on]], lever_arm_m)
-    first_met = partial(context.surface.first_met, origins)
-    hidden = hidden_in_part(model, labels.face[on], beams.corners(on), first_met)
-    on = on[~hidden]
+    on_faces = _BeamsOnFaces(labels.face[on], on, beams, origins, context.surface)
+    weight = weight_beside_shadows(model, on_faces, settings.ramp_m)
+    seen, hidden = weight > 0, int((weight == 0).sum())
+    on, weight = on[seen], np.minimum(weight[seen], labels.edge_weight[on[seen]])
     rows = near[on]
     names = ("t_ns", "pass", "ping", "beam", "x_mbes_m", "y_mbes_m", "z_mbes_m")
-    columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on]}
+    columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on], "edge_weight": weight}
     counts = _counts("above or near the water line", wet, "footprint near an edge", near, labels)
-    counts |= {"footprint partly on another face": int(hidden.sum()), "used": len(on)}
+    counts |= {"footprint partly on another face": hidden, "used": len(on)}
     return BatchResult({"soundings_labelled": columns}, counts)
+
+
+@dataclass(frozen=True)
+class _BeamsOnFaces:
+    """Beams with a face each: their faces (n,), their rows (n,) among ``beams``, and the sonar's positions (n, 3)."""
+
+    faces: NDArray[np.int16]
+    beam: NDArray[np.int64]
+    beams: TargetBeams
+    origins_m: Array
+    surface: ClosestSurface
+
+    def faces_at_corners(self, rows: NDArray[np.int64], beyond_m: float) -> Iterator[NDArray[np.int64]]:
+        """Yield the numbers of the faces that rays along the corners meet first."""
+        for rays in self.beams.corners(self.beam[rows], beyond_m):
+            yield self.surface.first_met(self.origins_m[rows], rays)
 
 
 def _counts(

@@ -46,7 +46,7 @@ def sounding(
 
 def labelled(target: TargetModel, widths: float, point: np.ndarray, beam: TargetBeams) -> bool:
     """Whether a sounding has a label."""
-    limits = sonar_limits(Segment(side_lobe_widths=widths, water_margin_m=WATER_MARGIN_M), 0.0, 0.05)
+    limits = sonar_limits(Segment(margin_m=0.03, side_lobe_widths=widths, water_margin_m=WATER_MARGIN_M), 0.0, 0.05)
     return bool(label_points(target, point, beam, limits).face[0] >= 0)
 
 

@@ -68,6 +68,7 @@ PROVISIONAL_MOUNT = Artefact(
         Column("within", BOOL, "", "false: no mount within the search limits was found"),
     ),
 )
+EDGE_WEIGHT = Column("edge_weight", F32, "1", "weight by the distance from edges: 0 at the limits, 1 beyond the ramp")
 LASER_LABELLED = Artefact(
     "segment", "laser_labelled", "stream", "laser points on the target's dry faces",
     (
@@ -75,6 +76,7 @@ LASER_LABELLED = Artefact(
         Column("face", I16, "1", "number of the face"),
         *float32_coordinates("laser"), *float32_coordinates("target"),
         Column("cos_incidence", F32, "1", "|cosine| of the angle between ray and the face's normal"),
+        EDGE_WEIGHT,
     ),
 )
 SOUNDINGS_LABELLED = Artefact(
@@ -85,6 +87,7 @@ SOUNDINGS_LABELLED = Artefact(
         Column("beam", I16, "1", "beam number"),
         Column("face", I16, "1", "number of the face"),
         *float32_coordinates("mbes"),
+        EDGE_WEIGHT,
     ),
 )
 SEGMENT_COUNTS = Artefact("segment", "counts", "table", "points labelled and left out, by reason", COUNTS)

@@ -40,7 +40,8 @@ class IntervalSums:
     first three features and s the time of a point between the two records, 0 to 1:
 
     normal (g, F, F) = Σ w q qᵀ, swept (g, 3, F) = Σ w s q₃ qᵀ, swept_twice (g, 3, 3) = Σ w s² q₃ q₃ᵀ,
-    right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,): points with a weight.
+    right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,): points with a weight, a
+    point near an edge counted by its weight there.
     """
 
     record: Integers
@@ -114,7 +115,8 @@ class LinearisedPoints:
     """Points of one batch for :func:`interval_sums`.
 
     record, surface (n,): the last INS record before each point, and its surface; share (n,): its time s between that
-    record and the next, 0 to 1; features (F, n): q; weight (n,): w; v_m (n,): distance from the surface.
+    record and the next, 0 to 1; features (F, n): q; weight (n,): w; count (n,): as which part of a
+    point each counts; v_m (n,): distance from the surface.
     """
 
     record: Integers
@@ -122,6 +124,7 @@ class LinearisedPoints:
     share: Array
     features: Array
     weight: Array
+    count: Array
     v_m: Array
 
 
@@ -158,7 +161,7 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
         right=right,
         right_swept=right_swept,
         squares=total(weight * v_m**2),
-        count=total((weight > 0).astype(np.float64)),
+        count=total(points.count),
     )
     return merged([sums.selected(np.flatnonzero(normal[:, 0, 0] > 0))])
 

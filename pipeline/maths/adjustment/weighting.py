@@ -158,6 +158,11 @@ class Residuals(Protocol):
         ...
 
     @property
+    def edge_weight(self) -> Array:
+        """Weights (n,) by the distance from edges, 0 to 1."""
+        ...
+
+    @property
     def v_m(self) -> Array:
         """Distances (n,) m from the surface."""
         ...
@@ -195,10 +200,11 @@ class Weighting:
         return 1.0 if self.robust is None else variance_kept(*self.robust)
 
     def weights(self, residuals: Residuals) -> tuple[Array, Array]:
-        """Return the robust weights w (n,) and the full weights w / (σ² f) (n,)."""
+        """Return the robust weights w (n,) and the full weights w e / (σ² f) (n,), e being the weight near edges."""
         size = self.normalised(residuals) / _of_surfaces(self.scales, residuals.sensor, residuals.surface)
         robust = np.ones(len(size)) if self.robust is None else igg3_weights(size, *self.robust)
-        return robust, robust / (residuals.sigma_m**2 * self.factors_of(residuals.sensor, residuals.surface))
+        variance = residuals.sigma_m**2 * self.factors_of(residuals.sensor, residuals.surface)
+        return robust, robust * residuals.edge_weight / variance
 
     def normalised(self, residuals: Residuals) -> Array:
         """Return v / sqrt(f σ² + c²) (n,)."""

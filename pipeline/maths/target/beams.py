@@ -39,12 +39,23 @@ class TargetBeams:
         """Return beams with unknown rays, for averaged points: every face counts as seen from its front."""
         return cls(np.zeros((count, 3)), np.zeros(count))
 
-    def corners(self, rows: NDArray[np.int64]) -> Iterator[Array]:
-        """Yield rays (n, 3) along each of the four corners of these beams; across, the corners include the stray."""
-        wider = [np.maximum(1.0, near / self.ranges_m[rows])[:, None] for near in self.near_m]
-        across, along = (width[rows] for width in self.half_widths)
+    def corners(self, rows: NDArray[np.int64], beyond_m: float = 0.0) -> Iterator[Array]:
+        """Yield rays (n, 3) along each of the four corners of these beams; across, the corners include the stray.
+
+        Parameters
+        ----------
+        rows
+            Numbers (n,) of the beams.
+        beyond_m
+            So much farther out is each corner at the measured range, both across and along.
+        """
+        ranges_m, halves = self.ranges_m[rows], []
+        for half, near, stray in zip(self.half_widths, self.near_m, (self.stray, 0.0), strict=True):
+            width = np.linalg.norm(half[rows], axis=1)
+            times = np.maximum(1.0, near / ranges_m) + stray + beyond_m / (ranges_m * width)
+            halves.append(times[:, None] * half[rows])
         for side, end in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
-            yield self.directions[rows] + side * (wider[0] + self.stray) * across + end * wider[1] * along
+            yield self.directions[rows] + side * halves[0] + end * halves[1]
 
     def spreads(self, rows: NDArray[np.int64], normal: Array, reached_m: Array) -> tuple[Array, ...]:
         """Return the half axes, (n, 3) m each, of the footprints on a plane.
