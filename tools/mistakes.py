@@ -4,28 +4,31 @@ Each line of the table is the default scenario with one kind of error (``tools.m
 seeds and calibrated in memory. It shows how many sessions were accepted and the adjustment's largest errors in angles
 and lever arm. For the accepted sessions it also shows the largest normalised squared error by the total covariance and
 the largest error in total sigmas; for the rejected ones, in how many of them what is named first is what was planted.
-The README must name every mistake that the verdict does not notice. Each session is a row of
-runs/montecarlo/mistakes.parquet.
+Below the table stand the same figures of all sessions together. The README must name every mistake that the verdict
+does not notice. Each session is a row of runs/montecarlo/mistakes.parquet. All kinds are simulated with the first seed,
+then with the second, and so on.
 
-    python -m tools.mistakes [--jobs 2] [--seeds 27] [--only NAME ...]
+    python -m tools.mistakes [--jobs 2] [--seeds 27] [--only NAME ...] [--resume]
+    python -m tools.mistakes --rows docs/accuracy/mistakes.parquet
 """
 
 import argparse
 import copy
 import json
 from collections.abc import Mapping
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from tools.campaigns import TASKS_OF_A_WORKER, THIN
+from tools.campaign_files import collect_rows
+from tools.campaigns import FOLDER, TASKS_OF_A_WORKER, THIN
 from tools.mistake_kinds import MISTAKES
 from tools.session_rows import NAMES, UNITS, errors_of
 
 SEEDS = 3
+LARGEST_NSE, LARGEST_SIGMAS = 45.0, 5.0  # an accepted session beyond either is wrong and looks right
 
 
 def named_first(reason_codes: list[str], artefacts: Mapping[str, Any]) -> frozenset[str]:
@@ -128,6 +131,20 @@ def table_of(rows: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
+def summary(rows: pd.DataFrame) -> str:
+    """Return what all sessions show: accepted ones that look right and are wrong, and how often the name is right."""
+    accepted = rows[rows["accepted"]]
+    wrong = accepted[(accepted["nse"] > LARGEST_NSE) | (accepted["sigmas"] > LARGEST_SIGMAS)]
+    rejected = rows[~rows["accepted"] & rows["has_right"]]
+    kinds = ", ".join(sorted(set(wrong["mistake"]))) or "none"
+    return (
+        f"{len(rows)} sessions of {rows['mistake'].nunique()} kinds. Accepted: {len(accepted)}; of these with an NSE above "
+        f"{LARGEST_NSE:.0f} or an error above {LARGEST_SIGMAS:.0f} total sigmas: {len(wrong)} ({kinds}).\n"
+        f"Rejected, and something is to be named: {len(rejected)}; what was planted is named first in "
+        f"{rejected['named_right'].mean():.1%}."
+    )
+
+
 def main() -> None:
     """Simulate and calibrate the sessions, write their rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -136,15 +153,17 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="*", metavar="NAME", help="mistakes to run, by the beginning of their names; default: all"
     )
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign of the same program")
+    parser.add_argument("--rows", type=Path, help="print the table of an existing file of rows")
     options = parser.parse_args()
-    names = [name for name in MISTAKES if not options.only or any(name.startswith(start) for start in options.only)]
-    tasks = [(name, seed) for name in names for seed in range(1, options.seeds + 1)]
-    with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
-        rows = pd.DataFrame(list(pool.imap(session_row, tasks)))
-    path = Path("runs/montecarlo/mistakes.parquet")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    rows.to_parquet(path, index=False)
-    print(table_of(rows))
+    if options.rows:
+        rows = pd.read_parquet(options.rows)
+    else:
+        names = [name for name in MISTAKES if not options.only or any(name.startswith(start) for start in options.only)]
+        tasks = [(name, seed) for seed in range(1, options.seeds + 1) for name in names]
+        path = FOLDER / "mistakes.parquet"
+        rows = collect_rows(path, session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)
+    print(f"{table_of(rows)}\n\n{summary(rows)}")
 
 
 if __name__ == "__main__":
