@@ -27,6 +27,7 @@ from pipeline.report.calibration_document import (
 )
 from pipeline.report.drift_check import NO_DRIFT, check_ins_drift, figures_disagree
 from pipeline.report.evidence import Evidence
+from pipeline.report.hypotheses import hypotheses_block
 from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
@@ -36,7 +37,7 @@ from pipeline.report.sensor_report import SensorReport
 from pipeline.report.sonar_report import SonarSettings, sonar_report
 from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.systematic_errors import systematic_block
-from pipeline.report.verdict import Criteria, rejections
+from pipeline.report.verdict import Criteria, explanations, rejections
 from pipeline.report.warnings import geometry_gaps, target_off_origin, unexpected_noise
 from pipeline.target.design import target_of
 
@@ -91,9 +92,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     drift_figures = sigmas_from_files(config.ins, inputs.ins_sigmas, inputs.passes)
     drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     source = "the INS's files say" if drift_figures else "ins.drift says"
-    drift_check = check_ins_drift(inputs.drift, drift, source)
-
-    reasons = rejections(inputs, report.methods, _criteria(config, report), drift_check)
+    drift_check, criteria = check_ins_drift(inputs.drift, drift, source), _criteria(config, report)
+    reasons = rejections(inputs, report.methods, criteria, drift_check)
     warnings = [
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
         *unexpected_noise(inputs.groups),
@@ -115,6 +115,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "verdict": verdict,
         "verdict_in_words": verdict_in_words(verdict, report.held),
         **statement_lists("reason", reasons),
+        "hypotheses": hypotheses_block(explanations(inputs, criteria)),
         **statement_lists("warning", warnings),
         "limits": config.verdict.model_dump(),
         "result": report.method,

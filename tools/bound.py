@@ -42,7 +42,7 @@ STEP = np.array([1e-5] * 3 + [1e-4] * 3)  # of differences, rad and m
 
 
 def equations(world: World, rays: Rays, calibrated: str = "mbes") -> tuple[Array, Array, Array]:
-    """Return Jx (n, 41), or (n, 12) for the laser; derivatives by the pose errors (n, 6); weights (n,).
+    """Return Jx (n, 42), or (n, 12) for the laser; derivatives by the pose errors (n, 6); weights (n,).
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
 """Biases that an estimator of the sonar's mount allows for: derivatives of the bound's equations, and a-priori sigmas.
 
-They are errors of the wet faces (turn, shift, bow by family), of the sonar's ranges by incidence and on level faces, of
-the transmitter's place and of the sound speed's change with depth, and of the laser's ranges by incidence. Derivatives
-follow from rays bent and lengthened here; nothing is imported from the adjustment but the settings' defaults.
+They are errors of the wet faces (turn, shift, bow by family), of the sonar's ranges (of all, by incidence, on level
+faces), of the transmitter's place and of the sound speed's change with depth, and of the laser's ranges by incidence.
+Derivatives follow from rays bent and lengthened here; nothing is imported from the adjustment but the settings'
+defaults.
 """
 
 from typing import Any
@@ -18,6 +19,7 @@ SPEED_M_S = 1500.0
 STEPS = 40  # of the integration of a bent ray
 LEVEL = 3  # number of the horizontal family
 AT_45_DEG = np.sqrt(2.0) - 1
+_OF_RANGES = ("range_bias_sigma_m", "incidence_bias_sigma_m", "level_bias_sigma_m")
 
 
 def sigmas() -> Array:
@@ -28,7 +30,7 @@ def sigmas() -> Array:
 
     survey, lean = AsBuilt(), np.radians(AsBuilt().angle_sigma_deg)
     wet = [lean, lean, survey.offset_sigma_m, survey.bow_sigma_m]
-    of_sonar = [default(Mbes, name) for name in ("incidence_bias_sigma_m", "level_bias_sigma_m")]
+    of_sonar = [default(Mbes, name) for name in _OF_RANGES]
     of_sonar += [default(Mbes, "projector_sigma_m")] * 3 + [default(Mbes, "sound_speed_gradient_sigma_1_s")]
     return np.array(wet * len(NORMALS) + of_sonar + [default(Laser, "incidence_bias_sigma_m")])
 
@@ -63,11 +65,11 @@ def derivatives(world: World, rays: Rays, of_surfaces: Array) -> Array:
         found[:, 4 * k : 4 * k + 3] = of_surfaces[:, 3 * k : 3 * k + 3]
         found[:, 4 * k + 3] = 4 * share * (1 - share) * (family == k) * (k != LEVEL)
     rest = 4 * len(NORMALS)
-    found[:, rest], found[:, rest + 1] = by_incidence, slant * (family == LEVEL)
+    found[:, rest : rest + 3] = np.column_stack([slant, by_incidence, slant * (family == LEVEL)])
     # the transmitter elsewhere: the way there and back is kept
-    found[:, rest + 2 : rest + 5] = slant[:, None] * rays.points_m / ranges[:, None] / 2
+    found[:, rest + 3 : rest + 6] = slant[:, None] * rays.points_m / ranges[:, None] / 2
     ends = [_bent(start, ray, ranges, gradient) for gradient in (1e-3, -1e-3)]
-    found[:, rest + 5] = np.einsum("ni,ni->n", normal, ends[0] - ends[1]) / 2e-3
+    found[:, rest + 6] = np.einsum("ni,ni->n", normal, ends[0] - ends[1]) / 2e-3
     return found
 
 

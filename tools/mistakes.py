@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.report.reason_codes import ReasonCode
 from tools.campaign_files import collect_rows
 from tools.campaigns import FOLDER, TASKS_OF_A_WORKER, THIN
 from tools.mistake_kinds import MISTAKES
@@ -31,42 +32,33 @@ SEEDS = 3
 LARGEST_NSE, LARGEST_SIGMAS = 45.0, 5.0  # an accepted session beyond either is wrong and looks right
 
 
-def named_first(reason_codes: list[str], artefacts: Mapping[str, Any]) -> frozenset[str]:
+def named_first(result: Mapping[str, Any]) -> frozenset[str]:
     """Return the names of what the verdict of a rejected session names first.
 
-    This is the suspected cause, by its parameter and the face in the parameter's name, unless a part of the points is
-    named before it, which may be the cause instead. Otherwise it is the first reason, by its code, and by its face if
-    it names one.
+    This is the strongest explanation of the residuals: a parameter, by its name and the parts of its name (the face
+    among them), or a part of the points, by the code of its reason and by its face. Without an explanation it is the
+    first reason, by its code.
 
     Parameters
     ----------
-    reason_codes : list of str
-        Of calibration.json, in its order.
-    artefacts : mapping
-        All tables of the session.
+    result : mapping
+        Content of calibration.json.
     """
-    from pipeline.adjustment.pattern_tests import OF_PASSES
-    from pipeline.config.pool import Adjust
-    from pipeline.report.reason_codes import ReasonCode
-    from pipeline.report.suspected_causes import significance_limit
-
-    local = {
-        ReasonCode.RESIDUALS_BY_FACE, ReasonCode.RESIDUALS_STEP, ReasonCode.RESIDUALS_BY_PING,
-        ReasonCode.PASSES_DISAGREE,
-    }  # fmt: skip
-    first = next(iter(reason_codes), "")
-    if ReasonCode.SUSPECTED_CAUSE in reason_codes and not local & set(reason_codes):
-        freed = artefacts["adjust/freed"]
-        beyond = freed["value"].abs() > significance_limit(freed, Adjust().test_level) * freed["expected"]
-        causes = freed[~freed["estimated"] & beyond]
-        parameter = str(causes.loc[(causes["value"].abs() / causes["sigma"]).idxmax(), "unknown"])
-        return frozenset({parameter, parameter.removeprefix("face_"), *parameter.split("_")})
-    if first == ReasonCode.RESIDUALS_BY_FACE:
-        patterns = artefacts["adjust/patterns"]
-        patterns = patterns[~patterns["by"].isin(OF_PASSES)]
-        number = int(patterns.loc[patterns["normalised"].abs().idxmax(), "low"])
-        return frozenset({first, str(artefacts["segment/faces"]["name"].iloc[number])})
-    return frozenset({first})
+    codes = {
+        "face": ReasonCode.RESIDUALS_BY_FACE,
+        "step": ReasonCode.RESIDUALS_STEP,
+        "ping": ReasonCode.RESIDUALS_BY_PING,
+        "pass": ReasonCode.PASSES_DISAGREE,
+        "drift": ReasonCode.INS_DRIFT_BETWEEN_PASSES,
+    }
+    first = next(iter(result["reason_codes"]), "")
+    if not result["hypotheses"] or first not in (*codes.values(), ReasonCode.SUSPECTED_CAUSE):
+        return frozenset({first})
+    kind, name = result["hypotheses"][0]["kind"], result["hypotheses"][0]["name"]
+    if kind == "parameter":
+        of_face = {ReasonCode.RESIDUALS_BY_FACE} if name.startswith("face_") else set()
+        return frozenset({name, name.removeprefix("face_"), *name.split("_"), *of_face})
+    return frozenset({codes[kind], name})
 
 
 def session_row(task: tuple[str, int]) -> dict[str, Any]:
@@ -98,7 +90,7 @@ def session_row(task: tuple[str, int]) -> dict[str, Any]:
     block = result["methods"]["adjustment"]
     row |= {"accepted": result["verdict"] == "accepted", "reasons": " | ".join(result["reasons"])}
     if not row["accepted"]:
-        names = named_first(result["reason_codes"], artefacts)
+        names = named_first(result)
         row |= {"named": " ".join(sorted(names)), "named_right": bool(names & kind.right)}
     if block["covariance_total"] is None:
         return row
@@ -138,8 +130,8 @@ def summary(rows: pd.DataFrame) -> str:
     rejected = rows[~rows["accepted"] & rows["has_right"]]
     kinds = ", ".join(sorted(set(wrong["mistake"]))) or "none"
     return (
-        f"{len(rows)} sessions of {rows['mistake'].nunique()} kinds. Accepted: {len(accepted)}; of these with an NSE above "
-        f"{LARGEST_NSE:.0f} or an error above {LARGEST_SIGMAS:.0f} total sigmas: {len(wrong)} ({kinds}).\n"
+        f"{len(rows)} sessions of {rows['mistake'].nunique()} kinds. Accepted: {len(accepted)}; of these with an NSE "
+        f"above {LARGEST_NSE:.0f} or an error above {LARGEST_SIGMAS:.0f} total sigmas: {len(wrong)} ({kinds}).\n"
         f"Rejected, and something is to be named: {len(rejected)}; what was planted is named first in "
         f"{rejected['named_right'].mean():.1%}."
     )

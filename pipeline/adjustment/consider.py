@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 LEAST_SPAN_M = 0.1  # smallest depth and smallest span that count
 LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
 ESTIMATED_WITH_PRIOR = (  # beginnings of the names
-    "wet_", "mbes_incidence", "mbes_level_range", "laser_incidence", "projector_", "sound_speed_gradient",
+    "wet_", "mbes_range", "mbes_incidence", "mbes_level_range", "laser_incidence", "projector_",
+    "sound_speed_gradient",
 )  # fmt: skip
 
 

@@ -145,7 +145,7 @@ class Mbes(Model):
     projector_offset_m: tuple[Lever, Lever, Lever] | None = None  # transmitter in the mbes frame; null: as recorded
     projector_sigma_m: SigmaM = 0.005  # of its place, each axis
     range_sigma_m: RangeSigma = 0.008
-    range_bias_sigma_m: SigmaM = 0.002  # common to all detections
+    range_bias_sigma_m: SigmaM = 0.005  # common to all detections
     incidence_bias_sigma_m: SigmaM = 0.003  # at 45° incidence against 0°, growing like 1 / cos i - 1
     level_bias_sigma_m: SigmaM = 0.010  # common to all detections on horizontal faces
     angle_sigma_deg: SigmaDeg = 0.06

@@ -5,6 +5,11 @@ deviate of the excess over the tolerance (``maths/adjustment/mean_tests.py``). A
 exceeds the tolerance, the chance that any row exceeds the limit is at most the test's level. A row beyond the limit
 deviates. There is at most one reason for the passes, and one for all other variables. Each describes the row that
 deviates most, and names the other variables.
+
+A deviation of a part of the points (a pass, a face, a step, one ping of two) is a hypothesis of its own, beside the
+parameters of table ``freed``. Its ``strength`` is comparable with theirs, value over sigma: the mean over its sigma,
+without tolerance; for a pass also the change of the mount without that pass, over all mount parameters (table
+``parts``), because a pass may be wrong in more ways than one mean shows.
 """
 
 from dataclasses import dataclass
@@ -13,7 +18,7 @@ import pandas as pd
 
 from pipeline.adjustment.pattern_tests import OF_PASSES, limit_for
 from pipeline.report.reason_codes import Statement
-from pipeline.report.residual_words import ExceededTests, ResidualTests, Row, describe_pass, describe_pattern
+from pipeline.report.residual_words import CYCLE, ExceededTests, ResidualTests, Row, describe_pass, describe_pattern
 
 LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # a deviation by these concerns a part of the points
 
@@ -25,17 +30,28 @@ class Deviation:
     Attributes
     ----------
     statement : code and words
+    kind, name : what deviates: a pass, face, step, ping, or drift in a pass; which one
     excess : excess over the tolerance, in sigmas
-    is_local : whether only a part of the points deviates (a face, a step), which no parameter of all points explains
+    strength : as a hypothesis on a part of the points, in sigmas; 0 for a deviation by angle, distance or time, which
+        only shows that something is wrong
     """
 
     statement: Statement
+    kind: str
+    name: str
     excess: float
-    is_local: bool
+    strength: float
 
 
-def deviations(tests: ResidualTests, level: float) -> list[Deviation]:
-    """Return at most two deviations, the larger first: one of the passes, one of all else; ``level``: of the test."""
+def deviations(tests: ResidualTests, parts: pd.DataFrame, level: float) -> list[Deviation]:
+    """Return at most two deviations, the larger first: one of the passes, one of all else.
+
+    Parameters
+    ----------
+    tests : means and their tests
+    parts : table ``parts``
+    level : level of the test
+    """
     limit = limit_for(tests.patterns, level)
     exceeded = ExceededTests(tests, tests.patterns[tests.patterns["normalised"].abs() > limit], limit)
     is_of_passes = exceeded.rows["by"].isin(OF_PASSES)
@@ -43,7 +59,7 @@ def deviations(tests: ResidualTests, level: float) -> list[Deviation]:
     for rows, describe in ((is_of_passes, describe_pass), (~is_of_passes, describe_pattern)):
         farthest = _farthest_of_each(exceeded.rows[rows])
         if farthest:
-            reasons.append(_deviation(farthest, describe(farthest[0], exceeded)))
+            reasons.append(_deviation(farthest, describe(farthest[0], exceeded), tests, parts))
     return sorted(reasons, key=lambda deviation: -deviation.excess)
 
 
@@ -55,12 +71,28 @@ def _farthest_of_each(rows: pd.DataFrame) -> list[Row]:
     return sorted(farthest, key=lambda row: -abs(row["normalised"]))
 
 
-def _deviation(farthest: list[Row], statement: Statement) -> Deviation:
+def _deviation(farthest: list[Row], statement: Statement, tests: ResidualTests, parts: pd.DataFrame) -> Deviation:
     """Return the deviation of the first row. The words of its ``statement`` get the variables of the other rows."""
     first, others = farthest[0], [str(row["by"]) for row in farthest[1:]]
     more = f"; residuals by {' and '.join(others)} lie beyond it too" if others else ""
+    kind = "ping" if first["by"].startswith(CYCLE) else str(first["by"])
+    name = f"{first['low']:g}" if kind != "ping" else first["by"].removeprefix(CYCLE)
     return Deviation(
         statement=Statement(statement.code, f"{statement.words}{more}"),
+        kind=kind,
+        name=tests.face_names[int(first["low"])] if kind == "face" else name,
         excess=abs(float(first["normalised"])),
-        is_local=first["by"] in LOCAL,
+        strength=_strength(first, parts),
     )
+
+
+def _strength(row: Row, parts: pd.DataFrame) -> float:
+    if row["by"] == "drift":
+        return abs(float(row["normalised"]))
+    if row["by"] not in LOCAL:
+        return 0.0
+    strength = abs(float(row["mean_m"] / row["sigma_mean_m"]))
+    if row["by"] == "pass":
+        without = parts.loc[parts["part"].str.startswith("without"), "normalised"]
+        strength = max(strength, float(without.max()) if len(without) else 0.0)
+    return strength

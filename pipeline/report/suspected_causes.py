@@ -28,8 +28,9 @@ UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence")
 
 @dataclass(frozen=True)
 class SuspectedCause:
-    """A parameter that would explain the residuals: its words, and its value over the sigma from noise."""
+    """A parameter that would explain the residuals: its name and words, and its value over the sigma from noise."""
 
+    unknown: str
     words: str
     normalised: float
 
@@ -70,7 +71,7 @@ def suspected_causes(freed: pd.DataFrame, level: float) -> list[SuspectedCause]:
     if not any(abs(row["value"]) > limit * row["expected"] for row in tested):
         return []
     causes = [
-        SuspectedCause(words_of(row), abs(row["value"]) / row["sigma"])
+        SuspectedCause(row["unknown"], words_of(row), abs(row["value"]) / row["sigma"])
         for row in tested
         if abs(row["value"]) > limit * row["sigma"]
     ]

@@ -40,12 +40,18 @@ from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.ambiguities import MountSearch, ambiguities
 from pipeline.report.coarse_mount import contradicted_coarse_mount
 from pipeline.report.evidence import Evidence
+from pipeline.report.hypotheses import Hypothesis, hypotheses
 from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit
 from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
-from pipeline.report.residual_tests import deviations
+from pipeline.report.residual_tests import Deviation, deviations
 from pipeline.report.residual_words import ResidualTests
-from pipeline.report.suspected_causes import estimated_parameters, significance_limit, suspected_causes
+from pipeline.report.suspected_causes import (
+    SuspectedCause,
+    estimated_parameters,
+    significance_limit,
+    suspected_causes,
+)
 
 NEARLY_AS_WELL = 2.0  # sigmas: a cause whose value over sigma is smaller by no more is named beside the first
 MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
@@ -94,14 +100,7 @@ def rejections(
     criteria : limits, levels and tolerances
     drift_check : doubt about the figures of the INS's drift; a reason only if residuals deviate or a cause is suspected
     """
-    doubts = ambiguities(
-        evidence.target_pose.iloc[0],
-        evidence.provisional_mount.iloc[0],
-        criteria.search,
-        criteria.shape,
-        criteria.sides,
-    )
-    if doubts:
+    if doubts := _doubts(evidence, criteria):
         return doubts
     summary = evidence.summary.iloc[0]
     if summary["reason"]:
@@ -126,20 +125,47 @@ def rejections(
     return reasons
 
 
+def _doubts(evidence: Evidence, criteria: Criteria) -> list[Statement]:
+    return ambiguities(
+        evidence.target_pose.iloc[0],
+        evidence.provisional_mount.iloc[0],
+        criteria.search,
+        criteria.shape,
+        criteria.sides,
+    )
+
+
+def explanations(evidence: Evidence, criteria: Criteria) -> list[Hypothesis]:
+    """Return what would explain the residuals, the strongest explanation first; empty if they need none."""
+    if _doubts(evidence, criteria) or evidence.summary["reason"].iloc[0]:
+        return []
+    return hypotheses(_deviations(evidence, criteria), suspected_causes(evidence.freed, criteria.test_level))
+
+
 def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: Statement | None) -> list[Statement]:
-    """Return the reasons from deviating mean residuals, from the INS's drift, and from a suspected cause."""
+    """Return the reasons from deviating mean residuals, from a suspected cause, and from the INS's drift.
+
+    What explains the residuals best comes first: a parameter, or a part of the points. What only shows that something
+    is wrong comes after it.
+    """
+    deviating = _deviations(evidence, criteria)
+    causes = suspected_causes(evidence.freed, criteria.test_level)
+    strongest = causes[0].normalised if causes else 0.0
+    stronger = [deviation.statement for deviation in deviating if deviation.strength > strongest]
+    weaker = [deviation.statement for deviation in deviating if deviation.strength <= strongest]
+    reasons = stronger + _suspected_cause(causes, bool(stronger)) + weaker
+    drift = [drift_check] if reasons and drift_check is not None else []
+    return reasons[:1] + drift + reasons[1:]
+
+
+def _deviations(evidence: Evidence, criteria: Criteria) -> list[Deviation]:
     tests = ResidualTests(
         patterns=evidence.patterns,
         face_names=evidence.faces["name"].tolist(),
         shape=criteria.shape,
         tolerance_m=criteria.tolerance_m,
     )
-    deviating = deviations(tests, criteria.test_level)
-    causes = _suspected_cause(evidence.freed, criteria.test_level, any(deviation.is_local for deviation in deviating))
-    reasons = [deviation.statement for deviation in deviating]
-    if (deviating or causes) and drift_check is not None:
-        reasons.append(drift_check)
-    return reasons + causes
+    return deviations(tests, evidence.parts, criteria.test_level)
 
 
 def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
@@ -156,13 +182,12 @@ def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
     ]
 
 
-def _suspected_cause(freed: pd.DataFrame, level: float, local: bool) -> list[Statement]:
+def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Statement]:
     """Return a reason with the parameter that explains the residuals best, and the number of the others.
 
-    Others that explain them nearly as well are named, too. ``local``: another reason names a face, step, pass or ping,
-    which may be the cause instead.
+    Others that explain them nearly as well are named, too. ``is_second``: a face, step, pass or ping explains them
+    better.
     """
-    causes = suspected_causes(freed, level)
     if not causes:
         return []
     first = causes[0]
@@ -170,7 +195,7 @@ def _suspected_cause(freed: pd.DataFrame, level: float, local: bool) -> list[Sta
     nearly = "".join(f"; nearly as well ({cause.normalised:.0f} sigma): {cause.words}" for cause in rivals)
     others = len(causes) - 1 - len(rivals)
     rest = f"; {plural(others, 'other parameter')} would explain it less well" if others else ""
-    unless = ", unless the face, step, pass or ping named above is itself the cause" if local else ""
+    unless = ", unless the face, step, pass or ping named above is itself the cause" if is_second else ""
     words = f"likely cause of residuals{unless} ({first.normalised:.0f} sigma): {first.words}{nearly}{rest}"
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 

@@ -14,8 +14,9 @@ from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 from pipeline.report.coarse_mount import share_of_coarse_mount
 from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.hypotheses import Hypothesis
 from pipeline.report.reason_codes import ReasonCode
-from pipeline.report.verdict import rejections
+from pipeline.report.verdict import explanations, rejections
 from tests.support.evidence import (
     ADJUSTED,
     FIGURES,
@@ -191,12 +192,12 @@ def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_nam
     assert words.endswith(f"; {'1 other parameter' if is_named else '2 other parameters'} would explain it less well")
 
 
-def test_an_ins_that_is_allowed_no_drift_is_named_first():
+def test_an_ins_that_is_allowed_no_drift_is_named_beside_the_first_cause():
     check = check_ins_drift(drift(1.0), Drift(**dict.fromkeys(FIGURES, 0.0)))
     assert rejections(evidence(), methods(), ADJUSTED, check) == []
     reasons = rejections(evidence(patterns=[OFF], freed={"value": 6e-4}), methods(), ADJUSTED, check)
-    residuals, first_cause = ReasonCode.RESIDUALS_BY_ANGLE, ReasonCode.INS_DRIFT_NOT_GIVEN
-    assert codes(reasons) == [residuals, first_cause, ReasonCode.SUSPECTED_CAUSE]
+    no_drift, residuals = ReasonCode.INS_DRIFT_NOT_GIVEN, ReasonCode.RESIDUALS_BY_ANGLE
+    assert codes(reasons) == [ReasonCode.SUSPECTED_CAUSE, no_drift, residuals]
     assert codes(judged(evidence(patterns=[PASS_3]))) == [ReasonCode.PASSES_DISAGREE]
 
 
@@ -245,9 +246,34 @@ def test_steps_to_both_sides_are_transmit_sectors(family, mean_m, low, tilted):
     assert ("transmit sectors of different tilt" in reason.words) == tilted
 
 
-def test_a_cause_of_all_points_is_told_apart_from_what_is_off_by_itself():
-    freed = {"value": 6e-4}
-    _, cause = judged(evidence(patterns=[OFF], freed=freed))
+def test_what_only_shows_that_something_is_wrong_comes_after_the_cause():
+    cause, residuals = judged(evidence(patterns=[OFF], freed={"value": 6e-4}))
     assert "likely cause of residuals (6 sigma)" in cause.words
-    _, cause = judged(evidence(patterns=[OFF | {"by": "step"}], freed=freed))
-    assert "unless the face, step, pass or ping named above is itself the cause (6 sigma)" in cause.words
+    assert residuals.code == ReasonCode.RESIDUALS_BY_ANGLE
+
+
+@pytest.mark.parametrize(("mean_m", "is_first"), [(0.00061, True), (0.00059, False)])
+def test_the_stronger_of_a_parameter_and_a_part_of_the_points_is_named_first(mean_m, is_first):
+    """Both are values over sigmas of noise: 6 sigma of the parameter, against 6.1 or 5.9 of the step."""
+    tables = evidence(patterns=[OFF | {"by": "step", "mean_m": mean_m}], freed={"value": 6e-4})
+    reasons = {reason.code: reason.words for reason in judged(tables)}
+    in_order = [ReasonCode.RESIDUALS_STEP, ReasonCode.SUSPECTED_CAUSE]
+    assert list(reasons) == (in_order if is_first else in_order[::-1])
+    unless = "unless the face, step, pass or ping named above is itself the cause (6 sigma)"
+    assert (unless in reasons[ReasonCode.SUSPECTED_CAUSE]) == is_first
+    step = Hypothesis("step", "20", pytest.approx(1e4 * mean_m))
+    parameter = Hypothesis("parameter", "sound_speed", pytest.approx(6.0))
+    assert explanations(tables, ADJUSTED) == ([step, parameter] if is_first else [parameter, step])
+
+
+def test_a_pass_is_as_strong_as_the_mounts_change_without_it():
+    """What changes in one pass may show in the mount more than in any mean."""
+    tables = evidence(patterns=[PASS_3], parts={"part": "without pass 3", "normalised": 150.0})
+    assert explanations(tables, ADJUSTED)[0] == Hypothesis("pass", "3", 150.0)
+    tables = evidence(patterns=[PASS_3])
+    assert explanations(tables, ADJUSTED)[0] == Hypothesis("pass", "3", pytest.approx(120.0))
+
+
+def test_where_the_labels_are_in_doubt_nothing_is_explained():
+    assert explanations(evidence(pose={"ambiguous": True}, patterns=[PASS_3]), ADJUSTED) == []
+    assert explanations(evidence(summary={"reason": "too few"}, patterns=[PASS_3]), ADJUSTED) == []

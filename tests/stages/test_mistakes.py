@@ -3,7 +3,6 @@
 import copy
 from typing import Any
 
-import pandas as pd
 import pytest
 
 from pipeline.config.yaml_models import parse
@@ -47,25 +46,21 @@ def test_names_that_would_be_right_are_names_of_the_program() -> None:
             assert right in set(ReasonCode) | faces | PARAMETERS, (name, right)
 
 
-def artefacts(*causes: tuple[str, float]) -> dict[str, Any]:
-    """Tests of fixed parameters, each of a sigma of 1, and two means of faces."""
-    freed = pd.DataFrame(causes, columns=["unknown", "value"]).assign(sigma=1.0, expected=1.1, estimated=False)
-    patterns = pd.DataFrame({"by": ["face", "face", "pass"], "low": [0.0, 1.0, 2.0], "normalised": [5.0, -6.0, 9.0]})
-    return {"adjust/freed": freed, "adjust/patterns": patterns, "segment/faces": pd.DataFrame({"name": ["P2", "P1-0"]})}
-
-
 @pytest.mark.parametrize(
-    ("codes", "causes", "expected"),
+    ("codes", "explanations", "expected"),
     [
-        (["suspected_cause"], [("mbes_range", 5.0), ("wet_P1-1_shift", -7.0), ("sound_speed", 3.0)], "P1-1"),
-        (["residuals_by_angle", "suspected_cause"], [("mbes_range", 5.0)], "mbes_range"),
-        (["residuals_by_face", "suspected_cause"], [("mbes_range", 50.0)], "P1-0"),
-        (["passes_disagree", "suspected_cause"], [("mbes_range", 50.0)], "passes_disagree"),
-        (["sigma_above_limit"], [], "sigma_above_limit"),
+        (["suspected_cause"], [("parameter", "face_P1-1"), ("parameter", "sound_speed")], {"P1-1"}),
+        (["suspected_cause"], [("parameter", "mbes_range")], {"mbes_range"}),
+        (["residuals_by_face", "suspected_cause"], [("face", "P1-0"), ("parameter", "mbes_range")], {"P1-0"}),
+        (["passes_disagree", "suspected_cause"], [("pass", "1"), ("parameter", "mbes_range")], {"passes_disagree"}),
+        (["sigma_above_limit"], [], {"sigma_above_limit"}),
+        (["too_few_soundings", "suspected_cause"], [("parameter", "mbes_range")], {"too_few_soundings"}),
+        (["residuals_by_angle"], [], {"residuals_by_angle"}),
     ],
 )
-def test_what_is_named_first(codes: list[str], causes: list[tuple[str, float]], expected: str) -> None:
-    named = named_first(codes, artefacts(*causes))
-    assert expected in named
-    assert "P2" not in named
-    assert ("mbes_range" in named) == (expected == "mbes_range")
+def test_what_is_named_first(codes: list[str], explanations: list[tuple[str, str]], expected: set[str]) -> None:
+    result = {"reason_codes": codes, "hypotheses": [{"kind": kind, "name": name} for kind, name in explanations]}
+    named = named_first(result)
+    assert expected <= named
+    assert "sound_speed" not in named
+    assert ("mbes_range" in named) == (expected == {"mbes_range"})

@@ -67,6 +67,7 @@ def evidence(
     nothing = {"unknown": "sound_speed", "estimated": False, "known": False}
     nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
+    pattern["sigma_mean_m"] = 1e-4
     geometry = [("remedy", "two more passes at 3 m would do")]
     tables: dict[str, Any] = {field.name: pd.DataFrame() for field in fields(Evidence)}
     part: dict[str, Any] = {"part": "without pass 2", "passes": "0 1 3", "normalised": 1.0, "dof": 6}

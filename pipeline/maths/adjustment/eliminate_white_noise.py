@@ -24,7 +24,7 @@ from pipeline.maths.adjustment.pose_errors import N_POSE, Knots
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SIDE_BY_SIDE = 256  # number of spans that are eliminated together
+SIDE_BY_SIDE = 32  # number of spans that are eliminated together: 15 MB of blocks; more are no quicker
 
 
 @dataclass(frozen=True)

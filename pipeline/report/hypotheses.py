@@ -1,0 +1,52 @@
+"""What would explain the residuals: parameters of all points, and parts of the points, in one list by their strength.
+
+A parameter's strength is its estimate from the points over the sigma from noise (:mod:`~pipeline.report
+.suspected_causes`). That of a pass, face, step or ping is its mean over the sigma of this mean
+(:mod:`~pipeline.report.residual_tests`). Each is the normal deviate of one alternative against the same null
+hypothesis, that all is as the settings say. The alternative with the largest is the most likely one (Baarda 1968, "A
+testing procedure for use in geodetic networks"; for alternatives of different kinds Teunissen 2018, "Distributional
+theory for the DIA method", 3.2).
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pipeline.report.residual_tests import Deviation
+from pipeline.report.suspected_causes import SuspectedCause
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One explanation of the residuals.
+
+    Attributes
+    ----------
+    kind : parameter, pass, face, step, ping or drift
+    name : of the parameter or face; number of the pass; angle of the step; length of the cycle of pings
+    sigmas : its strength
+    """
+
+    kind: str
+    name: str
+    sigmas: float
+
+
+def hypotheses(deviating: Sequence[Deviation], causes: Sequence[SuspectedCause]) -> list[Hypothesis]:
+    """Return all explanations, the strongest first.
+
+    Parameters
+    ----------
+    deviating : deviating mean residuals
+    causes : suspected causes
+    """
+    found = [Hypothesis("parameter", cause.unknown, cause.normalised) for cause in causes]
+    found += [
+        Hypothesis(deviation.kind, deviation.name, deviation.strength) for deviation in deviating if deviation.strength
+    ]
+    return sorted(found, key=lambda hypothesis: -hypothesis.sigmas)
+
+
+def hypotheses_block(found: Sequence[Hypothesis]) -> list[dict[str, Any]]:
+    """Return the block ``hypotheses`` of calibration.json."""
+    return [asdict(hypothesis) for hypothesis in found]
