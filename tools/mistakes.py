@@ -37,7 +37,7 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
 
     This is the strongest explanation of the residuals: a parameter, by its name and the parts of its name (the face
     among them), or a part of the points, by the code of its reason and by its face. Without an explanation it is the
-    first reason, by its code.
+    first reason, by its code. (That the adjustment did not converge names nothing.)
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
         "pass": ReasonCode.PASSES_DISAGREE,
         "drift": ReasonCode.INS_DRIFT_BETWEEN_PASSES,
     }
-    first = next(iter(result["reason_codes"]), "")
+    first = next((code for code in result["reason_codes"] if code != ReasonCode.NOT_CONVERGED), "")
     if not result["hypotheses"] or first not in (*codes.values(), ReasonCode.SUSPECTED_CAUSE):
         return frozenset({first})
     kind, name = result["hypotheses"][0]["kind"], result["hypotheses"][0]["name"]

@@ -56,6 +56,7 @@ def test_names_that_would_be_right_are_names_of_the_program() -> None:
         (["sigma_above_limit"], [], {"sigma_above_limit"}),
         (["too_few_soundings", "suspected_cause"], [("parameter", "mbes_range")], {"too_few_soundings"}),
         (["residuals_by_angle"], [], {"residuals_by_angle"}),
+        (["not_converged", "suspected_cause"], [("parameter", "mbes_range")], {"mbes_range"}),
     ],
 )
 def test_what_is_named_first(codes: list[str], explanations: list[tuple[str, str]], expected: set[str]) -> None:
