@@ -98,8 +98,9 @@ class World:
 
         Plane -1 marks a ray that stage segment would not label. The stage's settings require the whole footprint and a
         margin on one face, no grazing incidence, and a distance from the water line. A beam keeps a distance from inner
-        corners, where something stands before the face's plane (``segment.side_lobe_widths``). The edges are not
-        widened by the angle noise of a beam, so that the bound takes more rays than the stage labels.
+        corners, where something stands before the face's plane (``segment.side_lobe_widths``). The weights that rise
+        along a ramp (``segment.edge_ramp_m``) count as a limit in its middle. The edges are not widened by the angle
+        noise of a beam, so that the bound takes more rays than the stage labels.
 
         Parameters
         ----------
@@ -124,16 +125,17 @@ class World:
         reached = np.where(np.isfinite(ranges), ranges, 0.0)
         hit = start + reached[:, None] * axis
         good = (plane >= 0) & (self.family[plane] >= 0) & (-slant > np.sin(np.radians(self.segment.min_grazing_deg)))
+        ramp = self.segment.edge_ramp_m / 2
         highest_m = self.scenario.target.water_level_m - self.segment.water_margin_m
         above = (hit[:, 2] - self.scenario.target.water_level_m) * (1 if sensor == "laser" else -1)
-        rows = np.flatnonzero(good & (above > self.segment.water_margin_m))
+        rows = np.flatnonzero(good & (above > self.segment.water_margin_m + ramp))
         away = (reached * slant)[rows, None]
         reach = away / np.einsum("ni,nmi->nm", normal[rows], directions[rows, 1:])
         widths = start[rows, None] + reach[..., None] * directions[rows, 1:] - hit[rows, None]  # half axes on the plane
         level = np.cross(normal[rows], np.where(np.abs(normal[rows, 2:]) > 0.5, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
         level /= np.linalg.norm(level, axis=1)[:, None]
         spot = LASER_BEAM_M / 2 / -slant[rows, None] if sensor == "laser" else 0.0  # half its length on the plane
-        margin = np.maximum(self.segment.margin_m, spot)
+        margin = np.maximum(self.segment.margin_m, spot) + ramp
         inside = np.ones(len(rows), dtype=bool)
         for turn in np.arange(8) * np.pi / 4:  # each edge of the target is normal to one of these directions
             outward = np.cos(turn) * level + np.sin(turn) * np.cross(normal[rows], level)
@@ -142,7 +144,7 @@ class World:
             toward /= np.linalg.norm(toward, axis=1)[:, None]
             inside &= self.caster.cast(start[rows], toward)[1] == plane[rows]
             if sensor == "mbes":
-                beside = hit[rows] + 2 * self.segment.side_lobe_widths * rim
+                beside = hit[rows] + 2 * self.segment.side_lobe_widths * rim + ramp * outward
                 inside &= ~self._corner_beside(start[rows], beside) & (beside[:, 2] < highest_m)
         plane_on_target = np.full(len(plane), -1)
         plane_on_target[rows[inside]] = plane[rows[inside]]

@@ -98,7 +98,7 @@ def _face(names: tuple[str, ...]) -> Callable[[World], str]:
         """Plant a face that stands 20 mm farther out than the config says."""
         name = names[world.number % len(names)]
         world.pool["as_built"] = {"faces": {name: -0.02}}
-        return f"on face {name} "
+        return f"face {name} "
 
     return plant
 
@@ -202,7 +202,7 @@ def session_row(task: Task) -> dict[str, Any]:
     matching = [reason for reason in result["reasons"] if reason.startswith(("residuals go with", "the passes do not"))]
     row: dict[str, Any] = {"fault": fault, "kind": kind, "seed": seed, "accepted": result["verdict"] == "accepted"}
     row |= {"reasons": " | ".join(result["reasons"]), "tests": len(patterns), "found": bool(matching)}
-    row |= {"named": bool(matching) and expected in matching[0]}
+    row |= {"named": bool(matching) and expected in result["reasons"][0]}
     mean_m, sigma_m, dof = (patterns[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
     patterns = patterns.assign(bare=normal_deviates(mean_m, sigma_m, dof, tolerated=0.0))
     for by in BY:

@@ -128,8 +128,8 @@ class Observations:
             share=self.share,
             features=self.features_at_adjusted(weight),
             weight=weight,
-            count=np.where(weight > 0, self.edge_weight, 0.0),
             v_m=self.v_m,
+            count=np.where(weight > 0, self.edge_weight, 0.0),
         )
         return interval_sums(points)
 

@@ -46,7 +46,7 @@ class Georeference(Model):
 class Segment(Model):
     """Limits of the searches for the target and the provisional mount, and of labelling."""
 
-    margin_m: NotNegative = 0.02  # to a face's edges, beyond the footprint's half extent
+    margin_m: NotNegative = 0.015  # to a face's edges, beyond the footprint's half extent
     edge_ramp_m: NotNegative = 0.03  # weights rise from 0 to 1 within it, from these limits inward
     side_lobe_widths: Annotated[float, Field(ge=0.5, le=10)] = 1.0  # no sounding so near an inner corner, beam widths
     gate_m: Positive = 0.05  # smallest gate round a face; widened to five times the robust scale

@@ -15,12 +15,13 @@ from tools.bound import bound
 from tools.campaigns import DRIFT, WHITE
 
 SECTORS = [{"to_deg": 15.0, "tilt_deg": 5.0}, {"to_deg": 90.0, "tilt_deg": -5.0}]
+SHARP = {"margin_m": 0.03, "edge_ramp_m": 0.0}  # the bound takes a ramp for a limit in its middle, which is not exact
 KINDS = [
-    ({"ins": WHITE["ins"]}, {}),
-    ({"ins": {}}, {}),
-    ({"ins": DRIFT}, {}),
+    ({"ins": WHITE["ins"]}, SHARP),
+    ({"ins": {}}, SHARP),
+    ({"ins": DRIFT}, SHARP),
     # of few soundings on tops, those that a beam's noise moves over a limit would matter: so limits that leave more
-    ({"mbes": {"format": "parquet", "sectors": SECTORS}}, {"side_lobe_widths": 0.5}),
+    ({"mbes": {"format": "parquet", "sectors": SECTORS}}, SHARP | {"side_lobe_widths": 0.5}),
 ]
 
 

@@ -147,7 +147,8 @@ def made(
 
 
 def columns(t_ns: np.ndarray, face: np.ndarray, x: np.ndarray, suffix: str) -> dict[str, np.ndarray]:
-    return {"t_ns": t_ns, "face": face.astype(np.int16)} | {f"{axis}_{suffix}": x[:, k] for k, axis in enumerate("xyz")}
+    labels = {"t_ns": t_ns, "face": face.astype(np.int16), "edge_weight": np.ones(len(t_ns), dtype=np.float32)}
+    return labels | {f"{axis}_{suffix}": x[:, k] for k, axis in enumerate("xyz")}
 
 
 def error_of(found: MountAdjustment) -> np.ndarray:

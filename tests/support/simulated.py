@@ -78,9 +78,10 @@ def calibrated(
 
 
 def without_biases(session: SimulatedSession) -> SimulatedSession:
-    """The session, with the target, ranges by incidence, the sonar's transmitter and the water known exactly."""
+    """The session, with the target, the water, and all biases of ranges and of the transmitter known exactly."""
     survey = dict.fromkeys(("face_sigma_m", "offset_sigma_m", "angle_sigma_deg", "bow_sigma_m"), 0.0)
-    of_sonar = ("level_bias_sigma_m", "incidence_bias_sigma_m", "projector_sigma_m", "sound_speed_gradient_sigma_1_s")
+    of_ranges = ("range_bias_sigma_m", "incidence_bias_sigma_m", "level_bias_sigma_m")
+    of_sonar = (*of_ranges, "projector_sigma_m", "sound_speed_gradient_sigma_1_s")
     known = {
         "mbes": session.session["mbes"] | dict.fromkeys(of_sonar, 0.0),
         "laser": session.session["laser"] | {"incidence_bias_sigma_m": 0.0},

@@ -115,8 +115,8 @@ class LinearisedPoints:
     """Points of one batch for :func:`interval_sums`.
 
     record, surface (n,): the last INS record before each point, and its surface; share (n,): its time s between that
-    record and the next, 0 to 1; features (F, n): q; weight (n,): w; count (n,): as which part of a
-    point each counts; v_m (n,): distance from the surface.
+    record and the next, 0 to 1; features (F, n): q; weight (n,): w; v_m (n,): distance from the surface;
+    count (n,): as which part of a point each counts, None: each that has a weight as one.
     """
 
     record: Integers
@@ -124,8 +124,8 @@ class LinearisedPoints:
     share: Array
     features: Array
     weight: Array
-    count: Array
     v_m: Array
+    count: Array | None = None
 
 
 def interval_sums(points: LinearisedPoints) -> IntervalSums:
@@ -133,6 +133,7 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
     q, weight, v_m = points.features, points.weight, points.v_m
     runs = Runs.of(points.record, points.surface)
     features, intervals, total = len(q), len(runs.starts), runs.total
+    count = (weight > 0).astype(np.float64) if points.count is None else points.count
     normal, swept = np.empty((intervals, features, features)), np.empty((intervals, N_MOVED, features))
     swept_twice, right = np.empty((intervals, N_MOVED, N_MOVED)), np.empty((intervals, features))
     right_swept = np.empty((intervals, N_MOVED))
@@ -161,7 +162,7 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
         right=right,
         right_swept=right_swept,
         squares=total(weight * v_m**2),
-        count=total(points.count),
+        count=total(count),
     )
     return merged([sums.selected(np.flatnonzero(normal[:, 0, 0] > 0))])
 
