@@ -93,7 +93,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     source = "the INS's files say" if drift_figures else "ins.drift says"
     drift_check, criteria = check_ins_drift(inputs.drift, drift, source), _criteria(config, report)
-    reasons = rejections(inputs, report.methods, criteria, drift_check)
+    off_figures = figures_disagree(inputs.drift_figures, source)
+    reasons = rejections(inputs, report.methods, criteria, drift_check, off_figures)
     warnings = [
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
         *unexpected_noise(inputs.groups),
@@ -102,8 +103,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *sigmas_too_small(inputs.estimate, config.adjust.test_level),
         *errors_allowed_for(inputs.freed, config.adjust.test_level),
         *target_off_origin(target),
-        *(check for check in [drift_check] if check is not None and check not in (NO_DRIFT, *reasons)),
-        *(check for check in [figures_disagree(inputs.drift_figures, source)] if check is not None),
+        *(check for check in (drift_check, off_figures) if check is not None and check not in (NO_DRIFT, *reasons)),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model)),
         *report.cast_warnings,

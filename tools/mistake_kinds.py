@@ -20,7 +20,7 @@ Block = dict[str, Any]
 Change = Callable[[Block, Block, Block], None]  # changes scenario, session and pool in place
 TIMES = (1, 3)  # the expected size, and thrice
 SHAPE = frozenset({"residuals_by_face", "length_off_design", "angle_off_design", "target_beyond_search"})
-DRIFTS = frozenset({"ins_drift_above_settings", "ins_drift_between_passes"})
+DRIFTS = frozenset({"ins_drift_above_settings", "ins_drift_between_passes", "ins_drift_off_figures"})
 GEOMETRY = frozenset({"sigma_above_limit", "no_parameter_estimable", "no_result"})
 BOWS = ("wet_P1_bow", "wet_P2_bow", "wet_P3_bow")
 WET_WALL = frozenset({"P2", "wet_P2_shift", "wet_P2_turn_1", "wet_P2_turn_2", "wet_P2_bow"})
@@ -190,7 +190,8 @@ EFFECTS = (
     ),
     _effect(
         "sonar: ranges {:g} mm short at 45°, as tan² i", 10,
-        _mbes("incidence_bias_m", -1e-3, incidence_law="tangent_squared"), "mbes_incidence",
+        # the parameter goes as 1/cos i - 1; what tan² i has beyond it is on the grazed, that is the level faces
+        _mbes("incidence_bias_m", -1e-3, incidence_law="tangent_squared"), "mbes_incidence", "mbes_level_range",
     ),
     _effect("sonar: all ranges {:g} mm long", 10, _mbes("range_bias_m", 1e-3), "mbes_range"),
     _effect(
@@ -239,7 +240,10 @@ EFFECTS = (
     _effect("P3-1-top {:g} mm too high", 20, _faces("P3-1-top", shift_m=1e-3), "P3-1-top"),
     _effect("P1-2 under water turned by {:g}°", 0.3, _faces("P1-2", turn_deg=[1.0, 0.0]), "P1-2"),
     _effect("wet wall leans by {:g}°", 0.05, _faces("P2", turn_deg=[0.0, 1.0]), *WET_WALL),
-    _effect("wet P1 and P3 {:g} mm to the boat", 7, _faces("P1", "P3", shift_m=1e-3), "wet_P1_shift", "wet_P3_shift"),
+    _effect(  # or P2 away from it: the lever arm takes the rest
+        "wet P1 and P3 {:g} mm to the boat", 7, _faces("P1", "P3", shift_m=1e-3),
+        "wet_P1_shift", "wet_P2_shift", "wet_P3_shift",
+    ),
     _effect("faces uneven by {:g} mm", 2, lambda size: {"surroundings": {"unevenness_m": size / 1000}}),
     _effect("laser: ranges {:g} mm long at 45°, as tan² i", 1, _of_laser("incidence_bias_m", 1e-3), "laser_incidence"),
     _effect("laser: ranges of level faces {:g} mm short", 5, _of_laser("level_bias_m", -1e-3), "wet_H_shift"),

@@ -88,6 +88,7 @@ def rejections(
     methods: Mapping[str, Mapping[str, Any]],
     criteria: Criteria,
     drift_check: Statement | None = None,
+    off_figures: Statement | None = None,
 ) -> list[Statement]:
     """Return the reasons for which the calibration is rejected; empty if it is accepted.
 
@@ -99,6 +100,7 @@ def rejections(
     methods : blocks of calibration.json by method
     criteria : limits, levels and tolerances
     drift_check : doubt about the figures of the INS's drift; a reason only if residuals deviate or a cause is suspected
+    off_figures : that the INS drifts more than its figures say; a reason only if sigmas are above their limits
     """
     if doubts := _doubts(evidence, criteria):
         return doubts
@@ -118,7 +120,8 @@ def rejections(
     if len(criteria.held) == len(PARAMETERS):
         words = "no mount parameter is good enough: none is within its limit and better than the coarse mount"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
-    reasons += sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held)
+    wide = sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held)
+    reasons += [off_figures, *wide] if wide and off_figures is not None else wide
     if criteria.method != "adjustment" and evidence.corrections is not None:
         row = evidence.corrections.set_index("method").loc[criteria.method]
         reasons += patent_reasons(criteria.method, row, methods, criteria.limits)

@@ -15,7 +15,7 @@ from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 from pipeline.report.coarse_mount import share_of_coarse_mount
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.hypotheses import Hypothesis
-from pipeline.report.reason_codes import ReasonCode
+from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.verdict import explanations, rejections
 from tests.support.evidence import (
     ADJUSTED,
@@ -163,6 +163,15 @@ def test_the_limit_is_for_all_parameters_together():
 def test_what_was_freed_and_is_not_as_the_session_says(value, expected):
     freed = {"unknown": "mbes_latency", "estimated": True, "value": value} | CLOCK
     assert codes(judged(evidence(freed=freed))) == expected
+
+
+@pytest.mark.parametrize(("limit_deg", "expected"), [(0.0059, True), (0.006, False)])
+def test_an_ins_that_drifts_more_than_it_should_is_why_sigmas_are_large(limit_deg, expected):
+    check = Statement(ReasonCode.INS_DRIFT_OFF_FIGURES, "the INS drifts otherwise")
+    criteria = replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=limit_deg))
+    reasons = rejections(evidence(), methods(), criteria, off_figures=check)
+    assert reasons[:1] == ([check] if expected else [])
+    assert set(codes(reasons[1:])) == ({ReasonCode.SIGMA_ABOVE_LIMIT} if expected else set())
 
 
 def test_what_was_freed_where_there_is_no_result():
