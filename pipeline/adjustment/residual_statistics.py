@@ -16,7 +16,8 @@ from pipeline.artefacts.catalogue.results import PATTERNS
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
+from pipeline.maths.adjustment.design_matrix import FLATTEST
+from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums, merged
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
 from pipeline.maths.adjustment.residual_means import (
@@ -153,15 +154,20 @@ def _batch(
 
 
 def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, Array | Integers]]:
-    """Yield each variable by which residuals are binned: its name, and its values (n,) for the points."""
+    """Yield each variable by which residuals are binned: its name, and its values (n,) for the points.
+
+    The distance is that of the surface along the ray. By the measured range the noise would choose the bin: of a wall
+    that begins at 4.0 m, only points that are measured too near lie below 4 m.
+    """
     batch = observations.points
     own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)
+    reached_m = range_m - observations.v_m / np.minimum(observations.features[N_MOVED], -FLATTEST)  # v / (n · d)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
     yield "pass", batch["pass"].astype(np.int64)
     yield "face", batch["face"].astype(np.int64)
     yield "angle", angle
-    yield "distance", range_m
+    yield "distance", reached_m
     yield "time", batch["t_ns"] // NS
     if sensor == "mbes":
         yield "step", angle

@@ -1,0 +1,26 @@
+"""The bins of residuals: noise must not choose them."""
+
+import numpy as np
+import pytest
+
+from pipeline.adjustment.observation_model import Observations
+from pipeline.adjustment.residual_statistics import _variables
+
+WALL_M, SLANT = 4.02, np.radians(40.0)  # distance of the surface along the rays, and their incidence
+
+
+@pytest.mark.parametrize("sensor", ["laser", "mbes"])
+def test_a_point_has_the_distance_of_its_surface_not_its_measured_range(sensor: str) -> None:
+    """A range that is 10 cm short puts a point 10 cm · cos 40° before the wall; the wall stays at 4.02 m."""
+    n = 101
+    noise_m = np.linspace(-0.1, 0.1, n)
+    points = {f"{axis}_{sensor}_m": np.zeros(n) for axis in "xyz"} | {f"x_{sensor}_m": WALL_M + noise_m}
+    points |= dict.fromkeys(("pass", "face", "t_ns", "ping"), np.zeros(n, dtype=np.int64))
+    along, one = -np.cos(SLANT), np.ones(n)
+    features = np.stack([one, 0 * one, 0 * one, along * one])
+    zero = np.zeros(n, dtype=np.int64)
+    observations = Observations(
+        sensor=sensor, points=points, record=zero, share=0 * one, surface=zero, v_m=along * noise_m, mean_m=0 * one,
+        sigma_m=one, common_m=0 * one, edge_weight=one, features=features, slopes=features[1:],
+    )  # fmt: skip
+    np.testing.assert_allclose(dict(_variables(sensor, observations))["distance"], WALL_M, atol=1e-12)
