@@ -13,9 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from pipeline.atomic_files import read_regular
 from pipeline.errors import ConfigError
@@ -124,6 +121,10 @@ def _array(values: Any) -> Array:
 
 def _outline(vertices: Array, polygons: Sequence[Polygon], where: str) -> Array:
     """Return the corners (k, 3) of the polygons' single outline: the edges that belong to one polygon only."""
+    from scipy.sparse import coo_array  # the imports take a quarter of a second, and few targets are meshes
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(vertices).query_pairs(SAME_M, output_type="ndarray")
     count = len(vertices)
     _, place = connected_components(coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count)))

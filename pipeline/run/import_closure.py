@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 PACKAGES = ("pipeline", "stages")  # every other package is a library, identified by its version
+STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # these hold all statements of a module
 
 
 def import_closure(root: Path, modules: Sequence[str]) -> list[Path]:
@@ -92,10 +93,11 @@ def _imports(path: Path, name: str, inside: bool) -> tuple[tuple[str, str], ...]
 
     If module a.c names the program "b.py" in its folder, the pair is ("a", "b") too.
     """
-    tree = ast.parse(path.read_bytes())
+    source = path.read_bytes()
+    tree = ast.parse(source)
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     imports: list[tuple[str, str]] = []
-    for node in _nodes(tree, inside):
+    for node in _nodes(tree, inside, expressions=b".py" in source):
         if isinstance(node, ast.Import):
             imports += [(alias.name, "") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -112,12 +114,28 @@ def _is_program(text: str, path: Path) -> bool:
     return text.endswith(".py") and "/" not in text and path.with_name(text).is_file()
 
 
-def _nodes(tree: ast.AST, inside: bool) -> Iterator[ast.AST]:
-    """Yield the syntax nodes that run when a module is imported; ``inside``: also the nodes in its functions."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING"):
-            yield from (inner for branch in node.orelse for inner in (branch, *_nodes(branch, inside)))
-            continue
+def _nodes(tree: ast.AST, inside: bool, expressions: bool) -> Iterator[ast.AST]:
+    """Yield the syntax nodes that run when a module is imported.
+
+    Parameters
+    ----------
+    tree
+        The module.
+    inside
+        True: also the nodes in its functions.
+    expressions
+        False: statements alone. They are a tenth of the nodes, and an import is a statement.
+    """
+    kinds: tuple[type[ast.AST], ...] = (ast.AST,) if expressions else STATEMENTS
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
         yield node
-        if inside or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
-            yield from _nodes(node, inside)
+        if isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING"):
+            waiting += node.orelse
+        elif inside or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
+            for inner in vars(node).values():
+                if isinstance(inner, list):
+                    waiting += [one for one in inner if isinstance(one, kinds)]
+                elif isinstance(inner, kinds):
+                    waiting.append(inner)

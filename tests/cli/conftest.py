@@ -1,5 +1,20 @@
-"""The same toy session as the runner's tests have."""
+"""The same toy session as the runner's tests have, and the command line with toy stages in this process."""
+
+import sys
+from collections.abc import Callable
+
+import pytest
 
 from tests.run.conftest import pool
+from tests.support import toy_poolcal
+from tests.support.places import Told, poolcal
 
 __all__ = ["pool"]
+
+
+@pytest.fixture
+def toy(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Told]:
+    """A second for each start is saved where it does not matter that the command is a process of its own."""
+    for name, module in toy_poolcal.install(monkeypatch.setattr).items():
+        monkeypatch.setitem(sys.modules, name, module)
+    return poolcal

@@ -3,23 +3,25 @@
 import os
 import pty
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from stages.cli import call
+from tests.support.places import Told
 from tests.support.toy_commands import TOY, run_words, set_outcome, toy_poolcal
 from tests.support.toy_run import Pool
 
 
-def test_names_cannot_command_the_terminal(pool: Pool) -> None:
+def test_names_cannot_command_the_terminal(pool: Pool, toy: Callable[..., Told]) -> None:
     set_outcome(pool, 1)
     text = (pool.session / "session.yaml").read_text()
     (pool.session / "session.yaml").write_text(text.replace("name: toy", 'name: "a\\e[2Jb"'))
     (pool.session / "laser" / "\x1b[31m.bin").write_bytes(b"")
-    assert toy_poolcal(*run_words(pool)).stdout == "a\\x1b[2Jb: accepted\n"
+    assert toy(*run_words(pool)).out == "a\\x1b[2Jb: accepted\n"
     (pool.session / "laser" / "\x1b[31m.bin").write_bytes(bytes(8))
-    assert "take: laser/\\x1b[31m.bin changed" in toy_poolcal(*run_words(pool)).stderr
+    assert "take: laser/\\x1b[31m.bin changed" in toy(*run_words(pool)).err
 
 
 def test_nobody_listens(pool: Pool) -> None:
@@ -76,10 +78,12 @@ def test_a_log_that_cannot_be_written_changes_nothing(pool: Pool, code: int) -> 
 
 
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["verify"], ["run"]])
-def test_an_answer_that_cannot_be_written_is_one_line(pool: Pool, words: list[str]) -> None:
+def test_an_answer_that_cannot_be_written_is_one_line(
+    pool: Pool, toy: Callable[..., Told], words: list[str]
+) -> None:
     set_outcome(pool, 1)
     if words == ["verify"]:
-        toy_poolcal(*run_words(pool))
+        toy(*run_words(pool))
     given = {"verify": ["verify", pool.run_folder], "run": list(run_words(pool))}.get(words[-1], words)
     with Path("/dev/full").open("w") as full:
         done = subprocess.run([*TOY, *map(str, given)], stdout=full, stderr=subprocess.PIPE, text=True, check=False)

@@ -1,6 +1,7 @@
 """A session whose cast is a file: the same as one with the cast's list, and out of date when the file changes."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from tests.support.places import Place, digests, poolcal
+from tests.support.places import Place, Told, digests, poolcal
 
 DEPTHS = np.round(np.arange(0.1, 4.0, 0.02), 2)
 SPEEDS = np.round(1500.0 + 0.02 * DEPTHS**2, 3)
@@ -23,16 +24,26 @@ def give(place: Place, speeds: np.ndarray = SPEEDS, day: str = "2026-132") -> Pa
     return path
 
 
-@pytest.fixture
-def traced(done: Place) -> Place:
-    """A complete run, with the cast."""
-    give(done)
-    told = done.calibrate()
+@pytest.fixture(scope="module")
+def template(small: Path, undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run folder of a complete run, with the cast. Nobody changes it."""
+    place = Place(small, tmp_path_factory.mktemp("traced"))
+    place.mend()
+    shutil.copytree(undisturbed[0], place.run)
+    give(place)
+    told = place.calibrate()
     assert told.ran[0] == "georeference", "the raw files are not read again for a cast"
-    return done
+    return place.run
 
 
-def test_a_cast_from_its_file(traced: Place) -> None:
+@pytest.fixture
+def traced(place: Place, template: Path) -> Place:
+    give(place)
+    shutil.copytree(template, place.run)
+    return place
+
+
+def test_a_cast_from_its_file(traced: Place, template: Path) -> None:
     """The result names the cast; a list of the same depths gives the same numbers; a changed file is noticed."""
     result, path = traced.result(), traced.session / "cast.svp"
     used = yaml.safe_load((traced.run / "run.yaml").read_text())["session"]["mbes"]
@@ -54,7 +65,9 @@ def test_a_cast_from_its_file(traced: Place) -> None:
     for name, digest in digests(traced.run).items():
         assert digest == before[name], name
     give(traced)
-    traced.calibrate()
+    shutil.rmtree(traced.run)
+    shutil.copytree(template, traced.run)
+    assert traced.calibrate().ran == []
 
     path.write_text(path.read_text().replace("1500.001", "1500.101"))
     told = poolcal("verify", traced.run)
@@ -63,7 +76,8 @@ def test_a_cast_from_its_file(traced: Place) -> None:
     told = poolcal("stage", "adjust", traced.run)
     assert told.status == 2
     assert "cast.svp: is not the cast that this run was made with" in told.err
-    assert traced.calibrate().ran[0] == "georeference"
+    words = ("--session", traced.session, "--config", traced.config, "--jobs", 1)
+    assert poolcal("stage", "georeference", traced.run, *words).ran == ["georeference"]
     path.unlink()
     (line,) = traced.calibrate().complaints
     assert "mbes.svp: 'cast.svp' matches no file" in line

@@ -1,6 +1,7 @@
 """poolcal diff: a run with itself, with other settings, a moved sonar, whose errors count how, nothing comparable."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,13 @@ def run_of(session: Path) -> Path:
     return run
 
 
-@pytest.fixture
-def again(place: Place) -> Place:
-    """The small session in a run folder of one's own."""
+@pytest.fixture(scope="module")
+def wider(small: Path, undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFactory) -> Place:
+    """The small session with another margin. Nobody changes it."""
+    place = Place(small, tmp_path_factory.mktemp("wider"))
+    place.mend()
+    shutil.copytree(undisturbed[0], place.run)
+    place.edit_config("segment", margin_m=0.05)
     assert place.calibrate().status == 0
     return place
 
@@ -44,10 +49,8 @@ def test_with_itself_nothing(undisturbed: tuple[Path, Told]) -> None:
     assert told.out.splitlines()[:2] == ["The same result in both.", ""]
 
 
-def test_other_settings_are_named(undisturbed: tuple[Path, Told], again: Place) -> None:
-    again.edit_config("segment", margin_m=0.05)
-    assert again.calibrate().status == 0
-    status, found = compared(undisturbed[0], again.run)
+def test_other_settings_are_named(undisturbed: tuple[Path, Told], wider: Place) -> None:
+    status, found = compared(undisturbed[0], wider.run)
     assert status == 0, found["sentence"]
     assert found["config"] == [{"key": "segment.margin_m", "a": 0.03, "b": 0.05}]
     assert found["inputs"] == []
@@ -58,7 +61,7 @@ def test_other_settings_are_named(undisturbed: tuple[Path, Told], again: Place) 
     assert found["visible"] == ""
     largest = max(abs(row["difference"]) for row in found["parameters"] if row["unit"] == "deg")
     for factor, expected in ((0.99, 1), (1.01, 0)):
-        status, found = compared(undisturbed[0], again.run, "--tolerance-deg", largest * factor)
+        status, found = compared(undisturbed[0], wider.run, "--tolerance-deg", largest * factor)
         assert (status, bool(found["beyond_tolerance"])) == (expected, bool(expected))
 
 
@@ -102,16 +105,16 @@ def test_what_it_cannot_see_it_says(undisturbed: tuple[Path, Told], tmp_path: Pa
 
 
 def test_another_mount_of_the_laser_and_another_target_share_nothing(
-    undisturbed: tuple[Path, Told], again: Place
+    undisturbed: tuple[Path, Told], done: Place
 ) -> None:
     """Their errors are then each session's own, which is told, and the sigmas are larger."""
-    _, before = compared(undisturbed[0], again.run)
-    again.edit_session("laser", mount={"x_m": 0.212})
-    again.edit_config("as_built", offset_sigma_m=0.0012)
-    assert again.calibrate().status == 0
-    status, found = compared(undisturbed[0], again.run)
+    _, before = compared(undisturbed[0], done.run)
+    done.edit_session("laser", mount={"x_m": 0.212})
+    done.edit_config("as_built", offset_sigma_m=0.0012)
+    assert done.calibrate().status == 0
+    status, found = compared(undisturbed[0], done.run)
     assert found["errors"]["differing"] == ["the laser's mount", "the target"]
-    notes = poolcal("diff", undisturbed[0], again.run).out
+    notes = poolcal("diff", undisturbed[0], done.run).out
     assert "The laser's mount is not the same in both: its errors were counted as each session's own." in notes
     assert "laser_lever_arm_x" in found["errors"]["own"]
     x = [next(row for row in one["parameters"] if row["parameter"] == "lever arm x") for one in (before, found)]
@@ -159,15 +162,16 @@ def test_faces_of_one_run_alone_are_counted_and_others_are_listed() -> None:
     assert list(own_faces_counted(kept)) == kept
 
 
-def test_a_rejected_run_answers_nothing(undisturbed: tuple[Path, Told], again: Place) -> None:
+def test_a_rejected_run_answers_nothing(undisturbed: tuple[Path, Told], wider: Place, place: Place) -> None:
     """Its values must not be used, so they say neither yes nor no; unless they are the same."""
-    again.edit_config("verdict", max_sigma_deg=1e-6)
-    again.edit_config("segment", margin_m=0.05)
-    assert again.calibrate().status == 1
-    status, found = compared(undisturbed[0], again.run)
+    shutil.copytree(wider.run, place.run)
+    shutil.copy(wider.config, place.config)
+    place.edit_config("verdict", max_sigma_deg=1e-6)
+    assert place.calibrate().status == 1
+    status, found = compared(undisturbed[0], place.run)
     assert (status, found["answered"]) == (1, False)
     assert found["sentence"].startswith("no answer: b (2026-05-12_small) was rejected")
-    status, found = compared(again.run, again.run)
+    status, found = compared(place.run, place.run)
     assert (status, found["answered"]) == (0, True)
     assert found["sentence"].startswith("the same result in both; a (")
 

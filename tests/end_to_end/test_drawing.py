@@ -40,7 +40,7 @@ def drawn_in(run: Path) -> list[str]:
     return sorted(path.stem for path in run.glob("*/*.rrd"))
 
 
-def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failure_to_draw_spoils_nothing(done: Place, right: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """The reason on one line; a bug keeps its traceback as well."""
     for error, traced in ((OSError("no room\nfor pictures"), False), (ValueError("no room\nfor pictures"), True)):
 
@@ -48,13 +48,13 @@ def test_a_failure_to_draw_spoils_nothing(place: Place, right: dict[str, str], m
             raise error
 
         monkeypatch.setattr(stages.views.recording, "record", fails)
-        told = place.calibrate("--recordings")
+        told = done.calibrate("--recordings")
         assert told.status == 0
         last = f"recordings: not drawn ({type(error).__name__}: no room); the calibration is complete"
         assert told.complaints[-1] == last
         assert ("Traceback" in told.err) == traced
         assert (len(told.complaints) > 1) == traced
-        assert digests(place.run) == right
+        assert digests(done.run) == right
 
 
 @pytest.mark.parametrize("jobs", [2, 4])
@@ -159,9 +159,9 @@ def test_a_mistyped_run_is_refused_and_not_made(place: Place) -> None:
     assert not (place.folder / "typo").exists()
 
 
-def test_none_when_not_wanted(place: Place) -> None:
-    assert place.calibrate("--no-recordings").status == 0
-    assert not list(place.run.rglob("*.rrd"))
-    assert poolcal("view", place.folder / "nowhere").status == 2
-    told = poolcal("view", place.run, "--stage", "../elsewhere")
+def test_none_when_not_wanted(done: Place) -> None:
+    assert done.calibrate("--no-recordings").status == 0
+    assert not list(done.run.rglob("*.rrd"))
+    assert poolcal("view", done.folder / "nowhere").status == 2
+    told = poolcal("view", done.run, "--stage", "../elsewhere")
     assert (told.status, "is no stage" in told.err) == (2, True)

@@ -11,13 +11,12 @@ from tests.support.effort import often
 from tests.support.places import Place, digests, poolcal, poolcal_process
 
 NAMES = [
-    "水池 标定 2026 – ½",
-    "it's \"quoted\" <script>alert(1)</script>",
+    "水池 标定 2026 – ½, it's \"quoted\" <script>alert(1)</script>",
     "-rf [0] * ? %s {brace} $HOME `id`",
 ]
 
 
-@pytest.mark.parametrize("name", often(NAMES[:2], NAMES))
+@pytest.mark.parametrize("name", often(NAMES[:1], NAMES))
 def test_names(name: str, small: Path, tmp_path: Path, right: dict[str, str]) -> None:
     """Session folder, session, raw files and run folder all called so: the same tables, the name in the result."""
     place = Place(small, tmp_path)

@@ -107,27 +107,27 @@ def test_the_total_sigma_is_the_sum_of_its_parts(undisturbed: tuple[Path, Told])
     np.testing.assert_allclose(np.sqrt((parts**2).sum(axis=0)), expected, rtol=0.01, atol=0.0002)
 
 
-def test_a_laser_whose_six_correlate_is_one_part_of_the_total(place: Place) -> None:
+def test_a_laser_whose_six_correlate_is_one_part_of_the_total(done: Place) -> None:
     """Given as a covariance: whole in the total sigma, one row on the page, and the parts add up as before."""
     sigma = np.repeat([np.radians(0.01), 0.002], 3)
     correlation = np.eye(6)
     correlation[2, 4] = correlation[4, 2] = 0.9
-    place.edit_session("laser", mount_covariance=(correlation * np.outer(sigma, sigma)).tolist())
-    told = place.calibrate("--report")
+    done.edit_session("laser", mount_covariance=(correlation * np.outer(sigma, sigma)).tolist())
+    told = done.calibrate("--report")
     assert told.status == 0, told.err
-    rows = page_of(place.run).table("", "roll, °", "pitch, °", "yaw, °", "x, mm", "y, mm", "z, mm")
+    rows = page_of(done.run).table("", "roll, °", "pitch, °", "yaw, °", "x, mm", "y, mm", "z, mm")
     assert [row[0] for row in rows[:3]] == ["noise (the random sigma)", "the laser's mount", "the laser's ranges"]
     parts = np.array([row[1:] for row in rows], dtype=float)
-    block = result_of(place.run)["mbes"]["sigma_total"]
+    block = result_of(done.run)["mbes"]["sigma_total"]
     expected = np.r_[np.array(block["rotation_vector_deg"])[[1, 0, 2]], 1000 * np.array(block["lever_arm_m"])]
     np.testing.assert_allclose(np.sqrt((parts**2).sum(axis=0)), expected, rtol=0.01, atol=0.0002)
-    freed = pd.read_parquet(place.run / "adjust" / "freed.parquet").set_index("unknown")
+    freed = pd.read_parquet(done.run / "adjust" / "freed.parquet").set_index("unknown")
     mine = [f"laser_{kind}_{axis}" for kind in ("rotation", "lever_arm") for axis in "xyz"]
     np.testing.assert_allclose(freed["considered"][mine], sigma, rtol=1e-6)
     effects = freed.loc[mine, [f"effect_{kind}_{axis}" for kind in ("rotation", "lever_arm") for axis in "xyz"]]
     E = effects.to_numpy()
     whole = np.sqrt(np.diag(E.T @ correlation @ E))
-    written = result_of(place.run)["systematic"]["laser_mount"]
+    written = result_of(done.run)["systematic"]["laser_mount"]
     np.testing.assert_allclose(np.array(list(written["effects"].values())), E, rtol=1e-12)
     np.testing.assert_allclose(written["correlation"], correlation, atol=1e-12)
     shown = parts[1] * np.r_[np.full(3, np.pi / 180), np.full(3, 1e-3)]
@@ -148,13 +148,13 @@ def test_complete_in_itself_and_not_large(undisturbed: tuple[Path, Told]) -> Non
         assert not re.search(r'href="(?!#|data:image/png)', svg)
 
 
-def test_names_stay_names(place: Place) -> None:
-    place.edit_session("", name=HOSTILE[:300])
-    hostile = place.session / "laser" / "<img src=x onerror=alert(1)> & '水池'.las"
-    place.raw("laser").rename(hostile)
-    place.edit_config("", result="patent_alternating")
-    assert place.calibrate("--report").status in (0, 1)
-    page = page_of(place.run)
+def test_names_stay_names(done: Place) -> None:
+    done.edit_session("", name=HOSTILE[:300])
+    hostile = done.session / "laser" / "<img src=x onerror=alert(1)> & '水池'.las"
+    done.raw("laser").rename(hostile)
+    done.edit_config("", result="patent_alternating")
+    assert done.calibrate("--report", "--overwrite").status in (0, 1)
+    page = page_of(done.run)
     assert_self_contained(page)
     assert page.headings[0] == HOSTILE[:300]
     assert f"laser/{hostile.name}" in [row[1] for row in page.table("sensor", "file")]

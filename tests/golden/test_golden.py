@@ -31,7 +31,7 @@ KEYS = {"report/calibration": ["method", "parameter"], "adjust/groups": ["group"
 
 
 def tables() -> dict[str, pd.DataFrame]:
-    found = calibrated(made(seed=1))
+    found = calibrated(made({"ins": {"rate_hz": 200.0}}, seed=1))
     return {name: found[name][[*KEYS.get(name, []), *columns]] for name, columns in TOLERANCES.items()}
 
 

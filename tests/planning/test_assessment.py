@@ -49,7 +49,7 @@ def configs() -> tuple[PoolConfig, SessionConfig]:
 def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift: dict[str, Any]) -> None:
     distances = (4.0, 8.0, 5.0, 7.0)
     track = {"track": {"distances_m": list(distances)}, "mbes": {"coarse_angle_deg": 0.1}}
-    session = copy.deepcopy(made(track, drift, seed=6))
+    session = copy.deepcopy(made(track, {"ins": {"rate_hz": 200.0}}, drift, seed=6))
     exact = {"drift_within": {"sigmas": 1.0, "time_constant": 1.0}}  # no plan knows what the data will say of the drift
     session.session["ins"] |= exact
     result = json.loads(calibrated(session)["report/calibration.json"])["methods"]["adjustment"]

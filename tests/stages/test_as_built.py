@@ -26,8 +26,8 @@ def test_tops_and_bottoms_that_are_built_too_high_lift_the_sonar(noisy, noisy_fo
     higher = {row.name: 0.005 * row.normal_z_target_1 for row in wet.itertuples(index=False)}
     session = without_biases(noisy)
     plain, lifted = (
-        result(calibrated(session, pool={"as_built": {"faces": faces}}))["mbes"]["lever_arm_m"]
-        for faces in ({}, higher)
+        result(calibrated(session, pool={"as_built": {"faces": faces}}, known=known))["mbes"]["lever_arm_m"]
+        for faces, known in (({}, through("segment", noisy_found)), (higher, through("georeference", noisy_found)))
     )
     change = np.subtract(lifted, plain)
     np.testing.assert_allclose(change[:2], 0.0, atol=2e-4)

@@ -27,6 +27,7 @@ KINDS = [
 
 @pytest.mark.parametrize(("scenario", "segment"), often(KINDS[2:3], KINDS))
 def test_the_random_sigmas_are_those_of_the_best_estimator(scenario, segment):
+    scenario = merged(scenario, {"ins": {"rate_hz": 200.0}})
     session = made(scenario, seed=3)
     ins = session.session["ins"] | {"drift_within": {"sigmas": 1.0, "time_constant": 1.0}}  # the bound knows them, too
     session = replace(session, session=session.session | {"ins": ins})

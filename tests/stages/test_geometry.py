@@ -56,9 +56,13 @@ def labelled(scenario: str, seed: int) -> dict[str, Any]:
         pytest.param({"track": {"distances_m": [6.0, 6.0]}}, ALL, None, "all passes lie at 6.0 to 6.0 m", id="far"),
     ][: often(2, 6)],
 )
-def test_gaps(scenario: dict[str, Any], families: tuple[str, ...], accepted: bool | None, gap: str) -> None:
+def test_gaps(
+    scenario: dict[str, Any], families: tuple[str, ...], accepted: bool | None, gap: str, noisy_found: dict[str, Any]
+) -> None:
     """None: whatever the sigmas say, but warned, and with what it comes to."""
-    found = calibrated(made(scenario, seed=9), changed=seeing(*families), known=labelled(json.dumps(scenario), 9))
+    seed = 9 if scenario else 1
+    known = labelled(json.dumps(scenario), seed) if scenario else through("segment", noisy_found)
+    found = calibrated(made(scenario, seed=seed), changed=seeing(*families), known=known)
     result = json.loads(found["report/calibration.json"])
     if accepted is not None:
         assert (result["verdict"] == "accepted") == accepted

@@ -33,10 +33,10 @@ def test_without_noise_the_truth_comes_back_and_the_sequential_form_is_biased(qu
     assert sequential[4] > 1.0
 
 
-@pytest.mark.parametrize("seed", often([12], [11, 12, 13]))
-def test_with_noise_the_errors_are_as_the_sigmas_say(seed, errors_of):
+@pytest.mark.parametrize("seed", often([1], [1, 11, 12, 13]))
+def test_with_noise_the_errors_are_as_the_sigmas_say(seed, noisy_found, errors_of):
     session = made(seed=seed)
-    result = blocks(calibrated(session))
+    result = blocks(noisy_found if seed == 1 else calibrated(session))
     assert result["verdict"] == "accepted", result["reasons"]
     block = result["methods"]["adjustment"]
     error = errors_of(block, session.truth)

@@ -11,7 +11,7 @@ from pipeline.config.mount import Mount
 from pipeline.errors import RawDataError
 from pipeline.mount import mount_of, setting_change
 from tests.support.effort import often
-from tests.support.simulated import QUIET, calibrated, made, through
+from tests.support.simulated import INS_HZ, QUIET, calibrated, made, through
 
 NS = 1_000_000_000
 
@@ -68,7 +68,7 @@ def test_passes_and_quality_are_recorded(noisy_found):
     assert set(found["ingest/gaps"]["sensor"]) == {"ins", "mbes"}
     assert len(found["ingest/gaps"]) == 6
     rates = found["ingest/files"].set_index("sensor")["rate_hz"]
-    assert rates["ins"] == pytest.approx(200, rel=1e-3)
+    assert rates["ins"] == pytest.approx(INS_HZ, rel=1e-3)
     assert rates["mbes"] == pytest.approx(10, rel=1e-2)
 
 

@@ -16,12 +16,19 @@ from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.session import SimulatedSession, simulate_session
 from stages import ORDER
 from stages.in_memory import calibrate_in_memory
+from tests.support.effort import often
 
-THIN: dict[str, Any] = {"laser": {"point_rate_hz": 4000.0}, "mbes": {"ping_rate_hz": 10.0}}
+INS_HZ = often(100.0, 200.0)  # half the records are half the work of an adjustment
+THIN: dict[str, Any] = {
+    "ins": {"rate_hz": INS_HZ}, "laser": {"point_rate_hz": 4000.0}, "mbes": {"ping_rate_hz": 10.0}
+}  # fmt: skip
 
 
 QUIET: dict[str, Any] = {
-    "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
+    "ins": {
+        "rate_hz": 200.0,  # without noise the poses between two records count
+        "white": {"position_m": 0.0, "attitude_deg": 0.0},
+    },
     "laser": {"outlier_share": 0.0, "water_return_share": 0.0, "range_sigma_m": 0.0, "angle_sigma_deg": 0.0},
     "mbes": {
         "point_beams": True,

@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 import types
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -60,24 +61,27 @@ def _run(inputs: Inputs, config: Config) -> Outputs:
     return Outputs(json.dumps(result) + "\n")
 
 
-def install() -> None:
+def install(put: Callable[[object, str, object], object]) -> dict[str, types.ModuleType]:
+    """Put the toys in the place of what they replace; the modules that ``sys.modules`` must hold are returned."""
     report = types.ModuleType("stages.report")
     report.__file__ = __file__
     vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
-    stages.commands.draw.draw_missing = lambda *_: []  # toys have nothing to show
-    pipeline.results.screen.summary = lambda calibration: f"{calibration['session']}: {calibration['verdict']}"
+    put(stages.commands.draw, "draw_missing", lambda *_: [])  # toys have nothing to show
+    put(
+        pipeline.results.screen, "summary",
+        lambda calibration: f"{calibration['session']}: {calibration['verdict']}",
+    )  # fmt: skip
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
-    for module in (take, sift, report):
-        sys.modules[module.__name__] = module
-    vars(stages).update(ORDER=("take", "sift", "report"))
-    pipeline.readers.dispatch.raw_files = toys.raw_files
-    pipeline.readers.dispatch.raw_parts = toys.raw_parts
+    put(stages, "ORDER", ("take", "sift", "report"))
+    put(pipeline.readers.dispatch, "raw_files", toys.raw_files)
+    put(pipeline.readers.dispatch, "raw_parts", toys.raw_parts)
+    return {module.__name__: module for module in (take, sift, report)}
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal: a job in the background ignores it
-    install()
+    sys.modules |= install(setattr)
     from stages.cli import main
 
     main()

@@ -1,6 +1,7 @@
 """A face of the target: a convex planar polygon, its edges, and the lines along which it meets other faces."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,7 @@ class Face:
         across = across / np.linalg.norm(across) if not self.level else np.array([0.0, 1.0])
         return float(np.ptp(self.vertices_m[:, :2] @ across))
 
+    @cached_property
     def inward_edges(self) -> tuple[Array, Array]:
         """Return the inward unit vectors m (k, 3) of the edges, and their offsets (k,): m · x >= offset inside."""
         edges = np.roll(self.vertices_m, -1, axis=0) - self.vertices_m
@@ -104,7 +106,7 @@ class Face:
             edge = spread + (margin_m if stray_m is None else np.maximum(np.abs(stray_m @ axis), margin_m))
             return edge if outer else np.maximum(edge, corner_factor * spread)
 
-        inward, offsets = self.inward_edges()
+        inward, offsets = self.inward_edges
         smallest = np.full(len(points_m), np.inf)
         outer_edges = self.outer_edges or (False,) * len(offsets)
         for normal, offset, outer in zip(inward, offsets, outer_edges, strict=True):
