@@ -268,7 +268,7 @@ def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
         ["mbes", FOREIGN, "range_sigma_m", "0.02", "preset, unverified"],
     ]
     assert shown[-10:] == [
-        ["", "", "range_bias_sigma_m", "0.002", "default"],
+        ["", "", "range_bias_sigma_m", "0.005", "default"],
         ["", "", "incidence_bias_sigma_m", "0.003", "default"],
         ["", "", "level_bias_sigma_m", "0.01", "default"],
         ["", "", "angle_sigma_deg", "0.09", "session"],

@@ -120,7 +120,7 @@ def test_planes_close(undisturbed: tuple[Path, Told]) -> None:
         before, after = closing.loc[("coarse", name)], closing.loc[("adjustment", name)]
         assert before["angle_deg"] == pytest.approx(angle, abs=1e-9)
         assert after["angle_deg"] < before["angle_deg"] / (10 if name == "P2" else 2)  # the blocks are small
-        assert abs(after["distance_m"]) < 0.002 < abs(before["distance_m"])
+        assert abs(after["distance_m"]) < 0.004 < abs(before["distance_m"])  # the total sigma of x
 
 
 def test_steps_are_odd_and_keep_to_the_limit() -> None:

@@ -49,7 +49,7 @@ def test_the_errors_are_as_large_as_the_sessions_say() -> None:
             values -= 1500.0 if name == "sound_speed_true_m_s" else 0.0
             assert 0.9 < values.std() / sigma < 1.1
             assert abs(values.mean()) < 4 * sigma / np.sqrt(len(values))
-    assert 0.9 < np.std([one["mbes"]["range_bias_m"] for one in drawn]) / 0.002 < 1.1
+    assert 0.9 < np.std([one["mbes"]["range_bias_m"] for one in drawn]) / 0.005 < 1.1
     assert 0.9 < np.std([one["mbes"]["projector_offset_m"] for one in drawn]) / 0.005 < 1.1
     for key in SETTINGS:
         sigma = of_mount.angle_deg if key.endswith("_deg") else of_mount.lever_arm_m
