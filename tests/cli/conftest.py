@@ -5,6 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
+import stages.commands.run
+import stages.commands.stage  # noqa: F401  loaded before there are toys, of which they would keep some after the test
 from tests.run.conftest import pool
 from tests.support import toy_poolcal
 from tests.support.places import Told, poolcal
