@@ -105,13 +105,15 @@ def test_an_outer_edge_is_no_corner(target: TargetModel) -> None:
         assert labelled(target, 2.0, *sounding(4.0, -2.5 + off_m, -2.75, x_m=1.0 - off_m)) == good
 
 
+@pytest.mark.parametrize("beyond_m", [0.0, 0.02])
 @pytest.mark.parametrize(("range_m", "half_m"), [(4.0, 0.0476), (8.0, 8.0 * np.tan(np.radians(0.5)))])
-def test_corner_rays_reach_the_footprints_corners(range_m: float, half_m: float) -> None:
+def test_corner_rays_reach_the_footprints_corners(range_m: float, half_m: float, beyond_m: float) -> None:
     """In height the beam may also stray by three sigmas of 0.01°, which the near field does not change."""
     _, beam = sounding(range_m, 0.0, -2.0)
-    met = [corner[0] * range_m for corner in beam.corners(np.array([0]))]
-    np.testing.assert_allclose(sorted(ray[1] for ray in met), [-half_m] * 2 + [half_m] * 2, atol=1e-4)
-    high = range_m * np.tan(np.radians(0.25)) * (1 + 0.03 / 0.25)
+    met = [corner[0] * range_m for corner in beam.corners(np.array([0]), beyond_m)]
+    wide = half_m + beyond_m
+    np.testing.assert_allclose(sorted(ray[1] for ray in met), [-wide] * 2 + [wide] * 2, atol=1e-4)
+    high = range_m * np.tan(np.radians(0.25)) * (1 + 0.03 / 0.25) + beyond_m
     np.testing.assert_allclose(sorted(ray[2] for ray in met), [-high] * 2 + [high] * 2, atol=1e-4)
 
 
