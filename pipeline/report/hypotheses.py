@@ -2,10 +2,11 @@
 
 A parameter's strength is its estimate from the points over the sigma from noise (:mod:`~pipeline.report
 .suspected_causes`). That of a pass, face, step or ping is its mean over the sigma of this mean
-(:mod:`~pipeline.report.residual_tests`). Each is the normal deviate of one alternative against the same null
-hypothesis, that all is as the settings say. The alternative with the largest is the most likely one (Baarda 1968, "A
-testing procedure for use in geodetic networks"; for alternatives of different kinds Teunissen 2018, "Distributional
-theory for the DIA method", 3.2).
+(:mod:`~pipeline.report.residual_tests`). Each is the ratio of one alternative's estimate to its sigma, against the
+same null hypothesis, that all is as the settings say. The alternative with the largest is the most likely one (Baarda
+1968, "A testing procedure for use in geodetic networks"; for alternatives of different kinds Teunissen 2018,
+"Distributional theory for the DIA method", 3.2). The sigma of a mean comes from its scatter, that of a parameter from
+the model: degrees of freedom are not counted, because a large ratio over few of them would then be named too late.
 """
 
 from collections.abc import Sequence

@@ -93,6 +93,6 @@ def _strength(row: Row, parts: pd.DataFrame) -> float:
         return 0.0
     strength = abs(float(row["mean_m"] / row["sigma_mean_m"]))
     if row["by"] == "pass":
-        without = parts.loc[parts["part"].str.startswith("without"), "normalised"]
-        strength = max(strength, float(without.max()) if len(without) else 0.0)
+        without = parts.loc[parts["part"] == f"without pass {int(row['low'])}", "normalised"]
+        strength = max([strength, *without.tolist()])
     return strength

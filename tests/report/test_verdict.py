@@ -279,8 +279,9 @@ def test_a_pass_is_as_strong_as_the_mounts_change_without_it():
     """What changes in one pass may show in the mount more than in any mean."""
     tables = evidence(patterns=[PASS_3], parts={"part": "without pass 3", "normalised": 150.0})
     assert explanations(tables, ADJUSTED)[0] == Hypothesis("pass", "3", 150.0)
-    tables = evidence(patterns=[PASS_3])
-    assert explanations(tables, ADJUSTED)[0] == Hypothesis("pass", "3", pytest.approx(120.0))
+    for other in ({"part": "without pass 3", "normalised": 2.0}, {"part": "without pass 2", "normalised": 150.0}):
+        tables = evidence(patterns=[PASS_3], parts=other)
+        assert explanations(tables, ADJUSTED)[0] == Hypothesis("pass", "3", pytest.approx(120.0))
 
 
 def test_where_the_labels_are_in_doubt_nothing_is_explained():
