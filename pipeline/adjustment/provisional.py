@@ -20,6 +20,7 @@ from pipeline.maths.adjustment.pose_errors import N_POSE
 from pipeline.maths.adjustment.pseudo_observations import N_DISPLACEMENT, DesignPrior, displacement
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.maths.target.model import TargetModel
+from pipeline.target.gate import fitting_gate_m
 from pipeline.target.labelled_points import LabellingContext, label_batch
 
 ROUNDS = 2  # adjustments of the sample, the first without white noise; a third changes less than 0.1 % of the labels
@@ -96,7 +97,9 @@ def with_adjusted_sample(
     labelled = labelled_sample(sample, context)
     if not all(_counts(labelled)):
         return context  # stage segment tells why no point has a label
-    for number in range(1, ROUNDS + 1):
+    number, rounds = 0, ROUNDS
+    while number < rounds:
+        number += 1
         problem = problem_at(context)
         if number < ROUNDS:  # enough to label by: white noise of single records takes half the time
             noise = replace(problem.prior.noise, white=np.zeros(N_POSE))
@@ -109,7 +112,15 @@ def with_adjusted_sample(
         if any(now < LEAST_KEPT * before for now, before in zip(_counts(relabelled), _counts(labelled), strict=True)):
             return context
         context, labelled = corrected, relabelled
+        if context.mbes is not None and (gate_m := _fitting_gate_m(labelled, context)) > context.mount.gate_m:
+            context = replace(context, mount=replace(context.mount, gate_m=gate_m))
+            labelled, rounds = labelled_sample(sample, context), rounds + 1
     return context
+
+
+def _fitting_gate_m(labelled: Mapping[str, Stream], context: LabellingContext) -> float:
+    (batch,) = labelled["mbes"].batches()  # a sample is one part
+    return fitting_gate_m(batch, context)
 
 
 def _counts(labelled: Mapping[str, Stream]) -> list[int]:

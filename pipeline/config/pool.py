@@ -49,7 +49,7 @@ class Segment(Model):
     margin_m: NotNegative = 0.015  # to a face's edges, beyond the footprint's half extent
     edge_ramp_m: NotNegative = 0.03  # weights rise from 0 to 1 within it, from these limits inward
     side_lobe_widths: Annotated[float, Field(ge=0.5, le=10)] = 1.0  # no sounding so near an inner corner, beam widths
-    gate_m: Positive = 0.05  # smallest gate round a face; widened to five times the robust scale
+    gate_m: Positive = 0.05  # smallest gate round a face; widened to five times the noise
     water_margin_m: NotNegative = 0.10  # no point nearer than this to the water line is used
     min_grazing_deg: Annotated[float, Field(ge=0, lt=90)] = 5.0  # flatter rays are not used
     search_horizontal_m: Positive = 0.5  # how wrong the configured origin may be

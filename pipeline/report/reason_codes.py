@@ -32,6 +32,7 @@ class ReasonCode(StrEnum):
     NO_RESULT = "no_result", "the adjustment has no result"
     NOT_CONVERGED = "not_converged", "the adjustment did not converge"
     TOO_FEW_SOUNDINGS = "too_few_soundings", "a family of faces has too few soundings for its labels to be trusted"
+    NOISE_CUT_BY_GATE = "noise_cut_by_gate", "a family's noise is wider than the labels' gate, which cuts it off"
     NO_PARAMETER_ESTIMABLE = "no_parameter_estimable", "no mount parameter of the laser is good enough"
     COARSE_MOUNT_CONTRADICTED = "coarse_mount_contradicted", "the points contradict the laser's coarse mount"
     NO_COVARIANCE = "no_covariance", "the adjustment has no covariance"

@@ -8,7 +8,8 @@ The limits are defined at these places (paths from ``pipeline/``):
 * no result: ``RANK_TOLERANCE`` of maths/adjustment/solution.py;
 * convergence: ``max_iterations`` of class ``Adjust`` of config/pool.py, ``SETTLED``, ``CONVERGED`` and
   ``CLOSING_STEPS`` of adjustment/iteration.py;
-* number of soundings on a family: ``MIN_SOUNDINGS`` of this module;
+* number of soundings on a family, and its noise against the gate: ``MIN_SOUNDINGS`` and ``MAX_SHARE_OF_GATE`` of
+  label_checks.py;
 * mean residuals: ``test_level`` and ``test_tolerance_m`` of class ``Adjust`` of config/pool.py; ``FEWEST``,
   ``FEWEST_SLOTS`` and ``FEWEST_DOF`` of maths/adjustment/residual_means.py decide which means are tested;
 * the mount from parts of the session: ``test_level`` of class ``Adjust``, ``APART_M`` of adjustment/parts.py, and
@@ -41,6 +42,7 @@ from pipeline.report.ambiguities import MountSearch, ambiguities
 from pipeline.report.coarse_mount import contradicted_coarse_mount
 from pipeline.report.evidence import Evidence
 from pipeline.report.hypotheses import Hypothesis, hypotheses
+from pipeline.report.label_checks import noise_cut_by_gate, too_few_soundings
 from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit
 from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
@@ -54,7 +56,6 @@ from pipeline.report.suspected_causes import (
 )
 
 NEARLY_AS_WELL = 2.0  # sigmas: a cause whose value over sigma is smaller by no more is named beside the first
-MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +113,8 @@ def rejections(
     if not summary["converged"]:
         words = f"the adjustment did not converge in {summary['iterations']} steps"
         reasons.append(Statement(ReasonCode.NOT_CONVERGED, words))
-    reasons += _too_few_soundings(evidence.cells)
+    gates_m = {"laser": evidence.target_pose["gate_m"].iloc[0], "mbes": evidence.provisional_mount["gate_m"].iloc[0]}
+    reasons += too_few_soundings(evidence.cells) + noise_cut_by_gate(evidence.cells, gates_m)
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
     reasons += _estimates_off_settings(evidence.freed, criteria.test_level)
@@ -169,20 +171,6 @@ def _deviations(evidence: Evidence, criteria: Criteria) -> list[Deviation]:
         tolerance_m=criteria.tolerance_m,
     )
     return deviations(tests, evidence.parts, criteria.test_level)
-
-
-def _too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
-    """Return a reason for each family with too few soundings for reliable labels. A family without any is not used."""
-    count = cells[cells["sensor"] == "mbes"].groupby("family")["count"].sum()
-    return [
-        Statement(
-            ReasonCode.TOO_FEW_SOUNDINGS,
-            f"only {number} soundings lie on {family}: too few to trust; sail so that the fan covers it (poolcal check "
-            "tells why so few hit it)",
-        )
-        for family, number in count.items()
-        if number < MIN_SOUNDINGS
-    ]
 
 
 def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Statement]:

@@ -43,6 +43,7 @@ def evidence(
     patterns: Sequence[Mapping[str, Any]] = ({},),
     parts: Mapping[str, Any] | None = None,
     count: int = 500,
+    rms_m: float = 0.01,
 ) -> Evidence:
     """Tables of a session that is accepted, with changes to their rows."""
     pose_row = {
@@ -51,8 +52,9 @@ def evidence(
         "rival_agreement_m2": 9.0,
         "agreement_m2": 10.0,
         "within": True,
+        "gate_m": 0.05,
     }
-    mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4, "within": True}
+    mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4, "within": True, "gate_m": 0.08}
     mount_row |= {f"rotation_{axis}_deg": 4.4 for axis in "xyz"} | {f"lever_arm_{axis}_m": 0.44 for axis in "xyz"}
     summary_row = {"reason": "", "converged": True, "iterations": 6}
     row = {"method": "patent_alternating", "reason": "", "converged": True, "iterations": 9}
@@ -62,6 +64,7 @@ def evidence(
             "family": ["P1", "P2", "P2"],
             "pass": [0, 3, 4],
             "count": [5000, 400, count],
+            "rms_m": [0.005, 0.01, rms_m],
         }
     )
     nothing = {"unknown": "sound_speed", "estimated": False, "known": False}

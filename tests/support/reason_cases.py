@@ -48,6 +48,11 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         "the adjustment has no result: the data leave 2 directions open; two more passes at 3 m would do",
     ),
     ({"summary": {"converged": False}}, ReasonCode.NOT_CONVERGED, "the adjustment did not converge in 6 steps"),
+    (
+        {"rms_m": 0.06},
+        ReasonCode.NOISE_CUT_BY_GATE,
+        "soundings on P2 scatter by 45 mm, and those more than 80 mm off its faces are not used",
+    ),
     ({"count": -371}, ReasonCode.TOO_FEW_SOUNDINGS, "only 29 soundings lie on P2: too few to trust; sail so that"),
     (
         {"freed": {"unknown": "rotation_z", "value": -0.0523, "sigma": 2e-3, "expected": 9e-3}},

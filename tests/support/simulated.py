@@ -104,3 +104,9 @@ def through(last: str, artefacts: Mapping[str, Any]) -> dict[str, Any]:
     """The artefacts of the stages up to this one: for a calibration that differs from it later alone."""
     stages = ORDER[: ORDER.index(last) + 1]
     return {key: value for key, value in artefacts.items() if key.partition("/")[0] in stages}
+
+
+def mount_within_its_sigmas(result: dict[str, Any], errors: np.ndarray, sigmas: float) -> bool:
+    """Whether the errors (6,) in degrees and mm are below this many total sigmas."""
+    sigma = np.sqrt(np.diag(result["mbes"]["covariance_total"])) * np.repeat([180 / np.pi, 1000.0], 3)
+    return bool(np.all(np.abs(errors) < sigmas * sigma))

@@ -1,0 +1,52 @@
+"""Reasons about the labels: a family with too few soundings, or with noise that the labels' gate cuts off."""
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report.noise_warnings import POINTS
+from pipeline.report.reason_codes import ReasonCode, Statement
+
+MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
+# Largest RMS of a family's residuals as a share of the gate. Noise of which a gate leaves k sigmas on either side has
+# 0.20 for k = 5, 0.33 for 3, 0.39 for 2.5, 0.44 for 2; without any centre, spread over the gate, 0.58.
+MAX_SHARE_OF_GATE = 0.4
+
+
+def too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
+    """Return a reason for each family with too few soundings for reliable labels. A family without any is not used."""
+    count = cells[cells["sensor"] == "mbes"].groupby("family")["count"].sum()
+    return [
+        Statement(
+            ReasonCode.TOO_FEW_SOUNDINGS,
+            f"only {number} soundings lie on {family}: too few to trust; sail so that the fan covers it (poolcal check "
+            "tells why so few hit it)",
+        )
+        for family, number in count.items()
+        if number < MIN_SOUNDINGS
+    ]
+
+
+def noise_cut_by_gate(cells: pd.DataFrame, gates_m: dict[str, float]) -> list[Statement]:
+    """Return a reason for each family whose noise fills its gate.
+
+    Such a gate cuts the noise off where the provisional mount places the face. The mean of what remains is near there
+    whatever the mount, and so is the result.
+
+    Parameters
+    ----------
+    cells : the table
+    gates_m : largest distance from a face at which a point has a label, by sensor
+    """
+    statements = []
+    for names, rows in cells.groupby(["sensor", "family"], sort=True):
+        sensor, family = map(str, names)
+        rms_m = float(np.sqrt(np.average(rows["rms_m"] ** 2, weights=rows["count"])))
+        if rms_m > MAX_SHARE_OF_GATE * gates_m[sensor]:
+            words = (
+                f"{POINTS[sensor]} on {family} scatter by {1000 * rms_m:.0f} mm, and those more than "
+                f"{1000 * gates_m[sensor]:.0f} mm off its faces are not used: the result may be drawn to where the "
+                "search began; look for what makes them so noisy (weed, a face that is not there, a wrong range gate), "
+                "or enter a larger segment.gate_m"
+            )
+            statements.append(Statement(ReasonCode.NOISE_CUT_BY_GATE, words))
+    return statements

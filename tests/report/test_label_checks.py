@@ -1,0 +1,33 @@
+"""Both sides of the limits of the labels' checks."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.report.label_checks import MAX_SHARE_OF_GATE, noise_cut_by_gate
+from pipeline.report.reason_codes import ReasonCode
+
+
+def cut_normal(gate_in_sigmas: float) -> float:
+    """RMS of normal noise that a gate has cut off, as a share of the gate."""
+    noise = np.random.default_rng(3).normal(size=400_000)
+    return float(np.sqrt(np.mean(noise[np.abs(noise) < gate_in_sigmas] ** 2)) / gate_in_sigmas)
+
+
+@pytest.mark.parametrize(("gate_in_sigmas", "cut"), [(5.0, False), (2.6, False), (2.2, True), (0.3, True)])
+def test_noise_that_the_gate_cuts_off_is_a_reason(gate_in_sigmas: float, cut: bool) -> None:
+    rms_m = 0.06 * cut_normal(gate_in_sigmas)
+    rows = [("laser", "P1", 1000, 0.005), ("mbes", "P1", 400, rms_m), ("mbes", "P1", 100, rms_m)]
+    cells = pd.DataFrame(rows, columns=["sensor", "family", "count", "rms_m"])
+    found = noise_cut_by_gate(cells, {"laser": 0.05, "mbes": 0.06})
+    assert [statement.code for statement in found] == [ReasonCode.NOISE_CUT_BY_GATE] * cut
+    assert all("on P1 scatter" in statement.words and "soundings" in statement.words for statement in found)
+
+
+def test_each_sensor_has_its_own_gate() -> None:
+    cells = pd.DataFrame(
+        [("laser", "H", 50, 0.05 * (MAX_SHARE_OF_GATE + 0.01)), ("mbes", "H", 50, 0.03)],
+        columns=["sensor", "family", "count", "rms_m"],
+    )
+    (found,) = noise_cut_by_gate(cells, {"laser": 0.05, "mbes": 0.1})
+    assert found.words.startswith("laser points on H scatter")
