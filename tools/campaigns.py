@@ -150,6 +150,7 @@ def systematic_errors(seed: int) -> dict[str, Any]:
         "laser": {
             "latency_s": drawn(own, Laser, "latency_sigma_s"),
             "incidence_bias_m": drawn(own, Laser, "incidence_bias_sigma_m"),
+            "incidence_law": "secant",  # that of the sigma
             "coarse_error": dict(zip(SETTINGS, of_mount.tolist(), strict=True)),
         },
     }

@@ -30,7 +30,7 @@ def measured_ranges(scenario: LaserScenario, pool: Pool, rays: Rays) -> Floats:
         measured = _mixed(scenario, pool, rays)
     if scenario.incidence_bias_m or scenario.level_bias_m:
         normals = pool.caster.normals(rays.origins_m, rays.directions)
-        measured = measured + range_bias(scenario, normals, rays.directions, "tangent_squared")
+        measured = measured + range_bias(scenario, normals, rays.directions, scenario.incidence_law)
     return measured
 
 

@@ -12,7 +12,7 @@ from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.artefacts.streams import MemoryPart, Stream, point_array
 from pipeline.simulation.session import SimulatedSession
 from tests.support.effort import often
-from tests.support.simulated import calibrated, made, through
+from tests.support.simulated import calibrated, made, mount_within_its_sigmas, through
 
 Law = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of the incidence (n,) rad and |n_z| (n,) of the face
 
@@ -52,12 +52,6 @@ def recorded_too_long(session: SimulatedSession, bias_m: float, law: Law) -> Cal
     return changed
 
 
-def mount_within_its_sigmas(result: dict[str, Any], errors: np.ndarray, sigmas: float) -> bool:
-    """Whether the errors (6,) in degrees and mm are below this many total sigmas."""
-    sigma = np.sqrt(np.diag(result["mbes"]["covariance_total"])) * np.repeat([180 / np.pi, 1000.0], 3)
-    return bool(np.all(np.abs(errors) < sigmas * sigma))
-
-
 @pytest.mark.parametrize("sign", often([1.0], [1.0, -1.0]))
 def test_a_transmitter_whose_place_no_document_tells_is_found_and_allowed_for(errors_of: Any, sign: float) -> None:
     """0.119 m above or below the receiver, known to 6 cm. Nothing is told, and the mount is right."""
@@ -69,6 +63,18 @@ def test_a_transmitter_whose_place_no_document_tells_is_found_and_allowed_for(er
     assert mount_within_its_sigmas(result, errors_of(result["mbes"], session.truth), 3)
     place = result["warning_codes"].index("error_allowed_for")
     assert ("higher" if sign > 0 else "lower") in result["warnings"][place]
+
+
+def test_a_bias_of_the_lasers_ranges_is_found_on_tops_and_bottoms(errors_of: Any) -> None:
+    """One and a half of its sigma. From the laser's height both the lower blocks' tops and the upper ones' bottoms are
+    seen, under whose normals, which point up, the same bias moves points to opposite sides."""
+    session = made({"laser": {"incidence_bias_m": 0.0015, "incidence_law": "secant"}}, seed=3)
+    found = calibrated(session)
+    row = found["adjust/freed"].set_index("unknown").loc["laser_incidence"]
+    assert abs(row["value"] + 0.0015) < 0.3 * 0.0015  # beyond 80° the bias grows no more
+    result = json.loads(found["report/calibration.json"])
+    assert result["verdict"] == "accepted"
+    assert mount_within_its_sigmas(result, errors_of(result["mbes"], session.truth), 3)
 
 
 BIASES = pytest.mark.parametrize(

@@ -35,7 +35,10 @@ E v = (n · d) ρ σ_θ² (1/2 + t²). This holds for ∂²d/∂θ² = -d. For a
 k = (0, p, p² (1 - p²) / c³), and E v is less by ρ σ_θ² (n · k) / 2. (2) ρ in σ must not be the measured range, because
 a range too long would get a smaller weight. It is the range of the recorded ray to the surface, ρ - v / (n · d).
 
-Further features. A range b added to every range has the feature n · d. For the sonar, a sound speed higher by the share
+Further features. A range b added to every range has the feature n · d. The bias of ranges with incidence i,
+cos i = |n · d|, is b (1 / cos i - 1) / (√2 - 1): none at right angles, b at 45°, 6.9 b at 75°. It changes v by n · d
+times that, so that its feature is (s - n · d) / (√2 - 1) with s the sign of n · d. This is -1 on most faces, and +1 on
+the bottoms of the horizontal family, whose normal is that of the tops. For the sonar, a sound speed higher by the share
 k makes the ranges longer by k, and likewise sin θ and sin τ, because flat arrays steer their beams with the recorded
 speed. With (x, y, z) = ρ (s, p, -c) and c² = 1 - s² - p² the point moves by k (2 x, 2 y, z - (x² + y²) / z). Of this
 k (x, y, z) is due to the ranges, and the rest, k (x, y, -(x² + y²) / z), to the speed at the arrays, which steers. For
@@ -60,11 +63,7 @@ the body at p, T = R_target_from_body, its velocity (ṗ, ω) in the target fram
     turns of the surface:      t_k · (X - c) = t_k · (p - c) + (α or β)
     its shift:                 -1
     further features:          each is a derivative itself
-    incidence:                 -(1 + n · d) / (√2 - 1)
     level range:               n · d if the surface is horizontal, else 0
-
-The bias of ranges with incidence i, cos i = -n · d, is b (1 / cos i - 1) / (√2 - 1): none at right angles, b at 45°,
-6.9 b at 75°. As all points lie on fronts, n · d < 0, it changes v by -b (1 + n · d) / (√2 - 1).
 
 The turns need no reduction of X - c by a horizontal face's height: the reduction is along n, and t_k · n = 0.
 """
@@ -110,11 +109,12 @@ class PointDesign(NamedTuple):
 
 
 def laser_point_design(r: Array, lever_arm: Array, range_m: Array, sigmas: SensorSigmas) -> PointDesign:
-    """Return the design of laser points, F = 4.
+    """Return the design of laser points, F = 5.
 
     A row of the design matrix is q · C: a point's features q times its interval's design C of
     :func:`parameter_design`. A feature is a number of the point that multiplies a row of C. For the laser the features
-    are q = (1, α, β, n · d): constant, coordinates along the surface (m), and derivative of v by the range.
+    are q = (1, α, β, n · d, …): constant, coordinates along the surface (m), derivatives of v by the range and by the
+    bias with incidence.
 
     Parameters
     ----------
@@ -131,9 +131,10 @@ def laser_point_design(r: Array, lever_arm: Array, range_m: Array, sigmas: Senso
     across = (range_m * sigmas.angle_rad) ** 2
     along = ray[2] * (sigmas.range_m**2 - across)
     variance = along * ray[2] + across
-    slopes = np.stack([along * ray[0], along * ray[1], across / range_m * (1 - ray[2] * ray[2])])
+    turning = across / range_m * (1 - ray[2] * ray[2])
+    slopes = np.stack([along * ray[0], along * ray[1], turning, -turning / AT_45_DEG])
     slopes /= variance
-    features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2]])
+    features = np.stack([np.ones_like(range_m), r[0], r[1], ray[2], _by_incidence(ray[2])])
     return PointDesign(np.zeros_like(range_m), np.sqrt(variance), features, slopes)
 
 
@@ -156,8 +157,13 @@ class SoundingsOnSurface:
     depth_m: float
 
 
+def _by_incidence(slant: Array) -> Array:
+    """Return the feature (n,) of the bias with incidence, by n · d."""
+    return np.asarray((np.sign(slant) - slant) / AT_45_DEG)
+
+
 def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> PointDesign:
-    """Return the design of soundings, F = 11; see the module's docstring for each formula.
+    """Return the design of soundings, F = 12; see the module's docstring for each formula.
 
     The features q = (1, α, β, …) multiply the rows of :func:`parameter_design`. Those beyond β are the derivatives of v
     by ``MBES_FEATURES`` of :mod:`~pipeline.maths.adjustment.parameters`, and the form of a bow.
@@ -166,7 +172,7 @@ def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> P
     x, y, z = points_m
     range_m = np.sqrt(np.einsum("in,in->n", points_m, points_m))
     ray = np.einsum("kin,in->kn", axes, points_m) / range_m
-    slant = np.minimum(ray[2], -FLATTEST)
+    slant = np.copysign(np.maximum(np.abs(ray[2]), FLATTEST), ray[2])
     reached_m = np.clip(range_m - soundings.v_m / slant, range_m / 2, 2 * range_m)
     side = np.einsum("in,in->n", axes[2], across_beam(x, y, z)) / range_m  # n · a
     variance = (sigmas.range_m * ray[2]) ** 2 + (reached_m * sigmas.angle_rad * side) ** 2
@@ -180,8 +186,9 @@ def sonar_point_design(soundings: SoundingsOnSurface, sigmas: SensorSigmas) -> P
     gradient = (up_of_normal - 2 * up_of_ray * ray[2]) * range_m**2 / (2 * SPEED_M_S)
     projector, zero = points_m * (ray[2] / (2 * range_m)), np.zeros_like(x)
     bow, bent = 4 * soundings.height * (1 - soundings.height), 4 * (1 - 2 * soundings.height) / soundings.depth_m
-    features = np.stack([np.ones_like(x), r[0], r[1], ray[2], speed, gradient, steering, *projector, bow])
-    by_range = [ray[0], ray[1], zero, speed / range_m, 2 * gradient / range_m, steering / range_m, zero, zero, zero]
+    incidence = _by_incidence(ray[2])
+    features = np.stack([np.ones_like(x), r[0], r[1], ray[2], speed, gradient, steering, *projector, incidence, bow])
+    by_range = [ray[0], ray[1], zero, speed / range_m, 2 * gradient / range_m, steering / range_m, *[zero] * 4]
     return PointDesign(mean, np.sqrt(variance), features, np.stack([*by_range, bent * up_of_ray]) / slant)
 
 
@@ -279,15 +286,13 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     design[:, 0, turn] = -np.einsum("gij,gi->gj", T, np.cross(T @ observed.lever_arm_m, plane.normal))
     design[:, 1, turn], design[:, 2, turn] = -(second @ T), first @ T
     design[:, 0, arm] = plane.normal @ T
-    # latency, parameters with a feature of their own, and biases of ranges that go with the surface
+    # latency, parameters with a feature of their own, and the range of level faces
     latency, further = N_SURFACE + N_MOUNT, len(FEATURES[observed.sensor])
     design[:, :N_MOVED, latency] = -poses.rates @ pose_design([plane], np.zeros(1, dtype=np.int64))[0].T
     for number in range(further):
         design[:, N_MOVED + number, latency + 1 + number] = 1.0
-    incidence = latency + 1 + further
-    design[:, [0, N_MOVED], incidence] = -1 / AT_45_DEG
     if observed.sensor == "mbes" and plane.level:
-        design[:, N_MOVED, incidence + 1] = 1.0
+        design[:, N_MOVED, latency + 1 + further] = 1.0
     # the wet faces turn and shift like the surface, and bow
     if observed.sensor == "mbes":
         design[:, :, -N_WET:-1] = design[:, :, :N_SURFACE]

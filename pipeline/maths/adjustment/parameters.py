@@ -35,11 +35,12 @@ Integers = NDArray[np.int64]
 Sensor = Literal["mbes", "laser"]
 
 PROJECTOR_PARAMETERS = ("projector_x", "projector_y", "projector_z")
-MBES_FEATURES = ("mbes_range", "sound_speed", "sound_speed_gradient", "steering_speed", *PROJECTOR_PARAMETERS)
-LASER_FEATURES = ("laser_range",)  # as MBES_FEATURES: the parameters whose derivative is a feature of its own
+OF_WATER = ("sound_speed", "sound_speed_gradient", "steering_speed")
+MBES_FEATURES = ("mbes_range", *OF_WATER, *PROJECTOR_PARAMETERS, "mbes_incidence")
+LASER_FEATURES = ("laser_range", "laser_incidence")  # as MBES_FEATURES: those whose derivative is a feature of its own
 FEATURES: dict[str, tuple[str, ...]] = {"mbes": MBES_FEATURES, "laser": LASER_FEATURES}
-MBES_PARAMETERS = (*MOUNT_NAMES, "mbes_latency", *MBES_FEATURES, "mbes_incidence", "mbes_level_range")
-OF_LASER = ("laser_latency", *LASER_FEATURES, "laser_incidence")
+MBES_PARAMETERS = (*MOUNT_NAMES, "mbes_latency", *MBES_FEATURES, "mbes_level_range")
+OF_LASER = ("laser_latency", *LASER_FEATURES)
 LASER_PARAMETERS = (*(f"laser_{name}" for name in MOUNT_NAMES), *OF_LASER)
 CALIBRATED_LASER_PARAMETERS = (*MOUNT_NAMES, *OF_LASER)
 SURFACE_PARAMETERS = ("turn_1", "turn_2", "shift")

@@ -68,12 +68,14 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     x, still = 3 * rng.normal(size=(7, 3)), np.zeros(6)
     mount, lever = (R, state.lever_arm_m) if sensor == "mbes" else (R_LASER, LASER_LEVER)
     one = SURFACES[surface]
-    x *= -np.sign(x @ mount.T @ T.T @ one.normal)[:, None]  # all points on the front
+    x[:2] *= -np.sign(x[:2] @ mount.T @ T.T @ one.normal)[:, None] * [[1], [-1]]  # both sides: of H there are bottoms
     r = (x @ mount.T + lever) @ T.T
     ray = x @ mount.T @ T.T / np.linalg.norm(x, axis=1, keepdims=True)
-    q = np.vstack([np.ones(7), one.tangents @ r.T, ray @ one.normal])
+    slant = ray @ one.normal
+    by_incidence = slant * (1 / np.abs(slant) - 1) / (np.sqrt(2) - 1)
+    q = np.vstack([np.ones(7), one.tangents @ r.T, slant, by_incidence])
     if sensor == "mbes":  # the sonar's other features are tested where they are made
-        q = np.vstack([q, np.zeros((len(MBES_FEATURES) - 1, 7)), FORM])
+        q = np.vstack([q[:4], np.zeros((len(MBES_FEATURES) - 2, 7)), by_incidence, FORM])
     features = len(q)
     poses = BodyPoses(P[None], T[None], np.concatenate([VELOCITY, TURNING])[None])
     C = parameter_design(state, SensorOnSurface(sensor, lever, surface, features), poses)[0]

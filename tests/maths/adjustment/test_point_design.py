@@ -33,12 +33,12 @@ def beams(angles: np.ndarray, ranges: np.ndarray, tilts: np.ndarray | float = 0.
     return ranges * np.array([np.sin(angles), np.cos(angles) * np.sin(about_x), -np.cos(angles) * np.cos(about_x)])
 
 
-def seen(points: np.ndarray) -> PointDesign:
+def seen(points: np.ndarray, axes: np.ndarray = AXES) -> PointDesign:
     """Observations of points on the surface."""
     n = points.shape[1]
-    in_mbes = np.repeat((AXES @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
+    in_mbes = np.repeat((axes @ R_TARGET_FROM_MBES)[:, :, None], n, axis=2)
     up = np.repeat(R_TARGET_FROM_MBES[2][:, None], n, axis=1)
-    r = AXES @ (R_TARGET_FROM_MBES @ points + LEVER[:, None])
+    r = axes @ (R_TARGET_FROM_MBES @ points + LEVER[:, None])
     soundings = SoundingsOnSurface(points, in_mbes, up, r, np.zeros(n), heights_of(points), DEPTH_M)
     return sonar_point_design(soundings, SIGMAS)
 
@@ -73,6 +73,17 @@ def test_laser_sigma_is_the_scatter_of_noisy_rays() -> None:
     _, sigma, q, _ = laser_point_design(point, lever[:, None], np.array([range_m]), SIGMAS)
     assert sigma[0] == pytest.approx(np.std(noise @ NORMAL), rel=0.02)
     assert q[3, 0] == pytest.approx(NORMAL @ ray)  # a longer range
+
+
+@of_both_fans
+def test_soundings_on_the_other_side_of_a_surface_are_mirrored(tilts: np.ndarray) -> None:
+    """With the opposite normal v changes its sign, and with it all that is measured along the normal."""
+    front, back = seen(beams(ANGLES, RANGES, tilts)), seen(beams(ANGLES, RANGES, tilts), AXES * [[1.0], [1.0], [-1.0]])
+    along = np.array([1.0, 1.0, 1.0, *[-1.0] * len(MBES_FEATURES), 1.0])[:, None]  # 1, α, β; derivatives of v; bow
+    np.testing.assert_allclose(back.mean_m, -front.mean_m, rtol=1e-12)
+    np.testing.assert_allclose(back.sigma_m, front.sigma_m, rtol=1e-12)
+    np.testing.assert_allclose(back.features, along * front.features, rtol=1e-12)
+    np.testing.assert_allclose(back.slopes, -along[1:] * front.slopes, rtol=1e-12)
 
 
 def recomputed(tilts: np.ndarray, true_speed_m_s: float) -> np.ndarray:
