@@ -114,8 +114,9 @@ def rejections(
         words = f"the adjustment did not converge in {summary['iterations']} steps"
         reasons.append(Statement(ReasonCode.NOT_CONVERGED, words))
     gates_m = {"laser": evidence.target_pose["gate_m"].iloc[0], "mbes": evidence.provisional_mount["gate_m"].iloc[0]}
-    reasons += too_few_soundings(evidence.cells) + noise_cut_by_gate(evidence.cells, gates_m)
+    reasons += too_few_soundings(evidence.cells)
     reasons += _residual_reasons(evidence, criteria, drift_check)
+    reasons += noise_cut_by_gate(evidence.cells, gates_m)  # a face that is off scatters too, and is named before
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
     reasons += _estimates_off_settings(evidence.freed, criteria.test_level)
     reasons += contradicted_coarse_mount(evidence.freed, criteria.test_level)
