@@ -4,12 +4,12 @@ Each line of the table is the default scenario with one kind of error (``tools.m
 seeds and calibrated in memory. It shows how many sessions were accepted and the adjustment's largest errors in angles
 and lever arm. For the accepted sessions it also shows the largest normalised squared error by the total covariance and
 the largest error in total sigmas; for the rejected ones, in how many of them what is named first is what was planted.
-Below the table stand the same figures of all sessions together. The README must name every mistake that the verdict
+Above the table stand the same figures of all sessions together. The README must name every mistake that the verdict
 does not notice. Each session is a row of runs/montecarlo/mistakes.parquet. All kinds are simulated with the first seed,
 then with the second, and so on.
 
-    python -m tools.mistakes [--jobs 2] [--seeds 27] [--only NAME ...] [--resume]
-    python -m tools.mistakes --rows docs/accuracy/mistakes.parquet
+    python -m tools.mistakes [--jobs 2] [--seeds 25] [--only NAME ...] [--resume]
+    python -m tools.mistakes --rows docs/accuracy/mistakes.parquet [--page docs/accuracy/mistakes.md]
 """
 
 import argparse
@@ -147,6 +147,7 @@ def main() -> None:
     )
     parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign of the same program")
     parser.add_argument("--rows", type=Path, help="print the table of an existing file of rows")
+    parser.add_argument("--page", type=Path, help="file that the table is written to; default: none, it is printed")
     options = parser.parse_args()
     if options.rows:
         rows = pd.read_parquet(options.rows)
@@ -155,7 +156,11 @@ def main() -> None:
         tasks = [(name, seed) for seed in range(1, options.seeds + 1) for name in names]
         path = FOLDER / "mistakes.parquet"
         rows = collect_rows(path, session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)
-    print(f"{table_of(rows)}\n\n{summary(rows)}")
+    text = f"{summary(rows)}\n\n{table_of(rows)}\n"
+    if options.page is None:
+        print(text, end="")
+    else:
+        options.page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
