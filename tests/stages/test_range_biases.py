@@ -86,6 +86,11 @@ BIASES = pytest.mark.parametrize(
 )
 
 
+def test_usual_noise_needs_no_wider_gate(noisy_found: Any) -> None:
+    mount = noisy_found["segment/provisional_mount"].iloc[0]
+    assert mount["gate_m"] == pytest.approx(max(0.05, 5 * mount["scale_m"]))
+
+
 @BIASES
 def test_a_bias_within_its_sigma_is_found_and_allowed_for(
     noisy: SimulatedSession, noisy_found: Any, errors_of: Any, unknown: str, law: Law, bias_m: float, words: str
