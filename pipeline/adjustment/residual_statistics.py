@@ -157,12 +157,14 @@ def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, A
     """Yield each variable by which residuals are binned: its name, and its values (n,) for the points.
 
     The distance is that of the surface along the ray. By the measured range the noise would choose the bin: of a wall
-    that begins at 4.0 m, only points that are measured too near lie below 4 m.
+    that begins at 4.0 m, only points that are measured too near lie below 4 m. On bottoms the cosine
+    n · d is positive: their family's normal is that of the tops.
     """
     batch = observations.points
     own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)
-    reached_m = range_m - observations.v_m / np.minimum(observations.features[N_MOVED], -FLATTEST)  # v / (n · d)
+    cosine = observations.features[N_MOVED]  # n · d
+    reached_m = range_m - observations.v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
     yield "pass", batch["pass"].astype(np.int64)
     yield "face", batch["face"].astype(np.int64)

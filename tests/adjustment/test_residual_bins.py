@@ -9,14 +9,15 @@ from pipeline.adjustment.residual_statistics import _variables
 WALL_M, SLANT = 4.02, np.radians(40.0)  # distance of the surface along the rays, and their incidence
 
 
+@pytest.mark.parametrize("side", [-1, 1])  # of n · d: a face, or a bottom, whose family's normal is that of the tops
 @pytest.mark.parametrize("sensor", ["laser", "mbes"])
-def test_a_point_has_the_distance_of_its_surface_not_its_measured_range(sensor: str) -> None:
+def test_a_point_has_the_distance_of_its_surface_not_its_measured_range(sensor: str, side: int) -> None:
     """A range that is 10 cm short puts a point 10 cm · cos 40° before the wall; the wall stays at 4.02 m."""
     n = 101
     noise_m = np.linspace(-0.1, 0.1, n)
     points = {f"{axis}_{sensor}_m": np.zeros(n) for axis in "xyz"} | {f"x_{sensor}_m": WALL_M + noise_m}
     points |= dict.fromkeys(("pass", "face", "t_ns", "ping"), np.zeros(n, dtype=np.int64))
-    along, one = -np.cos(SLANT), np.ones(n)
+    along, one = side * np.cos(SLANT), np.ones(n)
     features = np.stack([one, 0 * one, 0 * one, along * one])
     zero = np.zeros(n, dtype=np.int64)
     observations = Observations(
