@@ -28,6 +28,7 @@ from pipeline.report.calibration_document import (
 from pipeline.report.drift_check import NO_DRIFT, check_ins_drift, figures_disagree
 from pipeline.report.evidence import Evidence
 from pipeline.report.hypotheses import hypotheses_block
+from pipeline.report.label_checks import unsettled_labels
 from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
@@ -97,6 +98,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     reasons = rejections(inputs, report.methods, criteria, drift_check, off_figures)
     warnings = [
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
+        *unsettled_labels(float(inputs.provisional_mount["label_change"].iloc[0])),
         *unexpected_noise(inputs.groups),
         *uneven_noise(inputs.groups),
         *correlated_beams(inputs.groups),

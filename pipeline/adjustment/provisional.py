@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from pipeline.adjustment.iteration import IterationSettings, MountAdjustment, adjust_mount
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
@@ -79,7 +80,8 @@ def with_adjusted_sample(
     """Return the context with mount and trajectory from the adjustment of a sample.
 
     Where the adjustment has no solution, the context stays as it is; stage adjust then tells why. So it does where the
-    adjusted mount loses a good part of the points: then they were too few to adjust by.
+    adjusted mount loses a good part of the points: then they were too few to adjust by. The mount's ``label_change``
+    tells, and stage report warns.
 
     Parameters
     ----------
@@ -111,7 +113,9 @@ def with_adjusted_sample(
         relabelled = labelled_sample(sample, corrected)
         if any(now < LEAST_KEPT * before for now, before in zip(_counts(relabelled), _counts(labelled), strict=True)):
             return context
-        context, labelled = corrected, relabelled
+        change = max(label_change(before, relabelled[sensor]) for sensor, before in labelled.items())
+        context = replace(corrected, mount=replace(corrected.mount, label_change=change))
+        labelled = relabelled
         if context.mbes is not None and (gate_m := _fitting_gate_m(labelled, context)) > context.mount.gate_m:
             context = replace(context, mount=replace(context.mount, gate_m=gate_m))
             labelled, rounds = labelled_sample(sample, context), rounds + 1
@@ -121,6 +125,20 @@ def with_adjusted_sample(
 def _fitting_gate_m(labelled: Mapping[str, Stream], context: LabellingContext) -> float:
     (batch,) = labelled["mbes"].batches()  # a sample is one part
     return fitting_gate_m(batch, context)
+
+
+def label_change(before: Stream, after: Stream) -> float:
+    """Return the share of the labels' weight that differs between two labellings of a sample.
+
+    A point that gains or loses its label counts with its weight, one that changes its face with both weights, one that
+    comes nearer to an edge with the difference.
+    """
+    weights = []
+    for (batch,) in (before.batches(), after.batches()):  # a sample is one part
+        keys = [batch[name] for name in ("t_ns", "beam", "face") if name in batch]
+        weights.append(pd.Series(batch["edge_weight"].astype(np.float64)).groupby(keys).sum())
+    changed = weights[0].sub(weights[1], fill_value=0.0).abs().sum()
+    return float(changed / weights[1].sum())
 
 
 def _counts(labelled: Mapping[str, Stream]) -> list[int]:

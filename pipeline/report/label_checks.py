@@ -1,4 +1,4 @@
-"""Reasons about the labels: a family with too few soundings, or with noise that the labels' gate cuts off."""
+"""Checks of the labels: too few on a family, noise that their gate cuts off, and labels that have not settled."""
 
 import numpy as np
 import pandas as pd
@@ -10,6 +10,7 @@ MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliab
 # Largest RMS of a family's residuals as a share of the gate. Noise of which a gate leaves k sigmas on either side has
 # 0.20 for k = 5, 0.33 for 3, 0.39 for 2.5, 0.44 for 2; without any centre, spread over the gate, 0.58.
 MAX_SHARE_OF_GATE = 0.4
+MAX_LABEL_CHANGE = 0.01  # share of the labels that the last provisional adjustment may change; usual: 0.001
 
 
 def too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
@@ -50,3 +51,18 @@ def noise_cut_by_gate(cells: pd.DataFrame, gates_m: dict[str, float]) -> list[St
             )
             statements.append(Statement(ReasonCode.NOISE_CUT_BY_GATE, words))
     return statements
+
+
+def unsettled_labels(label_change: float) -> list[Statement]:
+    """Return a warning if no provisional adjustment has corrected the labels, or if the last one still changed many.
+
+    ``label_change``: of table ``provisional_mount``.
+    """
+    advice = "labels near edges may be wrong: raise segment.margin_m, and compare"
+    if np.isnan(label_change):
+        words = f"no sample of the points could be adjusted: they are labelled with the INS's drift; {advice}"
+    elif label_change > MAX_LABEL_CHANGE:
+        words = f"the last adjustment of the sample still changed {100 * label_change:.1f} % of the labels; {advice}"
+    else:
+        return []
+    return [Statement(ReasonCode.LABELS_UNSETTLED, words)]

@@ -61,6 +61,7 @@ class ReasonCode(StrEnum):
     INS_DRIFT_ABOVE_SETTINGS = "ins_drift_above_settings", "the INS drifts farther than its figures say"
 
     # These only warn.
+    LABELS_UNSETTLED = "labels_unsettled", "labels were made with the INS's drift in them, or still changed at the end"
     INS_DRIFT_OFF_FIGURES = "ins_drift_off_figures", "by the data the INS drifts more, or faster, than its figures say"
     GEOMETRY_GAP = "geometry_gap", "the passes leave a gap in the geometry"
     NOISE_OFF_SIGMAS = "noise_off_sigmas", "observations scatter more, or less, than their sigmas say"

@@ -41,6 +41,7 @@ def provisional_mount_table(mount: ProvisionalMount) -> pd.DataFrame:
         "rival_score": mount.rival_score,
         "ambiguous": mount.ambiguous,
         "within": mount.within,
+        "label_change": mount.label_change,
     }
     row |= xyz_columns("rotation_{}_deg", np.degrees(mount.rotation_vector_rad))
     row |= xyz_columns("lever_arm_{}_m", mount.lever_arm_correction_m)

@@ -66,6 +66,8 @@ class ProvisionalMount:
         Whether the rival is nearly as good.
     within
         Whether the correction lies within the limits of the search.
+    label_change
+        Share of the labels that the last provisional adjustment changed; NaN: none has corrected mount and trajectory.
     """
 
     rotation_vector_rad: Array
@@ -76,6 +78,7 @@ class ProvisionalMount:
     rival_score: float
     ambiguous: bool
     within: bool
+    label_change: float = float("nan")
 
     def total(self, coarse: Mounted) -> Mounted:
         """Return the coarse mount with the correction applied."""

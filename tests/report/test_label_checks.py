@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.report.label_checks import MAX_SHARE_OF_GATE, noise_cut_by_gate
+from pipeline.report.label_checks import MAX_LABEL_CHANGE, MAX_SHARE_OF_GATE, noise_cut_by_gate, unsettled_labels
 from pipeline.report.reason_codes import ReasonCode
 
 
@@ -31,3 +31,18 @@ def test_each_sensor_has_its_own_gate() -> None:
     )
     (found,) = noise_cut_by_gate(cells, {"laser": 0.05, "mbes": 0.1})
     assert found.words.startswith("laser points on H scatter")
+
+
+@pytest.mark.parametrize(
+    ("label_change", "words"),
+    [
+        (float("nan"), "no sample of the points could be adjusted: they are labelled with the INS's drift"),
+        (1.01 * MAX_LABEL_CHANGE, "still changed 1.0 % of the labels"),
+        (0.99 * MAX_LABEL_CHANGE, None),
+        (0.0, None),
+    ],
+)
+def test_labels_that_have_not_settled_warn(label_change: float, words: str | None) -> None:
+    found = unsettled_labels(label_change)
+    assert [statement.code for statement in found] == ([] if words is None else [ReasonCode.LABELS_UNSETTLED])
+    assert all(words is not None and words in statement.words for statement in found)

@@ -15,6 +15,7 @@ from pipeline.report.as_built import deviations_from_design
 from pipeline.report.calibration_document import statement_lists
 from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
 from pipeline.report.drift_check import check_ins_drift, figures_disagree
+from pipeline.report.label_checks import unsettled_labels
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.suspected_causes import errors_allowed_for
@@ -104,6 +105,11 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         lambda: _one(check_ins_drift(drift(1.21), Drift())),
         ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
         "the INS drifts at least 1.2 times as far as ins.drift says: give its figures before you look",
+    ),
+    (
+        lambda: unsettled_labels(0.034),
+        ReasonCode.LABELS_UNSETTLED,
+        "the last adjustment of the sample still changed 3.4 % of the labels; labels near edges may be wrong: raise",
     ),
     (
         lambda: _one(figures_disagree(drift_figures(time_constant_s=(10.0, -2.5), horizontal_m=(0.03, 1.0)))),

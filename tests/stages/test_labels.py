@@ -45,6 +45,7 @@ def under_drift() -> tuple[dict[str, Any], np.ndarray]:
     session, twin = made(CLEAN, {"ins": {"drift": DRIFT}}, seed=SEED), made(CLEAN, EXACT, seed=SEED)
     np.testing.assert_array_equal(session.laser["x_m"], twin.laser["x_m"])
     artefacts = calibrated(session, until="segment")
+    assert artefacts["segment/provisional_mount"]["label_change"].iloc[0] < 0.005
     return artefacts, true_residuals(artefacts, calibrated(twin, until="georeference"), session.truth)
 
 

@@ -66,6 +66,7 @@ PROVISIONAL_MOUNT = Artefact(
         Column("rival_score", F64, "1", "the same for the best other solution (another block)"),
         Column("ambiguous", BOOL, "", "true: another solution explains the soundings nearly as well"),
         Column("within", BOOL, "", "false: no mount within the search limits was found"),
+        Column("label_change", F64, "1", "share of a sample's labels that the last adjustment changed; NaN: none did"),
     ),
 )
 EDGE_WEIGHT = Column("edge_weight", F32, "1", "weight by the distance from edges: 0 at the limits, 1 beyond the ramp")
