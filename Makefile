@@ -113,6 +113,8 @@ montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.mistakes --seeds 25
 	$(PY) -m tools.residual_tests
 	$(PY) -m tools.laser
+	$(PY) -m tools.laser --drift "within 10 s" --sessions 100
+	$(PY) -m tools.laser --drift "within 30 s" --sessions 100
 	$(PY) -m tools.laser_pairs
 	$(PY) -m tools.stress
 	$(PY) -m tools.accuracy

@@ -5,7 +5,11 @@ of 0.3° and 3 cm on every axis, which the pool's config states, and the laser i
 the laser's mount with its covariance and calibrates the sonar. The errors of the sonar's mount are then compared with a
 total covariance whose only consider parameters are those of the laser's mount.
 
+With ``--drift`` the INS errs faster than session.yaml says; then the laser alone is calibrated (``tools.stress`` has a
+line for each such campaign).
+
     python -m tools.laser [--sessions 240] [--first 0] [--jobs 2] [--rows docs/accuracy/laser.parquet] [--resume]
+    python -m tools.laser --drift "within 10 s" --sessions 100 [--resume]
 """
 
 import argparse
@@ -23,9 +27,11 @@ from tools.campaign_files import collect_rows
 from tools.campaign_statistics import nse_band
 from tools.campaigns import DRIFT, FOLDER
 from tools.session_rows import NAMES, UNITS, error_columns
+from tools.stress_campaigns import WITHIN_10_S, WITHIN_30_S
 
 Array = NDArray[np.float64]
 ROWS = FOLDER / "laser.parquet"
+FAST: dict[str, dict[str, float]] = {"within 10 s": WITHIN_10_S, "within 30 s": WITHIN_30_S}  # drifts by --drift
 TASKS_OF_A_WORKER = 8  # two sessions each
 FIRST_SEED, SECOND_SEED = 40_000, 50_000
 PLUMB_DEG = 0.001
@@ -76,14 +82,22 @@ def calibrate(session: dict[str, Any], pool: dict[str, Any], made: Any) -> dict[
     return content
 
 
-def session_row(number: int) -> dict[str, Any]:
-    """Return a row: errors and sigmas of laser and sonar, and the laser's verdict."""
+def rows_of(drift: str) -> Path:
+    """Return the file of a campaign's rows."""
+    return ROWS.with_stem(f"laser_drift_{drift.replace(' ', '_')}") if drift else ROWS
+
+
+def session_row(task: tuple[str, int]) -> dict[str, Any]:
+    """Return the row of a drift and a number: errors and sigmas of laser and sonar, and the laser's verdict."""
     from pipeline.config.yaml_models import parse
     from pipeline.simulation.scenario import Scenario
     from pipeline.simulation.session import simulate_session
 
-    scenario = parse(Scenario, scenario_of(number), "laser")
-    made = simulate_session(scenario, FIRST_SEED + number)
+    drift, number = task
+    scenario = scenario_of(number)
+    if drift:
+        scenario |= {"ins": {"drift": FAST[drift], "drift_declared": DRIFT["drift"]}, "mbes": {"ping_rate_hz": 0.5}}
+    made = simulate_session(parse(Scenario, scenario, "laser"), FIRST_SEED + number)
     alone = {name: value for name, value in made.session.items() if name != "mbes"}
     alone["laser"] = alone["laser"] | dict.fromkeys(SURE, 0.0)
     result = calibrate(alone, made.pool | {"laser_fit": FIT, "as_built": AS_DESIGNED}, made)
@@ -91,6 +105,8 @@ def session_row(number: int) -> dict[str, Any]:
     row: dict[str, Any] = {"number": number, "accepted": result["verdict"] == "accepted"}
     row |= {"held": " ".join(result["held"]), "rests_on_coarse": " ".join(result["rests_on_coarse"])}
     row |= error_columns(block, made.truth, "laser", "laser_")
+    if drift:
+        return row
     # the sonar, in another session, from the laser's result
     made = simulate_session(parse(Scenario, scenario_of(number), "laser"), SECOND_SEED + number)
     session = dict(made.session)
@@ -155,15 +171,19 @@ def main() -> None:
     parser.add_argument("--sessions", type=int, default=240, help="count of numbers, two sessions each; default: 240")
     parser.add_argument("--first", type=int, default=0, help="first number; default: 0")
     parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
-    parser.add_argument("--rows", type=Path, default=ROWS, help=f"Parquet file of the rows; default: {ROWS}")
+    parser.add_argument("--rows", type=Path, help=f"Parquet file of the rows; default: {ROWS}, or one by the drift")
+    parser.add_argument("--drift", choices=["", *FAST], default="", help="true drift; default: as session.yaml says")
     parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign of the same program")
     parser.add_argument("--report", action="store_true", help="print the table of an existing file of rows")
     options = parser.parse_args()
-    numbers = range(options.first, options.first + options.sessions)
+    path = options.rows or rows_of(options.drift)
+    tasks = [(options.drift, number) for number in range(options.first, options.first + options.sessions)]
     if options.report:
-        table = pd.read_parquet(options.rows)
+        table = pd.read_parquet(path)
     else:
-        table = collect_rows(options.rows, session_row, numbers, options.jobs, options.resume, TASKS_OF_A_WORKER)
+        table = collect_rows(path, session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)
+    if options.drift:
+        return
     with get_context("spawn").Pool(options.jobs) as pool:
         bound = np.mean(pool.map(laser_bound_of, table["number"].tolist()[:BOUNDS]), axis=0)
     print(report(table, np.asarray(bound)))

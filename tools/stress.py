@@ -6,6 +6,7 @@ it lies with 99 % probability, and a mean error beyond 2.6 of its standard error
 
     python -m tools.montecarlo --only "slant noise" drift steering perfect --resume
     python -m tools.laser --sessions 100 --resume
+    python -m tools.laser --sessions 100 --drift "within 10 s" --resume
     python -m tools.stress [runs/montecarlo | docs/accuracy] [--page docs/accuracy/stress.md]
 """
 
@@ -16,7 +17,7 @@ import pandas as pd
 
 from tools.campaign_statistics import HEAD, markdown_row, statistics_of
 from tools.campaigns import FOLDER, path_of
-from tools.laser import ROWS
+from tools.laser import FAST, rows_of
 from tools.session_rows import NAMES
 from tools.stress_campaigns import STRESS
 
@@ -26,8 +27,10 @@ WORDS = "the laser's own calibration"
 def table_of(folder: Path) -> str:
     """Return the table, in Markdown, of the campaigns that have rows in the folder."""
     sources = [(campaign.name, folder / path_of(campaign).name, "") for campaign in STRESS]
+    for drift in ("", *FAST):
+        sources.append((f"{WORDS}{drift and f', drift {drift}'}", folder / rows_of(drift).name, "laser_"))
     lines = [HEAD, "|---" + "|---:" * (HEAD.count("|") - 2) + "|"]
-    for name, path, prefix in [*sources, (WORDS, folder / ROWS.name, "laser_")]:
+    for name, path, prefix in sources:
         if path.is_file():
             table = pd.read_parquet(path)
             if prefix:  # the error of the coarse mount is in the total sigmas alone

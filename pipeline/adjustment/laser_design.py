@@ -22,6 +22,7 @@ from pipeline.config.mount import Covariance, Mount, MountOrigin
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser
 from pipeline.config.stage_settings import LaserPrior
+from pipeline.maths.adjustment.drift_likelihood import DriftPrior
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pseudo_observations import DesignPrior, ParameterPrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
@@ -58,7 +59,8 @@ def laser_problem(
     """Return the problem of calibrating the laser against the target's design. No fixed parameter has an error yet.
 
     The coarse mount is an observation of all six mount parameters, so that each is estimated, and has the sigma that
-    it and the points give together.
+    it and the points give together. Of the drift's figures only the sigmas follow the points, and only upwards
+    (:mod:`~pipeline.maths.adjustment.drift_likelihood` tells why).
 
     Parameters
     ----------
@@ -77,8 +79,9 @@ def laser_problem(
     coarse, covariance = coarse_mount(laser, settings)
     known = State.at(coarse.R_body_from_sensor, coarse.lever_arm_body_m, session.surfaces, "laser")
     prior = PriorInformation(
-        noise=session.noise,  # its drift stays as given: corrected by likelihood it made pitch and roll too certain
+        noise=session.noise,
         surfaces=design_prior(session.target, set_up, settings),
+        drift=DriftPrior(session.drift.sigma, 0.0, only_larger=True),
         parameters=ParameterPrior(np.arange(N_MOUNT), covariance, known),
     )
     return problem_at(session, state, prior, {"laser": laser})

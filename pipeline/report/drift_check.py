@@ -64,9 +64,10 @@ def figures_disagree(figures: pd.DataFrame, source: str = "ins.drift says") -> S
         if rows[name]["configured"] > 0
     ]
     seconds = rows["time_constant_s"]
+    of_time = f", with a time constant of {seconds['estimated']:.0f} s, not {seconds['configured']:.0f} s"
     return Statement(
         ReasonCode.INS_DRIFT_OFF_FIGURES,
-        f"the INS drifts otherwise than {source}: {' and '.join(parts)}, with a time constant of "
-        f"{seconds['estimated']:.0f} s, not {seconds['configured']:.0f} s; the sigmas count with that, but look for "
+        f"the INS drifts otherwise than {source}: {' and '.join(parts)}"
+        f"{of_time if seconds['estimated'] != seconds['configured'] else ''}; the sigmas count with that, but look for "
         "the cause in the INS",
     )

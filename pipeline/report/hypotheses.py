@@ -13,8 +13,16 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from pipeline.report.residual_tests import Deviation
+from pipeline.report.residual_tests import DeviatingPart
 from pipeline.report.suspected_causes import SuspectedCause
+
+PART_WORDS = {
+    "pass": "pass {}",
+    "face": "face {}",
+    "step": "a step of the fan at {}°",
+    "ping": "one ping of {}",
+    "drift": "the INS in pass {}",
+}
 
 
 @dataclass(frozen=True)
@@ -26,25 +34,26 @@ class Hypothesis:
     kind : parameter, pass, face, step, ping or drift
     name : of the parameter or face; number of the pass; angle of the step; length of the cycle of pings
     sigmas : its strength
+    words : for people
     """
 
     kind: str
     name: str
     sigmas: float
+    words: str
 
 
-def hypotheses(deviating: Sequence[Deviation], causes: Sequence[SuspectedCause]) -> list[Hypothesis]:
+def hypotheses(parts: Sequence[DeviatingPart], causes: Sequence[SuspectedCause]) -> list[Hypothesis]:
     """Return all explanations, the strongest first.
 
     Parameters
     ----------
-    deviating : deviating mean residuals
+    parts : deviating parts of the points
     causes : suspected causes
     """
-    found = [Hypothesis("parameter", cause.unknown, cause.normalised) for cause in causes]
-    found += [
-        Hypothesis(deviation.kind, deviation.name, deviation.strength) for deviation in deviating if deviation.strength
-    ]
+    found = [Hypothesis("parameter", cause.unknown, cause.normalised, cause.words) for cause in causes]
+    for part in parts:
+        found.append(Hypothesis(part.kind, part.name, part.strength, PART_WORDS[part.kind].format(part.name)))
     return sorted(found, key=lambda hypothesis: -hypothesis.sigmas)
 
 

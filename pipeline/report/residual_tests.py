@@ -3,13 +3,15 @@
 Every row of the table ``patterns`` is a mean or the difference of two means. Its column ``normalised`` is the normal
 deviate of the excess over the tolerance (``maths/adjustment/mean_tests.py``). All rows have one limit. If no true mean
 exceeds the tolerance, the chance that any row exceeds the limit is at most the test's level. A row beyond the limit
-deviates. There is at most one reason for the passes, and one for all other variables. Each describes the row that
-deviates most, and names the other variables.
+deviates.
 
 A deviation of a part of the points (a pass, a face, a step, one ping of two) is a hypothesis of its own, beside the
 parameters of table ``freed``. Its ``strength`` is comparable with theirs, value over sigma: the mean over its sigma,
 without tolerance; for a pass also the change of the mount without that pass, over all mount parameters (table
 ``parts``), because a pass may be wrong in more ways than one mean shows.
+
+There is at most one reason for the passes, and one for all other variables. It describes the strongest part of the
+points, or, if none deviates, the row that deviates most (by angle, distance or time), and names the other variables.
 """
 
 from dataclasses import dataclass
@@ -30,16 +32,22 @@ class Deviation:
     Attributes
     ----------
     statement : code and words
-    kind, name : what deviates: a pass, face, step, ping, or drift in a pass; which one
     excess : excess over the tolerance, in sigmas
     strength : as a hypothesis on a part of the points, in sigmas; 0 for a deviation by angle, distance or time, which
         only shows that something is wrong
     """
 
     statement: Statement
+    excess: float
+    strength: float
+
+
+@dataclass(frozen=True)
+class DeviatingPart:
+    """A part of the points that deviates: a pass, face, step, ping, or drift in a pass; which one; its strength."""
+
     kind: str
     name: str
-    excess: float
     strength: float
 
 
@@ -52,15 +60,38 @@ def deviations(tests: ResidualTests, parts: pd.DataFrame, level: float) -> list[
     parts : table ``parts``
     level : level of the test
     """
-    limit = limit_for(tests.patterns, level)
-    exceeded = ExceededTests(tests, tests.patterns[tests.patterns["normalised"].abs() > limit], limit)
+    exceeded = _exceeded(tests, level)
     is_of_passes = exceeded.rows["by"].isin(OF_PASSES)
     reasons = []
-    for rows, describe in ((is_of_passes, describe_pass), (~is_of_passes, describe_pattern)):
-        farthest = _farthest_of_each(exceeded.rows[rows])
-        if farthest:
-            reasons.append(_deviation(farthest, describe(farthest[0], exceeded), tests, parts))
+    if farthest := _farthest_of_each(exceeded.rows[is_of_passes]):
+        reasons.append(_deviation(farthest, describe_pass(farthest[0], exceeded), parts))
+    if farthest := _farthest_of_each(exceeded.rows[~is_of_passes]):
+        farthest.sort(key=lambda row: -_strength(row, parts))  # stable: those without one stay behind, in their order
+        reasons.append(_deviation(farthest, describe_pattern(farthest[0], exceeded), parts))
     return sorted(reasons, key=lambda deviation: -deviation.excess)
+
+
+def deviating_parts(tests: ResidualTests, parts: pd.DataFrame, level: float) -> list[DeviatingPart]:
+    """Return for each variable the part of the points that deviates most.
+
+    Parameters
+    ----------
+    tests, parts, level
+        As for :func:`deviations`.
+    """
+    found = []
+    for row in _farthest_of_each(_exceeded(tests, level).rows):
+        if strength := _strength(row, parts):
+            by, name = str(row["by"]), f"{row['low']:g}"
+            if by.startswith(CYCLE):
+                by, name = "ping", by.removeprefix(CYCLE)
+            found.append(DeviatingPart(by, tests.face_names[int(row["low"])] if by == "face" else name, strength))
+    return found
+
+
+def _exceeded(tests: ResidualTests, level: float) -> ExceededTests:
+    limit = limit_for(tests.patterns, level)
+    return ExceededTests(tests, tests.patterns[tests.patterns["normalised"].abs() > limit], limit)
 
 
 def _farthest_of_each(rows: pd.DataFrame) -> list[Row]:
@@ -71,16 +102,12 @@ def _farthest_of_each(rows: pd.DataFrame) -> list[Row]:
     return sorted(farthest, key=lambda row: -abs(row["normalised"]))
 
 
-def _deviation(farthest: list[Row], statement: Statement, tests: ResidualTests, parts: pd.DataFrame) -> Deviation:
+def _deviation(rows: list[Row], statement: Statement, parts: pd.DataFrame) -> Deviation:
     """Return the deviation of the first row. The words of its ``statement`` get the variables of the other rows."""
-    first, others = farthest[0], [str(row["by"]) for row in farthest[1:]]
+    first, others = rows[0], [str(row["by"]) for row in rows[1:]]
     more = f"; residuals by {' and '.join(others)} lie beyond it too" if others else ""
-    kind = "ping" if first["by"].startswith(CYCLE) else str(first["by"])
-    name = f"{first['low']:g}" if kind != "ping" else first["by"].removeprefix(CYCLE)
     return Deviation(
         statement=Statement(statement.code, f"{statement.words}{more}"),
-        kind=kind,
-        name=tests.face_names[int(first["low"])] if kind == "face" else name,
         excess=abs(float(first["normalised"])),
         strength=_strength(first, parts),
     )

@@ -46,7 +46,7 @@ from pipeline.report.label_checks import noise_cut_by_gate, too_few_soundings
 from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit
 from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
-from pipeline.report.residual_tests import Deviation, deviations
+from pipeline.report.residual_tests import deviating_parts, deviations
 from pipeline.report.residual_words import ResidualTests
 from pipeline.report.suspected_causes import (
     SuspectedCause,
@@ -145,7 +145,8 @@ def explanations(evidence: Evidence, criteria: Criteria) -> list[Hypothesis]:
     """Return what would explain the residuals, the strongest explanation first; empty if they need none."""
     if _doubts(evidence, criteria) or evidence.summary["reason"].iloc[0]:
         return []
-    return hypotheses(_deviations(evidence, criteria), suspected_causes(evidence.freed, criteria.test_level))
+    parts = deviating_parts(_residual_tests(evidence, criteria), evidence.parts, criteria.test_level)
+    return hypotheses(parts, suspected_causes(evidence.freed, criteria.test_level))
 
 
 def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: Statement | None) -> list[Statement]:
@@ -154,7 +155,7 @@ def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: State
     What explains the residuals best comes first: a parameter, or a part of the points. What only shows that something
     is wrong comes after it.
     """
-    deviating = _deviations(evidence, criteria)
+    deviating = deviations(_residual_tests(evidence, criteria), evidence.parts, criteria.test_level)
     causes = suspected_causes(evidence.freed, criteria.test_level)
     strongest = causes[0].normalised if causes else 0.0
     stronger = [deviation.statement for deviation in deviating if deviation.strength > strongest]
@@ -164,14 +165,13 @@ def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: State
     return reasons[:1] + drift + reasons[1:]
 
 
-def _deviations(evidence: Evidence, criteria: Criteria) -> list[Deviation]:
-    tests = ResidualTests(
+def _residual_tests(evidence: Evidence, criteria: Criteria) -> ResidualTests:
+    return ResidualTests(
         patterns=evidence.patterns,
         face_names=evidence.faces["name"].tolist(),
         shape=criteria.shape,
         tolerance_m=criteria.tolerance_m,
     )
-    return deviations(tests, evidence.parts, criteria.test_level)
 
 
 def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Statement]:

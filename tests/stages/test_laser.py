@@ -22,6 +22,7 @@ from tests.support.effort import often
 from tests.support.mount_errors import mount_error, rotation_error
 from tests.support.roots import SCENARIOS
 from tests.support.simulated import THIN, made, merged
+from tools.stress_campaigns import WITHIN_10_S
 
 OFF = {"laser": {"coarse_angle_deg": 0.3, "coarse_lever_m": 0.03}, "mbes": {"ping_rate_hz": 0.5}}
 DRIFT = {
@@ -35,12 +36,16 @@ DRIFT = {
 FAST = {"ins": {"rate_hz": 200.0}}  # where it is asked how small the sigmas are
 EXACT = {"face_sigma_deg": 0.001, "plumb_sigma_deg": 0.001, "face_sigma_m": 0.0002}
 WIDE = {"max_sigma_deg": 1.0, "max_sigma_m": 0.1}
+EXACTLY = {"drift_within": {"sigmas": 1.0, "time_constant": 1.0}}
 
 
-def calibrated(session: SimulatedSession, more: dict[str, Any] | None = None, **pool: Any) -> dict[str, Any]:
-    """Every artefact; ``more``: of session.yaml's laser."""
+def calibrated(
+    session: SimulatedSession, more: dict[str, Any] | None = None, ins: dict[str, Any] | None = None, **pool: Any
+) -> dict[str, Any]:
+    """Every artefact; ``more``: of session.yaml's laser; ``ins``: of its INS."""
     settings = {name: value for name, value in session.session.items() if name != "mbes"}
     settings["laser"] = settings["laser"] | (more or {})
+    settings["ins"] = settings["ins"] | (ins or {})
     raw = {"ins": session.ins, "laser": session.laser}
     given = parse(SessionConfig, settings, "session"), parse(PoolConfig, session.pool | pool, "pool")
     return calibrate_in_memory(*given, raw)
@@ -89,6 +94,22 @@ def test_what_the_session_determines_badly_is_estimated_and_named() -> None:
     assert error @ np.linalg.solve(total, error) < 22.5  # 99.9 % of six degrees of freedom
     assert total[2, 4] < -0.15 * sigma[2] * sigma[4]  # all six with each other: yaw and y
     assert np.linalg.eigvalsh(total - noise).min() > -1e-12
+
+
+def test_an_ins_that_errs_faster_than_its_session_says_widens_the_sigmas() -> None:
+    """Errors within 10 s where 200 s are stated; roll and pitch keep the sigma of a slow drift's mean."""
+    session = made(OFF, {"ins": {"drift": WITHIN_10_S, "drift_declared": DRIFT["ins"]["drift"]}}, seed=5)
+    pool = {"laser_fit": EXACT, "verdict": WIDE}
+    believed, found = (result_of(calibrated(session, ins=more, **pool)) for more in (EXACTLY, {}))
+    sigmas = [np.sqrt(np.diag(result["laser"]["covariance_total"])) for result in (believed, found)]
+    assert sigmas[1][2] > 1.3 * sigmas[0][2]  # yaw
+    assert np.all(sigmas[1][:2] > 0.99 * sigmas[0][:2])
+    error, total = errors(found, session.truth), np.array(found["laser"]["covariance_total"])
+    assert error @ np.linalg.solve(total, error) < 22.5
+    estimated = found["ins_drift_estimated"]
+    assert estimated["time_constant_s"] == 200.0
+    assert estimated["horizontal_m"] == pytest.approx(WITHIN_10_S["horizontal_m"] * np.sqrt(200 / 10), rel=0.25)  # rate
+    assert estimated["roll_pitch_deg"] >= 0.01  # not below the session's
 
 
 def test_a_surveyed_target_and_a_steady_ins_give_all_six() -> None:
@@ -170,7 +191,7 @@ def test_a_coarse_mount_that_the_points_contradict_is_refused_and_named() -> Non
         assert np.hypot(row["sigma"], 1e-3) <= row["expected"] < 1.1e-3  # with the systematic errors
     (reason,) = result["reasons"]
     first = max(("rotation_x", "rotation_y"), key=lambda name: abs(rows.loc[name, "value"]))
-    size = f"turned by {np.degrees(rows.loc[first, 'value']):+.3f} ± "
+    size = f"turned by {np.degrees(rows.loc[first, 'value']):+.2f} ± "
     assert size in reason, reason
 
 

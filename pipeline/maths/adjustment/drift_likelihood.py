@@ -35,6 +35,12 @@ within which the session's figure holds (one sigma). Within a session not much l
 2 σ² / τ well, σ and τ themselves hardly: along this valley the prior decides. Within shifts, and within turns, the
 components keep the session's ratios: the data hardly tell them apart.
 
+**The laser's own calibration.** The points cannot tell the drift's mean over the session from the laser's roll and
+pitch, which are known only as well as that mean: σ √(2 τ / T) for a session of T much longer than τ, σ for a shorter
+one. An INS has slow errors beside fast ones. If τ followed the fast ones, which the points show, this sigma would be
+too small. So there τ stays as the session says, and the sigmas may only grow (``only_larger``): with their rate
+2 σ² / τ the fast drift has its true weight, and the slow one is not smaller than the session says.
+
 J is minimised by Newton's method (:mod:`~pipeline.maths.adjustment.newton`, 10 evaluations a step). Its second
 derivatives give the covariance of z, 2 (∂²J)⁻¹. Along the valley J is far from quadratic, and this variance may exceed
 the prior's. So data and session are compared by z_i / s_i alone. An estimate by both varies less than the prior (Var
@@ -60,11 +66,13 @@ LEAST_LOG = 1e-6  # a figure known better than this is exact
 class DriftPrior:
     """Logarithms of the factors within which the session's figures are right (one sigma); 0: they are exact.
 
-    sigma: of the drift's standard deviations; time_constant: of its time constant.
+    sigma: of the drift's standard deviations; time_constant: of its time constant; only_larger: standard deviations
+    below the session's do not count.
     """
 
     sigma: float
     time_constant: float
+    only_larger: bool = False
 
 
 EXACT = DriftPrior(0.0, 0.0)
@@ -118,9 +126,11 @@ def drift_figures(
 
     found, curvature = newton_minimum(objective, len(free), LARGEST_LOG)
     z[free] = found
+    if prior.only_larger:
+        z[:2] = np.maximum(z[:2], 0.0)
     of_free = 2 * np.linalg.inv(curvature)
     covariance[np.ix_(free, free)] = of_free
-    deviation[free] = found / known[free]
+    deviation[free] = z[free] / known[free]
     return DriftFigures(noise.drifting(*np.exp(z).tolist()), z, covariance, deviation)
 
 

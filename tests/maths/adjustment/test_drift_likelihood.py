@@ -100,6 +100,17 @@ def test_figures_that_are_right_stay() -> None:
     assert all(one.covariance[2, 2] > 0.3**2 for one in found)
 
 
+def test_only_larger_sigmas_grow_to_the_rate_of_the_drift_and_never_shrink() -> None:
+    """Shifts that change within 10 s in place of 200 s have the rate of √20 times the sigma; turns are far smaller."""
+    truth, prior = STATED.drifting(1.0, 0.5, 0.05), DriftPrior(np.log(2.0), 0.0, only_larger=True)
+    half = replace(truth, drift=truth.drift * [1, 1, 1, 0.1, 0.1, 0.1])
+    values = observed(np.random.default_rng(4), half, 400)
+    found = drift_figures(equations_of(values), STATED, prior)
+    assert found.log[0] == pytest.approx(np.log(np.sqrt(20)), abs=0.2)
+    assert (found.log[1], found.log[2], found.deviation[1]) == (0, 0, 0)
+    assert drift_figures(equations_of(values), STATED, replace(prior, only_larger=False)).log[1] < -0.3
+
+
 def test_exact_figures_and_absent_drift_are_not_touched() -> None:
     values = observed(np.random.default_rng(3), STATED.drifting(3.0, 3.0, 0.1), 200)
     exact = drift_figures(equations_of(values), STATED, DriftPrior(0.0, 0.0))
