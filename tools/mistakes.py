@@ -1,9 +1,10 @@
 """Plant mistakes and real errors in simulated sessions, and tabulate their effect on the result and on the verdict.
 
-Each line of the table is the default scenario with one kind of error (``tools.mistake_kinds``), simulated with fixed
-seeds and calibrated in memory. It shows how many sessions were accepted and the adjustment's largest errors in angles
-and lever arm. For the accepted sessions it also shows the largest normalised squared error by the total covariance and
-the largest error in total sigmas; for the rejected ones, in how many of them what is named first is what was planted.
+Each line of the table is the default scenario with one kind of error (``tools.mistake_kinds``,
+``tools.mistake_effects``), simulated with fixed seeds and calibrated in memory. It shows how many sessions were
+accepted and the adjustment's largest errors in angles and lever arm. For the accepted sessions it also shows the
+largest normalised squared error by the total covariance and the largest error in total sigmas; for the rejected ones,
+in how many of them what is named first is what was planted.
 Above the table stand the same figures of all sessions together. The README must name every mistake that the verdict
 does not notice. Each session is a row of runs/montecarlo/mistakes.parquet. All kinds are simulated with the first seed,
 then with the second, and so on.
@@ -25,7 +26,7 @@ import pandas as pd
 from pipeline.report.reason_codes import ReasonCode
 from tools.campaign_files import collect_rows
 from tools.campaigns import FOLDER, TASKS_OF_A_WORKER, THIN
-from tools.mistake_kinds import MISTAKES
+from tools.mistake_effects import MISTAKES
 from tools.session_rows import NAMES, UNITS, errors_of
 
 SEEDS = 3
@@ -127,13 +128,15 @@ def summary(rows: pd.DataFrame) -> str:
     """Return what all sessions show: accepted ones that look right and are wrong, and how often the name is right."""
     accepted = rows[rows["accepted"]]
     wrong = accepted[(accepted["nse"] > LARGEST_NSE) | (accepted["sigmas"] > LARGEST_SIGMAS)]
-    rejected = rows[~rows["accepted"] & rows["has_right"]]
+    rejected = rows[~rows["accepted"]]
+    named = rejected[rejected["has_right"]]
     kinds = ", ".join(sorted(set(wrong["mistake"]))) or "none"
     return (
         f"{len(rows)} sessions of {rows['mistake'].nunique()} kinds. Accepted: {len(accepted)}; of these with an NSE "
         f"above {LARGEST_NSE:.0f} or an error above {LARGEST_SIGMAS:.0f} total sigmas: {len(wrong)} ({kinds}).\n"
-        f"Rejected, and something is to be named: {len(rejected)}; what was planted is named first in "
-        f"{rejected['named_right'].mean():.1%}."
+        f"Rejected: {len(rejected)}. In {len(named)} of these the program has a name for what was planted, and names "
+        f"it first in {named['named_right'].mean():.1%}; that is {named['named_right'].sum() / len(rejected):.1%} of "
+        "all rejected."
     )
 
 

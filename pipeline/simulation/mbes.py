@@ -123,13 +123,14 @@ class _SonarPass:
         }
 
     def _steered(self, shape: tuple[int, int]) -> Floats:
-        """Return the angles (p, b) at which the beams listen: those recorded, and their noise.
+        """Return the angles (p, b) at which the beams listen: those recorded, the array's errors, and noise.
 
         Of the correlated part each beam keeps ``steering_correlation`` times that of the beam before.
         """
         scenario = self.scenario
         noise = self.random["angle"].standard_normal(shape)
-        steered: Floats = self.angles_rad + np.radians(scenario.angle_sigma_deg) * noise
+        array = self.angles_rad + np.radians(scenario.array_ripple_deg) * np.sin(2 * self.angles_rad)
+        steered: Floats = array + np.radians(scenario.angle_sigma_deg) * noise
         if not scenario.steering_sigma_deg:
             return steered
         kept = scenario.steering_correlation

@@ -49,6 +49,7 @@ class MbesScenario(Model):
     ping_range_sigma_m: NotNegative = 0.0  # noise common to all ranges of a ping
     ping_roll_sigma_deg: NotNegative = 0.0  # noise common to all angles of a ping
     angle_sigma_deg: NotNegative = 0.06
+    array_ripple_deg: NotNegative = 0.0  # angles off by this times sin 2θ: errors of the array
     steering_sigma_deg: NotNegative = 0.0  # further noise of the angles, alike in neighbouring beams of a ping
     steering_correlation: Annotated[float, Field(ge=0, lt=1)] = 0.8  # of two neighbours; of n beams apart its nth power
     beam_deg: tuple[Positive, Positive] = (0.5, 1.0)  # across, along track

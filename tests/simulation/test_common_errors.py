@@ -64,6 +64,12 @@ def test_steering_noise_is_alike_in_neighbours(one_pass: Pass) -> None:
     assert np.mean(noise[1:] * noise[:-1]) / noise.var() == pytest.approx(0.0, abs=0.06)  # from ping to ping
 
 
+def test_an_array_errs_with_the_sine_of_twice_the_angle(one_pass: Pass) -> None:
+    ranges, angles = on_floor(one_pass(array_ripple_deg=0.05))
+    off = np.degrees(-np.arccos(3.3 / ranges) - angles)
+    np.testing.assert_allclose(off, 0.05 * np.sin(2 * angles), atol=1e-3)
+
+
 def test_sound_that_is_faster_at_the_arrays_steers_outward_alone(one_pass: Pass) -> None:
     """sin(true) = 1.001 sin(recorded): the beam at 60° meets the wall higher up; the range straight down stays."""
     session = one_pass(head_speed_excess=0.001)

@@ -12,7 +12,7 @@ from pipeline.simulation.face_faults import face_of_polygon
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.scenario import Scenario
 from tools.campaigns import THIN
-from tools.mistake_kinds import EFFECTS, MISTAKES
+from tools.mistake_effects import EFFECTS, MISTAKES
 from tools.mistakes import named_first
 
 WET = {f"wet_{family}_{name}" for family in ("P1", "P2", "P3", "H") for name in WET_PARAMETERS}
