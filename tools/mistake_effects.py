@@ -96,6 +96,16 @@ def _of_arrays(size: float) -> Block:
     return {"mbes": {"sound_speed_recorded_m_s": 1500 * (1 + size / 100), "head_speed_excess": size / 100}}
 
 
+def _leaning(size: float) -> Block:
+    """Return wet blocks whose faces lean by degrees as one, from the water line downward away from the boat."""
+    faults = []
+    for family, lowest_m in (("P1", -3.75), ("P3", -3.25)):  # height of the middle of the lowest block
+        for number in range(4):
+            shift_m = float(np.tan(np.radians(size)) * (lowest_m + number))
+            faults.append({"faces": [f"{family}-{number}"], "part": "wet", "shift_m": shift_m, "turn_deg": [0.0, size]})
+    return {"surroundings": {"face_faults": faults}}
+
+
 def _each_block(size: float) -> Block:
     """Return wet blocks that are off by errors with this sigma, mm, of their own."""
     names = [f"{family}-{number}" for family in ("P1", "P3") for number in range(8)]
@@ -182,7 +192,7 @@ EFFECTS = (
     _effect("P3-1-top {:g} mm too high", 20, _faces("P3-1-top", shift_m=1e-3), "P3-1-top"),
     _effect("P1-2 under water turned by {:g}°", 0.3, _faces("P1-2", turn_deg=[1.0, 0.0]), "P1-2"),
     _effect("wet wall leans by {:g}°", 0.05, _faces("P2", turn_deg=[0.0, 1.0]), *WET_WALL),
-    _effect("wet P1 and P3 lean by {:g}°", 0.05, _faces("P1", "P3", turn_deg=[0.0, 1.0]), *WET_SIDES),
+    _effect("wet P1 and P3 lean by {:g}°", 0.05, _leaning, *WET_SIDES),
     _effect("each wet block off at random, {:g} mm", 3, _each_block, "residuals_by_face"),
     _effect(  # or P2 away from it: the lever arm takes the rest
         "wet P1 and P3 {:g} mm to the boat", 7, _faces("P1", "P3", shift_m=1e-3),

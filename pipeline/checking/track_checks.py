@@ -115,6 +115,18 @@ def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
         )
 
 
+def survey_findings(pool: PoolConfig) -> Iterator[Finding]:
+    """Yield a finding if the pool's file says nothing of the target as built: the defaults are the best target's."""
+    if "as_built" not in pool.model_fields_set:
+        best = pool.as_built
+        yield Finding(
+            "survey",
+            "the pool's file has no as_built: the sigmas will count on a target whose faces were surveyed one by one, "
+            f"to {1000 * best.face_sigma_m:g} mm, with the pool filled; say how yours was (as_built)",
+            "look",
+        )
+
+
 def azimuth_remedy(track: InsTrack, place: TargetPlace) -> str:
     """Return the remedy for an azimuth far from the boat's direction; an empty text if it is near or one is unknown."""
     turn = askew_deg(track)

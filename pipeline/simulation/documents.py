@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.config.mount import Mount
+from pipeline.config.pool import AsBuilt
 from pipeline.gps_time import WEEK_NS
 from pipeline.simulation.motion import Movement
 from pipeline.simulation.mounts import R_body_from_sensor, coarse_error, coarse_mount, lever_arm_m
@@ -67,7 +68,10 @@ def _sigmas(range_m: float, angle_deg: float) -> _Text:
 
 
 def pool_text(scenario: Scenario, movement: Movement) -> _Text:
-    """Return the content of pool.yaml: the target by its design, at its surveyed position (with survey errors)."""
+    """Return the content of pool.yaml: the target by its design, at its surveyed position (with survey errors).
+
+    It states the sigmas of a target that was surveyed face by face: what differs from the design is planted unknown.
+    """
     surroundings, target = scenario.surroundings, scenario.target.model_dump(mode="json")
     if any(surroundings.origin_error_m):
         surveyed = np.array([surroundings.origin_error_m])
@@ -76,7 +80,7 @@ def pool_text(scenario: Scenario, movement: Movement) -> _Text:
         target["origin"] = degrees | {"height_m": height}
     azimuth_deg = scenario.azimuth_deg + surroundings.azimuth_error_deg
     target["azimuth_deg"] = azimuth_deg if surroundings.give_azimuth else None
-    return {"target": target}
+    return {"target": target, "as_built": AsBuilt().model_dump(exclude={"faces"})}
 
 
 def truth_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from pipeline.checking import excerpts
 from tests.support.checks import SBET, checked
@@ -59,6 +60,17 @@ def test_sensors_that_ran_before_the_ins_are_no_clocks(
     assert {one["severity"] for one in found if one["question"] == "ins missing"} <= {severity}
     assert not [one for one in found if one["question"] == "clock"], found
     assert status == (severity == "fault")
+
+
+def test_a_target_that_nobody_surveyed_is_looked_at(good: Callable[..., Path], tmp_path: Path) -> None:
+    content = yaml.safe_load((good() / "pool.yaml").read_text("utf-8"))
+    del content["as_built"]
+    pool = tmp_path / "pool.yaml"
+    pool.write_text(yaml.safe_dump(content), "utf-8")
+    told = poolcal("check", good(), "--config", pool, "--json")
+    (found,) = json.loads(told.out)["findings"]
+    assert (found["question"], found["severity"], told.status) == ("survey", "look", 0)
+    assert "surveyed one by one, to 0.5 mm, with the pool filled; say how yours was (as_built)" in found["words"]
 
 
 def test_people_see_files_passes_and_that_nothing_was_found(good: Callable[..., Path]) -> None:
