@@ -111,8 +111,8 @@ def _laser(
 ) -> int:
     """Calibrate the laser itself, from its own passes at the target.
 
-    The adjustment estimates those of the laser's angles and lever-arm components which this target and these passes
-    determine; the others stay fixed, and the result names them.
+    The adjustment estimates all six angles and lever-arm components, with the coarse mount as an observation. The
+    result names those that are not good enough.
     """
     from stages.commands import laser
     from stages.commands.draw import Drawings

@@ -22,6 +22,13 @@ from tools.session_rows import NAMES
 from tools.stress_campaigns import STRESS
 
 WORDS = "the laser's own calibration"
+PAGE_HEAD = """# Campaigns under noise that the settings do not describe
+
+NSE: normalised squared error of the six mount parameters by their random covariance (of the laser: by the total one,
+with the coarse mount), 6 on average if it is true; in brackets the band of its mean with 99 % probability. σ: the
+sigma by the same covariance. No systematic errors are simulated, so that the NSE by total sigmas is smaller. README,
+"Accuracy", says what each campaign simulates.
+"""
 
 
 def table_of(folder: Path) -> str:
@@ -50,7 +57,7 @@ def main() -> None:
     if options.page is None:
         print(text, end="")
     else:
-        options.page.write_text(text, encoding="utf-8")
+        options.page.write_text(f"{PAGE_HEAD}\n{text}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ class Segment(Model):
     search_azimuth_deg: Annotated[float, Field(gt=0, le=20)] = 3.0  # how wrong the configured azimuth may be
     search_mount_deg: Annotated[float, Field(gt=0, le=5)] = 3.0  # how wrong the coarse mount's angles may be
     search_mount_m: Annotated[float, Field(gt=0, le=0.5)] = 0.3  # how wrong its lever arm may be, each axis
-    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # how wrong the laser's angles may be, if calibrated
+    search_laser_deg: Annotated[float, Field(gt=0, le=2)] = 0.5  # a third of how wrong the laser's angles may be
     ambiguity_share: Annotated[float, Field(gt=0, lt=1)] = 0.3  # least margin over a rival pose, share of b times e
     ambiguity_margin: Annotated[float, Field(gt=0, lt=1)] = (
         0.02  # the mount is ambiguous if a rival's score is smaller by less than this share

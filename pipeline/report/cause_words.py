@@ -7,6 +7,9 @@ import numpy as np
 
 AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
 FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
+TURNS_OF_FAMILY = dict.fromkeys(  # turns of the normal along the tangents (maths/geometry/planes.py)
+    ("P1", "P2", "P3"), ("are turned by {} counter-clockwise from above", "lean away from the boat by {}")
+) | {"H": ("are tilted by {}, looking toward +x", "are tilted by {}, looking toward +y")}
 WORDS = {  # by parameter: scale and unit of its estimate, and the words round it
     "mbes_latency": (1e3, "ms", "the sonar's clock: its latency is {} more than mbes.latency_s says"),
     "laser_latency": (1e3, "ms", "the laser's clock: its latency is {} more than laser.latency_s says"),
@@ -16,13 +19,13 @@ WORDS = {  # by parameter: scale and unit of its estimate, and the words round i
         1e3,
         "mm",
         "the sonar's ranges go with the angle at which it sees a face: at 45° they should be {} longer, against a face "
-        "seen at right angles (at 75° seven times as much): its bottom detection, or what coats the faces",
+        "seen at right angles (at 75° seven times as much); look at its bottom detection, and at what coats the faces",
     ),
     "laser_incidence": (
         1e3,
         "mm",
         "the laser's ranges go with the angle at which it sees a face: at 45° they should be {} longer, against a face "
-        "seen at right angles (at 75° seven times as much): faces that are glazed, wet or dark",
+        "seen at right angles (at 75° seven times as much); look for faces that are glazed, wet or dark",
     ),
     "mbes_level_range": (
         1e3,
@@ -45,7 +48,7 @@ WORDS = {  # by parameter: scale and unit of its estimate, and the words round i
     "sound_speed_gradient": (
         1.0,
         "m/s",
-        "a sound speed that changes with depth, by {} per metre: take a (better) cast",
+        "a sound speed that changes with depth, by {} per metre; take a (better) cast",
     ),
 }
 PLACES = {  # of the transmitter by component: where it sits if the estimate is positive, and if it is negative
@@ -53,6 +56,17 @@ PLACES = {  # of the transmitter by component: where it sits if the estimate is 
     "projector_y": ("farther forward", "farther aft"),
     "projector_z": ("higher", "lower"),
 }
+
+
+def unit_of(name: str) -> tuple[float, str]:
+    """Return the unit in which a parameter is shown, and how many of it are one rad, m, s, 1 or 1/s.
+
+    >>> unit_of("mbes_latency"), unit_of("wet_P1_shift")
+    ((1000.0, 'ms'), (1000.0, 'mm'))
+    """
+    if name in WORDS:
+        return WORDS[name][:2]
+    return (float(np.degrees(1.0)), "°") if "rotation" in name or "turn" in name else (1e3, "mm")
 
 
 def words_of(row: Mapping[Any, Any]) -> str:
@@ -66,7 +80,7 @@ def words_of(row: Mapping[Any, Any]) -> str:
         size = size_words(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
         return (
             f"the transmitter sits {size} {farther} than mbes.projector_offset_m says (null: where the receiver is), "
-            "in the sonar's own axes: measure it at the head, or find out to which point the head reduces its ranges"
+            "in the sonar's own axes; measure it at the head, or find out to which point the head reduces its ranges"
         )
     if name.startswith("laser_rotation"):
         angle = size_words(np.degrees(value), np.degrees(sigma), "°")
@@ -86,7 +100,8 @@ def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
     faces = FACES_OF_FAMILY.get(family, f"of {family}")
     if kind.startswith("turn"):
         angle = size_words(np.degrees(value), np.degrees(sigma), "°")
-        return f"the target: its wet faces {faces} are turned by {angle} against the dry ones"
+        turns = TURNS_OF_FAMILY.get(family, ("are turned by {} (first tangent)", "are turned by {} (second tangent)"))
+        return f"the target: its wet faces {faces} {turns[kind == 'turn 2'].format(angle)}, against the dry ones"
     shift = size_words(1e3 * value, 1e3 * sigma, "mm")
     if kind == "bow":
         return f"the target: its wet faces {faces} are bowed outward, by {shift} at half depth; survey them"

@@ -13,11 +13,11 @@ from pipeline.text_table import text_table
 SIGMAS_IN_WORDS = {
     "mbes": (
         "sigma: the random part, from the noise of the sensors and the INS, relative to the laser.",
-        "total: with the systematic errors of the laser's mount, ranges, sound speed, clocks, target. Use the total.",
+        "total: with the systematic errors of the laser's mount, ranges, sound speed, clocks, target. Use this sigma.",
     ),
     "laser": (
         "sigma: the random part, from the noise of the laser and the INS.",
-        "total: with the uncertainty of target and coarse mount, and the errors of ranges and clock. Use the total.",
+        "total: with the uncertainty of target and coarse mount, and the errors of ranges and clock. Use this sigma.",
     ),
 }
 
