@@ -13,7 +13,7 @@ from pipeline.artefacts.schema import Provenance
 from pipeline.config.pool import Adjust, AsBuilt, LaserFit, Method, Segment, VerdictLimits
 from pipeline.config.session import Calibrated, Ins, Laser, Mbes
 from pipeline.config.target import Target
-from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
+from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape, shape_errors
 from pipeline.report.calibration_document import (
     SCHEMA,
     documents,
@@ -107,7 +107,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *target_off_origin(target),
         *(check for check in (drift_check, off_figures) if check is not None and check not in (NO_DRIFT, *reasons)),
         *report.pass_warnings,
-        *deviations_from_design(shape, design_shape(model)),
+        *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),
         *report.cast_warnings,
     ]
     verdict = "rejected" if reasons else "accepted"

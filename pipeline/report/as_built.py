@@ -27,8 +27,9 @@ from pipeline.report.reason_codes import ReasonCode, Statement
 Plane = tuple[NDArray[np.float64], float]  # normal, distance
 FLANKS = ("P1", "P3")
 WALL = "P2"
-MAX_DEVIATION = {"b": 0.01, "e": 0.002}  # m: drift from face to face makes less
-MAX_DEVIATION_DEG = 0.2  # of a corner: drift makes less
+MAX_DEVIATION = {"b": 0.01, "e": 0.002}  # m
+MAX_DEVIATION_DEG = 0.2  # of a corner
+CERTAIN = 4.0  # standard errors by which b or a corner must differ, too: an INS that drifts turns planes in each pass
 MIN_FACES = 3  # smallest number of horizontal faces for e
 MIN_SIGMA_M = 1e-5  # smallest sigma of a mean
 
@@ -53,6 +54,26 @@ def measured_shape(planes: pd.DataFrame, patterns: pd.DataFrame, model: TargetMo
         "corner_deg": _corners(measured, reference_family(of_family)),
         "lean_deg": _leans(measured),
     }
+
+
+def shape_errors(planes: pd.DataFrame, model: TargetModel) -> dict[str, float]:
+    """Return the standard errors of ``b`` (m) and of each family's corner (degrees), from the scatter of the passes.
+
+    What fewer than two passes show is left out.
+
+    Parameters
+    ----------
+    planes : table with the laser's planes
+    model : the target's design
+    """
+    laser = laser_planes(planes)
+    names, shapes = _upright(model), list[dict[str, float | None]]()
+    for number in sorted({number for number, _ in laser if number != ALL_PASSES}):
+        seen = {name: plane for name in names if (plane := laser.get((number, name))) is not None}
+        measured = {name: (plane.normal, plane.distance_m) for name, plane in seen.items()}
+        shapes.append({"b": _width(measured), **_corners(measured, reference_family(names))})
+    errors = pd.DataFrame(shapes, dtype=np.float64).sem().dropna()
+    return dict(zip(map(str, errors.index), errors.tolist(), strict=True))
 
 
 def design_shape(model: TargetModel) -> dict[str, Any]:
@@ -124,19 +145,27 @@ def _half_period(patterns: pd.DataFrame, model: TargetModel) -> float | None:
     return float(model.half_period_m * (1 + share))
 
 
-def deviations_from_design(measured: Mapping[str, Any], design: Mapping[str, Any]) -> Iterator[Statement]:
+def deviations_from_design(
+    measured: Mapping[str, Any], design: Mapping[str, Any], errors: Mapping[str, float]
+) -> Iterator[Statement]:
     """Yield a warning for each length and corner that differs from the design by more than its limit.
 
     The place of the target and its tilt have a separate warning (``target_off_origin``).
+
+    Parameters
+    ----------
+    measured : the shape, from :func:`measured_shape`
+    design : the shape, from :func:`design_shape`
+    errors : standard errors, from :func:`shape_errors`
     """
     for letter, limit_m in MAX_DEVIATION.items():
         value, designed = measured[f"{letter}_m"], design[f"{letter}_m"]
-        if value is not None and abs(value - designed) > limit_m:
+        if value is not None and abs(value - designed) > max(limit_m, CERTAIN * errors.get(letter, 0.0)):
             words = f"the laser finds {letter} = {value:.4f} m where the config has {designed:g} m: measure it"
             yield Statement(ReasonCode.LENGTH_OFF_DESIGN, words)
     reference = family_title(reference_family(design["lean_deg"]))
     for family, angle in measured["corner_deg"].items():
         designed = design["corner_deg"][family]
-        if abs(angle - designed) > MAX_DEVIATION_DEG:
+        if abs(angle - designed) > max(MAX_DEVIATION_DEG, CERTAIN * errors.get(family, 0.0)):
             words = f"the laser finds {angle:.2f}° between {reference} and {family}, by design {designed:g}°"
             yield Statement(ReasonCode.ANGLE_OFF_DESIGN, words)

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from pipeline.config.target import Letters, Origin
-from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape
+from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape, shape_errors
 from pipeline.target.design import target_of
 
 ROOT = np.sqrt(0.5)
@@ -43,7 +43,7 @@ def test_as_designed_nothing_is_said() -> None:
     assert found["b_m"] == pytest.approx(3.0)
     assert found["e_m"] == pytest.approx(0.5)
     assert found["corner_deg"] == pytest.approx({"P1": 45.0, "P3": 45.0})
-    assert not [*deviations_from_design(found, DESIGN)]
+    assert not [*deviations_from_design(found, DESIGN, {})]
 
 
 @pytest.mark.parametrize(
@@ -56,24 +56,42 @@ def test_as_designed_nothing_is_said() -> None:
     ],
 )
 def test_what_differs_is_said_alone(half_width: float, corner_deg: float, share: float, words: str) -> None:
-    (warning,) = deviations_from_design(measured_shape(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)
+    found = measured_shape(planes(half_width, corner_deg), heights(share), MODEL)
+    (warning,) = deviations_from_design(found, DESIGN, {})
     assert words in warning.words
 
 
 @pytest.mark.parametrize("differs", [(1.504, 45.0, 0.0), (1.5, 45.19, 0.0), (1.5, 45.0, 0.003)])
 def test_what_a_target_is_built_to_is_not_said(differs: tuple[float, float, float]) -> None:
     half_width, corner_deg, share = differs
-    assert not [*deviations_from_design(measured_shape(planes(half_width, corner_deg), heights(share), MODEL), DESIGN)]
+    found = measured_shape(planes(half_width, corner_deg), heights(share), MODEL)
+    assert not [*deviations_from_design(found, DESIGN, {})]
+
+
+def test_the_passes_tell_how_certain_a_shape_is() -> None:
+    """Four passes with corners of P3 0.6° apart, as an INS that drifts makes them; b is 3.00 or 3.02 m."""
+    passes = [
+        planes(half_width, corner_deg).query("sensor == 'laser' and `pass` == -1").assign(**{"pass": number})
+        for number, (half_width, corner_deg) in enumerate([(1.5, 44.7), (1.51, 45.3), (1.5, 44.7), (1.51, 45.3)])
+    ]
+    errors = shape_errors(pd.concat(passes), MODEL)
+    assert errors["P3"] == pytest.approx(0.6 / np.sqrt(12), rel=1e-6)  # scatter 0.6 / √3, of four
+    assert errors["b"] == pytest.approx(0.02 / np.sqrt(12), rel=1e-6)
+    assert errors["P1"] == pytest.approx(0.0, abs=1e-9)
+    for corner_deg, said in ((45.65, False), (45.75, True)):  # beyond four of 0.173°
+        found = measured_shape(planes(1.5, corner_deg), heights(0.0), MODEL)
+        assert bool([*deviations_from_design(found, DESIGN, errors)]) == said
+    assert shape_errors(planes(1.5), MODEL) == {}  # one pass tells nothing
 
 
 def test_without_a_flank_there_is_no_width() -> None:
     found = measured_shape(planes(1.5).query("plane != 'P3'"), heights(0.0), MODEL)
     assert found["b_m"] is None
     assert set(found["corner_deg"]) == {"P1"}
-    assert not [*deviations_from_design(found, DESIGN)]
+    assert not [*deviations_from_design(found, DESIGN, {})]
 
 
 def test_without_the_wall_no_angle_is_compared_with_the_walls() -> None:
     found = measured_shape(planes(1.5).query("plane != 'P2'"), heights(0.0), MODEL)
     assert found["corner_deg"] == {}
-    assert not [*deviations_from_design(found, DESIGN)]
+    assert not [*deviations_from_design(found, DESIGN, {})]

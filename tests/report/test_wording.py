@@ -180,12 +180,12 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         "pass 6: the sonar saw the target, and there are no laser points on it; was it recording?",
     ),
     (
-        lambda: deviations_from_design(SHAPE | {"b_m": 3.012}, SHAPE),
+        lambda: deviations_from_design(SHAPE | {"b_m": 3.012}, SHAPE, {}),
         ReasonCode.LENGTH_OFF_DESIGN,
         "the laser finds b = 3.0120 m where the config has 3 m: measure it",
     ),
     (
-        lambda: deviations_from_design(SHAPE | {"corner_deg": {"P1": 45.0, "P3": 45.3}}, SHAPE),
+        lambda: deviations_from_design(SHAPE | {"corner_deg": {"P1": 45.0, "P3": 45.3}}, SHAPE, {}),
         ReasonCode.ANGLE_OFF_DESIGN,
         "the laser finds 45.30° between wall and P3, by design 45°",
     ),
