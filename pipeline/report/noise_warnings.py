@@ -72,7 +72,7 @@ def sigmas_too_small(estimate: pd.DataFrame, level: float) -> Iterator[Statement
             found.append(f"{words_of[row['unknown']]} {np.sqrt(ratio):.1f} ± {spread:.1f} times ({dof:.0f} slots)")
     if found:
         words = (
-            f"slots of a second scatter more than the random sigmas say: {', '.join(found)}; errors that neighbouring "
-            "pings share, or uneven faces"
+            f"stretches of one second scatter more than the random sigmas say: {', '.join(found)}; errors that "
+            "neighbouring pings share, or uneven faces"
         )
         yield Statement(ReasonCode.SIGMAS_OFF_SCATTER, words)
