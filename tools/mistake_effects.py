@@ -1,7 +1,7 @@
 """The errors of real water that ``tools.mistakes`` plants, at the size that is to be expected and at three times it.
 
-In these sessions the INS drifts by the figures that session.yaml has. All kinds, with the crew's mistakes, are
-``MISTAKES``.
+In these sessions the INS drifts by the figures that session.yaml has, but for the kinds that concern it. All kinds,
+with the crew's mistakes, are ``MISTAKES``.
 """
 
 from collections.abc import Callable
@@ -107,8 +107,8 @@ def _leaning(size: float) -> Block:
 
 
 def _each_block(size: float) -> Block:
-    """Return wet blocks that are off by errors with this sigma, mm, of their own."""
-    names = [f"{family}-{number}" for family in ("P1", "P3") for number in range(8)]
+    """Return wet blocks that are off by errors with this sigma, mm, of their own, the same in all sessions."""
+    names = [f"{family}-{number}" for family in ("P1", "P3") for number in range(4)]
     shifts = np.random.default_rng(11).normal(size=len(names)) * size / 1000
     pairs = zip(names, shifts.tolist(), strict=True)
     return {"surroundings": {"face_faults": [{"faces": [name], "part": "wet", "shift_m": by} for name, by in pairs]}}

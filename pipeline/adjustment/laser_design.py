@@ -59,8 +59,8 @@ def laser_problem(
     """Return the problem of calibrating the laser against the target's design. No fixed parameter has an error yet.
 
     The coarse mount is an observation of all six mount parameters, so that each is estimated, and has the sigma that
-    it and the points give together. Of the drift's figures only the sigmas follow the points, and only upwards
-    (:mod:`~pipeline.maths.adjustment.drift_likelihood` tells why).
+    it and the points give together. Of the drift's figures only the sigmas follow the points, and only upwards, where
+    that is certain (:mod:`~pipeline.maths.adjustment.drift_likelihood` tells why).
 
     Parameters
     ----------

@@ -90,7 +90,8 @@ def _check(folder: Path, session: SessionConfig, pool: PoolConfig | None, calibr
     unusable = {finding.words.split(":")[0] for finding in findings if finding.question == "clock"}
     unusable |= {"laser", "mbes"} if "ins" in unusable else set()
     unusable |= {"laser" for finding in findings if finding.question == "frame"}
-    findings += track_checks.survey_findings(pool)
+    if session.mbes is not None:
+        findings += track_checks.survey_findings(pool)
     at_target = _check_at_target(_Session(files, session, pool, target_of(pool.target), calibrate), epochs, unusable)
     return replace(at_target, findings=(*findings, *at_target.findings))
 

@@ -57,7 +57,7 @@ def measured_shape(planes: pd.DataFrame, patterns: pd.DataFrame, model: TargetMo
 
 
 def shape_errors(planes: pd.DataFrame, model: TargetModel) -> dict[str, float]:
-    """Return the standard errors of ``b`` (m) and of each family's corner (degrees), from the scatter of the passes.
+    """Return the standard errors of ``b_m`` and of each family's corner (degrees), from the scatter of the passes.
 
     What fewer than two passes show is left out.
 
@@ -71,7 +71,7 @@ def shape_errors(planes: pd.DataFrame, model: TargetModel) -> dict[str, float]:
     for number in sorted({number for number, _ in laser if number != ALL_PASSES}):
         seen = {name: plane for name in names if (plane := laser.get((number, name))) is not None}
         measured = {name: (plane.normal, plane.distance_m) for name, plane in seen.items()}
-        shapes.append({"b": _width(measured), **_corners(measured, reference_family(names))})
+        shapes.append({"b_m": _width(measured), **_corners(measured, reference_family(names))})
     errors = pd.DataFrame(shapes, dtype=np.float64).sem().dropna()
     return dict(zip(map(str, errors.index), errors.tolist(), strict=True))
 
@@ -148,7 +148,7 @@ def _half_period(patterns: pd.DataFrame, model: TargetModel) -> float | None:
 def deviations_from_design(
     measured: Mapping[str, Any], design: Mapping[str, Any], errors: Mapping[str, float]
 ) -> Iterator[Statement]:
-    """Yield a warning for each length and corner that differs from the design by more than its limit.
+    """Yield a warning for each length and corner that differs from the design by more than limit and standard errors.
 
     The place of the target and its tilt have a separate warning (``target_off_origin``).
 
@@ -160,7 +160,7 @@ def deviations_from_design(
     """
     for letter, limit_m in MAX_DEVIATION.items():
         value, designed = measured[f"{letter}_m"], design[f"{letter}_m"]
-        if value is not None and abs(value - designed) > max(limit_m, CERTAIN * errors.get(letter, 0.0)):
+        if value is not None and abs(value - designed) > max(limit_m, CERTAIN * errors.get(f"{letter}_m", 0.0)):
             words = f"the laser finds {letter} = {value:.4f} m where the config has {designed:g} m: measure it"
             yield Statement(ReasonCode.LENGTH_OFF_DESIGN, words)
     reference = family_title(reference_family(design["lean_deg"]))

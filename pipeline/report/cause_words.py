@@ -61,12 +61,14 @@ PLACES = {  # of the transmitter by component: where it sits if the estimate is 
 def unit_of(name: str) -> tuple[float, str]:
     """Return the unit in which a parameter is shown, and how many of it are one rad, m, s, 1 or 1/s.
 
-    >>> unit_of("mbes_latency"), unit_of("wet_P1_shift")
+    >>> unit_of("mbes_latency"), unit_of("wet_return-south_shift")
     ((1000.0, 'ms'), (1000.0, 'mm'))
     """
     if name in WORDS:
-        return WORDS[name][:2]
-    return (float(np.degrees(1.0)), "°") if "rotation" in name or "turn" in name else (1e3, "mm")
+        scale, unit, _ = WORDS[name]
+        return scale, "(m/s)/m" if name == "sound_speed_gradient" else unit
+    is_angle = name.startswith("laser_rotation") or name.endswith(("_turn_1", "_turn_2"))
+    return (float(np.degrees(1.0)), "°") if is_angle else (1e3, "mm")
 
 
 def words_of(row: Mapping[Any, Any]) -> str:

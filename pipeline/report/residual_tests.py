@@ -10,8 +10,9 @@ parameters of table ``freed``. Its ``strength`` is comparable with theirs, value
 without tolerance; for a pass also the change of the mount without that pass, over all mount parameters (table
 ``parts``), because a pass may be wrong in more ways than one mean shows.
 
-There is at most one reason for the passes, and one for all other variables. It describes the strongest part of the
-points, or, if none deviates, the row that deviates most (by angle, distance or time), and names the other variables.
+There is at most one reason for the passes, and one for all other variables. The first describes the row that deviates
+most, a pass or the drift in one. The second describes the strongest part of the points, or, if none deviates, the row
+that deviates most (by angle, distance or time). Each names the other variables.
 """
 
 from dataclasses import dataclass
@@ -52,7 +53,7 @@ class DeviatingPart:
 
 
 def deviations(tests: ResidualTests, parts: pd.DataFrame, level: float) -> list[Deviation]:
-    """Return at most two deviations, the larger first: one of the passes, one of all else.
+    """Return at most two deviations, the stronger first: one of the passes, one of all else.
 
     Parameters
     ----------
@@ -61,26 +62,26 @@ def deviations(tests: ResidualTests, parts: pd.DataFrame, level: float) -> list[
     level : level of the test
     """
     exceeded = _exceeded(tests, level)
-    is_of_passes = exceeded.rows["by"].isin(OF_PASSES)
+    of_passes, others = _farthest_rows(exceeded, parts)
     reasons = []
-    if farthest := _farthest_of_each(exceeded.rows[is_of_passes]):
-        reasons.append(_deviation(farthest, describe_pass(farthest[0], exceeded), parts))
-    if farthest := _farthest_of_each(exceeded.rows[~is_of_passes]):
-        farthest.sort(key=lambda row: -_strength(row, parts))  # stable: those without one stay behind, in their order
-        reasons.append(_deviation(farthest, describe_pattern(farthest[0], exceeded), parts))
-    return sorted(reasons, key=lambda deviation: -deviation.excess)
+    if of_passes:
+        reasons.append(_deviation(of_passes, describe_pass(of_passes[0], exceeded), parts))
+    if others:
+        reasons.append(_deviation(others, describe_pattern(others[0], exceeded), parts))
+    return sorted(reasons, key=lambda deviation: (-deviation.strength, -deviation.excess))
 
 
 def deviating_parts(tests: ResidualTests, parts: pd.DataFrame, level: float) -> list[DeviatingPart]:
-    """Return for each variable the part of the points that deviates most.
+    """Return the pass or drift that the reason describes, and of each other variable the part that deviates most.
 
     Parameters
     ----------
     tests, parts, level
         As for :func:`deviations`.
     """
+    of_passes, others = _farthest_rows(_exceeded(tests, level), parts)
     found = []
-    for row in _farthest_of_each(_exceeded(tests, level).rows):
+    for row in [*of_passes[:1], *others]:
         if strength := _strength(row, parts):
             by, name = str(row["by"]), f"{row['low']:g}"
             if by.startswith(CYCLE):
@@ -92,6 +93,14 @@ def deviating_parts(tests: ResidualTests, parts: pd.DataFrame, level: float) -> 
 def _exceeded(tests: ResidualTests, level: float) -> ExceededTests:
     limit = limit_for(tests.patterns, level)
     return ExceededTests(tests, tests.patterns[tests.patterns["normalised"].abs() > limit], limit)
+
+
+def _farthest_rows(exceeded: ExceededTests, parts: pd.DataFrame) -> tuple[list[Row], list[Row]]:
+    """Return each variable's row that deviates most: of passes, the largest first; of all else, the strongest first."""
+    is_of_passes = exceeded.rows["by"].isin(OF_PASSES)
+    of_passes, others = (_farthest_of_each(exceeded.rows[rows]) for rows in (is_of_passes, ~is_of_passes))
+    others.sort(key=lambda row: -_strength(row, parts))  # stable: those without one stay behind, in their order
+    return of_passes, others
 
 
 def _farthest_of_each(rows: pd.DataFrame) -> list[Row]:

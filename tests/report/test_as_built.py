@@ -76,7 +76,7 @@ def test_the_passes_tell_how_certain_a_shape_is() -> None:
     ]
     errors = shape_errors(pd.concat(passes), MODEL)
     assert errors["P3"] == pytest.approx(0.6 / np.sqrt(12), rel=1e-6)  # scatter 0.6 / √3, of four
-    assert errors["b"] == pytest.approx(0.02 / np.sqrt(12), rel=1e-6)
+    assert errors["b_m"] == pytest.approx(0.02 / np.sqrt(12), rel=1e-6)
     assert errors["P1"] == pytest.approx(0.0, abs=1e-9)
     for corner_deg, said in ((45.65, False), (45.75, True)):  # beyond four of 0.173°
         found = measured_shape(planes(1.5, corner_deg), heights(0.0), MODEL)

@@ -49,3 +49,15 @@ def test_a_pass_is_as_strong_as_the_mounts_change_without_it():
 def test_where_the_labels_are_in_doubt_nothing_is_explained():
     assert explanations(evidence(pose={"ambiguous": True}, patterns=[PASS_3]), ADJUSTED) == []
     assert explanations(evidence(summary={"reason": "too few"}, patterns=[PASS_3]), ADJUSTED) == []
+
+
+def test_the_first_reason_and_the_first_explanation_are_of_one_thing():
+    """A pass and the drift in it, and a face: what is described first is what stands first in the list."""
+    face = OFF | {"by": "face", "low": 0.0, "mean_m": 0.002, "sigma_mean_m": 1e-4, "normalised": 9.0}
+    drift = PASS_3 | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "normalised": 4.5}
+    for patterns, code, kind in (
+        ([PASS_3, face], ReasonCode.PASSES_DISAGREE, "pass"),
+        ([PASS_3, drift], ReasonCode.INS_DRIFT_BETWEEN_PASSES, "drift"),
+    ):
+        tables = evidence(patterns=patterns)
+        assert (judged(tables)[0].code, explanations(tables, ADJUSTED)[0].kind) == (code, kind)

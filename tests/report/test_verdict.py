@@ -232,9 +232,9 @@ def test_the_consistency_of_passes_is_of_residuals_and_of_drift():
     assert (alone["statistic"], alone["dof"], alone["passed"]) == (0.0, 0, True)
 
 
-def test_what_lies_farthest_off_comes_first():
-    """A step of ten millimetres shows by angle as well: named once, by what shows it best."""
-    step = {"by": "step", "normalised": -15.0, "mean_m": -0.0101}
+def test_the_strongest_part_of_the_points_comes_first():
+    """A step of ten millimetres, 202 sigma, shows by angle as well: named once, by what shows it best."""
+    step = {"by": "step", "normalised": -15.0, "mean_m": -0.0101, "sigma_mean_m": 5e-5}
     first, second = judged(evidence(patterns=[{"normalised": 6.0}, step, PASS_3 | {"normalised": -5.0}]))
     assert codes([first, second]) == [ReasonCode.RESIDUALS_STEP, ReasonCode.PASSES_DISAGREE]
     assert "steps by -10.1 mm (15.0 sigma beyond 3 mm, limit 3.6)" in first.words

@@ -5,14 +5,16 @@ import pandas as pd
 import pytest
 
 from pipeline.maths.adjustment.mean_tests import joint_limit
-from pipeline.results.pages.parameter_tests import parameter_test_rows
+from pipeline.maths.mount_parameters import MOUNT_NAMES
+from pipeline.results.pages.parameter_tests import parameter_test_rows, untold_parameters
 
 LEVEL = 0.001
 
 
 def freed(*rows: dict[str, object]) -> pd.DataFrame:
     usual = {"estimated": False, "known": False, "value": 1e-4, "sigma": 1e-3, "considered": 5e-4, "expected": 1.2e-3}
-    return pd.DataFrame([{"unknown": "mbes_latency"} | usual | row for row in rows])
+    effects = {f"effect_{name}": 1e-3 for name in MOUNT_NAMES}
+    return pd.DataFrame([{"unknown": "mbes_latency"} | usual | effects | row for row in rows])
 
 
 def test_an_error_of_the_size_that_is_found_is_found_in_95_of_100_sessions() -> None:
@@ -41,3 +43,16 @@ def test_only_tested_parameters_of_all_points_have_a_row() -> None:
     turned, leaning = (row["words"] for row in parameter_test_rows(wet, LEVEL))
     assert "are turned by +0.01 ± 0.06° counter-clockwise from above, against the dry ones" in turned
     assert "lean away from the boat by +0.01 ± 0.06°, against the dry ones" in leaning
+
+
+def test_sizes_are_plain_numbers_in_the_parameters_unit() -> None:
+    names = ("projector_z", "wet_return-south_shift", "sound_speed_gradient", "laser_rotation_x")
+    rows = [*parameter_test_rows(freed(*({"unknown": name, "considered": 0.12} for name in names)), LEVEL)]
+    assert [row["considered"] for row in rows] == ["120 mm", "120 mm", "0.12 (m/s)/m", "6.9 °"]
+
+
+def test_what_the_points_do_not_tell_is_named() -> None:
+    unknown = {"value": np.nan, "sigma": np.nan, "expected": np.nan, "considered": 0.005}
+    still = {f"effect_{name}": 0.0 for name in MOUNT_NAMES}
+    rows = [{"unknown": "projector_y"}, {"unknown": "wet_H_bow"} | still, {"unknown": "surfaces_P1"}]
+    assert untold_parameters(freed({}, *(unknown | row for row in rows))) == ["the transmitter's place, y (± 5 mm)"]

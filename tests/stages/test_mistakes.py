@@ -37,6 +37,12 @@ def test_every_kind_is_a_scenario_of_its_own() -> None:
         parse(Scenario, scenario_of(name), name)
 
 
+def test_a_near_field_that_nobody_declared_is_planted_as_one() -> None:
+    session = {"mbes": {"focused": [False, False]}}
+    MISTAKES["sonar: near field, aperture 0.19 m, not declared"].change({}, session, {})
+    assert session["mbes"]["focused"] == [True, True]
+
+
 def test_names_that_would_be_right_are_names_of_the_program() -> None:
     default = Scenario()
     polygons = build_mesh(default.target, default.surroundings).names

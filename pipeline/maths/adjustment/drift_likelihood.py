@@ -38,8 +38,10 @@ components keep the session's ratios: the data hardly tell them apart.
 **The laser's own calibration.** The points cannot tell the drift's mean over the session from the laser's roll and
 pitch, which are known only as well as that mean: σ √(2 τ / T) for a session of T much longer than τ, σ for a shorter
 one. An INS has slow errors beside fast ones. If τ followed the fast ones, which the points show, this sigma would be
-too small. So there τ stays as the session says, and the sigmas may only grow (``only_larger``): with their rate
-2 σ² / τ the fast drift has its true weight, and the slow one is not smaller than the session says.
+too small. So there τ stays as the session says, and the sigmas may only grow, where the data are certain
+of it (``only_larger``): with their rate 2 σ² / τ the fast drift has its true weight, and the slow one is not smaller
+than the session says. A figure that does not grow is taken for the session's after the minimum is found; the other
+keeps its value.
 
 J is minimised by Newton's method (:mod:`~pipeline.maths.adjustment.newton`, 10 evaluations a step). Its second
 derivatives give the covariance of z, 2 (∂²J)⁻¹. Along the valley J is far from quadratic, and this variance may exceed
@@ -59,6 +61,7 @@ from pipeline.maths.adjustment.pose_errors import SHIFTS, TURNS, PoseNoise
 
 Array = NDArray[np.float64]
 LARGEST_LOG = float(np.log(1000.0))  # bound of the log figures: beyond it the drift is as good as absent, or white
+CERTAIN = 2.0  # standard deviations by which a logarithm must exceed zero, where figures may only grow
 LEAST_LOG = 1e-6  # a figure known better than this is exact
 
 
@@ -66,8 +69,8 @@ LEAST_LOG = 1e-6  # a figure known better than this is exact
 class DriftPrior:
     """Logarithms of the factors within which the session's figures are right (one sigma); 0: they are exact.
 
-    sigma: of the drift's standard deviations; time_constant: of its time constant; only_larger: standard deviations
-    below the session's do not count.
+    sigma: of the drift's standard deviations; time_constant: of its time constant; only_larger: a standard deviation
+    counts only if it is certainly larger than the session's.
     """
 
     sigma: float
@@ -126,10 +129,10 @@ def drift_figures(
 
     found, curvature = newton_minimum(objective, len(free), LARGEST_LOG)
     z[free] = found
-    if prior.only_larger:
-        z[:2] = np.maximum(z[:2], 0.0)
     of_free = 2 * np.linalg.inv(curvature)
     covariance[np.ix_(free, free)] = of_free
+    if prior.only_larger:
+        z[z < CERTAIN * np.sqrt(np.diag(covariance))] = 0.0
     deviation[free] = z[free] / known[free]
     return DriftFigures(noise.drifting(*np.exp(z).tolist()), z, covariance, deviation)
 

@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.adjustment.error_sources import source_of
 from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.cause_words import unit_of, words_of
 from pipeline.report.suspected_causes import significance_limit
 
 SURE = 1.645  # standard normal quantile of 95 %
 SINGLE_FACE = "face_"  # beginning of the names of parameters that the table leaves to the residuals by face
+OF_DESIGN = "surfaces_"  # beginning of the names of errors that have no test
 
 
 def parameter_test_rows(freed: pd.DataFrame, level: float) -> Iterator[Mapping[str, Any]]:
@@ -35,12 +37,28 @@ def parameter_test_rows(freed: pd.DataFrame, level: float) -> Iterator[Mapping[s
         name, expected, considered = str(row["unknown"]), row["expected"], row["considered"]
         if not np.isfinite(expected) or name in MOUNT_NAMES or name.startswith(SINGLE_FACE) or row["estimated"]:
             continue
-        scale, unit = unit_of(name)
         found_from = limit * expected + SURE * np.sqrt(max(expected**2 - considered**2, 0.0))
         yield {
             "words": words_of(row).partition("; ")[0],  # without the advice
-            "considered": f"{scale * considered:.2g} {unit}",
+            "considered": _shown(name, considered),
             "normalised": abs(row["value"]) / expected,
-            "found_from": f"{scale * found_from:.2g} {unit}",
+            "found_from": _shown(name, found_from),
             "beyond": abs(row["value"]) > limit * expected,
         }
+
+
+def untold_parameters(freed: pd.DataFrame) -> list[str]:
+    """Return in words the parameters that move the mount, and of which the points tell nothing."""
+    words = []
+    for row in freed[~np.isfinite(freed["expected"]) & ~freed["estimated"]].to_dict("records"):
+        name = str(row["unknown"])
+        moves = any(row[f"effect_{one}"] for one in MOUNT_NAMES)
+        if moves and name not in MOUNT_NAMES and not name.startswith((SINGLE_FACE, OF_DESIGN)):
+            axis = f", {name[-1]}" if name[-2:] in ("_x", "_y", "_z") else ""
+            words.append(f"{source_of(name).words}{axis} (± {_shown(name, row['considered'])})")
+    return words
+
+
+def _shown(name: str, value: float) -> str:
+    scale, unit = unit_of(name)
+    return f"{float(f'{scale * value:.2g}'):g} {unit}"

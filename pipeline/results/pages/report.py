@@ -34,7 +34,7 @@ from pipeline.report.reason_codes import verdict_in_words
 from pipeline.results.pages.currency import page_digest
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows, part_rows
-from pipeline.results.pages.parameter_tests import parameter_test_rows
+from pipeline.results.pages.parameter_tests import parameter_test_rows, untold_parameters
 from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_rows
 from pipeline.results.pages.plots import picture_names
 from pipeline.results.pages.rendering import render_page
@@ -139,6 +139,7 @@ def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "level": f"{100 * settings.pool.adjust.test_level:g}",
         "tests": [row | {"name": SORTED_BY[row["by"]]} for row in result["geometry"]["patterns"]],
         "parts": part_rows(result.get("parts", [])),
+        "untold": untold_parameters(tables.table(FREED)),
         "parameter_tests": list(parameter_test_rows(tables.table(FREED), settings.pool.adjust.test_level)),
         "groups": tables.table(GROUPS).to_dict("records"),
         "drift_figures": [row for row in tables.table(DRIFT_FIGURES).to_dict("records") if row["sigma_log"]],
