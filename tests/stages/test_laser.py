@@ -191,7 +191,7 @@ def test_a_coarse_mount_that_the_points_contradict_is_refused_and_named() -> Non
         assert np.hypot(row["sigma"], 1e-3) <= row["expected"] < 1.1e-3  # with the systematic errors
     (reason,) = result["reasons"]
     first = max(("rotation_x", "rotation_y"), key=lambda name: abs(rows.loc[name, "value"]))
-    size = f"turned by {np.degrees(rows.loc[first, 'value']):+.2f} ± "
+    size = f"turned by {np.degrees(rows.loc[first, 'value']):+.3f} ± "
     assert size in reason, reason
 
 
