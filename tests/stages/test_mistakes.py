@@ -11,16 +11,15 @@ from pipeline.report.reason_codes import ReasonCode
 from pipeline.simulation.face_faults import face_of_polygon
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.scenario import Scenario
-from tools.campaigns import THIN
 from tools.mistake_effects import EFFECTS, MISTAKES
-from tools.mistakes import named_first
+from tools.mistakes import BASE, named_first
 
 WET = {f"wet_{family}_{name}" for family in ("P1", "P2", "P3", "H") for name in WET_PARAMETERS}
 PARAMETERS = {*MBES_PARAMETERS, *LASER_PARAMETERS, *WET}
 
 
 def scenario_of(name: str) -> dict[str, Any]:
-    scenario: dict[str, Any] = {"name": "mistake", **copy.deepcopy(THIN)}
+    scenario: dict[str, Any] = {"name": "mistake", **copy.deepcopy(BASE)}
     MISTAKES[name].change(scenario, {}, {})
     return scenario
 
