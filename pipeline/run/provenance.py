@@ -18,7 +18,7 @@ from pipeline.run.stage_protocol import declared
 
 LIBRARIES = (  # libraries that can change a digit: they compute, or decode raw files, meshes or tables
     "numpy", "scipy", "pandas", "pyarrow", "pyproj", "open3d-cpu", "laspy", "lazrs", "novatel-edie", "pye57", "gsfu",
-    "pykmall", "trimesh",
+    "pykmall", "trimesh", "numba", "llvmlite",
 )  # fmt: skip
 ROOT = Path(pipeline.__file__).parent.parent
 CALLS = ("pipeline.run.stage_protocol",)  # calls every stage, and writes its streams

@@ -79,6 +79,7 @@ from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
 from pipeline.maths.adjustment.parameters import FEATURES, N_SURFACE, N_WET, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE
+from pipeline.maths.geometry.rotations import skew
 from pipeline.maths.mount_parameters import N_MOUNT
 from pipeline.maths.sonar.soundings import across_beam
 
@@ -274,8 +275,7 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     """
     plane, T = state.surfaces[observed.surface], poses.R_target_from_body
     first, second = plane.tangents
-    columns = state.columns(observed.sensor, observed.surface)
-    design = np.zeros((len(T), observed.features, len(columns)))
+    design = np.zeros((len(T), observed.features, len(state.columns(observed.sensor, observed.surface))))
     from_centre = poses.positions_m - plane.centre_m
     # turns and shift of the surface
     design[:, 0, 0], design[:, 1, 0] = from_centre @ first, 1.0
@@ -283,8 +283,8 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     design[:, 0, 2] = -1.0
     # rotation and lever arm of the mount
     turn, arm = slice(N_SURFACE, N_SURFACE + 3), slice(N_SURFACE + 3, N_SURFACE + N_MOUNT)
-    design[:, 0, turn] = -np.einsum("gij,gi->gj", T, np.cross(T @ observed.lever_arm_m, plane.normal))
-    design[:, 1, turn], design[:, 2, turn] = -(second @ T), first @ T
+    across = T @ observed.lever_arm_m @ skew(plane.normal)  # T l × n
+    design[:, 0, turn], design[:, 1, turn], design[:, 2, turn] = -(across[:, None] @ T)[:, 0], -(second @ T), first @ T
     design[:, 0, arm] = plane.normal @ T
     # latency, parameters with a feature of their own, and the range of level faces
     latency, further = N_SURFACE + N_MOUNT, len(FEATURES[observed.sensor])

@@ -153,7 +153,7 @@ def test_many_intervals_side_by_side_are_the_same_as_few(monkeypatch: pytest.Mon
     knots = place_knots(np.unique(np.concatenate([one.record for one in found])), seconds, 0.5, 2.0)
     white = np.full(SIX, 0.4)
     whole = whole_of(found, TimeAxis(seconds, knots), white)
-    monkeypatch.setattr("pipeline.maths.adjustment.eliminate_white_noise.SIDE_BY_SIDE", 3)
+    monkeypatch.setattr("pipeline.maths.adjustment.eliminate_white_noise.SIDE_BY_SIDE", 15)  # records: two spans
     parts = whole_of(found, TimeAxis(seconds, knots), white)
     np.testing.assert_allclose(parts.spans, whole.spans, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(parts.others, whole.others, rtol=1e-12, atol=1e-12)
