@@ -27,14 +27,18 @@ from pipeline.gps_time import NS, utc_text
 from pipeline.readers.file_summaries import (
     ChunkSummary,
     Summaries,
+    different_milliseconds,
     files_table,
     gaps_table,
     ingest_counts_table,
     refuse_disjoint_times,
     refuse_empty_sensors,
+    refuse_times_of_reception,
     thin_sigmas,
 )
 from pipeline.readers.track_tables import passes_table, pool_frame_table
+
+_OF_A_SOUNDING = ("sound_speed_m_s", "two_way_time_s")
 
 
 @dataclass(frozen=True)
@@ -107,10 +111,15 @@ def run_batch(source: str, chunk: Chunk, prepared: None, config: Config) -> Batc
         return BatchResult({}, summary)
     if source == "laser":
         return BatchResult({"laser_points": chunk.columns}, ChunkSummary(len(t_ns), dropped, _one_a_second(t_ns)))
-    speed = np.asarray(chunk.columns["sound_speed_m_s"]) if len(t_ns) else np.empty(0)
+    speed, way = (np.asarray(chunk.columns[name]) if len(t_ns) else np.empty(0) for name in _OF_A_SOUNDING)
     lowest, highest = (float(speed.min()), float(speed.max())) if len(speed) else (np.inf, -np.inf)
     summary = ChunkSummary(
-        len(t_ns), dropped, np.unique(t_ns), lowest_speed_m_s=lowest, highest_speed_m_s=highest
+        len(t_ns),
+        dropped,
+        np.unique(t_ns),
+        lowest_speed_m_s=lowest,
+        highest_speed_m_s=highest,
+        echoes=different_milliseconds(t_ns, way),
     )
     return BatchResult({"soundings": chunk.columns}, summary)
 
@@ -130,11 +139,12 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, ChunkSummary]]],
     Raises
     ------
     RawDataError
-        A sensor has no usable record, or no record while the INS recorded, or the azimuth of the target cannot be
-        estimated.
+        A sensor has no usable record, or no record while the INS recorded, or the soundings have the times of
+        reception, or the azimuth of the target cannot be estimated.
     """
     recorded = {name: summaries for name, summaries in partials.items() if name != "mbes" or config.recordings.mbes}
     refuse_empty_sensors(recorded)
+    refuse_times_of_reception(partials["mbes"])
     trajectory, repeated = _trajectory([summary.trajectory for _, summary in partials["ins"] if summary.count])
     ins_t = trajectory["t_ns"].to_numpy()
     epochs = {

@@ -13,11 +13,14 @@ import numpy as np
 from tools.campaigns import DRIFT
 from tools.mistake_kinds import DRIFTS, OF_THE_CREW, Block, Change, Kind, drifting, scenario_change
 
+REFUSED = "refused"  # in place of a name: one line says what is wrong, and nothing is calibrated
 TIMES = (1, 3)  # the expected size, and thrice
 BOWS = ("wet_P1_bow", "wet_P2_bow", "wet_P3_bow")
 WET_WALL = frozenset({"P2", "wet_P2_shift", "wet_P2_turn_1", "wet_P2_turn_2", "wet_P2_bow"})
 SIDES = ("wet_P1_shift", "wet_P2_shift", "wet_P3_shift")
-WET_SIDES = ("wet_P1_turn_1", "wet_P1_turn_2", "wet_P3_turn_1", "wet_P3_turn_2")
+WET_SIDES = (  # or P2 the other way: roll takes the rest
+    "wet_P1_turn_1", "wet_P1_turn_2", "wet_P3_turn_1", "wet_P3_turn_2", "wet_P2_turn_2",
+)  # fmt: skip
 TRUE_PROFILE = [[0.0, 1502.0], [1.5, 1501.5], [2.0, 1499.5], [5.0, 1499.0]]  # a warm layer of 1.5 to 2 m, 0.6 °C
 
 
@@ -172,7 +175,7 @@ EFFECTS = (
     _effect(
         "sonar stamps reception, at {:g} m/s", 0.4,
         lambda size: {"mbes": {"stamp": "reception", "format": "parquet"}, "track": {"speed_m_s": size}},
-        "mbes_latency",
+        REFUSED,
     ),
     _effect("sonar: pings' times {:g} ms", 0.5, _mbes("pps_jitter_s", 1e-3)),
     _effect("INS: drift within 10 s, × {:g}", 1, lambda size: {"ins": drifting(
@@ -190,7 +193,7 @@ EFFECTS = (
     ),
     _effect("P3-1 under water {:g} mm off", 20, _faces("P3-1", shift_m=1e-3), "P3-1"),
     _effect("P3-1-top {:g} mm too high", 20, _faces("P3-1-top", shift_m=1e-3), "P3-1-top"),
-    _effect("P1-2 under water turned by {:g}°", 0.3, _faces("P1-2", turn_deg=[1.0, 0.0]), "P1-2"),
+    _effect("P1-2 under water turned by {:g}°", 0.3, _faces("P1-2", turn_deg=[1.0, 0.0]), "P1-2", "wet_P1_turn_1"),
     _effect("wet wall leans by {:g}°", 0.05, _faces("P2", turn_deg=[0.0, 1.0]), *WET_WALL),
     _effect("wet P1 and P3 lean by {:g}°", 0.05, _leaning, *WET_SIDES),
     _effect("each wet block off at random, {:g} mm", 3, _each_block, "residuals_by_face"),

@@ -26,7 +26,7 @@ import pandas as pd
 from pipeline.report.reason_codes import ReasonCode
 from tools.campaign_files import collect_rows
 from tools.campaigns import FOLDER, TASKS_OF_A_WORKER, THIN
-from tools.mistake_effects import MISTAKES
+from tools.mistake_effects import MISTAKES, REFUSED
 from tools.session_rows import NAMES, UNITS, errors_of
 
 PAGE_HEAD = """# Mistakes and real errors, and what the verdict makes of them
@@ -95,7 +95,8 @@ def session_row(task: tuple[str, int]) -> dict[str, Any]:
     try:
         artefacts = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
     except PoolcalError as error:
-        return row | {"reasons": f"refused: {error}", "named": "refused"}
+        refused = {"named": REFUSED, "named_right": REFUSED in kind.right}
+        return row | refused | {"reasons": f"refused: {error}"}
     result = json.loads(artefacts["report/calibration.json"])
     block = result["methods"]["adjustment"]
     row |= {"accepted": result["verdict"] == "accepted", "reasons": " | ".join(result["reasons"])}

@@ -21,6 +21,8 @@ from pipeline.maths.geometry.passes import split_at_gaps
 from pipeline.readers.rates import rate_hz
 from pipeline.readers.whole_days import DAY_NS, whole_days_apart
 
+_MS_NS = NS // 1000
+_LEAST_STAMPS = 100  # different milliseconds: fewer decide nothing
 _SPACING_NS = NS // 2  # one row of INS sigmas is kept per interval of this length
 
 
@@ -36,6 +38,7 @@ class ChunkSummary:
     accuracy: bool = False  # the chunk has INS sigmas only
     lowest_speed_m_s: float = np.inf  # sound speeds recorded with the pings
     highest_speed_m_s: float = -np.inf
+    echoes: tuple[int, int, int] = (0, 0, 0)  # of soundings: see different_milliseconds
 
 
 Summaries = Sequence[tuple[str, ChunkSummary]]  # part's name (file, or file#stretch), and a chunk's summary
@@ -57,6 +60,38 @@ def refuse_empty_sensors(partials: Mapping[str, Summaries]) -> None:
             counts = [f"{number} x {reason}" for reason, number in sorted(reasons.items())]
             why = ", ".join(counts) or "the files are empty"
             raise RawDataError(f"{', '.join(names[:3])}: no usable {sensor} record ({why}); {_REMEDIES[sensor]}")
+
+
+def different_milliseconds(t_ns: NDArray[np.int64], two_way_time_s: NDArray[np.float64]) -> tuple[int, int, int]:
+    """Return the number of different milliseconds in which soundings (n,) have their times, less 0, 1/2 and 1 two-way.
+
+    All soundings of a ping have the time of its transmission. If each has the time at which its echo came back, or at
+    which the sound was at the bottom, the times of a ping are as many as its ranges, and become one if the way is
+    subtracted.
+    """
+    way_ns = two_way_time_s * NS
+    times = [t_ns - np.rint(share * way_ns).astype(np.int64) for share in (0.0, 0.5, 1.0)]
+    none, half, whole = (len(np.unique(one // _MS_NS)) for one in times)
+    return none, half, whole
+
+
+def refuse_times_of_reception(soundings: Summaries) -> None:
+    """Raise RawDataError if the soundings of a file have the times at which their echoes came back, or began to.
+
+    At the speed v, taken for times of transmission, they turn the sonar's yaw by 2 v / c, 0.03° at 0.4 m/s. On passes
+    of one speed nothing else shows it.
+    """
+    found: dict[str, list[tuple[int, int, int]]] = {}
+    for name, summary in soundings:
+        found.setdefault(_file_name(name), []).append(summary.echoes)
+    for name, counts in found.items():
+        stamped, *less = (sum(numbers) for numbers in zip(*counts, strict=True))
+        sent, words = min(zip(less, ("half their two-way times", "their two-way times"), strict=True))
+        if stamped >= _LEAST_STAMPS and sent < stamped / 2:
+            raise RawDataError(
+                f"{name}: the soundings do not have the time of their ping's transmission: they lie in {stamped} "
+                f"different milliseconds, less {words} in {sent}; export one time for all beams of a ping"
+            )
 
 
 def _file_name(part_name: str) -> str:

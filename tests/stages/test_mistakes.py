@@ -11,7 +11,7 @@ from pipeline.report.reason_codes import ReasonCode
 from pipeline.simulation.face_faults import face_of_polygon
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.scenario import Scenario
-from tools.mistake_effects import EFFECTS, MISTAKES
+from tools.mistake_effects import EFFECTS, MISTAKES, REFUSED
 from tools.mistakes import BASE, named_first
 
 WET = {f"wet_{family}_{name}" for family in ("P1", "P2", "P3", "H") for name in WET_PARAMETERS}
@@ -48,7 +48,7 @@ def test_names_that_would_be_right_are_names_of_the_program() -> None:
     faces = {face_of_polygon(default.target, polygon) for polygon in polygons} - {""}
     for name, kind in MISTAKES.items():
         for right in kind.right:
-            assert right in set(ReasonCode) | faces | PARAMETERS, (name, right)
+            assert right in set(ReasonCode) | faces | PARAMETERS | {REFUSED}, (name, right)
 
 
 @pytest.mark.parametrize(
