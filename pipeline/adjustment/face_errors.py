@@ -12,6 +12,7 @@ from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.face_shifts import equations_with_faces
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.ping_noise import with_ping_noise
+from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.solution import Solution, solve
 
 Array = NDArray[np.float64]
@@ -33,7 +34,10 @@ class FinalSolution:
 
 
 def final_solution(
-    problem: CalibrationProblem, adjustment: MountAdjustment, sums_by_face: Mapping[str, IntervalSums]
+    problem: CalibrationProblem,
+    adjustment: MountAdjustment,
+    sums_by_face: Mapping[str, IntervalSums],
+    noise: PoseNoise | None = None,
 ) -> FinalSolution:
     """Return the solution with the shifts of single faces.
 
@@ -45,8 +49,10 @@ def final_solution(
         The adjusted values.
     sums_by_face : mapping of IntervalSums
         Sums by interval and face at these values, by sensor.
+    noise : PoseNoise, optional
+        The pose errors; by default with the estimated figures of the drift.
     """
-    faces, last, noise = problem.model.faces, adjustment.last, adjustment.drift_figures.noise
+    faces, last, noise = problem.model.faces, adjustment.last, noise or adjustment.drift_figures.noise
     sums = dict(sums_by_face)
     if adjustment.ping is not None:
         on_surface = replace(sums["mbes"], surface=faces.surface[sums["mbes"].surface])

@@ -11,13 +11,14 @@ from pipeline.adjustment.face_errors import FinalSolution, final_solution
 from pipeline.adjustment.ins_drift import drift_figures_table
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.noise_tables import groups_table, sigma_check
+from pipeline.adjustment.parameter_strengths import parameter_tests, strengths_by_session
 from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_statistics import ResidualStatistics
 from pipeline.artefacts.catalogue.results import CELLS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
-from pipeline.maths.adjustment.parameter_tests import ParameterTest, prior_parameter_tests, single_parameter_tests
+from pipeline.maths.adjustment.parameter_tests import ParameterTest
 from pipeline.maths.adjustment.solution import Solution, weakest_direction
 from pipeline.maths.adjustment.weighting import scatter
 from pipeline.maths.geometry.passes import pass_of
@@ -51,10 +52,11 @@ def result_tables(
     t_ns = problem.model.body.trajectory.t_ns
     final = final_solution(problem, adjustment, statistics.sums_by_face)
     estimate, random, total = _estimate(problem, final)
+    by_session = strengths_by_session(problem, adjustment, statistics.sums_by_face)
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
-        "freed": _single_parameter_table(problem, final, estimate),
+        "freed": _single_parameter_table(problem, final, estimate, by_session),
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
         "drift": _drift_table(adjustment, t_ns),
@@ -126,18 +128,19 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
     )
 
 
-def _single_parameter_table(problem: CalibrationProblem, final: FinalSolution, estimate: pd.DataFrame) -> pd.DataFrame:
+def _single_parameter_table(
+    problem: CalibrationProblem, final: FinalSolution, estimate: pd.DataFrame, by_session: Mapping[int, float]
+) -> pd.DataFrame:
     """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
 
     The parameters are fixed, or estimated with a value known beforehand (those of a laser's coarse mount among them),
     or named in adjust.free. Where values known beforehand correlate, the effects are of independent errors instead,
     whose squares have the same sum.
     """
-    solution, equations, consider = final.solution, final.equations, problem.consider
+    solution, consider = final.solution, problem.consider
     mount, known = np.arange(N_MOUNT), problem.prior.known_parameters
-    found = single_parameter_tests(equations.normal, equations.right, solution, consider)
-    found += prior_parameter_tests(solution, final.from_known, consider, known)
-    tests, effects = {test.parameter: test for test in found}, np.zeros((N_MOUNT, len(final.names)))
+    tests = {test.parameter: test for test in parameter_tests(problem, final)}
+    effects = np.zeros((N_MOUNT, len(final.names)))
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
     effects[:, known] = solution.prior_effects(mount, known)
     by_name, rows = estimate.set_index("unknown"), []
@@ -152,6 +155,7 @@ def _single_parameter_table(problem: CalibrationProblem, final: FinalSolution, e
         row: dict[str, Any] = {"unknown": name, "estimated": number in freed}
         row |= {"known": number in known, "considered": considered}
         row |= {"value": test.value, "sigma": test.sigma, "expected": test.expected}
+        row |= {"by_session": by_session.get(number, np.nan)}
         rows.append(row | {f"effect_{axis}": effects[k, number] for k, axis in enumerate(MOUNT_NAMES)})
     return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces)])
 
@@ -164,7 +168,8 @@ def _surface_rows(solution: Solution, surfaces: slice) -> list[dict[str, Any]]:
     effects = solution.group_effects(np.arange(N_MOUNT), group)
     if not np.any(effects):
         return []
-    none = {"estimated": False, "known": False, "considered": 1.0, "value": np.nan, "sigma": np.nan, "expected": np.nan}
+    none = {"estimated": False, "known": False, "considered": 1.0}
+    none |= dict.fromkeys(("value", "sigma", "expected", "by_session"), np.nan)
     return [
         {"unknown": f"surfaces_{name}"} | none | {f"effect_{axis}": of[k] for k, axis in enumerate(MOUNT_NAMES)}
         for name, of in zip(MOUNT_NAMES, effects.T, strict=True)

@@ -8,10 +8,14 @@ it with the chance ``adjust.test_level``. So with a hundred parameters it is 4.4
 
 One error often moves the estimates of several parameters. The report names the cause that explains most, with the
 largest value over sigma. Where one parameter is contradicted, this may be another that is not: a parameter with a large
-a-priori sigma, which explains the residuals without being off its setting.
+a-priori sigma, which explains the residuals without being off its setting. The data may also say that the INS drifts
+more than its figures say. Where one parameter explains more than that (column ``by_session``), all count with the drift
+as its figures say.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,11 +32,15 @@ UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence")
 
 @dataclass(frozen=True)
 class SuspectedCause:
-    """A parameter that would explain the residuals: its name and words, and its value over the sigma from noise."""
+    """A parameter that would explain the residuals: its name and words, and its value over the sigma from noise.
+
+    not_drift: it explains more than another drift than the session's would; ``normalised`` is with the session's.
+    """
 
     unknown: str
     words: str
     normalised: float
+    not_drift: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,11 +79,16 @@ def suspected_causes(freed: pd.DataFrame, level: float) -> list[SuspectedCause]:
     if not any(abs(row["value"]) > limit * row["expected"] for row in tested):
         return []
     causes = [
-        SuspectedCause(row["unknown"], words_of(row), abs(row["value"]) / row["sigma"])
+        SuspectedCause(row["unknown"], words_of(row), _strength(row), bool(np.isfinite(row["by_session"])))
         for row in tested
         if abs(row["value"]) > limit * row["sigma"]
     ]
     return sorted(causes, key=lambda cause: -cause.normalised)
+
+
+def _strength(row: Mapping[Any, Any]) -> float:
+    by_session = float(row["by_session"])
+    return by_session if np.isfinite(by_session) else abs(float(row["value"])) / float(row["sigma"])
 
 
 def errors_allowed_for(freed: pd.DataFrame, level: float) -> list[Statement]:

@@ -161,7 +161,8 @@ def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: State
     stronger = [deviation.statement for deviation in deviating if deviation.strength > strongest]
     weaker = [deviation.statement for deviation in deviating if deviation.strength <= strongest]
     reasons = stronger + _suspected_cause(causes, bool(stronger)) + weaker
-    drift = [drift_check] if reasons and drift_check is not None else []
+    exonerated = any(cause.not_drift for cause in causes)
+    drift = [drift_check] if reasons and drift_check is not None and not exonerated else []
     return reasons[:1] + drift + reasons[1:]
 
 
@@ -188,7 +189,8 @@ def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Stat
     others = len(causes) - 1 - len(rivals)
     rest = f"; {plural(others, 'other parameter')} would explain it less well" if others else ""
     unless = ", unless the face, step, pass or ping named above is itself the cause" if is_second else ""
-    words = f"likely cause of residuals{unless} ({first.normalised:.0f} sigma): {first.words}{nearly}{rest}"
+    given = ", more than another drift of the INS explains" if first.not_drift else ""
+    words = f"likely cause of residuals{unless} ({first.normalised:.0f} sigma{given}): {first.words}{nearly}{rest}"
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 
 

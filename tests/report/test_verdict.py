@@ -15,7 +15,7 @@ from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 from pipeline.report.coarse_mount import share_of_coarse_mount
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.reason_codes import ReasonCode, Statement
-from pipeline.report.verdict import rejections
+from pipeline.report.verdict import explanations, rejections
 from tests.support.evidence import (
     ADJUSTED,
     FIGURES,
@@ -150,7 +150,7 @@ def test_the_limit_is_for_all_parameters_together():
     others += [{"unknown": "face_unseen", "value": np.nan, "sigma": np.nan, "expected": np.nan}]
     for share, expected in ((0.99, []), (1.01, [ReasonCode.SUSPECTED_CAUSE])):
         one = {"unknown": "face_P1-3", "value": share * limit * 1e-4, "sigma": 1e-4, "expected": 1e-4}
-        table = pd.DataFrame([one, *others]).assign(estimated=False)
+        table = pd.DataFrame([one, *others]).assign(estimated=False, by_session=np.nan)
         reasons = judged(replace(evidence(), freed=table))
         assert codes(reasons) == expected
         assert all("face P1-3 stands out by +0.4 ± 0.1 mm" in reason.words for reason in reasons)
@@ -181,7 +181,8 @@ def test_what_was_freed_where_there_is_no_result():
 def test_of_several_causes_the_most_telling_is_named():
     sigmas = (("mbes_range", 1e-3), ("laser_range", 1e-4))
     sonar, laser = (
-        {"unknown": name, "estimated": False, "expected": sigma, "sigma": sigma} for name, sigma in sigmas
+        {"unknown": name, "estimated": False, "expected": sigma, "sigma": sigma, "by_session": np.nan}
+        for name, sigma in sigmas
     )
     both = replace(evidence(), freed=pd.DataFrame([sonar | {"value": 0.01}, laser | {"value": 0.002}]))
     (reason,) = judged(both)
@@ -192,7 +193,7 @@ def test_of_several_causes_the_most_telling_is_named():
 @pytest.mark.parametrize(("value", "is_named"), [(0.00181, True), (0.00179, False)])
 def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_named):
     names = (("mbes_range", 0.002), ("laser_range", value), ("mbes_level_range", 0.001))
-    one = {"estimated": False, "expected": 1e-4, "sigma": 1e-4}
+    one = {"estimated": False, "expected": 1e-4, "sigma": 1e-4, "by_session": np.nan}
     (reason,) = judged(replace(evidence(), freed=pd.DataFrame([one | {"unknown": k, "value": v} for k, v in names])))
     words = reason.words
     assert "(20 sigma): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words
@@ -207,6 +208,21 @@ def test_an_ins_that_is_allowed_no_drift_is_named_beside_the_first_cause():
     no_drift, residuals = ReasonCode.INS_DRIFT_NOT_GIVEN, ReasonCode.RESIDUALS_BY_ANGLE
     assert codes(reasons) == [ReasonCode.SUSPECTED_CAUSE, no_drift, residuals]
     assert codes(judged(evidence(patterns=[PASS_3]))) == [ReasonCode.PASSES_DISAGREE]
+
+
+@pytest.mark.parametrize(("by_session", "blames_drift"), [(np.nan, True), (13.0, False)])
+def test_what_explains_more_than_any_drift_is_not_laid_to_the_drift(by_session, blames_drift):
+    """A drift between passes of nine sigmas; a sound speed of six, and of 13 without more drift than is stated."""
+    drifting = PASS_3 | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "normalised": 9.0}
+    check = check_ins_drift(drift(2.0), Drift())
+    tables = evidence(patterns=[drifting], freed={"value": 6e-4, "by_session": by_session})
+    reasons = rejections(tables, methods(), ADJUSTED, check)
+    cause, between = ReasonCode.SUSPECTED_CAUSE, ReasonCode.INS_DRIFT_BETWEEN_PASSES
+    above = ReasonCode.INS_DRIFT_ABOVE_SETTINGS
+    assert codes(reasons) == ([between, above, cause] if blames_drift else [cause, between])
+    assert explanations(tables, ADJUSTED)[0].kind == ("drift" if blames_drift else "parameter")
+    words = {reason.code: reason.words for reason in reasons}[cause]
+    assert ("(13 sigma, more than another drift of the INS explains): the sound speed" in words) != blames_drift
 
 
 def table(*rows):

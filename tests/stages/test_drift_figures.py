@@ -18,7 +18,7 @@ EXACT = {"sigmas": 1.0, "time_constant": 1.0}
 
 @pytest.fixture(scope="module")
 def judged():
-    """calibration.json with the data counting, and with the session's figures taken as exact; and the errors."""
+    """calibration.json, the errors, the covariance and table freed: with the data counting, and with exact figures."""
     session = without_biases(made({"ins": {"drift": TRUE}, "mbes": WHITE["mbes"]}, seed=5))  # they would hide much
     found, known = [], None
     for more in ({}, {"drift_within": EXACT}):
@@ -28,7 +28,7 @@ def judged():
         result = json.loads(artefacts["report/calibration.json"])
         block = result["methods"]["adjustment"]
         error = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), session.truth)
-        found.append((result, error, np.array(block["covariance"])))
+        found.append((result, error, np.array(block["covariance"]), artefacts["adjust/freed"]))
     return found
 
 
@@ -44,7 +44,7 @@ def test_the_time_constant_is_found_and_said(judged):
 
 
 def test_the_sigmas_count_with_it(judged):
-    (_, error, covariance), (_, _, believed) = judged
+    (_, error, covariance, _), (_, _, believed, _) = judged
     assert error @ np.linalg.solve(covariance, error) < chi2.ppf(0.999, 6)
     assert covariance[5, 5] > 1.25**2 * believed[5, 5]  # z; figures that are right change it by a tenth at most
     assert np.all(np.linalg.eigvalsh(covariance - 0.9 * believed) > 0)
@@ -55,3 +55,21 @@ def test_exact_figures_are_believed(judged):
     assert {name: estimated[name] for name in STATED} == pytest.approx(STATED)
     assert set(estimated["sigma_log"].values()) == set(estimated["deviation"].values()) == {0}
     assert "ins_drift_off_figures" not in judged[1][0]["warning_codes"]
+
+
+def test_drift_is_not_blamed_for_a_wrong_sound_speed():
+    """Fans steered with a speed 0.1 % above the water's look turned from pass to pass, as by an INS that drifts."""
+    speeds = {"sound_speed_recorded_m_s": 1501.5, "head_speed_excess": 0.001}
+    found = calibrated(made({"ins": DRIFT, "mbes": speeds}, seed=1))
+    document, freed = json.loads(found["report/calibration.json"]), found["adjust/freed"].set_index("unknown")
+    assert document["hypotheses"][0]["name"] == "sound_speed"
+    of_speed = freed.loc["sound_speed"]
+    assert of_speed["by_session"] > 1.3 * abs(of_speed["value"] / of_speed["sigma"])
+    assert of_speed["value"] == pytest.approx(-0.001, abs=3 * of_speed["sigma"])
+    assert ", more than another drift of the INS explains): the sound speed" in document["reasons"][0]
+    assert "ins_drift_above_settings" not in document["reason_codes"]
+
+
+def test_an_ins_that_does_drift_remains_the_explanation(judged):
+    for _, _, _, freed in judged:
+        assert freed["by_session"].isna().all()

@@ -68,7 +68,7 @@ def evidence(
         }
     )
     nothing = {"unknown": "sound_speed", "estimated": False, "known": False}
-    nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4}
+    nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4, "by_session": np.nan}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     pattern["sigma_mean_m"] = 1e-4
     geometry = [("remedy", "two more passes at 3 m would do")]

@@ -88,6 +88,8 @@ FREED = Artefact(
                "its estimate from the points alone, without its a-priori sigma (NaN: not determined)"),
         Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of this estimate"),
         Column("expected", F64, "rad, m, s, 1 or 1/s", "its standard deviation if all a-priori errors hold"),
+        Column("by_session", F64, "1",
+               "|value| / sigma with the drift as configured, if a parameter explains more than any drift (else NaN)"),
         *(
             Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount by an error of one a-priori sigma")
             for kind, unit in (("rotation", "rad"), ("lever_arm", "m")) for axis in "xyz"

@@ -43,6 +43,11 @@ of it (``only_larger``): with their rate 2 σ² / τ the fast drift has its true
 than the session says. A figure that does not grow is taken for the session's after the minimum is found; the other
 keeps its value.
 
+**Drift or something else.** What is wrong with the sonar, such as the sound speed, may look like drift from pass to
+pass, and a parameter's test loses strength where a larger drift is allowed for. The fall of J from the session's
+figures to the estimated ones compares both: with the session's figures, a parameter of z sigmas lets the squares fall
+by z². The larger fall is the better explanation.
+
 J is minimised by Newton's method (:mod:`~pipeline.maths.adjustment.newton`, 10 evaluations a step). Its second
 derivatives give the covariance of z, 2 (∂²J)⁻¹. Along the valley J is far from quadratic, and this variance may exceed
 the prior's. So data and session are compared by z_i / s_i alone. An estimate by both varies less than the prior (Var
@@ -87,13 +92,14 @@ class DriftFigures:
 
     noise: the pose errors with these figures; log (3,): logarithms of the factors of the sigmas of shifts, of those of
     turns, and of the time constant; covariance (3, 3) of log; deviation (3,): log in sigmas of the prior (0: not
-    estimated).
+    estimated); gain: by how much J is smaller than with the session's figures.
     """
 
     noise: PoseNoise
     log: Array
     covariance: Array
     deviation: Array
+    gain: float = 0.0
 
     @classmethod
     def of_session(cls, noise: PoseNoise) -> "DriftFigures":
@@ -134,7 +140,8 @@ def drift_figures(
     if prior.only_larger:
         z[z < CERTAIN * np.sqrt(np.diag(covariance))] = 0.0
     deviation[free] = z[free] / known[free]
-    return DriftFigures(noise.drifting(*np.exp(z).tolist()), z, covariance, deviation)
+    gain = max(objective(np.zeros(len(free))) - objective(z[free]), 0.0)
+    return DriftFigures(noise.drifting(*np.exp(z).tolist()), z, covariance, deviation, gain)
 
 
 def restricted(equations: NormalEquations) -> float:

@@ -125,3 +125,15 @@ def test_exact_figures_and_absent_drift_are_not_touched() -> None:
     assert without.log[0] != 0.0
     absent = replace(STATED, drift=np.zeros(N_POSE))
     assert drift_figures(equations_of(0 * values), absent, WITHIN).noise == absent
+
+
+@pytest.mark.parametrize("within", [WITHIN, replace(WITHIN, only_larger=True)])
+def test_the_gain_is_the_fall_of_likelihood_and_prior(within: DriftPrior) -> None:
+    """By the dense covariance; none where the session's figures are taken as exact."""
+    values = observed(np.random.default_rng(8), STATED.drifting(3.0, 2.0, 1.0), 80)
+    found = drift_figures(equations_of(values), STATED, within)
+    known = np.array([within.sigma, within.sigma, within.time_constant])
+    fall = dense(values, STATED) - dense(values, found.noise) - float(np.sum((found.log / known) ** 2))
+    assert fall > 20
+    assert found.gain == pytest.approx(fall, abs=1e-5)
+    assert drift_figures(equations_of(values), STATED, DriftPrior(0.0, 0.0)).gain == 0.0
