@@ -26,7 +26,8 @@ from pathlib import Path
 from stages.commands.draw_worker import main
 main(Path(sys.argv[1]), sys.argv[2:])
 """
-PROGRAM = f"""import sys
+PROGRAM = f"""import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal: a job in the background ignores it
 from stages.cli import main
 from stages.commands import draw
 draw.WORKER = [sys.executable, "-c", {TELLING!r}]
