@@ -189,7 +189,7 @@ def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Stat
     others = len(causes) - 1 - len(rivals)
     rest = f"; {plural(others, 'other parameter')} would explain it less well" if others else ""
     unless = ", unless the face, step, pass or ping named above is itself the cause" if is_second else ""
-    given = ", more than another drift of the INS explains" if first.not_drift else ""
+    given = "; a larger drift of the INS would explain less" if first.not_drift else ""
     words = f"likely cause of residuals{unless} ({first.normalised:.0f} sigma{given}): {first.words}{nearly}{rest}"
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 

@@ -222,7 +222,7 @@ def test_what_explains_more_than_any_drift_is_not_laid_to_the_drift(by_session, 
     assert codes(reasons) == ([between, above, cause] if blames_drift else [cause, between])
     assert explanations(tables, ADJUSTED)[0].kind == ("drift" if blames_drift else "parameter")
     words = {reason.code: reason.words for reason in reasons}[cause]
-    assert ("(13 sigma, more than another drift of the INS explains): the sound speed" in words) != blames_drift
+    assert ("(13 sigma; a larger drift of the INS would explain less): the sound speed" in words) != blames_drift
 
 
 def table(*rows):

@@ -66,7 +66,7 @@ def test_drift_is_not_blamed_for_a_wrong_sound_speed():
     of_speed = freed.loc["sound_speed"]
     assert of_speed["by_session"] > 1.3 * abs(of_speed["value"] / of_speed["sigma"])
     assert of_speed["value"] == pytest.approx(-0.001, abs=3 * of_speed["sigma"])
-    assert ", more than another drift of the INS explains): the sound speed" in document["reasons"][0]
+    assert "; a larger drift of the INS would explain less): the sound speed" in document["reasons"][0]
     assert "ins_drift_above_settings" not in document["reason_codes"]
 
 
