@@ -166,7 +166,7 @@ EFFECTS = (
     _effect(
         "sonar: sound {:g} % slower in the water than at the arrays", 0.1, _of_arrays, "sound_speed", "steering_speed"
     ),
-    _effect("layers of water, × {:g}, no cast", 1, _stratified, "sound_speed_gradient"),
+    _effect("layers of water, × {:g}, no cast", 1, _stratified, "sound_speed_gradient", "sound_speed"),
     _effect(
         "layers of water {:g} m deeper than the cast says", 0.3,
         lambda size: {"mbes": {"sound_speed_profile": _layers(size), "svp_declared": TRUE_PROFILE}},

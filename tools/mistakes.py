@@ -91,18 +91,16 @@ def session_row(task: tuple[str, int]) -> dict[str, Any]:
     raw = {"ins": made.ins, "laser": made.laser, "mbes": made.mbes}
     empty = {f"{kind}_{axis}": np.nan for kind in ("error", "sigma") for axis in NAMES}
     row: dict[str, Any] = {"mistake": name, "seed": seed, "accepted": False, "nse": np.nan, "sigmas": np.nan} | empty
-    row |= {"named": "", "has_right": bool(kind.right), "named_right": False}
+    row |= {"named": ""}
     try:
         artefacts = calibrate_in_memory(parse(SessionConfig, session, "session"), parse(PoolConfig, pool, "pool"), raw)
     except PoolcalError as error:
-        refused = {"named": REFUSED, "named_right": REFUSED in kind.right}
-        return row | refused | {"reasons": f"refused: {error}"}
+        return row | {"named": REFUSED, "reasons": f"refused: {error}"}
     result = json.loads(artefacts["report/calibration.json"])
     block = result["methods"]["adjustment"]
     row |= {"accepted": result["verdict"] == "accepted", "reasons": " | ".join(result["reasons"])}
     if not row["accepted"]:
-        names = named_first(result)
-        row |= {"named": " ".join(sorted(names)), "named_right": bool(names & kind.right)}
+        row["named"] = " ".join(sorted(named_first(result)))
     if block["covariance_total"] is None:
         return row
     errors = errors_of(np.array(block["R_body_from_mbes"]), np.array(block["lever_arm_m"]), made.truth)
@@ -113,6 +111,13 @@ def session_row(task: tuple[str, int]) -> dict[str, Any]:
     for k, axis in enumerate(NAMES):
         row |= {f"error_{axis}": errors[k] / UNITS[k], f"sigma_{axis}": sigma[k] / UNITS[k]}
     return row
+
+
+def with_right_names(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows, with columns for whether the program has a name for what was planted, and whether it gave it."""
+    right = [MISTAKES[name].right for name in rows["mistake"]]
+    named = [not names.isdisjoint(found.split()) for names, found in zip(right, rows["named"], strict=True)]
+    return rows.assign(has_right=[bool(names) for names in right], named_right=named)
 
 
 def table_of(rows: pd.DataFrame) -> str:
@@ -173,6 +178,7 @@ def main() -> None:
         tasks = [(name, seed) for seed in range(1, options.seeds + 1) for name in names]
         path = FOLDER / "mistakes.parquet"
         rows = collect_rows(path, session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)
+    rows = with_right_names(rows)
     text = f"{summary(rows)}\n\n{table_of(rows)}\n"
     if options.page is None:
         print(text, end="")
