@@ -4,7 +4,7 @@ An error of the sonar may look like drift from pass to pass. Where the data made
 it and lose strength. :mod:`~pipeline.maths.adjustment.drift_likelihood` tells how drift and a parameter compare.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from pipeline.adjustment.face_errors import FinalSolution, final_solution
@@ -25,11 +25,14 @@ def parameter_tests(problem: CalibrationProblem, final: FinalSolution) -> list[P
 
 
 def strengths_by_session(
-    problem: CalibrationProblem, adjustment: MountAdjustment, sums_by_face: Mapping[str, IntervalSums]
+    problem: CalibrationProblem,
+    adjustment: MountAdjustment,
+    sums_by_face: Mapping[str, IntervalSums],
+    final: FinalSolution,
 ) -> dict[int, float]:
     """Return |value| over sigma of each parameter, with the drift as the session says, if one explains more than drift.
 
-    Otherwise, and where the data left the drift's figures as they are, there are none.
+    Otherwise, and where the data did not make the drift larger, there are none: a larger drift takes strength away.
 
     Parameters
     ----------
@@ -39,16 +42,25 @@ def strengths_by_session(
         The adjusted values.
     sums_by_face : mapping of IntervalSums
         Sums by interval and face at these values, by sensor.
+    final : FinalSolution
+        The solution with the estimated figures of the drift.
     """
     figures = adjustment.drift_figures
     if figures.gain < LEAST_GAIN:
         return {}
-    session = replace(problem.prior.noise, white=figures.noise.white)
-    final = final_solution(problem, adjustment, sums_by_face, session)
-    final = replace(final, from_known=final.from_known + final.solution.step)  # not the adjustment's own solution
-    found = {
+    session = final_solution(problem, adjustment, sums_by_face, replace(problem.prior.noise, white=figures.noise.white))
+    # the values are not this solution's
+    session = replace(session, from_known=session.from_known + session.solution.step)
+    found = _strengths(parameter_tests(problem, session))
+    largest, estimated = (
+        max(of.values(), default=0.0) for of in (found, _strengths(parameter_tests(problem, final)))
+    )
+    return found if largest**2 > figures.gain and largest > estimated else {}
+
+
+def _strengths(tests: Sequence[ParameterTest]) -> dict[int, float]:
+    return {
         test.parameter: abs(test.value) / test.sigma
-        for test in parameter_tests(problem, final)
+        for test in tests
         if test.parameter >= N_MOUNT and test.sigma > 0
     }
-    return found if max(found.values(), default=0.0) ** 2 > figures.gain else {}

@@ -52,7 +52,7 @@ def result_tables(
     t_ns = problem.model.body.trajectory.t_ns
     final = final_solution(problem, adjustment, statistics.sums_by_face)
     estimate, random, total = _estimate(problem, final)
-    by_session = strengths_by_session(problem, adjustment, statistics.sums_by_face)
+    by_session = strengths_by_session(problem, adjustment, statistics.sums_by_face, final)
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),

@@ -90,6 +90,7 @@ def _check(folder: Path, session: SessionConfig, pool: PoolConfig | None, calibr
     unusable = {finding.words.split(":")[0] for finding in findings if finding.question == "clock"}
     unusable |= {"laser", "mbes"} if "ins" in unusable else set()
     unusable |= {"laser" for finding in findings if finding.question == "frame"}
+    unusable |= {"mbes" for finding in findings if finding.question == "stamps"}
     if session.mbes is not None:
         findings += track_checks.survey_findings(pool)
     at_target = _check_at_target(_Session(files, session, pool, target_of(pool.target), calibrate), epochs, unusable)
@@ -107,6 +108,7 @@ def _file_findings(
     yield from file_checks.wrong_frames(files, session)
     yield from file_checks.long_lever_arms(session)
     if session.mbes is not None:
+        yield from file_checks.soundings_by_reception(files)
         yield from file_checks.doubtful_sound_speeds(files, session.mbes)
         yield from file_checks.doubtful_cast(files, session.mbes)
 

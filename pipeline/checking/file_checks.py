@@ -11,6 +11,7 @@ from pipeline.checking.findings import Finding
 from pipeline.config.session import Mbes, SessionConfig
 from pipeline.gps_time import utc_text
 from pipeline.maths.geometry.geodesy import ecef_from_geodetic
+from pipeline.readers.file_summaries import different_milliseconds, times_of_reception
 from pipeline.report.cast_checks import cast_origin_warnings
 
 SLOWEST_HZ = 49.0  # slowest rate of an INS: 50 Hz, less an allowance for its clock
@@ -154,6 +155,15 @@ def long_lever_arms(session: SessionConfig) -> Iterator[Finding]:
                     f"({value / 100:g} m)?",
                     "look",
                 )
+
+
+def soundings_by_reception(files: Sequence[SurveyedFile]) -> Iterator[Finding]:
+    """Yield a finding for each file whose soundings do not have their ping's time of transmission."""
+    for file in files:
+        if file.sensor == "mbes" and file.columns:
+            counts = different_milliseconds(file.columns["t_ns"], file.columns["two_way_time_s"])
+            if words := times_of_reception(file.name, [counts]):
+                yield Finding("stamps", words)
 
 
 def doubtful_sound_speeds(files: Sequence[SurveyedFile], mbes: Mbes) -> Iterator[Finding]:

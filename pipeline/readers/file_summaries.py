@@ -75,23 +75,37 @@ def different_milliseconds(t_ns: NDArray[np.int64], two_way_time_s: NDArray[np.f
     return none, half, whole
 
 
-def refuse_times_of_reception(soundings: Summaries) -> None:
-    """Raise RawDataError if the soundings of a file have the times at which their echoes came back, or began to.
+def times_of_reception(name: str, counts: Sequence[tuple[int, int, int]]) -> str | None:
+    """Return what is wrong if a file's soundings have the times at which their echoes came back, or began to.
 
     At the speed v, taken for times of transmission, they turn the sonar's yaw by 2 v / c, 0.03° at 0.4 m/s. On passes
     of one speed nothing else shows it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file.
+    counts : sequence of tuples
+        Of each of its chunks the result of :func:`different_milliseconds`.
     """
+    stamped, *less = (sum(numbers) for numbers in zip(*counts, strict=True))
+    sent, words = min(zip(less, ("half their two-way times", "their two-way times"), strict=True))
+    if stamped < _LEAST_STAMPS or sent >= stamped / 2:
+        return None
+    return (
+        f"{name}: the soundings do not have the time of their ping's transmission: they lie in {stamped} different "
+        f"milliseconds, less {words} in {sent}; export one time for all beams of a ping"
+    )
+
+
+def refuse_times_of_reception(soundings: Summaries) -> None:
+    """Raise RawDataError if the soundings of a file do not have the time of transmission."""
     found: dict[str, list[tuple[int, int, int]]] = {}
     for name, summary in soundings:
         found.setdefault(_file_name(name), []).append(summary.echoes)
     for name, counts in found.items():
-        stamped, *less = (sum(numbers) for numbers in zip(*counts, strict=True))
-        sent, words = min(zip(less, ("half their two-way times", "their two-way times"), strict=True))
-        if stamped >= _LEAST_STAMPS and sent < stamped / 2:
-            raise RawDataError(
-                f"{name}: the soundings do not have the time of their ping's transmission: they lie in {stamped} "
-                f"different milliseconds, less {words} in {sent}; export one time for all beams of a ping"
-            )
+        if words := times_of_reception(name, counts):
+            raise RawDataError(words)
 
 
 def _file_name(part_name: str) -> str:

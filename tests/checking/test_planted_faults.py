@@ -31,6 +31,16 @@ def test_a_slow_ins(spoilt: Callable[..., Path]) -> None:
     assert_only(spoilt(ins={"rate_hz": 20.0}), "ins rate", "logged at 20.0 Hz", "100 Hz or more")
 
 
+def test_soundings_with_the_times_of_their_echoes(spoilt: Callable[..., Path], tmp_path: Path) -> None:
+    """The run refuses them in the same words; that the fan reaches too little is not said, for it does."""
+    session = spoilt(mbes={"stamp": "reception", "format": "parquet"})
+    first = assert_only(session, "stamps", "mbes/pass_0.parquet", "less their two-way times in", "export one time for")
+    told = poolcal("run", session, "--config", session / "pool.yaml", "--run", tmp_path / "run")
+    assert told.status == 2
+    assert told.complaints[-1].startswith("poolcal: mbes/pass_0.parquet: the soundings do not have the time of")
+    assert first.split(": they lie")[0] in told.complaints[-1]
+
+
 def test_a_hole_in_the_ins(spoilt: Callable[..., Path]) -> None:
     session = spoilt(**SBET)
     path = session / "ins" / "ins.sbet"
