@@ -3,12 +3,11 @@
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import lfilter
 
 from pipeline.config.session import Drift
 from pipeline.gps_time import NS
 from pipeline.simulation.motion import Times
-from pipeline.simulation.random_streams import generator
+from pipeline.simulation.random_streams import autoregressive, generator
 from pipeline.simulation.scenario_ins import InsScenario
 from pipeline.simulation.site import Floats
 
@@ -80,6 +79,8 @@ def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator
         (scenario.horizontal_m, scenario.horizontal_m, scenario.vertical_m),
         (scenario.roll_pitch_deg, scenario.roll_pitch_deg, scenario.heading_deg),
     )
+    if not np.any(scale):
+        return np.zeros((6, len(t_ns)))
     shocks = random.standard_normal((6, len(t_ns)))
     steps = np.diff(t_ns)
     usual = np.median(steps) if len(steps) else 1
@@ -91,6 +92,6 @@ def gauss_markov_drift(scenario: Drift, t_ns: Times, random: np.random.Generator
         shocks[:, begin] = f * last + np.sqrt(1 - f**2) * shocks[:, begin]
         f = np.exp(-usual / NS / scenario.time_constant_s)
         shocks[:, begin + 1 : end] *= np.sqrt(1 - f**2)
-        result[:, begin:end] = lfilter([1.0], [1.0, -f], shocks[:, begin:end], axis=1)
+        result[:, begin:end] = autoregressive(shocks[:, begin:end], f)
         last, before_ns = result[:, end - 1], t_ns[end - 1]
     return scale * result

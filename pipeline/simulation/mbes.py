@@ -1,7 +1,6 @@
 """Records of the sonar: two-way times and angles of beams of finite width, with unwanted echoes."""
 
 import numpy as np
-from scipy.signal import lfilter
 
 from pipeline.gps_time import NS
 from pipeline.simulation.beams import BeamBundles, fan_angles, swing_rad, transmit_tilts_rad
@@ -9,7 +8,7 @@ from pipeline.simulation.echoes import Echoes
 from pipeline.simulation.ins import Columns
 from pipeline.simulation.motion import Movement, Times
 from pipeline.simulation.mounts import R_body_from_sensor, lever_arm_m
-from pipeline.simulation.random_streams import generator
+from pipeline.simulation.random_streams import autoregressive, generator
 from pipeline.simulation.raycast import Pool
 from pipeline.simulation.scenario_mbes import MbesScenario
 from pipeline.simulation.site import Floats
@@ -136,4 +135,4 @@ class _SonarPass:
         kept = scenario.steering_correlation
         shocks = self.random["steering"].standard_normal(shape)
         shocks[:, 1:] *= np.sqrt(1 - kept**2)
-        return np.asarray(steered + np.radians(scenario.steering_sigma_deg) * lfilter([1.0], [1.0, -kept], shocks))
+        return np.asarray(steered + np.radians(scenario.steering_sigma_deg) * autoregressive(shocks, kept))

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from pipeline.simulation.site import Floats
+
 PURPOSES = (
     "coarse", "motion", "ins_white", "ins_drift", "laser_range", "laser_angle", "laser_outlier", "laser_water",
     "mbes_clock", "mbes_range", "mbes_angle", "mbes_outlier", "mbes_surface", "mbes_corner", "mbes_drop",
@@ -25,3 +27,10 @@ def generator(seed: int, purpose: str, index: int = 0) -> np.random.Generator:
         Number of the pass.
     """
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PURPOSES.index(purpose), index)))
+
+
+def autoregressive(shocks: Floats, kept: float) -> Floats:
+    """Return the first-order process y(i) = kept y(i - 1) + shock(i) along the last axis, with y(-1) = 0."""
+    from scipy.signal import lfilter  # the import takes a second, and few sessions need it
+
+    return np.asarray(lfilter([1.0], [1.0, -kept], shocks), np.float64)

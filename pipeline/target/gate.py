@@ -16,7 +16,7 @@ median it gives k, and σ.
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from pipeline.artefacts.streams import Batch, point_array
 from pipeline.target.labelled_points import LabellingContext
@@ -49,7 +49,7 @@ def sigma_through_gate(median_m: float, gate_m: float) -> float:
     """Return the sigma (m) of normal noise by the median of its absolute values within a gate."""
 
     def excess(k: float) -> float:
-        return float(norm.ppf(0.25 + norm.cdf(k) / 2) / k) - median_m / gate_m
+        return float(ndtri(0.25 + ndtr(k) / 2) / k) - median_m / gate_m
 
     if excess(NARROWEST) <= 0:
         return gate_m / NARROWEST

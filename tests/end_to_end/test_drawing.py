@@ -16,6 +16,7 @@ import stages.views.recording
 from pipeline.run.folder import locked
 from stages import ORDER
 from stages.commands.draw import Drawings, draw_missing
+from tests.support.effort import often
 from tests.support.places import Place, digests, poolcal
 from tests.support.recordings import points, read
 from tests.support.roots import ROOT
@@ -58,7 +59,7 @@ def test_a_failure_to_draw_spoils_nothing(done: Place, right: dict[str, str], mo
         assert digests(done.run) == right
 
 
-@pytest.mark.parametrize("jobs", [2, 4])
+@pytest.mark.parametrize("jobs", often([4], [2, 4]))
 def test_processes_of_their_own_draw_the_same(done: Place, right: dict[str, str], drawn: Path, jobs: int) -> None:
     """Whether one draws all, or one the page and one the recordings."""
     told = poolcal(*done.words()[:-1], jobs, "--report", "--recordings")
@@ -97,7 +98,7 @@ def test_no_room_for_another_process(done: Place, monkeypatch: pytest.MonkeyPatc
     assert drawn_in(done.run) == sorted(ORDER)
 
 
-@pytest.mark.parametrize(("end", "status"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(("end", "status"), often([(signal.SIGINT, 130)], [(signal.SIGKILL, -9), (signal.SIGINT, 130)]))
 def test_nothing_stays_behind_of_a_run_that_ends_while_it_draws(done: Place, end: signal.Signals, status: int) -> None:
     """Every process that it started holds its standard error open: that ends when the last of them has ended."""
     calibration = (done.run / "report" / "calibration.json").read_bytes()

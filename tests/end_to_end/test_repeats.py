@@ -156,6 +156,7 @@ def make(place: Place, target: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.thorough
 def test_make_calibrate_twice(done: Place, right: dict[str, str]) -> None:
     for name in ORDER[-2:]:
         shutil.rmtree(done.run / name)

@@ -57,6 +57,7 @@ def test_exact_figures_are_believed(judged):
     assert "ins_drift_off_figures" not in judged[1][0]["warning_codes"]
 
 
+@pytest.mark.thorough
 def test_drift_is_not_blamed_for_a_wrong_sound_speed():
     """Fans steered with a speed 0.1 % above the water's look turned from pass to pass, as by an INS that drifts."""
     speeds = {"sound_speed_recorded_m_s": 1501.5, "head_speed_excess": 0.001}

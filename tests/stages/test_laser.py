@@ -96,6 +96,7 @@ def test_what_the_session_determines_badly_is_estimated_and_named() -> None:
     assert np.linalg.eigvalsh(total - noise).min() > -1e-12
 
 
+@pytest.mark.thorough
 def test_an_ins_that_errs_faster_than_its_session_says_widens_the_sigmas() -> None:
     """Errors within 10 s where 200 s are stated; roll and pitch keep the sigma of a slow drift's mean."""
     session = made(OFF, {"ins": {"drift": WITHIN_10_S, "drift_declared": DRIFT["ins"]["drift"]}}, seed=5)
@@ -195,6 +196,7 @@ def test_a_coarse_mount_that_the_points_contradict_is_refused_and_named() -> Non
     assert size in reason, reason
 
 
+@pytest.mark.thorough
 def test_a_good_survey_is_hardly_improved_and_said_to_be_what_the_values_rest_on() -> None:
     slight = {"laser": {"coarse_angle_deg": 0.03, "coarse_lever_m": 0.002}, "mbes": {"ping_rate_hz": 0.5}}
     session = made(slight, DRIFT, seed=2)
@@ -222,6 +224,7 @@ def test_what_is_calibrated_is_the_sonar_or_the_laser() -> None:
     assert stage_config(adjust.Config, settings_by_name(usual, alone)) == of_laser
 
 
+@pytest.mark.thorough
 def test_the_dock_gives_the_lasers_angles_as_well() -> None:
     session = simulate_session(parse(Scenario, merged(read_yaml(SCENARIOS / "dock.yaml"), THIN, OFF), "dock"), 3)
     result = result_of(calibrated(session, laser_fit=EXACT, verdict=WIDE))

@@ -144,6 +144,7 @@ def test_a_cast_puts_a_wrong_speed_at_the_head_right(errors_of):
     assert right[3:].max() < EXACT_MM
 
 
+@pytest.mark.thorough
 def test_latency_is_subtracted(errors_of):
     late = {"mbes": {"latency_s": 0.05, "latency_declared_s": 0.05}, "laser": {"latency_s": -0.03}}
     session = made(QUIET, late, {"laser": {"latency_declared_s": -0.03}}, seed=9)

@@ -45,6 +45,7 @@ def test_a_fault_is_named(noisy, noisy_found, fault, words):
     assert said.startswith(words)
 
 
+@pytest.mark.thorough
 def test_sectors_of_different_tilt_that_the_file_does_not_tell(noisy):
     """The middle of the fan is that of the same session with the sonar turned about its own x."""
 

@@ -109,6 +109,7 @@ def test_an_unseen_top_makes_the_registration_ambiguous(quiet, quiet_found):
     assert any("ambiguous" in reason for reason in calibration["reasons"])
 
 
+@pytest.mark.thorough
 def test_a_stack_shifted_onto_the_floor_is_no_rival():
     """Met in a campaign: 0.7 m up, the floor passes for tops of blocks, and more soundings are explained than by the
     truth; but others then lie behind faces."""

@@ -13,7 +13,7 @@ from tests.support.viewer import views_of
 from tools.pictures import show_tab, viewer
 
 REJECTED, LASER = "rejected", "laser"  # beside the scenarios
-IN_THE_USUAL_SUITE = ("dock", REJECTED)
+IN_THE_USUAL_SUITE = (REJECTED,)
 EVERY = [*sorted(path.stem for path in SCENARIOS.glob("*.yaml")), REJECTED, LASER]
 GONE = {  # tabs, where there is nothing to show
     "caisson": {"Iteration"}, "dock": {"Iteration"}, REJECTED: {"Iteration"}, LASER: {"Before and after", "Iteration"},
