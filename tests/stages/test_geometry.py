@@ -125,6 +125,7 @@ def test_an_ins_that_drifts_three_times_as_far_is_named_before_any_mount() -> No
     assert all(k > place for k, reason in enumerate(found) if reason.startswith("likely cause"))
 
 
+@pytest.mark.thorough
 def test_what_is_freed_is_found_said_and_to_be_corrected(errors_of: Any) -> None:
     """The same 20 ms with the latency free: the mount is right, and still nobody shall sail with that clock."""
     late = {"mbes": {"latency_s": 0.02}}

@@ -131,6 +131,7 @@ def test_a_surveyed_origin_that_is_wrong_is_seen_in_the_lever_arm() -> None:
     assert errors(result, session.truth)[3] == pytest.approx(-0.02, abs=0.004)
 
 
+@pytest.mark.thorough
 def test_a_target_out_of_plumb_within_its_sigma_keeps_the_errors_within_theirs() -> None:
     session = made(OFF, DRIFT, {"surroundings": {"tilt_deg": [0.03, -0.03]}}, seed=2)
     honest = result_of(calibrated(session, laser_fit={"plumb_sigma_deg": 0.03}))

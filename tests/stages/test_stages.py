@@ -135,6 +135,7 @@ def test_a_swapped_low_side_is_seen(quiet):
     assert "left and right exchanged" in pose["rival"]
 
 
+@pytest.mark.thorough
 def test_a_tilted_target_is_reported_and_does_no_harm(errors_of):
     session = made(QUIET, {"surroundings": {"tilt_deg": [0.2, -0.3]}}, seed=4)
     found = calibrated(session)
