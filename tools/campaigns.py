@@ -1,19 +1,16 @@
 """Campaigns of simulated sessions: which sessions are simulated, with which seeds, and where their rows go."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pipeline.config.mount import MountSigma
-from pipeline.config.session import Laser, Mbes
 from pipeline.maths.mount_parameters import SETTINGS
+from tools.drawn_errors import all_errors, errors_of_pairs
 
 FOLDER = Path("runs/montecarlo")
 TASKS_OF_A_WORKER = 20  # then a new process: hundreds of ray casting scenes make a process slow and large
 COARSE_DEG, COARSE_M = 2.5, 0.25
-SOUND_SPEED_M_S = 1500.0  # recorded
 THIN: dict[str, Any] = {"laser": {"point_rate_hz": 5000.0}}  # enough laser points for the sonar's noise to dominate
 WHITE: dict[str, Any] = {
     "ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}},
@@ -55,7 +52,7 @@ class Campaign:
     scenario: dict[str, Any] = field(default_factory=dict)
     through_files: bool = False
     pairs: bool = False  # also compare sessions in pairs: how often does the comparison report a move?
-    own_errors: bool = False  # systematic errors are drawn: a session's own, and those that a pair shares
+    drawn: Callable[[int], dict[str, Any]] | None = None  # blocks of a session's systematic errors, by its seed
 
 
 def _target(**letters: Any) -> dict[str, Any]:
@@ -95,7 +92,8 @@ CAMPAIGNS = (
     Campaign("tilted sectors, border at 48", 24, 12300, _sectors(48.0)),
     Campaign("tilted from ping to ping", 24, 12400, {"mbes": TABLE | {"ping_tilts_deg": [0.0, 0.3]}}),
     Campaign("1000 pairs, half as dense", 2000, 10000, WHITE | HALF, pairs=True),
-    Campaign("300 pairs, own errors", 600, 13000, WHITE | HALF | {"ins": DRIFT}, pairs=True, own_errors=True),
+    Campaign("300 pairs, own errors", 600, 13000, WHITE | HALF | {"ins": DRIFT}, pairs=True, drawn=errors_of_pairs),
+    Campaign("all errors drawn", 200, 14000, {"ins": DRIFT, "mbes": {"ping_rate_hz": 10.0}}, drawn=all_errors),
 )
 
 
@@ -108,7 +106,7 @@ def scenario_of(campaign: Campaign, number: int) -> dict[str, Any]:
     """Return the scenario of a session: the campaign's, thinned where it says nothing, coarse and systematic errors."""
     coarse = {"coarse_error": coarse_error(number, COARSE_DEG, COARSE_M)}
     merged: dict[str, Any] = {"name": campaign.name}
-    drawn = systematic_errors(campaign.first_seed + number) if campaign.own_errors else {}
+    drawn = campaign.drawn(campaign.first_seed + number) if campaign.drawn else {}
     for part in (THIN, campaign.scenario, {"mbes": coarse}, drawn):
         for key, value in part.items():
             merged[key] = merged.get(key, {}) | value if isinstance(value, dict) else value
@@ -120,37 +118,3 @@ def coarse_error(number: int, size_deg: float, size_m: float) -> dict[str, float
     signs = [1.0 if number >> bit & 1 else -1.0 for bit in range(6)]
     sizes = (size_deg,) * 3 + (size_m,) * 3
     return {key: sign * size for key, sign, size in zip(SETTINGS, signs, sizes, strict=True)}
-
-
-def systematic_errors(seed: int) -> dict[str, Any]:
-    """Return the blocks of a scenario with drawn errors, whose sigmas are the defaults that hold in session.yaml.
-
-    Each session has its own errors of the sound speed (recorded as 1500 m/s), of the same at the arrays, of its
-    gradient, of both clocks, and of ranges by incidence and on level faces. The two sessions of a pair, an even seed
-    and the next, share those of the laser's mount, of the sonar's ranges and of the transmitter's place.
-    """
-    own, common = np.random.default_rng([seed, 1]), np.random.default_rng([seed // 2, 2])  # not the simulator's numbers
-
-    def drawn(rng: np.random.Generator, sensor: type[Laser | Mbes], name: str) -> float:
-        return float(sensor.model_fields[name].default * rng.normal())
-
-    mount = MountSigma()
-    of_mount = np.repeat([mount.angle_deg, mount.lever_arm_m], 3) * common.normal(size=len(SETTINGS))
-    return {
-        "mbes": {
-            "sound_speed_true_m_s": SOUND_SPEED_M_S + drawn(own, Mbes, "sound_speed_sigma_m_s"),
-            "head_speed_excess": drawn(own, Mbes, "sound_speed_sigma_m_s") / SOUND_SPEED_M_S,
-            "sound_speed_gradient_1_s": drawn(own, Mbes, "sound_speed_gradient_sigma_1_s"),
-            "latency_s": drawn(own, Mbes, "latency_sigma_s"),
-            "incidence_bias_m": drawn(own, Mbes, "incidence_bias_sigma_m"),
-            "level_bias_m": drawn(own, Mbes, "level_bias_sigma_m"),
-            "range_bias_m": drawn(common, Mbes, "range_bias_sigma_m"),
-            "projector_offset_m": [drawn(common, Mbes, "projector_sigma_m") for _ in range(3)],
-        },
-        "laser": {
-            "latency_s": drawn(own, Laser, "latency_sigma_s"),
-            "incidence_bias_m": drawn(own, Laser, "incidence_bias_sigma_m"),
-            "incidence_law": "secant",  # that of the sigma
-            "coarse_error": dict(zip(SETTINGS, of_mount.tolist(), strict=True)),
-        },
-    }

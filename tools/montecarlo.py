@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import norm
 
 from tools.campaign_files import collect_rows
 from tools.campaign_statistics import statistics_of
@@ -27,25 +28,27 @@ from tools.stress_campaigns import ALL, campaign_of
 
 
 def report(campaign: Campaign, table: pd.DataFrame) -> str:
-    """Return the summary of a campaign in five lines."""
+    """Return the summary of a campaign in six lines. Sigmas are total ones if systematic errors are drawn."""
     statistics = statistics_of(table)
+    kind, nse = ("total", statistics.nse_total) if campaign.drawn else ("sigma", statistics.nse)
     low, high = statistics.band
-    verdict = "inside" if statistics.in_band else "OUTSIDE"
-    agreement = f"; mean normalised squared error {statistics.nse:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}"
-    if campaign.own_errors:  # which its covariance from noise does not have
-        agreement = ""
+    verdict = "inside" if low < nse < high else "OUTSIDE"
     lines = [
-        f"{campaign.name}: {statistics.sessions} sessions, {statistics.accepted} accepted{agreement}",
+        f"{campaign.name}: {statistics.sessions} sessions, {statistics.accepted} accepted; mean normalised squared error "
+        f"{nse:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}",
         f"  {'':16}" + "".join(f"{name:>10}" for name in NAMES) + "     (degrees, millimetres)",
     ]
+    errors, sigmas = (np.array([table[f"{word}_{name}"] for name in NAMES]) for word in ("error", kind))
     for word, values in (
-        ("RMS error", [np.sqrt(np.mean(table[f"error_{name}"] ** 2)) for name in NAMES]),
-        ("largest error", [table[f"error_{name}"].abs().max() for name in NAMES]),
-        ("mean sigma", [np.sqrt(np.mean(table[f"sigma_{name}"] ** 2)) for name in NAMES]),
+        ("RMS error", np.sqrt(np.mean(errors**2, axis=1))),
+        ("largest error", np.abs(errors).max(axis=1)),
+        ("total sigma" if campaign.drawn else "mean sigma", np.sqrt(np.mean(sigmas**2, axis=1))),
     ):
         lines.append(
             f"  {word:16}" + "".join(f"{value:10.4f}" if k < 3 else f"{value:10.3f}" for k, value in enumerate(values))
         )
+    within = 100 * np.mean(np.abs(errors) < norm.ppf(0.975) * sigmas, axis=1)
+    lines.append(f"  {'% within 95 %':16}" + "".join(f"{share:10.1f}" for share in within))
     return "\n".join(lines)
 
 

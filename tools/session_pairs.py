@@ -31,7 +31,7 @@ def pairs_report(campaign: Campaign, table: pd.DataFrame) -> str:
     """
     rows: list[Any] = table.to_dict("records")
     by_noise = _pairs([replace(session, systematic={}) for session in map(_estimate, rows)])
-    pairs = _pairs([_estimate(row) for row in rows]) if campaign.own_errors else by_noise
+    pairs = _pairs([_estimate(row) for row in rows]) if campaign.drawn else by_noise
     accepted = table["accepted"].to_numpy(dtype=bool).reshape(-1, 2).all(axis=1)
     both = np.flatnonzero(accepted).tolist()
     still = [movement_between(*pair) for pair in pairs]

@@ -31,7 +31,7 @@ def measured_ranges(scenario: LaserScenario, pool: Pool, rays: Rays) -> Floats:
     if scenario.incidence_bias_m or scenario.level_bias_m:
         normals = pool.caster.normals(rays.origins_m, rays.directions)
         measured = measured + range_bias(scenario, normals, rays.directions, scenario.incidence_law)
-    return measured
+    return measured + scenario.range_bias_m
 
 
 def _mixed(scenario: LaserScenario, pool: Pool, rays: Rays) -> Floats:

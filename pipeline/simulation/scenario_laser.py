@@ -29,6 +29,7 @@ class LaserScenario(Model):
     splash_share: Share = 0.0  # of the rays to splash_height_m or less above the water: they end in drops or foam
     splash_height_m: NotNegative = 0.2
     splash_depth_m: NotNegative = 0.1  # which are up to this far before the surface
+    range_bias_m: Bias = 0.0  # added to all ranges of faces
     incidence_bias_m: Bias = 0.0  # added to ranges at 45° of incidence; beyond 80° as at 80°
     incidence_law: Literal["secant", "tangent_squared"] = "tangent_squared"  # grows with 1 / cos i - 1, or with tan² i
     level_bias_m: Bias = 0.0  # added to ranges of level faces

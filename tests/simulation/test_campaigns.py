@@ -8,9 +8,10 @@ from pipeline.config.mount import MountSigma
 from pipeline.config.yaml_models import parse
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.simulation.scenario import Scenario
-from tools.campaigns import CAMPAIGNS, scenario_of, systematic_errors
+from tools.campaigns import CAMPAIGNS, scenario_of
+from tools.drawn_errors import errors_of_pairs
 
-(PAIRS,) = (campaign for campaign in CAMPAIGNS if campaign.own_errors)
+(PAIRS,) = (campaign for campaign in CAMPAIGNS if campaign.drawn is errors_of_pairs)
 
 
 def scenarios(count: int) -> list[Scenario]:
@@ -41,7 +42,7 @@ def test_a_pair_shares_what_belongs_to_its_devices_and_nothing_else() -> None:
 
 def test_the_errors_are_as_large_as_the_sessions_say() -> None:
     """Nothing in session.yaml says otherwise than the defaults, which are these."""
-    drawn: list[dict[str, Any]] = [systematic_errors(seed) for seed in range(0, 2000, 2)]
+    drawn: list[dict[str, Any]] = [errors_of_pairs(seed) for seed in range(0, 2000, 2)]
     of_mount = MountSigma()
     for sensor, sizes in OWN.items():
         for name, sigma in sizes.items():

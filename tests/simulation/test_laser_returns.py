@@ -59,6 +59,13 @@ def test_biases_by_incidence_and_of_level_faces(one_pass: Callable[..., Simulate
         np.testing.assert_allclose((seen(by_level)[0] - ranges)[rows], of_level, atol=1e-9)
 
 
+def test_a_bias_of_all_ranges(one_pass: Callable[..., SimulatedSession]) -> None:
+    ranges, _, points = seen(one_pass())
+    longer = seen(one_pass(range_bias_m=0.003))[0] - ranges
+    for rows in faces(points).values():
+        np.testing.assert_allclose(longer[rows], 0.003, atol=1e-9)
+
+
 def test_splashes_end_rays_just_above_the_water(one_pass: Callable[..., SimulatedSession]) -> None:
     plain = one_pass()
     wet = one_pass(splash_share=0.5, splash_height_m=0.2, splash_depth_m=0.1)
