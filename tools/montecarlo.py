@@ -34,8 +34,8 @@ def report(campaign: Campaign, table: pd.DataFrame) -> str:
     low, high = statistics.band
     verdict = "inside" if low < nse < high else "OUTSIDE"
     lines = [
-        f"{campaign.name}: {statistics.sessions} sessions, {statistics.accepted} accepted; mean normalised squared error "
-        f"{nse:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}",
+        f"{campaign.name}: {statistics.sessions} sessions, {statistics.accepted} accepted; mean normalised squared "
+        f"error {nse:.2f}, {verdict} its 99 % band {low:.2f}-{high:.2f}",
         f"  {'':16}" + "".join(f"{name:>10}" for name in NAMES) + "     (degrees, millimetres)",
     ]
     errors, sigmas = (np.array([table[f"{word}_{name}"] for name in NAMES]) for word in ("error", kind))
