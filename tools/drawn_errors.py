@@ -21,6 +21,7 @@ from pipeline.target.design import target_of
 
 SOUND_SPEED_M_S = 1500.0  # recorded
 Draws = np.random.Generator
+DEFAULTS = AsBuilt()
 
 
 def errors_of_pairs(seed: int) -> dict[str, Any]:
@@ -69,12 +70,11 @@ def _of_sensors(own: Draws, common: Draws) -> dict[str, dict[str, Any]]:
     }
 
 
-def face_faults(target: TargetModel, draws: Draws) -> Iterator[dict[str, Any]]:
+def face_faults(target: TargetModel, draws: Draws, sigmas: AsBuilt = DEFAULTS) -> Iterator[dict[str, Any]]:
     """Yield faults of all faces: each stands out by its own error, and the wet ones of a family differ together.
 
     The wet faces of a family shift, turn about one point as a rigid body, and bow.
     """
-    sigmas = AsBuilt()
     for face in target.faces:
         yield {"faces": [face.name], "shift_m": sigmas.face_sigma_m * draws.normal()}
     for family in target.families:

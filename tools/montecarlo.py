@@ -24,7 +24,7 @@ from tools.campaign_statistics import statistics_of
 from tools.campaigns import TASKS_OF_A_WORKER, Campaign, path_of
 from tools.session_pairs import pairs_report
 from tools.session_rows import NAMES, session_row
-from tools.stress_campaigns import ALL, campaign_of
+from tools.stress_campaigns import ALL, campaign_of, named
 
 
 def report(campaign: Campaign, table: pd.DataFrame) -> str:
@@ -87,9 +87,7 @@ def main() -> None:
         for task in tasks:
             print(session_report(session_row(task)), flush=True)
         return
-    for campaign in ALL:
-        if options.only and not any(campaign.name.startswith(name) for name in options.only):
-            continue
+    for campaign in named(*options.only) if options.only else ALL:
         started = time.monotonic()
         tasks = [(campaign, number) for number in range(max(2, round(campaign.sessions * options.share)))]
         table = collect_rows(path_of(campaign), session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)

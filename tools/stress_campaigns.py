@@ -49,6 +49,11 @@ STRESS = (
 ALL = (*CAMPAIGNS, *STRESS)
 
 
+def named(*beginnings: str) -> tuple[Campaign, ...]:
+    """Return the campaigns whose names begin so."""
+    return tuple(campaign for campaign in ALL if campaign.name.startswith(beginnings))
+
+
 def campaign_of(seed: int) -> tuple[Campaign, int]:
     """Return the campaign of a seed, and the session's number in it.
 
