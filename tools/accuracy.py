@@ -1,15 +1,16 @@
 """Compare the errors of the campaigns with the Cramér-Rao bound, in a table and on a page with plots.
 
-The program reads runs/montecarlo/*.parquet, which ``tools.montecarlo`` and ``tools.mistakes`` write, and computes the
-Cramér-Rao bound for each kind of noise (``tools.bound``). It prints the README's table and writes
-runs/montecarlo/accuracy.html.
+The program reads the rows that ``tools.montecarlo`` and ``tools.mistakes`` have written, and computes the Cramér-Rao
+bound for each kind of noise (``tools.bound``). A campaign whose systematic errors are drawn is judged by its total
+sigmas, and has no bound. The program prints the README's table and writes runs/montecarlo/accuracy.html.
 
-    python -m tools.accuracy [--bounds 24] [--jobs 2]
+    python -m tools.accuracy [runs/montecarlo | docs/accuracy] [--bounds 24] [--jobs 2]
 """
 
 import argparse
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
 
 import jinja2
 import numpy as np
@@ -28,7 +29,7 @@ from tools.campaigns import CAMPAIGNS, FOLDER, Campaign, path_of, scenario_of
 from tools.session_rows import NAMES, UNITS
 
 Array = NDArray[np.float64]
-BOUNDED = ("finite beams, outliers", "finite beams and INS", "twelve passes")
+NAMED = ("finite beams, outliers", "finite beams and INS", "twelve passes", "all errors")
 LEVEL = 0.95
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>poolcal: accuracy</title>
 <style>body{font:16px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem}
@@ -46,20 +47,21 @@ td:first-child,th:first-child{text-align:left}img{max-width:100%;height:auto}</s
 
 @dataclass(frozen=True)
 class Result:
-    """The errors of a campaign's sessions against the Cramér-Rao bound.
+    """The errors of a campaign's sessions against their sigmas and the Cramér-Rao bound.
 
     Attributes
     ----------
     campaign
         The campaign.
     errors, sigmas
-        (n, 6): errors of the mount parameters and their random sigmas, in degrees and millimetres.
+        (n, 6): errors of the mount parameters and their sigmas, in degrees and millimetres: random sigmas, or total
+        ones where the campaign's systematic errors are drawn.
     nse
-        (n,): normalised squared errors.
+        (n,): normalised squared errors by the covariance of these sigmas.
     accepted
         Number of accepted sessions.
     bound
-        (6,): sigmas of the bound, in degrees and millimetres.
+        (6,): sigmas of the bound, in degrees and millimetres; None: there is none for total sigmas.
     """
 
     campaign: Campaign
@@ -67,7 +69,7 @@ class Result:
     sigmas: Array
     nse: Array
     accepted: int
-    bound: Array
+    bound: Array | None
 
     @property
     def count(self) -> int:
@@ -80,14 +82,9 @@ class Result:
         return np.asarray(np.sqrt(np.mean(self.errors**2, axis=0)))
 
     @property
-    def ratio(self) -> Array:
-        """RMS error ÷ bound (6,)."""
-        return self.rms / self.bound
-
-    @property
-    def ratio_below(self) -> Array:
-        """Upper confidence limit (6,) of the ratio: n RMS² / σ² is chi-squared with n degrees of freedom."""
-        return self.ratio * float(np.sqrt(self.count / chi2.ppf(1 - LEVEL, self.count)))
+    def below(self) -> float:
+        """Upper confidence limit of RMS ÷ σ, per its value: n RMS² / σ² is chi-squared with n degrees of freedom."""
+        return float(np.sqrt(self.count / chi2.ppf(1 - LEVEL, self.count)))
 
     @property
     def covered(self) -> Array:
@@ -109,33 +106,38 @@ class Result:
         low, high = self.band
         head = f"**{self.campaign.name}**: {self.count} sessions, {self.accepted} accepted, mean NSE "
         head += f"{self.nse.mean():.2f} ({low:.2f}–{high:.2f})"
-        both = zip(self.ratio, self.ratio_below, strict=True)
+        kind, sigma = "total" if self.bound is None else "mean", np.sqrt(np.mean(self.sigmas**2, axis=0))
+        name, reference = ("total sigma", sigma) if self.bound is None else ("bound", self.bound)
+        ratio = self.rms / reference
         return [
             [head, *[""] * len(NAMES)],
             line("mean error", np.mean(self.errors, axis=0), "+"),
-            ["the same in its own sigmas", *(f"{value:+.1f}" for value in means_in_standard_errors(self.errors))],
+            ["the same ÷ its standard error", *(f"{value:+.1f}" for value in means_in_standard_errors(self.errors))],
             line("RMS error", self.rms),
-            line("mean sigma", np.sqrt(np.mean(self.sigmas**2, axis=0))),
-            line("Cramér–Rao bound", self.bound),
-            ["RMS ÷ bound (95 % below)", *(f"{value:.2f} ({below:.2f})" for value, below in both)],
+            line(f"{kind} sigma", sigma),
+            *([] if self.bound is None else [line("Cramér–Rao bound", self.bound)]),
+            [f"RMS ÷ {name} (95 % below)", *(f"{value:.2f} ({value * self.below:.2f})" for value in ratio)],
             ["truth within the 95 % interval", *(f"{100 * value:.1f} %" for value in self.covered)],
         ]
 
 
-def campaign_results(bounds: int, jobs: int) -> list[Result]:
-    """Return a result for each campaign that has rows; its bound is the mean over ``bounds`` sessions."""
+def campaign_results(folder: Path, bounds: int, jobs: int) -> list[Result]:
+    """Return a result for each named campaign with rows in the folder; its bound is the mean over some sessions."""
     results = []
     with get_context("spawn").Pool(jobs) as pool:
         for campaign in CAMPAIGNS:
-            if not campaign.name.startswith(BOUNDED) or not path_of(campaign).is_file():
+            path = folder / path_of(campaign).name
+            if not campaign.name.startswith(NAMED) or not path.is_file():
                 continue
-            table = pd.read_parquet(path_of(campaign))
-            tasks = [(campaign, number) for number in range(min(bounds, len(table)))]
-            covariance = np.mean(pool.starmap(_bound, tasks), axis=0)
-            errors, sigmas = (table[[f"{kind}_{name}" for name in NAMES]].to_numpy() for kind in ("error", "sigma"))
-            bound_sigmas = np.sqrt(np.diag(covariance)) / UNITS
-            accepted = int(table["accepted"].sum())
-            results.append(Result(campaign, errors, sigmas, table["nse"].to_numpy(), accepted, bound_sigmas))
+            table = pd.read_parquet(path)
+            words, nse, bound_sigmas = ("error", "total"), table["nse_total"].to_numpy(), None
+            if not campaign.drawn:
+                tasks = [(campaign, number) for number in range(min(bounds, len(table)))]
+                covariance = np.mean(pool.starmap(_bound, tasks), axis=0)
+                words, nse = ("error", "sigma"), table["nse"].to_numpy()
+                bound_sigmas = np.sqrt(np.diag(covariance)) / UNITS
+            errors, sigmas = (table[[f"{word}_{name}" for name in NAMES]].to_numpy() for word in words)
+            results.append(Result(campaign, errors, sigmas, nse, int(table["accepted"].sum()), bound_sigmas))
     return results
 
 
@@ -197,11 +199,13 @@ def page(results: list[Result], mistakes: pd.DataFrame | None) -> str:
 def main() -> None:
     """Print the table and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=FOLDER, help=f"folder of the rows; default: {FOLDER}")
     parser.add_argument("--bounds", type=int, default=24, help="number of sessions over which the bound is averaged")
     parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
     options = parser.parse_args()
-    results = campaign_results(options.bounds, options.jobs)
-    path = FOLDER / "mistakes.parquet"
+    results = campaign_results(options.folder, options.bounds, options.jobs)
+    path = options.folder / "mistakes.parquet"
+    FOLDER.mkdir(parents=True, exist_ok=True)
     (FOLDER / "accuracy.html").write_text(page(results, pd.read_parquet(path) if path.is_file() else None), "utf-8")
     print(markdown(results))
 
