@@ -106,7 +106,7 @@ class Result:
         low, high = self.band
         head = f"**{self.campaign.name}**: {self.count} sessions, {self.accepted} accepted, mean NSE "
         head += f"{self.nse.mean():.2f} ({low:.2f}–{high:.2f})"
-        kind, sigma = "total" if self.bound is None else "mean", np.sqrt(np.mean(self.sigmas**2, axis=0))
+        sigma = np.sqrt(np.mean(self.sigmas**2, axis=0))
         name, reference = ("total sigma", sigma) if self.bound is None else ("bound", self.bound)
         ratio = self.rms / reference
         return [
@@ -114,7 +114,7 @@ class Result:
             line("mean error", np.mean(self.errors, axis=0), "+"),
             ["the same ÷ its standard error", *(f"{value:+.1f}" for value in means_in_standard_errors(self.errors))],
             line("RMS error", self.rms),
-            line(f"{kind} sigma", sigma),
+            line("total sigma" if self.bound is None else "mean sigma", sigma),
             *([] if self.bound is None else [line("Cramér–Rao bound", self.bound)]),
             [f"RMS ÷ {name} (95 % below)", *(f"{value:.2f} ({value * self.below:.2f})" for value in ratio)],
             ["truth within the 95 % interval", *(f"{100 * value:.1f} %" for value in self.covered)],
@@ -130,14 +130,14 @@ def campaign_results(folder: Path, bounds: int, jobs: int) -> list[Result]:
             if not campaign.name.startswith(NAMED) or not path.is_file():
                 continue
             table = pd.read_parquet(path)
-            words, nse, bound_sigmas = ("error", "total"), table["nse_total"].to_numpy(), None
+            kind, squared = campaign.judged_by
+            errors, sigmas = (table[[f"{word}_{name}" for name in NAMES]].to_numpy() for word in ("error", kind))
+            bound_sigmas = None
             if not campaign.drawn:
                 tasks = [(campaign, number) for number in range(min(bounds, len(table)))]
-                covariance = np.mean(pool.starmap(_bound, tasks), axis=0)
-                words, nse = ("error", "sigma"), table["nse"].to_numpy()
-                bound_sigmas = np.sqrt(np.diag(covariance)) / UNITS
-            errors, sigmas = (table[[f"{word}_{name}" for name in NAMES]].to_numpy() for word in words)
-            results.append(Result(campaign, errors, sigmas, nse, int(table["accepted"].sum()), bound_sigmas))
+                bound_sigmas = np.sqrt(np.diag(np.mean(pool.starmap(_bound, tasks), axis=0))) / UNITS
+            accepted = int(table["accepted"].sum())
+            results.append(Result(campaign, errors, sigmas, table[squared].to_numpy(), accepted, bound_sigmas))
     return results
 
 

@@ -54,6 +54,11 @@ class Campaign:
     pairs: bool = False  # also compare sessions in pairs: how often does the comparison report a move?
     drawn: Callable[[int], dict[str, Any]] | None = None  # blocks of a session's systematic errors, by its seed
 
+    @property
+    def judged_by(self) -> tuple[str, str]:
+        """Names of the sigmas and of the squared errors that judge a row: total ones if systematic errors are drawn."""
+        return ("total", "nse_total") if self.drawn else ("sigma", "nse")
+
 
 def _target(**letters: Any) -> dict[str, Any]:
     origin = {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0}

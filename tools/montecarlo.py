@@ -30,7 +30,8 @@ from tools.stress_campaigns import ALL, campaign_of, named
 def report(campaign: Campaign, table: pd.DataFrame) -> str:
     """Return the summary of a campaign in six lines. Sigmas are total ones if systematic errors are drawn."""
     statistics = statistics_of(table)
-    kind, nse = ("total", statistics.nse_total) if campaign.drawn else ("sigma", statistics.nse)
+    kind, squared = campaign.judged_by
+    nse = getattr(statistics, squared)
     low, high = statistics.band
     verdict = "inside" if low < nse < high else "OUTSIDE"
     lines = [
