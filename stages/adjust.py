@@ -34,6 +34,7 @@ from pipeline.artefacts.catalogue.results import (
     RESIDUAL_BINS,
     RESIDUAL_MAP,
     RESIDUALS,
+    SETS,
     SURFACES,
 )
 from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
@@ -90,6 +91,7 @@ class Outputs:
     drift: Annotated[pd.DataFrame, DRIFT]
     drift_figures: Annotated[pd.DataFrame, DRIFT_FIGURES]
     freed: Annotated[pd.DataFrame, FREED]
+    sets: Annotated[pd.DataFrame, SETS]
     groups: Annotated[pd.DataFrame, GROUPS]
     cells: Annotated[pd.DataFrame, CELLS]
     summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]

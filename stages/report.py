@@ -176,4 +176,5 @@ def _criteria(config: Config, report: SensorReport) -> Criteria:
         shape=config.target.shape,
         sides=report.sides,
         held=report.held,
+        laser_correlates=config.calibrated == "mbes" and config.laser.mount_covariance is not None,
     )

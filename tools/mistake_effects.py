@@ -15,11 +15,11 @@ from tools.mistake_kinds import DRIFTS, OF_THE_CREW, Block, Change, Kind, drifti
 
 REFUSED = "refused"  # in place of a name: one line says what is wrong, and nothing is calibrated
 TIMES = (1, 3)  # the expected size, and thrice
-BOWS = ("wet_P1_bow", "wet_P2_bow", "wet_P3_bow")
+BOWS = ("wet_P1_bow", "wet_P2_bow", "wet_P3_bow", "wet_bows")
 WET_WALL = frozenset({"P2", "wet_P2_shift", "wet_P2_turn_1", "wet_P2_turn_2", "wet_P2_bow"})
-SIDES = ("wet_P1_shift", "wet_P2_shift", "wet_P3_shift")
+SIDES = ("wet_P1_shift", "wet_P2_shift", "wet_P3_shift", "wet_shifts")
 WET_SIDES = (  # or P2 the other way: roll takes the rest
-    "wet_P1_turn_1", "wet_P1_turn_2", "wet_P3_turn_1", "wet_P3_turn_2", "wet_P2_turn_2",
+    "wet_P1_turn_1", "wet_P1_turn_2", "wet_P3_turn_1", "wet_P3_turn_2", "wet_P2_turn_2", "wet_turns",
 )  # fmt: skip
 TRUE_PROFILE = [[0.0, 1502.0], [1.5, 1501.5], [2.0, 1499.5], [5.0, 1499.0]]  # a warm layer of 1.5 to 2 m, 0.6 °C
 
@@ -129,12 +129,14 @@ def _stratified(size: float) -> Block:
 
 EFFECTS = (
     _effect(
-        "sonar: ranges {:g} mm short at 45°, as 1/cos i - 1", 10, _mbes("incidence_bias_m", -1e-3), "mbes_incidence"
+        "sonar: ranges {:g} mm short at 45°, as 1/cos i - 1", 10, _mbes("incidence_bias_m", -1e-3), "mbes_incidence",
+        "mbes_detection",
     ),
     _effect(
         "sonar: ranges {:g} mm short at 45°, as tan² i", 10,
         # the parameter goes as 1/cos i - 1; what tan² i has beyond it is on the grazed, that is the level faces
         _mbes("incidence_bias_m", -1e-3, incidence_law="tangent_squared"), "mbes_incidence", "mbes_level_range",
+        "mbes_detection",
     ),
     _effect("sonar: all ranges {:g} mm long", 10, _mbes("range_bias_m", 1e-3), "mbes_range"),
     _effect(
@@ -144,9 +146,9 @@ EFFECTS = (
         "sonar: ranges of level faces {:g} mm short", 10, _mbes("level_bias_m", -1e-3), "mbes_level_range",
         "wet_H_shift",
     ),
-    _effect("sonar: noise × {:g} at 45° along track", 3, _mbes("slanted_noise")),
-    _effect("sonar: noise × {:g} at 45°", 2, _mbes("incidence_noise")),
-    _effect("sonar: near field, aperture {:g} m", 0.19, _near_field),
+    _effect("sonar: noise × {:g} at 45° along track", 3, _mbes("slanted_noise"), "noise"),
+    _effect("sonar: noise × {:g} at 45°", 2, _mbes("incidence_noise"), "noise"),
+    _effect("sonar: near field, aperture {:g} m", 0.19, _near_field, "noise"),
     _effect("sonar: near field, aperture {:g} m, not declared", 0.19, _near_field, session=_focused),
     _effect("sonar: {:g} of beams near corners by a side lobe", 0.1, _mbes("side_lobe_share")),
     _effect(
@@ -161,7 +163,7 @@ EFFECTS = (
     _effect("sonar: angles {:g}° · sin 2θ off", 0.02, _mbes("array_ripple_deg")),
     _effect("sonar: roll of a ping {:g}°", 0.02, _mbes("ping_roll_sigma_deg")),
     _effect("sonar: ranges of a ping {:g} mm", 3, _mbes("ping_range_sigma_m", 1e-3)),
-    _effect("sonar: steering {:g}° alike in neighbours", 0.06, _mbes("steering_sigma_deg")),
+    _effect("sonar: steering {:g}° alike in neighbours", 0.06, _mbes("steering_sigma_deg"), "noise"),
     _effect("sonar: sound {:g} % faster at the arrays alone", 0.1, _mbes("head_speed_excess", 0.01), "steering_speed"),
     _effect(
         "sonar: sound {:g} % slower in the water than at the arrays", 0.1, _of_arrays, "sound_speed", "steering_speed"
@@ -201,7 +203,9 @@ EFFECTS = (
         "wet P1 and P3 {:g} mm to the boat", 7, _faces("P1", "P3", shift_m=1e-3),
         *SIDES,
     ),
-    _effect("faces uneven by {:g} mm", 2, lambda size: {"surroundings": {"unevenness_m": size / 1000}}),
+    _effect(
+        "faces uneven by {:g} mm", 2, lambda size: {"surroundings": {"unevenness_m": size / 1000}}, "residuals_by_face"
+    ),
     _effect("laser: ranges {:g} mm long at 45°, as tan² i", 1, _of_laser("incidence_bias_m", 1e-3), "laser_incidence"),
     _effect("dry P1 and P3 {:g} mm to the boat", 3, _faces("P1", "P3", part="dry", shift_m=1e-3), *SIDES),
     _effect("laser: ranges of level faces {:g} mm short", 5, _of_laser("level_bias_m", -1e-3), "wet_H_shift"),

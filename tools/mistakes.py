@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.report.reason_codes import ReasonCode
+from pipeline.report.sigma_sources import NOISE
 from tools.campaign_files import collect_rows
 from tools.campaigns import FOLDER, TASKS_OF_A_WORKER, THIN
 from tools.mistake_effects import MISTAKES, REFUSED
@@ -46,8 +47,9 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
     """Return the names of what the verdict of a rejected session names first.
 
     This is the strongest explanation of the residuals: a parameter, by its name and the parts of its name (the face
-    among them), or a part of the points, by the code of its reason and by its face. Without an explanation it is the
-    first reason, by its code. (That the adjustment did not converge names nothing.)
+    among them), a set of parameters by its name, or a part of the points, by the code of its reason and by its face.
+    Without an explanation it is the first reason, by its code, and "noise" where this is a sigma that is mostly noise.
+    (That the adjustment did not converge names nothing.)
 
     Parameters
     ----------
@@ -63,11 +65,14 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
     }
     first = next((code for code in result["reason_codes"] if code != ReasonCode.NOT_CONVERGED), "")
     if not result["hypotheses"] or first not in (*codes.values(), ReasonCode.SUSPECTED_CAUSE):
-        return frozenset({first})
+        noisy = any(f"mostly from {NOISE}" in words for words in result["reasons"][:1])
+        return frozenset({first, NOISE} if noisy else {first})
     kind, name = result["hypotheses"][0]["kind"], result["hypotheses"][0]["name"]
     if kind == "parameter":
         of_face = {ReasonCode.RESIDUALS_BY_FACE} if name.startswith("face_") else set()
         return frozenset({name, name.removeprefix("face_"), *name.split("_"), *of_face})
+    if kind == "set":
+        return frozenset({name, ReasonCode.RESIDUALS_BY_FACE} if name == "faces" else {name})
     return frozenset({codes[kind], name})
 
 

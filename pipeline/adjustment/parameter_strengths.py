@@ -1,20 +1,41 @@
-"""Single-parameter tests of the final solution; also with the drift as the session says, if that explains more.
+"""Tests of parameters and of sets of them; also with the drift as the session says, if that explains more.
 
 An error of the sonar may look like drift from pass to pass. Where the data made the drift larger, the tests allow for
 it and lose strength. :mod:`~pipeline.maths.adjustment.drift_likelihood` tells how drift and a parameter compare.
+
+Parameters that may well be wrong all at once are a *set*, and are also tested together: all faces, and the two by which
+ranges go wrong where the sonar grazes a face.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from pipeline.adjustment.face_errors import FinalSolution, final_solution
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.maths.adjustment.interval_sums import IntervalSums
+from pipeline.maths.adjustment.joint_tests import JointTest, joint_test
 from pipeline.maths.adjustment.parameter_tests import ParameterTest, prior_parameter_tests, single_parameter_tests
 from pipeline.maths.mount_parameters import N_MOUNT
 
 LEAST_GAIN = 9.0  # a fall of J, three sigmas squared; below it the drift's figures explain nothing worth comparing
+SETS = {  # by name: pattern of its parameters' names
+    "faces": re.compile("face_.+"),
+    "wet_shifts": re.compile("wet_.+_shift"),
+    "wet_turns": re.compile("wet_.+_turn_[12]"),
+    "wet_bows": re.compile("wet_.+_bow"),
+    "mbes_detection": re.compile("mbes_incidence|mbes_level_range"),
+}
+
+
+@dataclass(frozen=True)
+class SetTest:
+    """Joint test of a set of parameters: its name, and the names of its parameters."""
+
+    name: str
+    parameters: tuple[str, ...]
+    test: JointTest
 
 
 def parameter_tests(problem: CalibrationProblem, final: FinalSolution) -> list[ParameterTest]:
@@ -24,13 +45,25 @@ def parameter_tests(problem: CalibrationProblem, final: FinalSolution) -> list[P
     return fixed + prior_parameter_tests(solution, final.from_known, consider, problem.prior.known_parameters)
 
 
+def set_tests(final: FinalSolution, tests: Iterable[ParameterTest]) -> list[SetTest]:
+    """Return the joint test of each set that has two or more of the parameters that have tests of their own."""
+    tested, found = [test.parameter for test in tests if test.sigma > 0], []
+    for name, pattern in SETS.items():
+        numbers = [k for k in tested if pattern.fullmatch(final.names[k])]
+        if len(numbers) > 1:
+            equations = final.equations
+            test = joint_test(equations.normal, equations.right, final.solution, final.from_known, numbers)
+            found.append(SetTest(name, tuple(final.names[k] for k in numbers), test))
+    return found
+
+
 def strengths_by_session(
     problem: CalibrationProblem,
     adjustment: MountAdjustment,
     sums_by_face: Mapping[str, IntervalSums],
     final: FinalSolution,
-) -> dict[int, float]:
-    """Return |value| over sigma of each parameter, with the drift as the session says, if one explains more than drift.
+) -> dict[str, float]:
+    """Return the strengths of parameters and sets with the drift as the session says, if one explains more than drift.
 
     Otherwise, and where the data did not make the drift larger, there are none: a larger drift takes strength away.
 
@@ -51,16 +84,12 @@ def strengths_by_session(
     session = final_solution(problem, adjustment, sums_by_face, replace(problem.prior.noise, white=figures.noise.white))
     # the values are not this solution's
     session = replace(session, from_known=session.from_known + session.solution.step)
-    found = _strengths(parameter_tests(problem, session))
-    largest, estimated = (
-        max(of.values(), default=0.0) for of in (found, _strengths(parameter_tests(problem, final)))
-    )
-    return found if largest**2 > figures.gain and largest > estimated else {}
+    found, estimated = (_strengths(of, parameter_tests(problem, of)) for of in (session, final))
+    largest = max(found.values(), default=0.0)
+    exceeds = largest**2 > figures.gain and largest > max(estimated.values(), default=0.0)
+    return found if exceeds else {}
 
 
-def _strengths(tests: Sequence[ParameterTest]) -> dict[int, float]:
-    return {
-        test.parameter: abs(test.value) / test.sigma
-        for test in tests
-        if test.parameter >= N_MOUNT and test.sigma > 0
-    }
+def _strengths(final: FinalSolution, tests: Sequence[ParameterTest]) -> dict[str, float]:
+    of_single = {final.names[test.parameter]: test.strength for test in tests if test.parameter >= N_MOUNT}
+    return of_single | {one.name: one.test.strength for one in set_tests(final, tests)}

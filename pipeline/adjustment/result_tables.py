@@ -1,6 +1,6 @@
 """The results of the adjustment as tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,11 @@ from pipeline.adjustment.face_errors import FinalSolution, final_solution
 from pipeline.adjustment.ins_drift import drift_figures_table
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.noise_tables import groups_table, sigma_check
-from pipeline.adjustment.parameter_strengths import parameter_tests, strengths_by_session
+from pipeline.adjustment.parameter_strengths import SetTest, parameter_tests, set_tests, strengths_by_session
 from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_statistics import ResidualStatistics
-from pipeline.artefacts.catalogue.results import CELLS
+from pipeline.artefacts.catalogue.results import CELLS, SETS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
 from pipeline.maths.adjustment.parameter_tests import ParameterTest
@@ -52,11 +52,13 @@ def result_tables(
     t_ns = problem.model.body.trajectory.t_ns
     final = final_solution(problem, adjustment, statistics.sums_by_face)
     estimate, random, total = _estimate(problem, final)
+    tests = parameter_tests(problem, final)
     by_session = strengths_by_session(problem, adjustment, statistics.sums_by_face, final)
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
-        "freed": _single_parameter_table(problem, final, estimate, by_session),
+        "freed": _single_parameter_table(problem, final, estimate, tests, by_session),
+        "sets": _set_table(set_tests(final, tests), by_session),
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
         "drift": _drift_table(adjustment, t_ns),
@@ -129,7 +131,11 @@ def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
 
 
 def _single_parameter_table(
-    problem: CalibrationProblem, final: FinalSolution, estimate: pd.DataFrame, by_session: Mapping[int, float]
+    problem: CalibrationProblem,
+    final: FinalSolution,
+    estimate: pd.DataFrame,
+    tests: Sequence[ParameterTest],
+    by_session: Mapping[str, float],
 ) -> pd.DataFrame:
     """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
 
@@ -139,7 +145,7 @@ def _single_parameter_table(
     """
     solution, consider = final.solution, problem.consider
     mount, known = np.arange(N_MOUNT), problem.prior.known_parameters
-    tests = {test.parameter: test for test in parameter_tests(problem, final)}
+    by_number = {test.parameter: test for test in tests}
     effects = np.zeros((N_MOUNT, len(final.names)))
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
     effects[:, known] = solution.prior_effects(mount, known)
@@ -148,14 +154,14 @@ def _single_parameter_table(
     freed = np.setdiff1d(solution.estimated, [*mount, *range(surfaces.start, surfaces.stop), *known]).tolist()
     for number in [*sorted([*solution.fixed.tolist(), *known.tolist()]), *freed]:
         name, considered = final.names[number], consider.sigmas[number]
-        test = tests.get(number, ParameterTest(number, np.nan, np.nan, np.nan))
+        test = by_number.get(number, ParameterTest(number, np.nan, np.nan, np.nan, np.nan))
         if number in freed:
-            sigma = by_name.loc[name, "sigma_total"]
-            test = ParameterTest(number, by_name.loc[name, "value"], sigma, float(np.hypot(sigma, considered)))
+            value, sigma = by_name.loc[name, ["value", "sigma_total"]]
+            test = ParameterTest(number, value, sigma, float(np.hypot(sigma, considered)), np.nan)
         row: dict[str, Any] = {"unknown": name, "estimated": number in freed}
         row |= {"known": number in known, "considered": considered}
         row |= {"value": test.value, "sigma": test.sigma, "expected": test.expected}
-        row |= {"by_session": by_session.get(number, np.nan)}
+        row |= {"strength": test.strength, "by_session": by_session.get(name, np.nan)}
         rows.append(row | {f"effect_{axis}": effects[k, number] for k, axis in enumerate(MOUNT_NAMES)})
     return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces)])
 
@@ -169,11 +175,27 @@ def _surface_rows(solution: Solution, surfaces: slice) -> list[dict[str, Any]]:
     if not np.any(effects):
         return []
     none = {"estimated": False, "known": False, "considered": 1.0}
-    none |= dict.fromkeys(("value", "sigma", "expected", "by_session"), np.nan)
+    none |= dict.fromkeys(("value", "sigma", "expected", "strength", "by_session"), np.nan)
     return [
         {"unknown": f"surfaces_{name}"} | none | {f"effect_{axis}": of[k] for k, axis in enumerate(MOUNT_NAMES)}
         for name, of in zip(MOUNT_NAMES, effects.T, strict=True)
     ]
+
+
+def _set_table(tests: Sequence[SetTest], by_session: Mapping[str, float]) -> pd.DataFrame:
+    """Return table ``sets``: the joint test of each set of parameters."""
+    rows = [
+        {
+            "set": one.name,
+            "parameters": " ".join(one.parameters),
+            "fall": one.test.fall,
+            "dof": one.test.dof,
+            "strength": one.test.strength,
+            "by_session": by_session.get(one.name, np.nan),
+        }
+        for one in tests
+    ]
+    return pd.DataFrame(rows, columns=[column.name for column in SETS.columns])
 
 
 def _surfaces_table(adjustment: MountAdjustment, statistics: ResidualStatistics) -> pd.DataFrame:

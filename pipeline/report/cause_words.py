@@ -1,6 +1,7 @@
-"""The estimate of a fixed parameter in words, with the setting or the device to check."""
+"""The estimate of a parameter in words, with the setting or the device to check; and sets of parameters in words."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,18 @@ WORDS = {  # by parameter: scale and unit of its estimate, and the words round i
         "a sound speed that changes with depth, by {} per metre; take a (better) cast",
     ),
 }
+WORDS_OF_SETS = {  # with a place for the names of the strongest
+    "faces": "the target: several faces stand off, each by its own ({} most); survey them all, and give them in "
+    "as_built.faces",
+    "wet_shifts": "the target: the wet faces of several families stand off against the dry ones ({} most); check its "
+    "shape in the config, and its survey",
+    "wet_turns": "the target: the wet faces of several families are turned or lean against the dry ones ({} most); "
+    "survey them",
+    "wet_bows": "the target: the wet faces of several families are bowed ({} most); survey them",
+    "mbes_detection": "the sonar's ranges go with the angle at which it sees a face, and are off on horizontal faces; "
+    "look at its bottom detection, and at what coats the faces",
+}
+NAMED_OF_SET = 3
 PLACES = {  # of the transmitter by component: where it sits if the estimate is positive, and if it is negative
     "projector_x": ("farther to starboard", "farther to port"),
     "projector_y": ("farther forward", "farther aft"),
@@ -94,6 +107,24 @@ def words_of(row: Mapping[Any, Any]) -> str:
     if name.startswith("laser_lever_arm"):
         return f"laser.mount: {name[-1]}_m should be {size_words(1e3 * value, 1e3 * sigma, 'mm')} more"
     return _words_of_wet_faces(name, value, sigma)
+
+
+def words_of_set(name: str, by_strength: Sequence[str]) -> str:
+    """Return in words that a set of parameters is wrong.
+
+    Parameters
+    ----------
+    name : of the set
+    by_strength : names of its parameters, the strongest first
+
+    >>> words_of_set("wet_turns", ["wet_P1_turn_2", "wet_P1_turn_1", "wet_H_turn_1"]).partition(";")[0]
+    'the target: the wet faces of several families are turned or lean against the dry ones (P1 and H most)'
+    """
+    places = [one.removeprefix("face_").removeprefix("wet_") for one in by_strength]
+    if name != "faces":
+        places = [re.sub(r"_(shift|turn_.|bow)$", "", place) for place in places]
+    *others, last = list(dict.fromkeys(places))[:NAMED_OF_SET]
+    return WORDS_OF_SETS[name].format(f"{', '.join(others)} and {last}" if others else last)
 
 
 def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:

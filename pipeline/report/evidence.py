@@ -19,6 +19,7 @@ from pipeline.artefacts.catalogue.results import (
     GROUPS,
     PARTS,
     PATTERNS,
+    SETS,
 )
 from pipeline.artefacts.catalogue.target import FACES, PLANES, PROVISIONAL_MOUNT, SOUNDING_MOMENTS, TARGET_POSE
 
@@ -41,6 +42,7 @@ class Evidence:
     drift: Annotated[pd.DataFrame, DRIFT]
     drift_figures: Annotated[pd.DataFrame, DRIFT_FIGURES]
     freed: Annotated[pd.DataFrame, FREED]
+    sets: Annotated[pd.DataFrame, SETS]
     patterns: Annotated[pd.DataFrame, PATTERNS]
     parts: Annotated[pd.DataFrame, PARTS]
     cells: Annotated[pd.DataFrame, CELLS]

@@ -1,12 +1,13 @@
 """What would explain the residuals: parameters of all points, and parts of the points, in one list by their strength.
 
-A parameter's strength is its estimate from the points over the sigma from noise (:mod:`~pipeline.report
-.suspected_causes`). That of a pass, face, step or ping is its mean over the sigma of this mean
-(:mod:`~pipeline.report.residual_tests`). Each is the ratio of one alternative's estimate to its sigma, against the
-same null hypothesis, that all is as the settings say. The alternative with the largest is the most likely one (Baarda
-1968, "A testing procedure for use in geodetic networks"; for alternatives of different kinds Teunissen 2018,
-"Distributional theory for the DIA method", 3.2). The sigma of a mean comes from its scatter, that of a parameter from
-the model: degrees of freedom are not counted, because a large ratio over few of them would then be named too late.
+A parameter's strength is the root of the fall of the least sum of squares if it is freed; that of a set of parameters
+is the normal deviate as improbable as their common fall (:mod:`~pipeline.report.suspected_causes`). That of a pass,
+face, step or ping is its mean over the sigma of this mean (:mod:`~pipeline.report.residual_tests`). All are against the
+same null hypothesis, that all is as the settings and their a-priori sigmas say. The alternative with the largest is the
+most likely one (Baarda 1968, "A testing procedure for use in geodetic networks"; for alternatives of different kinds
+Teunissen 2018, "Distributional theory for the DIA method", 3.2). The sigma of a mean comes from its scatter, that of a
+parameter from the model: degrees of freedom of a sigma are not counted, because a large ratio over few of them would
+then be named too late.
 """
 
 from collections.abc import Sequence
@@ -31,8 +32,8 @@ class Hypothesis:
 
     Attributes
     ----------
-    kind : parameter, pass, face, step, ping or drift
-    name : of the parameter or face; number of the pass; angle of the step; length of the cycle of pings
+    kind : parameter, set (of parameters), pass, face, step, ping or drift
+    name : of the parameter, set or face; number of the pass; angle of the step; length of the cycle of pings
     sigmas : its strength
     words : for people
     """
@@ -51,7 +52,9 @@ def hypotheses(parts: Sequence[DeviatingPart], causes: Sequence[SuspectedCause])
     parts : deviating parts of the points
     causes : suspected causes
     """
-    found = [Hypothesis("parameter", cause.unknown, cause.normalised, cause.words) for cause in causes]
+    found = [
+        Hypothesis("set" if cause.is_set else "parameter", cause.name, cause.strength, cause.words) for cause in causes
+    ]
     for part in parts:
         found.append(Hypothesis(part.kind, part.name, part.strength, PART_WORDS[part.kind].format(part.name)))
     return sorted(found, key=lambda hypothesis: -hypothesis.sigmas)

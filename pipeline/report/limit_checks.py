@@ -3,21 +3,30 @@
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipeline.config.pool import VerdictLimits
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
+NAMED_SOURCES = 2  # of a sigma above its limit: so many sources are named
+
 
 def sigmas_above_limit(
-    sigmas: Mapping[str, float] | None, limits: VerdictLimits, held: Collection[str]
+    sigmas: Mapping[str, float] | None,
+    limits: VerdictLimits,
+    held: Collection[str],
+    sources: Mapping[str, NDArray[np.float64]],
 ) -> list[Statement]:
-    """Return a reason for each mount parameter whose total sigma is above its limit.
+    """Return a reason for each mount parameter whose total sigma is above its limit, with what makes it so large.
 
     Parameters
     ----------
     sigmas : total sigmas by setting, degrees and m; None if the adjustment has none
     limits : limits of the total sigmas
     held : names of the parameters that may be above it
+    sources : contributions (6,) of the sources to the total sigmas, rad and m, by their words
     """
     if sigmas is None:
         return [Statement(ReasonCode.NO_COVARIANCE, "the adjustment has no covariance")]
@@ -26,11 +35,20 @@ def sigmas_above_limit(
         Statement(
             ReasonCode.SIGMA_ABOVE_LIMIT,
             f"total sigma of {MOUNT_WORDS[place]} is {sigmas[key]:.4g}{bounds[unit][1]}, above the limit of "
-            f"{bounds[unit][0]:g}{bounds[unit][1]}",
+            f"{bounds[unit][0]:g}{bounds[unit][1]}{_largest(sources, place, unit)}",
         )
         for name, place, key, unit in PARAMETERS
         if name not in held and not sigmas[key] <= bounds[unit][0]
     ]
+
+
+def _largest(sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:
+    """Return in words the largest contributions to one sigma; nothing if no source is known."""
+    scale, symbol = (float(np.degrees(1.0)), "°") if unit == "deg" else (1.0, " m")
+    of_sigma = {words: scale * float(of_source[place]) for words, of_source in sources.items() if of_source[place] > 0}
+    largest = sorted(of_sigma.items(), key=lambda item: -item[1])[:NAMED_SOURCES]
+    named = [f"{words} ({size:.2g}{symbol})" for words, size in largest]
+    return f", mostly from {' and '.join(named)}" if named else ""
 
 
 def patent_reasons(

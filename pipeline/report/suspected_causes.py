@@ -1,4 +1,4 @@
-"""Suspected causes (parameters that the residuals contradict), and the parameters that adjust.free names.
+"""Suspected causes (parameters that would explain the residuals), and the parameters that adjust.free names.
 
 Table ``freed`` has the single-parameter test of each parameter that is fixed, or known beforehand: its estimate from
 the points alone. The residuals contradict it if this estimate is farther from zero than noise and all a-priori errors
@@ -6,11 +6,12 @@ explain: its own, and those of others that look alike. All these tests have one 
 :func:`~pipeline.maths.adjustment.mean_tests.joint_limit`): if all errors are as the settings say, one of them exceeds
 it with the chance ``adjust.test_level``. So with a hundred parameters it is 4.4 sigmas.
 
-One error often moves the estimates of several parameters. The report names the cause that explains most, with the
-largest value over sigma. Where one parameter is contradicted, this may be another that is not: a parameter with a large
-a-priori sigma, which explains the residuals without being off its setting. The data may also say that the INS drifts
-more than its figures say. Where one parameter explains more than that (column ``by_session``), all count with the drift
-as its figures say.
+One error often moves the estimates of several parameters. The report names the cause that explains most, by its
+strength: the root of the fall of the least sum of squares if it is freed. Where one parameter is contradicted, this may
+be another that is not: a fixed parameter with a large a-priori sigma, which explains the residuals without being off
+its setting. Or it is a set of parameters that are wrong all at once (table ``sets``): a set is a cause in place of its
+parameters where it is stronger than each of them. The data may also say that the INS drifts more than its figures say.
+Where one parameter explains more than that (column ``by_session``), all count with the drift as its figures say.
 """
 
 from collections.abc import Mapping
@@ -22,7 +23,7 @@ import pandas as pd
 
 from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.mount_parameters import MOUNT_NAMES
-from pipeline.report.cause_words import words_of
+from pipeline.report.cause_words import words_of, words_of_set
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 OF_HEAD = "projector_"  # beginning of the names of parameters that a survey with the head has as well
@@ -32,15 +33,17 @@ UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence")
 
 @dataclass(frozen=True)
 class SuspectedCause:
-    """A parameter that would explain the residuals: its name and words, and its value over the sigma from noise.
+    """A parameter or a set of them that would explain the residuals: its name, words and strength.
 
-    not_drift: it explains more than another drift than the session's would; ``normalised`` is with the session's.
+    not_drift: it explains more than another drift than the session's would; ``strength`` is with the session's.
+    is_set: it is a set of parameters.
     """
 
-    unknown: str
+    name: str
     words: str
-    normalised: float
+    strength: float
     not_drift: bool = False
+    is_set: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,8 +71,8 @@ def significance_limit(freed: pd.DataFrame, level: float) -> float:
     return joint_limit(int(np.isfinite(freed["expected"]).sum()), level)
 
 
-def suspected_causes(freed: pd.DataFrame, level: float) -> list[SuspectedCause]:
-    """Return the suspected causes from table ``freed``, the one with the largest value over sigma first.
+def suspected_causes(freed: pd.DataFrame, sets: pd.DataFrame, level: float) -> list[SuspectedCause]:
+    """Return the suspected causes, the strongest first, from the tables ``freed`` and ``sets``.
 
     There are none unless the residuals contradict at least one parameter that ``adjust.free`` does not name. A coarse
     mount that is an observation is judged by itself (:mod:`~pipeline.report.coarse_mount`).
@@ -78,17 +81,24 @@ def suspected_causes(freed: pd.DataFrame, level: float) -> list[SuspectedCause]:
     tested = freed[~freed["estimated"] & ~freed["unknown"].isin(MOUNT_NAMES)].to_dict("records")
     if not any(abs(row["value"]) > limit * row["expected"] for row in tested):
         return []
-    causes = [
-        SuspectedCause(row["unknown"], words_of(row), _strength(row), bool(np.isfinite(row["by_session"])))
-        for row in tested
-        if abs(row["value"]) > limit * row["sigma"]
-    ]
-    return sorted(causes, key=lambda cause: -cause.normalised)
+    strengths = {str(row["unknown"]): _strength(row) for row in tested}
+    causes = {
+        name: SuspectedCause(name, words_of(row), strengths[name], bool(np.isfinite(row["by_session"])))
+        for name, row in zip(strengths, tested, strict=True)
+        if strengths[name] > limit
+    }
+    for row in sets.to_dict("records"):
+        by_strength = sorted(row["parameters"].split(), key=lambda name: -strengths.get(name, 0.0))
+        if _strength(row) > max(limit, strengths.get(by_strength[0], 0.0)):
+            causes = {name: cause for name, cause in causes.items() if name not in by_strength}
+            words, not_drift = words_of_set(row["set"], by_strength), bool(np.isfinite(row["by_session"]))
+            causes[row["set"]] = SuspectedCause(row["set"], words, _strength(row), not_drift, is_set=True)
+    return sorted(causes.values(), key=lambda cause: -cause.strength)
 
 
 def _strength(row: Mapping[Any, Any]) -> float:
     by_session = float(row["by_session"])
-    return by_session if np.isfinite(by_session) else abs(float(row["value"])) / float(row["sigma"])
+    return by_session if np.isfinite(by_session) else float(row["strength"])
 
 
 def errors_allowed_for(freed: pd.DataFrame, level: float) -> list[Statement]:

@@ -48,6 +48,7 @@ from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.residual_tests import deviating_parts, deviations
 from pipeline.report.residual_words import ResidualTests
+from pipeline.report.sigma_sources import contributions
 from pipeline.report.suspected_causes import (
     SuspectedCause,
     estimated_parameters,
@@ -55,7 +56,7 @@ from pipeline.report.suspected_causes import (
     suspected_causes,
 )
 
-NEARLY_AS_WELL = 2.0  # sigmas: a cause whose value over sigma is smaller by no more is named beside the first
+NEARLY_AS_WELL = 2.0  # sigmas: a cause whose strength is smaller by no more is named beside the first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +73,7 @@ class Criteria:
     shape : names of the settings of the target's shape, in words
     sides : name of the setting of the target's left and right, in words
     held : mount parameters of a laser that need not be good enough, as long as others are
+    laser_correlates : whether the sonar is calibrated, and the laser's mount has a covariance
     """
 
     limits: VerdictLimits
@@ -82,6 +84,7 @@ class Criteria:
     shape: str
     sides: str = "the target's left and right"
     held: Collection[str] = ()
+    laser_correlates: bool = False
 
 
 def rejections(
@@ -123,7 +126,8 @@ def rejections(
     if len(criteria.held) == len(PARAMETERS):
         words = "no mount parameter is good enough: none is within its limit and better than the coarse mount"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
-    wide = sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held)
+    sources = contributions(evidence.freed, evidence.estimate, criteria.laser_correlates)
+    wide = sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held, sources)
     reasons += [off_figures, *wide] if wide and off_figures is not None else wide
     if criteria.method != "adjustment" and evidence.corrections is not None:
         row = evidence.corrections.set_index("method").loc[criteria.method]
@@ -146,7 +150,7 @@ def explanations(evidence: Evidence, criteria: Criteria) -> list[Hypothesis]:
     if _doubts(evidence, criteria) or evidence.summary["reason"].iloc[0]:
         return []
     parts = deviating_parts(_residual_tests(evidence, criteria), evidence.parts, criteria.test_level)
-    return hypotheses(parts, suspected_causes(evidence.freed, criteria.test_level))
+    return hypotheses(parts, suspected_causes(evidence.freed, evidence.sets, criteria.test_level))
 
 
 def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: Statement | None) -> list[Statement]:
@@ -156,8 +160,8 @@ def _residual_reasons(evidence: Evidence, criteria: Criteria, drift_check: State
     is wrong comes after it.
     """
     deviating = deviations(_residual_tests(evidence, criteria), evidence.parts, criteria.test_level)
-    causes = suspected_causes(evidence.freed, criteria.test_level)
-    strongest = causes[0].normalised if causes else 0.0
+    causes = suspected_causes(evidence.freed, evidence.sets, criteria.test_level)
+    strongest = causes[0].strength if causes else 0.0
     stronger = [deviation.statement for deviation in deviating if deviation.strength > strongest]
     weaker = [deviation.statement for deviation in deviating if deviation.strength <= strongest]
     reasons = stronger + _suspected_cause(causes, bool(stronger)) + weaker
@@ -176,7 +180,7 @@ def _residual_tests(evidence: Evidence, criteria: Criteria) -> ResidualTests:
 
 
 def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Statement]:
-    """Return a reason with the parameter that explains the residuals best, and the number of the others.
+    """Return a reason with the parameter or set that explains the residuals best, and the number of the others.
 
     Others that explain them nearly as well are named, too. ``is_second``: a face, step, pass or ping explains them
     better.
@@ -184,13 +188,13 @@ def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Stat
     if not causes:
         return []
     first = causes[0]
-    rivals = [cause for cause in causes[1:] if first.normalised - cause.normalised <= NEARLY_AS_WELL]
-    nearly = "".join(f"; nearly as well ({cause.normalised:.0f} sigma): {cause.words}" for cause in rivals)
+    rivals = [cause for cause in causes[1:] if first.strength - cause.strength <= NEARLY_AS_WELL]
+    nearly = "".join(f"; nearly as well ({cause.strength:.0f} sigma): {cause.words}" for cause in rivals)
     others = len(causes) - 1 - len(rivals)
-    rest = f"; {plural(others, 'other parameter')} would explain it less well" if others else ""
+    rest = f"; {plural(others, 'other cause')} would explain it less well" if others else ""
     unless = ", unless the face, step, pass or ping named above is itself the cause" if is_second else ""
     given = "; a larger drift of the INS would explain less" if first.not_drift else ""
-    words = f"likely cause of residuals{unless} ({first.normalised:.0f} sigma{given}): {first.words}{nearly}{rest}"
+    words = f"likely cause of residuals{unless} ({first.strength:.0f} sigma{given}): {first.words}{nearly}{rest}"
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 
 

@@ -19,7 +19,7 @@ def test_the_stronger_of_a_parameter_and_a_part_of_the_points_is_named_first(mea
     unless = "unless the face, step, pass or ping named above is itself the cause (6 sigma)"
     assert (unless in reasons[ReasonCode.SUSPECTED_CAUSE]) == is_first
     step = Hypothesis("step", "20", pytest.approx(1e4 * mean_m), "a step of the fan at 20°")
-    words = suspected_causes(tables.freed, ADJUSTED.test_level)[0].words
+    words = suspected_causes(tables.freed, tables.sets, ADJUSTED.test_level)[0].words
     parameter = Hypothesis("parameter", "sound_speed", pytest.approx(6.0), words)
     assert explanations(tables, ADJUSTED) == ([step, parameter] if is_first else [parameter, step])
 

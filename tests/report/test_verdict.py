@@ -26,6 +26,7 @@ from tests.support.evidence import (
     codes,
     drift,
     evidence,
+    freed_table,
     judged,
     methods,
 )
@@ -88,8 +89,8 @@ def test_a_coarse_mount_is_contradicted_from_the_limit_of_all_tests_on(value):
 
 def test_of_a_contradicted_coarse_mount_the_value_farthest_off_comes_first():
     wrong = [("rotation_z", 0.005), ("lever_arm_y", -0.009), ("rotation_x", 0.0035)]
-    row = {"estimated": False, "sigma": 5e-4, "expected": 1e-3}
-    freed = pd.DataFrame([row | {"unknown": name, "value": value} for name, value in wrong])
+    row = {"sigma": 5e-4, "expected": 1e-3}
+    freed = freed_table(*(row | {"unknown": name, "value": value} for name, value in wrong))
     (reason,) = judged(replace(evidence(), freed=freed))
     assert "moved by -9.0 ± 0.5 mm along body y, 9.0 times" in reason.words
     assert "; beyond the limit of 3.6 as well: yaw; " in reason.words
@@ -150,8 +151,7 @@ def test_the_limit_is_for_all_parameters_together():
     others += [{"unknown": "face_unseen", "value": np.nan, "sigma": np.nan, "expected": np.nan}]
     for share, expected in ((0.99, []), (1.01, [ReasonCode.SUSPECTED_CAUSE])):
         one = {"unknown": "face_P1-3", "value": share * limit * 1e-4, "sigma": 1e-4, "expected": 1e-4}
-        table = pd.DataFrame([one, *others]).assign(estimated=False, by_session=np.nan)
-        reasons = judged(replace(evidence(), freed=table))
+        reasons = judged(replace(evidence(), freed=freed_table(one, *others)))
         assert codes(reasons) == expected
         assert all("face P1-3 stands out by +0.4 ± 0.1 mm" in reason.words for reason in reasons)
 
@@ -180,12 +180,9 @@ def test_what_was_freed_where_there_is_no_result():
 
 def test_of_several_causes_the_most_telling_is_named():
     sigmas = (("mbes_range", 1e-3), ("laser_range", 1e-4))
-    sonar, laser = (
-        {"unknown": name, "estimated": False, "expected": sigma, "sigma": sigma, "by_session": np.nan}
-        for name, sigma in sigmas
-    )
-    both = replace(evidence(), freed=pd.DataFrame([sonar | {"value": 0.01}, laser | {"value": 0.002}]))
-    (reason,) = judged(both)
+    sonar, laser = ({"unknown": name, "expected": sigma, "sigma": sigma} for name, sigma in sigmas)
+    freed = freed_table(sonar | {"value": 0.01}, laser | {"value": 0.002})
+    (reason,) = judged(replace(evidence(), freed=freed))
     assert reason.code == ReasonCode.SUSPECTED_CAUSE
     assert "20 sigma): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason.words
 
@@ -193,12 +190,51 @@ def test_of_several_causes_the_most_telling_is_named():
 @pytest.mark.parametrize(("value", "is_named"), [(0.00181, True), (0.00179, False)])
 def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_named):
     names = (("mbes_range", 0.002), ("laser_range", value), ("mbes_level_range", 0.001))
-    one = {"estimated": False, "expected": 1e-4, "sigma": 1e-4, "by_session": np.nan}
-    (reason,) = judged(replace(evidence(), freed=pd.DataFrame([one | {"unknown": k, "value": v} for k, v in names])))
+    one = {"expected": 1e-4, "sigma": 1e-4}
+    freed = freed_table(*(one | {"unknown": name, "value": value} for name, value in names))
+    (reason,) = judged(replace(evidence(), freed=freed))
     words = reason.words
     assert "(20 sigma): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words
     assert ("longer; nearly as well (18 sigma): the laser's ranges: they should be +1.8 ± 0.1 mm" in words) == is_named
-    assert words.endswith(f"; {'1 other parameter' if is_named else '2 other parameters'} would explain it less well")
+    assert words.endswith(f"; {'1 other cause' if is_named else '2 other causes'} would explain it less well")
+
+
+def test_a_known_error_is_as_strong_as_its_prior_information_lets_it_be():
+    """4 mm of a bow known to 1 mm, 20 sigmas of noise, explain less than 5 sigmas of a face, which is not known."""
+    bow = {"unknown": "wet_P2_bow", "value": 0.004, "sigma": 2e-4, "expected": 1.02e-3, "strength": 3.92}
+    face = {"unknown": "face_P1-0", "value": 0.0025, "sigma": 5e-4, "expected": 5e-4}
+    (reason,) = judged(replace(evidence(), freed=freed_table(bow, face)))
+    assert "(5 sigma): the target: face P1-0 stands out by +2.5 ± 0.5 mm" in reason.words
+    assert "nearly as well (4 sigma): the target: its wet faces of the wall are bowed outward" in reason.words
+
+
+@pytest.mark.parametrize(("strength", "is_named"), [(6.1, True), (5.9, False)])
+def test_a_set_stands_in_place_of_its_parameters_where_it_is_stronger_than_each(strength, is_named):
+    """Two faces of 6 and 5.5 sigmas."""
+    one = {"expected": 1e-4, "sigma": 1e-4}
+    freed = freed_table(one | {"unknown": "face_P1-0", "value": 5.5e-4}, one | {"unknown": "face_P2", "value": 6e-4})
+    both = {"parameters": "face_P1-0 face_P2", "strength": strength}
+    tables = replace(evidence(sets=[both]), freed=freed)
+    (reason,) = judged(tables)
+    assert ("(6 sigma): the target: several faces stand off, each by its own (P2 and P1-0" in reason.words) == is_named
+    assert ("(6 sigma): the target: face P2 stands out by +0.6 ± 0.1 mm" in reason.words) != is_named
+    found = [(one.kind, one.name) for one in explanations(tables, ADJUSTED)]
+    assert found == ([("set", "faces")] if is_named else [("parameter", "face_P2"), ("parameter", "face_P1-0")])
+
+
+def test_a_set_alone_is_no_reason():
+    """Where no parameter is contradicted nothing needs an explanation."""
+    assert judged(evidence(sets=[{"strength": 50.0}])) == []
+
+
+def test_a_sigma_above_its_limit_names_its_two_largest_sources():
+    effects = {"effect_lever_arm_y": 0.003, "effect_lever_arm_x": 0.009}
+    tables = replace(
+        evidence(freed={"unknown": "mbes_range"} | effects),
+        estimate=pd.DataFrame({"unknown": MOUNT_NAMES, "sigma": 4e-3, "sigma_total": 5e-3}),
+    )
+    (reason,) = judged(tables, replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=1.0, max_sigma_m=LIMITS[1][1])))
+    assert reason.words.endswith(", mostly from noise (0.004 m) and the sonar's ranges (0.003 m)")
 
 
 def test_an_ins_that_is_allowed_no_drift_is_named_beside_the_first_cause():

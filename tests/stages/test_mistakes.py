@@ -5,9 +5,11 @@ from typing import Any
 
 import pytest
 
+from pipeline.adjustment.parameter_strengths import SETS
 from pipeline.config.yaml_models import parse
 from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, MBES_PARAMETERS, WET_PARAMETERS
 from pipeline.report.reason_codes import ReasonCode
+from pipeline.report.sigma_sources import NOISE
 from pipeline.simulation.face_faults import face_of_polygon
 from pipeline.simulation.mesh import build_mesh
 from pipeline.simulation.scenario import Scenario
@@ -48,7 +50,7 @@ def test_names_that_would_be_right_are_names_of_the_program() -> None:
     faces = {face_of_polygon(default.target, polygon) for polygon in polygons} - {""}
     for name, kind in MISTAKES.items():
         for right in kind.right:
-            assert right in set(ReasonCode) | faces | PARAMETERS | {REFUSED}, (name, right)
+            assert right in set(ReasonCode) | faces | PARAMETERS | set(SETS) | {REFUSED, NOISE}, (name, right)
 
 
 @pytest.mark.parametrize(
@@ -62,11 +64,21 @@ def test_names_that_would_be_right_are_names_of_the_program() -> None:
         (["too_few_soundings", "suspected_cause"], [("parameter", "mbes_range")], {"too_few_soundings"}),
         (["residuals_by_angle"], [], {"residuals_by_angle"}),
         (["not_converged", "suspected_cause"], [("parameter", "mbes_range")], {"mbes_range"}),
+        (["suspected_cause"], [("set", "faces"), ("parameter", "mbes_range")], {"faces", "residuals_by_face"}),
+        (["suspected_cause"], [("set", "wet_bows")], {"wet_bows"}),
     ],
 )
 def test_what_is_named_first(codes: list[str], explanations: list[tuple[str, str]], expected: set[str]) -> None:
-    result = {"reason_codes": codes, "hypotheses": [{"kind": kind, "name": name} for kind, name in explanations]}
+    hypotheses = [{"kind": kind, "name": name} for kind, name in explanations]
+    result = {"reason_codes": codes, "reasons": codes, "hypotheses": hypotheses}
     named = named_first(result)
     assert expected <= named
     assert "sound_speed" not in named
     assert ("mbes_range" in named) == (expected == {"mbes_range"})
+
+
+@pytest.mark.parametrize(("source", "is_named"), [("noise", True), ("the sonar's ranges", False)])
+def test_noise_is_named_where_a_sigma_is_mostly_noise(source: str, is_named: bool) -> None:
+    words = f"total sigma of yaw is 0.06°, above the limit of 0.05°, mostly from {source} (0.05°) and noise (0.01°)"
+    result = {"reason_codes": ["sigma_above_limit"], "reasons": [words], "hypotheses": []}
+    assert ("noise" in named_first(result)) == is_named

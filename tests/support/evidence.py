@@ -40,6 +40,7 @@ def evidence(
     summary: Mapping[str, Any] | None = None,
     alternating: Mapping[str, Any] | None = None,
     freed: Mapping[str, Any] | None = None,
+    sets: Sequence[Mapping[str, Any]] = (),
     patterns: Sequence[Mapping[str, Any]] = ({},),
     parts: Mapping[str, Any] | None = None,
     count: int = 500,
@@ -67,8 +68,9 @@ def evidence(
             "rms_m": [0.005, 0.01, rms_m],
         }
     )
-    nothing = {"unknown": "sound_speed", "estimated": False, "known": False}
+    nothing: dict[str, Any] = {"unknown": "sound_speed", "estimated": False, "known": False}
     nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4, "by_session": np.nan}
+    of_set = {"set": "faces", "parameters": "face_P2", "strength": 0.0, "by_session": np.nan}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     pattern["sigma_mean_m"] = 1e-4
     geometry = [("remedy", "two more passes at 3 m would do")]
@@ -86,10 +88,18 @@ def evidence(
         "summary": pd.DataFrame([summary_row | dict(summary or {})]),
         "cells": cells,
         "geometry": pd.DataFrame(geometry, columns=["kind", "words"]),
-        "freed": pd.DataFrame([nothing | dict(freed or {})]),
+        "freed": freed_table(nothing | dict(freed or {})),
+        "sets": pd.DataFrame([of_set | dict(changes) for changes in sets]),
+        "estimate": pd.DataFrame({"unknown": MOUNT_NAMES, "sigma": 1e-4, "sigma_total": 1e-4}),
         "patterns": pd.DataFrame([pattern | {"normalised": 0.3} | dict(changes) for changes in patterns]),
     }
     return Evidence(**tables)
+
+
+def freed_table(*rows: Mapping[str, Any]) -> pd.DataFrame:
+    """The table of single-parameter tests; each strength is that of a fixed parameter, and no error moves the mount."""
+    usual = {"estimated": False, "by_session": np.nan} | {f"effect_{name}": 0.0 for name in MOUNT_NAMES}
+    return pd.DataFrame([usual | {"strength": abs(row["value"]) / row["sigma"]} | dict(row) for row in rows])
 
 
 def judged(tables: Evidence, criteria: Criteria = ADJUSTED) -> list[Statement]:

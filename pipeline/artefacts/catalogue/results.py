@@ -88,12 +88,25 @@ FREED = Artefact(
                "its estimate from the points alone, without its a-priori sigma (NaN: not determined)"),
         Column("sigma", F64, "rad, m, s, 1 or 1/s", "standard deviation of this estimate"),
         Column("expected", F64, "rad, m, s, 1 or 1/s", "its standard deviation if all a-priori errors hold"),
+        Column("strength", F64, "1", "root of the fall of the least sum of squares if it is freed"),
         Column("by_session", F64, "1",
-               "|value| / sigma with the drift as configured, if a parameter explains more than any drift (else NaN)"),
+               "strength with the drift as configured, if a parameter explains more than any drift (else NaN)"),
         *(
             Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount by an error of one a-priori sigma")
             for kind, unit in (("rotation", "rad"), ("lever_arm", "m")) for axis in "xyz"
         ),
+    ),
+)
+SETS = Artefact(
+    "adjust", "sets", "table", "joint test of each set of parameters that may all be wrong at once",
+    (
+        Column("set", TEXT, "", "faces, wet_shifts, wet_turns, wet_bows or mbes_detection"),
+        Column("parameters", TEXT, "", "those of its parameters that the points determine, separated by blanks"),
+        Column("fall", F64, "1", "fall of the least sum of squares if all are freed"),
+        Column("dof", I64, "", "degrees of freedom of the fall"),
+        Column("strength", F64, "1", "normal deviate that is as improbable as the fall"),
+        Column("by_session", F64, "1",
+               "strength with the drift as configured, if a parameter explains more than any drift (else NaN)"),
     ),
 )
 SURFACES = Artefact(

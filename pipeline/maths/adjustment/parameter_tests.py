@@ -20,6 +20,11 @@ the variance of that if all a-priori errors hold:
 values with sigmas q, W_ii = (1 - C_ii / q²) / q², and the parameter would be d_i / (1 - C_ii / q²) without its prior
 information: information adds up. Errors x_h of the fixed parameters change d by S x_h, and so this by (P S x_h)_i /
 W_ii.
+
+If that parameter is freed, the least sum of squares J, in which the values known beforehand count as observations,
+falls by M_ii times the square of its value, or by W_ii times that. The root of this fall is the parameter's *strength*.
+All falls are from the same J. So the strengths of fixed parameters and of those with a value known beforehand can be
+compared (Teunissen 2018, "Distributional theory for the DIA method", 3.2).
 """
 
 from dataclasses import dataclass
@@ -38,13 +43,14 @@ KNOWN_SHARE = 1e-6  # least share of the information that counts
 class ParameterTest:
     """Value and sigma that a parameter would have without what is known of it: if it were not fixed, or had no prior.
 
-    expected: standard deviation of the value if all a-priori errors hold.
+    expected: standard deviation of the value if all a-priori errors hold; strength: root of the fall of J.
     """
 
     parameter: int
     value: float
     sigma: float
     expected: float
+    strength: float
 
 
 def single_parameter_tests(
@@ -75,7 +81,8 @@ def single_parameter_tests(
         if information > RANK_TOLERANCE * max(float(normal[number, number]), 1e-300):
             value, variance = float(values[place]) / information, 1 / information
             expected = float(np.sqrt(variance + a_priori[place] / information**2))
-            tests.append(ParameterTest(number, value, float(np.sqrt(variance)), expected))
+            strength = abs(value) * float(np.sqrt(information))
+            tests.append(ParameterTest(number, value, float(np.sqrt(variance)), expected, strength))
     return tests
 
 
@@ -108,5 +115,6 @@ def prior_parameter_tests(
         if information > KNOWN_SHARE * own:
             expected = float(np.sqrt(1 / information + others[k] / information**2))
             sigma = float(np.sqrt(max(1 / information - 1 / own, 0.0)))
-            tests.append(ParameterTest(number, float(misclosure[k]) / information, sigma, expected))
+            value = float(misclosure[k]) / information
+            tests.append(ParameterTest(number, value, sigma, expected, abs(value) * float(np.sqrt(information))))
     return tests
