@@ -11,7 +11,7 @@ from pipeline.artefacts.streams import Batch, Stream
 from pipeline.maths.adjustment.interval_sums import IntervalSums, Runs, merged
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, histogram, robust_scale
-from pipeline.maths.adjustment.weighting import Weighting, rescaled, scatter, shrunk_factors
+from pipeline.maths.adjustment.weighting import Weighting, edge_shares, rescaled, scatter, shrunk_factors
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -115,7 +115,7 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
 
 
 def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -> tuple[Accumulation, Weighting]:
-    """Return the sums rescaled by new variance factors, and the weighting with these factors.
+    """Return the sums rescaled by new variance factors and edge shares, and the weighting with these.
 
     The scatter within the intervals changes the factor of each sensor and surface. Where it has few degrees of freedom,
     the sensor's other surfaces count as well.
@@ -129,12 +129,13 @@ def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -
     weighting : Weighting
         Weights with which the sums were made.
     """
-    factors, sums = dict(weighting.factors), {}
+    factors, shares, sums = dict(weighting.factors), dict(weighting.edge_shares), {}
     surfaces, level = np.arange(len(state.surfaces)), np.array([surface.level for surface in state.surfaces])
     for sensor, intervals in accumulation.sums.items():
-        before = weighting.factors_of(sensor, surfaces)
-        parts = [scatter(intervals, intervals.surface == number, weighting.kept) for number in surfaces]
+        factor, share = weighting.factors_of(sensor, surfaces), weighting.edge_shares_of(sensor, surfaces)
+        parts = [scatter(intervals, intervals.surface == number, weighting.kept, share) for number in surfaces]
         change, dof = np.array([(part.factor, part.dof) for part in parts]).T
-        factors[sensor] = shrunk_factors(np.maximum(before * change, LEAST_SCALE**2), dof, level)
-        sums[sensor] = rescaled(intervals, factors[sensor] / before)
-    return replace(accumulation, sums=sums), replace(weighting, factors=factors)
+        factors[sensor] = shrunk_factors(np.maximum(factor * change, LEAST_SCALE**2), dof, level)
+        shares[sensor] = edge_shares(intervals, len(surfaces))
+        sums[sensor] = rescaled(intervals, factors[sensor] * shares[sensor] / (factor * share))
+    return replace(accumulation, sums=sums), replace(weighting, factors=factors, edge_shares=shares)

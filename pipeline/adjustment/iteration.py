@@ -105,10 +105,13 @@ class MountAdjustment:
     def redundancy(self) -> float:
         """Expectation of the sum of squares: observations with a weight, prior information, less estimated parameters.
 
-        An observation counts as the part of its variance that its weights, robust and near edges, leave. Pose errors do
-        not count: each has one pseudo-observation.
+        Observations count as the part of their variance that robust weights leave, and, with those near edges, as their
+        effective number. Pose errors do not count: each has one pseudo-observation.
         """
-        observations = sum(group.information for group in self.accumulation.groups.values())
+        observations = sum(
+            group.information / float(self.weighting.edge_shares[sensor][surface])
+            for (sensor, surface), group in self.accumulation.groups.items()
+        )
         return self.weighting.kept * observations + self.last.prior.count - len(self.solution.estimated)
 
     @property
@@ -117,8 +120,11 @@ class MountAdjustment:
 
         They show how well intervals, passes and sensors agree.
         """
-        kept = self.weighting.kept
-        parts = [scatter(sums, np.ones(len(sums), dtype=bool), kept) for sums in self.accumulation.sums.values()]
+        kept, shares = self.weighting.kept, self.weighting.edge_shares
+        parts = [
+            scatter(sums, np.ones(len(sums), dtype=bool), kept, shares[sensor])
+            for sensor, sums in self.accumulation.sums.items()
+        ]
         within = sum(part.squares for part in parts), sum(part.dof for part in parts)
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 

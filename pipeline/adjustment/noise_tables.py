@@ -26,9 +26,10 @@ def groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
     """
     surfaces, weighting, sums = adjustment.state.surfaces, adjustment.weighting, adjustment.accumulation.sums
     together: dict[tuple[str, str], list[Member]] = {}
+    shares = weighting.edge_shares
     by_family = []
     for (sensor, number), group in sorted(adjustment.accumulation.groups.items()):
-        within = scatter(sums[sensor], sums[sensor].surface == number, weighting.kept)
+        within = scatter(sums[sensor], sums[sensor].surface == number, weighting.kept, shares[sensor])
         factor = float(weighting.factors[sensor][number])
         member = group, Scatter(factor * within.dof, within.dof)
         family = surfaces[number].family

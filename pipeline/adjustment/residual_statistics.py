@@ -135,7 +135,7 @@ def _batch(
     observations, weighting = model.linearise(sensor, batch, values), values.weighting
     robust, weight = weighting.weights(observations)
     # weights without robust reduction: a bin with large residuals must show, not lose its weight
-    plain = observations.sigma_m * np.sqrt(weighting.factors_of(sensor, observations.surface))
+    plain = weighting.plain_weights(observations)
     normalised = np.where(robust > 0, np.abs(weighting.normalised(observations)), 0.0)
     slot = observations.points["t_ns"] // thinning.slot_ns
     sums = {}
@@ -144,7 +144,7 @@ def _batch(
             first=observations.surface,
             second=np.floor(column / WIDTHS.get(variable, 1.0)).astype(np.int64),
             slot=slot,
-            weight=observations.edge_weight / plain**2,
+            weight=plain,
             v_m=observations.v_m,
             normalised=normalised,
         )

@@ -229,14 +229,14 @@ def _pass_means_table(
     patterns = statistics.patterns
     normalised = patterns[patterns["by"] == "pass"].set_index(["sensor", "family", "low"])["normalised"].to_dict()
     starts, ends = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
-    rows = []
+    weighting, rows = adjustment.weighting, []
     for (sensor, surface, number), mean in sorted(statistics.pass_means.items()):
         sums = adjustment.accumulation.sums[sensor]
         family = adjustment.state.surfaces[surface].family
         beside = sums.record, np.minimum(sums.record + 1, len(t_ns) - 1)  # one of the two may lie outside the pass
         pass_of_interval = np.maximum(*(pass_of(t_ns[record], starts, ends) for record in beside))
         rows_here = (pass_of_interval == number) & (sums.surface == surface)
-        within = scatter(sums, rows_here, adjustment.weighting.kept)
+        within = scatter(sums, rows_here, weighting.kept, weighting.edge_shares[sensor])
         rows.append(
             {
                 "sensor": sensor,

@@ -40,8 +40,8 @@ class IntervalSums:
     first three features and s the time of a point between the two records, 0 to 1:
 
     normal (g, F, F) = Σ w q qᵀ, swept (g, 3, F) = Σ w s q₃ qᵀ, swept_twice (g, 3, 3) = Σ w s² q₃ q₃ᵀ,
-    right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,): points with a weight, a
-    point near an edge counted by its weight there.
+    right (g, F) = Σ w q v, right_swept (g, 3) = Σ w s q₃ v, squares (g,) = Σ w v², count (g,) = Σ e and squared_count
+    (g,) = Σ e² over points with a weight; e is 1, or the weight of a point near an edge.
     """
 
     record: Integers
@@ -53,6 +53,7 @@ class IntervalSums:
     right_swept: Array
     squares: Array
     count: Array
+    squared_count: Array
 
     def __len__(self) -> int:
         return len(self.record)
@@ -116,7 +117,7 @@ class LinearisedPoints:
 
     record, surface (n,): the last INS record before each point, and its surface; share (n,): its time s between that
     record and the next, 0 to 1; features (F, n): q; weight (n,): w; v_m (n,): distance from the surface;
-    count (n,): as which part of a point each counts, None: each that has a weight as one.
+    count (n,): e, as which part of a point each counts, None: each that has a weight as one.
     """
 
     record: Integers
@@ -163,6 +164,7 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
         right_swept=right_swept,
         squares=total(weight * v_m**2),
         count=total(count),
+        squared_count=total(count**2),
     )
     return merged([sums.selected(np.flatnonzero(normal[:, 0, 0] > 0))])
 

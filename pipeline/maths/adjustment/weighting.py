@@ -4,12 +4,20 @@
 beam of 1° spreads over decimetres of slant range on a face at 45° along track, and over millimetres on a wall. f
 follows from the scatter of each interval's points about a plane of their own. When v is fitted by (1, α, β) within an
 interval, pose, mount and surface have no effect. Only the sensor's noise remains (pure error, Draper & Smith 1998,
-2.1). The expectation of the remaining Σ w v² is f times n - rank. The rank is 3 if the points spread over the surface
-and 2 if they lie on a line, like those of one ping. (Noise moves the points of a line aside, and a fit to that
-direction would remove the noise: f came out a third too small.) Robust weights remove a part of the variance of good
-observations too, so the expectation is multiplied by the part that they leave
+2.1). The expectation of the remaining Σ w v² is f times n - rank, where all weights are 1 / σ². The rank is 3 if the
+points spread over the surface and 2 if they lie on a line, like those of one ping. (Noise moves the points of a line
+aside, and a fit to that direction would remove the noise: f came out a third too small.) Robust weights remove a part
+of the variance of good observations too, so the expectation is multiplied by the part that they leave
 (:func:`~pipeline.maths.adjustment.robust_weights.variance_kept`). Where few intervals see a family, f is drawn to the
 sensor's other families: :func:`shrunk_factors`.
+
+**Near edges.** A point near an edge has the weight e / σ², 0 < e < 1, so that it begins to count little by little. But
+its noise is σ, like that of any other. Weighted so, n points give a mean whose variance is not σ² / Σ e, but Σ (e σ)² /
+(Σ e)² = κ σ² / Σ e with the *edge share* κ = Σ e² / Σ e of the family, and only with weights divided by κ the inverse
+of the normal equations is the covariance. So the weights of a family are e / (κ f σ²), and Σ e / κ is the effective
+number of its points. (κ is 0.86 on the default target's tops, 0.95 on its slanted faces. Without it, sigmas came out up
+to a tenth too large.) What is left of Σ w v² in an interval has the expectation (Σ e - rank Σ e² / Σ e) / κ, because a
+fit to weighted points takes away tr((Σ e a aᵀ)⁻¹ Σ e² a aᵀ), with e alike over the interval's points.
 
 **In common.** The points of an interval share errors: the white noise of the INS's records, whose variance factor
 follows from the laser's points (:mod:`~pipeline.maths.adjustment.record_noise`), and those that the soundings of a ping
@@ -55,10 +63,21 @@ class Scatter:
         return self.squares / self.dof if self.dof > 0 else 1.0
 
 
-def scatter(sums: IntervalSums, rows: NDArray[np.bool_], kept: float) -> Scatter:
-    """Return the scatter of the intervals in the mask (g,) together. Intervals of few points are left out.
+def scatter(
+    sums: IntervalSums, rows: NDArray[np.bool_], kept: float, edge_shares: Array | None = None
+) -> Scatter:
+    """Return the scatter of some intervals together. Intervals of few points are left out.
 
-    ``kept``: the part of the variance that the robust weights leave.
+    Parameters
+    ----------
+    sums : IntervalSums
+        The sensor's intervals.
+    rows : (g,) array of bool
+        Those that are used.
+    kept : float
+        The part of the variance that the robust weights leave.
+    edge_shares : (s,) array, optional
+        Edge shares κ by surface, by which the weights of the sums are divided; by default 1.
     """
     use = np.flatnonzero(rows & (sums.count >= FEWEST))
     normal, right = sums.normal[use][:, :N_MOVED, :N_MOVED], sums.right[use][:, :N_MOVED]
@@ -67,8 +86,17 @@ def scatter(sums: IntervalSums, rows: NDArray[np.bool_], kept: float) -> Scatter
     determined = values > FLAT
     along = np.einsum("gik,gi->gk", vectors, right * scale)
     fitted = np.sum(np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0), axis=1)
-    freedom = kept * float(np.sum(sums.count[use] - determined.sum(axis=1)))
-    return Scatter(float(np.sum(sums.squares[use] - fitted)), freedom)
+    count, share = sums.count[use], 1.0 if edge_shares is None else edge_shares[sums.surface[use]]
+    freedom = (count - determined.sum(axis=1) * sums.squared_count[use] / count) / share
+    return Scatter(float(np.sum(sums.squares[use] - fitted)), kept * float(np.sum(freedom)))
+
+
+def edge_shares(sums: IntervalSums, n_surfaces: int) -> Array:
+    """Return the edge share κ = Σ e² / Σ e (s,) of each surface; 1 without points."""
+    count, squared = (
+        np.bincount(sums.surface, weights=part, minlength=n_surfaces) for part in (sums.count, sums.squared_count)
+    )
+    return np.divide(squared, count, out=np.ones(n_surfaces), where=count > 0)
 
 
 def shrunk_factors(factors: Array, dof: Array, level: NDArray[np.bool_]) -> Array:
@@ -100,9 +128,9 @@ def _drawn(factors: Array, dof: Array, prior: float) -> float:
     return float((PRIOR_DOF * prior + dof @ factors) / (PRIOR_DOF + dof.sum()))
 
 
-def rescaled(sums: IntervalSums, factor_by_surface: Array) -> IntervalSums:
-    """Return the sums with the weights divided by the factor of their surface, (s,)."""
-    share = 1 / factor_by_surface[sums.surface]
+def rescaled(sums: IntervalSums, divisors: Array) -> IntervalSums:
+    """Return the sums with the weights divided by a number for each surface, (s,)."""
+    share = 1 / divisors[sums.surface]
     names = ("normal", "swept", "swept_twice", "right", "right_swept", "squares")
     parts = {name: getattr(sums, name) for name in names}
     return replace(sums, **{name: part * share.reshape(-1, *[1] * (part.ndim - 1)) for name, part in parts.items()})
@@ -180,16 +208,17 @@ class Residuals(Protocol):
 
 @dataclass(frozen=True)
 class Weighting:
-    """Variance factors f and robust scales (s,) by sensor and surface, and the bounds of IGG III.
+    """Variance factors f, edge shares κ and robust scales (s,) by sensor and surface, and the bounds of IGG III.
 
-    white (6,): standard deviations of the white noise of the INS's records, m and rad. A sensor without factors or
-    scales has 1 for all surfaces. Bounds None: no weight is reduced. Residuals are normalised by sqrt(f σ² + c²), c
+    white (6,): standard deviations of the white noise of the INS's records, m and rad. A sensor without factors, shares
+    or scales has 1 for all surfaces. Bounds None: no weight is reduced. Residuals are normalised by sqrt(f σ² + c²), c
     being the INS's white noise common to the points of an interval. Without c, points at grazing incidence (σ = 1 mm)
     would be rejected because of the INS's 2 mm. In a trial they were rejected, and the sigmas of the result came out
     3 % too small.
     """
 
     factors: Mapping[str, Array] = field(default_factory=dict)
+    edge_shares: Mapping[str, Array] = field(default_factory=dict)
     scales: Mapping[str, Array] = field(default_factory=dict)
     robust: tuple[float, float] | None = None
     white: Array = field(default_factory=lambda: np.zeros(N_POSE))
@@ -200,11 +229,16 @@ class Weighting:
         return 1.0 if self.robust is None else variance_kept(*self.robust)
 
     def weights(self, residuals: Residuals) -> tuple[Array, Array]:
-        """Return the robust weights w (n,) and the full weights w e / (σ² f) (n,), e being the weight near edges."""
+        """Return the robust weights w (n,) and the full weights w e / (κ f σ²) (n,), e being the weight near edges."""
         size = self.normalised(residuals) / _of_surfaces(self.scales, residuals.sensor, residuals.surface)
         robust = np.ones(len(size)) if self.robust is None else igg3_weights(size, *self.robust)
-        variance = residuals.sigma_m**2 * self.factors_of(residuals.sensor, residuals.surface)
-        return robust, robust * residuals.edge_weight / variance
+        return robust, robust * self.plain_weights(residuals)
+
+    def plain_weights(self, residuals: Residuals) -> Array:
+        """Return the weights e / (κ f σ²) (n,), not reduced for large residuals."""
+        sensor, surface = residuals.sensor, residuals.surface
+        variance = residuals.sigma_m**2 * self.factors_of(sensor, surface)
+        return np.asarray(residuals.edge_weight / (variance * self.edge_shares_of(sensor, surface)))
 
     def normalised(self, residuals: Residuals) -> Array:
         """Return v / sqrt(f σ² + c²) (n,)."""
@@ -214,6 +248,10 @@ class Weighting:
     def factors_of(self, sensor: str, surface: Integers) -> Array:
         """Return the variance factors (n,) of a sensor's observations of these surfaces (n,)."""
         return _of_surfaces(self.factors, sensor, surface)
+
+    def edge_shares_of(self, sensor: str, surface: Integers) -> Array:
+        """Return the edge shares (n,) of a sensor's observations of these surfaces (n,)."""
+        return _of_surfaces(self.edge_shares, sensor, surface)
 
 
 def _of_surfaces(values: Mapping[str, Array], sensor: str, surface: Integers) -> Array:
