@@ -1,0 +1,96 @@
+"""Suspected causes: from which limit on there are any, and which parameter or set of parameters is named first."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from pipeline.config.session import Drift
+from pipeline.report.drift_check import check_ins_drift
+from pipeline.report.reason_codes import ReasonCode
+from pipeline.report.verdict import explanations, rejections
+from tests.support.evidence import ADJUSTED, PASS_3, codes, drift, evidence, freed_table, judged, methods
+
+
+def test_both_sides_of_the_limit_of_one_parameter():
+    """Noise and all a-priori sigmas count together; a normal deviate exceeds 3.29 with the chance 0.001."""
+    near, far = ({"value": value, "sigma": 3e-4, "expected": 5e-4} for value in (3.28 * 5e-4, 3.30 * 5e-4))
+    assert judged(evidence(freed=near)) == []
+    assert codes(judged(evidence(freed=far))) == [ReasonCode.SUSPECTED_CAUSE]
+
+
+def test_the_limit_is_for_all_parameters_together():
+    """Of 87 parameters one exceeds 4.39 with the chance 0.001 = 1 - (1 - p)^87; those not determined do not count."""
+    limit = norm.isf((1 - 0.999 ** (1 / 87)) / 2)
+    others = [{"unknown": f"face_{k}", "value": 0.0, "sigma": 1e-4, "expected": 1e-4} for k in range(86)]
+    others += [{"unknown": "face_unseen", "value": np.nan, "sigma": np.nan, "expected": np.nan}]
+    for share, expected in ((0.99, []), (1.01, [ReasonCode.SUSPECTED_CAUSE])):
+        one = {"unknown": "face_P1-3", "value": share * limit * 1e-4, "sigma": 1e-4, "expected": 1e-4}
+        reasons = judged(replace(evidence(), freed=freed_table(one, *others)))
+        assert codes(reasons) == expected
+        assert all("face P1-3 stands out by +0.4 ± 0.1 mm" in reason.words for reason in reasons)
+
+
+def test_of_several_causes_the_most_telling_is_named():
+    sigmas = (("mbes_range", 1e-3), ("laser_range", 1e-4))
+    sonar, laser = ({"unknown": name, "expected": sigma, "sigma": sigma} for name, sigma in sigmas)
+    freed = freed_table(sonar | {"value": 0.01}, laser | {"value": 0.002})
+    (reason,) = judged(replace(evidence(), freed=freed))
+    assert reason.code == ReasonCode.SUSPECTED_CAUSE
+    assert "20 sigma): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason.words
+
+
+@pytest.mark.parametrize(("value", "is_named"), [(0.00181, True), (0.00179, False)])
+def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_named):
+    names = (("mbes_range", 0.002), ("laser_range", value), ("mbes_level_range", 0.001))
+    one = {"expected": 1e-4, "sigma": 1e-4}
+    freed = freed_table(*(one | {"unknown": name, "value": value} for name, value in names))
+    (reason,) = judged(replace(evidence(), freed=freed))
+    words = reason.words
+    assert "(20 sigma): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words
+    assert ("longer; nearly as well (18 sigma): the laser's ranges: they should be +1.8 ± 0.1 mm" in words) == is_named
+    assert words.endswith(f"; {'1 other cause' if is_named else '2 other causes'} would explain it less well")
+
+
+def test_a_known_error_is_as_strong_as_its_prior_information_lets_it_be():
+    """4 mm of a bow known to 1 mm, 20 sigmas of noise, explain less than 5 sigmas of a face, which is not known."""
+    bow = {"unknown": "wet_P2_bow", "value": 0.004, "sigma": 2e-4, "expected": 1.02e-3, "strength": 3.92}
+    face = {"unknown": "face_P1-0", "value": 0.0025, "sigma": 5e-4, "expected": 5e-4}
+    (reason,) = judged(replace(evidence(), freed=freed_table(bow, face)))
+    assert "(5 sigma): the target: face P1-0 stands out by +2.5 ± 0.5 mm" in reason.words
+    assert "nearly as well (4 sigma): the target: its wet faces of the wall are bowed outward" in reason.words
+
+
+@pytest.mark.parametrize(("strength", "is_named"), [(6.1, True), (5.9, False)])
+def test_a_set_stands_in_place_of_its_parameters_where_it_is_stronger_than_each(strength, is_named):
+    """Two faces of 6 and 5.5 sigmas."""
+    one = {"expected": 1e-4, "sigma": 1e-4}
+    freed = freed_table(one | {"unknown": "face_P1-0", "value": 5.5e-4}, one | {"unknown": "face_P2", "value": 6e-4})
+    both = {"parameters": "face_P1-0 face_P2", "strength": strength}
+    tables = replace(evidence(sets=[both]), freed=freed)
+    (reason,) = judged(tables)
+    assert ("(6 sigma): the target: several faces stand off, each by its own (P2 and P1-0" in reason.words) == is_named
+    assert ("(6 sigma): the target: face P2 stands out by +0.6 ± 0.1 mm" in reason.words) != is_named
+    found = [(one.kind, one.name) for one in explanations(tables, ADJUSTED)]
+    assert found == ([("set", "faces")] if is_named else [("parameter", "face_P2"), ("parameter", "face_P1-0")])
+
+
+def test_a_set_alone_is_no_reason():
+    """Where no parameter is contradicted nothing needs an explanation."""
+    assert judged(evidence(sets=[{"strength": 50.0}])) == []
+
+
+@pytest.mark.parametrize(("by_session", "blames_drift"), [(np.nan, True), (13.0, False)])
+def test_what_explains_more_than_any_drift_is_not_laid_to_the_drift(by_session, blames_drift):
+    """A drift between passes of nine sigmas; a sound speed of six, and of 13 without more drift than is stated."""
+    drifting = PASS_3 | {"by": "drift", "sensor": "ins", "family": "turn_z", "mean_m": -0.002, "normalised": 9.0}
+    check = check_ins_drift(drift(2.0), Drift())
+    tables = evidence(patterns=[drifting], freed={"value": 6e-4, "by_session": by_session})
+    reasons = rejections(tables, methods(), ADJUSTED, check)
+    cause, between = ReasonCode.SUSPECTED_CAUSE, ReasonCode.INS_DRIFT_BETWEEN_PASSES
+    above = ReasonCode.INS_DRIFT_ABOVE_SETTINGS
+    assert codes(reasons) == ([between, above, cause] if blames_drift else [cause, between])
+    assert explanations(tables, ADJUSTED)[0].kind == ("drift" if blames_drift else "parameter")
+    words = {reason.code: reason.words for reason in reasons}[cause]
+    assert ("(13 sigma; a larger drift of the INS would explain less): the sound speed" in words) != blames_drift
