@@ -65,14 +65,14 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
     }
     first = next((code for code in result["reason_codes"] if code != ReasonCode.NOT_CONVERGED), "")
     if not result["hypotheses"] or first not in (*codes.values(), ReasonCode.SUSPECTED_CAUSE):
-        noisy = any(f"mostly from {NOISE}" in words for words in result["reasons"][:1])
-        return frozenset({first, NOISE} if noisy else {first})
+        of_first = dict(zip(result["reason_codes"][::-1], result["reasons"][::-1], strict=True)).get(first, "")
+        return frozenset({first, NOISE} if f"the most of it is {NOISE}" in of_first else {first})
     kind, name = result["hypotheses"][0]["kind"], result["hypotheses"][0]["name"]
     if kind == "parameter":
         of_face = {ReasonCode.RESIDUALS_BY_FACE} if name.startswith("face_") else set()
         return frozenset({name, name.removeprefix("face_"), *name.split("_"), *of_face})
     if kind == "set":
-        return frozenset({name, ReasonCode.RESIDUALS_BY_FACE} if name == "faces" else {name})
+        return frozenset({name})
     return frozenset({codes[kind], name})
 
 

@@ -23,7 +23,7 @@ class FinalSolution:
     """The adjusted values' solution, with the shifts of single faces as fixed parameters after all others.
 
     names (u,): of all parameters; deviation (u,): their estimates, zero for the fixed ones; from_known (u,): deviations
-    from the values known beforehand, where there are such; equations, solution: of them.
+    from the values known beforehand, where there are such, after the solution's step; equations, solution: of them.
     """
 
     names: tuple[str, ...]
@@ -67,10 +67,11 @@ def final_solution(
     equations = replace(
         equations, normal=equations.normal + of_prior, right=equations.right + np.pad(prior.right, (0, count))
     )
+    solution = solve(equations.normal, equations.right, adjustment.solution.estimated.tolist(), of_prior)
     return FinalSolution(
         names=problem.model.names,
         deviation=np.pad(state.deviation_from(coarse), (0, count)),
-        from_known=np.pad(state.deviation_from(known), (0, count)),
+        from_known=np.pad(state.deviation_from(known), (0, count)) + solution.step,
         equations=equations,
-        solution=solve(equations.normal, equations.right, adjustment.solution.estimated.tolist(), of_prior),
+        solution=solution,
     )

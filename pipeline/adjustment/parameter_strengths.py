@@ -3,8 +3,10 @@
 An error of the sonar may look like drift from pass to pass. Where the data made the drift larger, the tests allow for
 it and lose strength. :mod:`~pipeline.maths.adjustment.drift_likelihood` tells how drift and a parameter compare.
 
-Parameters that may well be wrong all at once are a *set*, and are also tested together: all faces, and the two by which
-ranges go wrong where the sonar grazes a face.
+Parameters that may well be wrong all at once are a *set*, and are also tested together: the shifts, the turns, the bows
+of all wet faces, and the two errors of the sonar's ranges that are largest where it grazes a face. All of them have
+values known beforehand. (Shifts of single faces are no set: they are fixed, and so count as exact. Together they would
+explain too much, as each face is off by its a-priori sigma.)
 """
 
 import re
@@ -21,7 +23,6 @@ from pipeline.maths.mount_parameters import N_MOUNT
 
 LEAST_GAIN = 9.0  # a fall of J, three sigmas squared; below it the drift's figures explain nothing worth comparing
 SETS = {  # by name: pattern of its parameters' names
-    "faces": re.compile("face_.+"),
     "wet_shifts": re.compile("wet_.+_shift"),
     "wet_turns": re.compile("wet_.+_turn_[12]"),
     "wet_bows": re.compile("wet_.+_bow"),
@@ -82,8 +83,6 @@ def strengths_by_session(
     if figures.gain < LEAST_GAIN:
         return {}
     session = final_solution(problem, adjustment, sums_by_face, replace(problem.prior.noise, white=figures.noise.white))
-    # the values are not this solution's
-    session = replace(session, from_known=session.from_known + session.solution.step)
     found, estimated = (_strengths(of, parameter_tests(problem, of)) for of in (session, final))
     largest = max(found.values(), default=0.0)
     exceeds = largest**2 > figures.gain and largest > max(estimated.values(), default=0.0)

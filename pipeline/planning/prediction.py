@@ -21,6 +21,7 @@ from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.face_shifts import equations_with_faces
 from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
 from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations
+from pipeline.maths.adjustment.weighting import edge_shares, rescaled
 from pipeline.maths.geometry.rotations import rotation_from_attitude
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import mount_of
@@ -155,14 +156,16 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
         return np.zeros((size, size))
     noise = pose_noise(setting.ins.drift, setting.ins.white)
     drift = body.zero_drift(record, noise, PAUSE_S)
-    linearisation = Linearisation(sums, setting.state, body, drift)
-    if single_faces:
-        return equations_with_faces(linearisation, faces, drift, noise).normal
     by_surface = {
         sensor: merged([replace(of_sensor, surface=faces.surface[of_sensor.surface])])
         for sensor, of_sensor in sums.items()
     }
-    return normal_equations(replace(linearisation, sums=by_surface), drift, noise).normal
+    shares = {sensor: edge_shares(one, len(setting.state.surfaces)) for sensor, one in by_surface.items()}
+    if single_faces:
+        by_face = {sensor: rescaled(one, shares[sensor][faces.surface]) for sensor, one in sums.items()}
+        return equations_with_faces(Linearisation(by_face, setting.state, body, drift), faces, drift, noise).normal
+    by_surface = {sensor: rescaled(one, shares[sensor]) for sensor, one in by_surface.items()}
+    return normal_equations(Linearisation(by_surface, setting.state, body, drift), drift, noise).normal
 
 
 def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Array:

@@ -10,7 +10,7 @@ from pipeline.config.pool import VerdictLimits
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
-NAMED_SOURCES = 2  # of a sigma above its limit: so many sources are named
+NAMED_SOURCES, LEAST_SHARE = 2, 0.15  # at most so many sources of a sigma are named, from this share of its square on
 
 
 def sigmas_above_limit(
@@ -45,10 +45,11 @@ def sigmas_above_limit(
 def _largest(sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:
     """Return in words the largest contributions to one sigma; nothing if no source is known."""
     scale, symbol = (float(np.degrees(1.0)), "°") if unit == "deg" else (1.0, " m")
-    of_sigma = {words: scale * float(of_source[place]) for words, of_source in sources.items() if of_source[place] > 0}
-    largest = sorted(of_sigma.items(), key=lambda item: -item[1])[:NAMED_SOURCES]
-    named = [f"{words} ({size:.2g}{symbol})" for words, size in largest]
-    return f", mostly from {' and '.join(named)}" if named else ""
+    sizes = {words: scale * float(of_source[place]) for words, of_source in sources.items()}
+    least = np.sqrt(LEAST_SHARE * sum(size**2 for size in sizes.values()))
+    largest = sorted(sizes.items(), key=lambda item: -item[1])[:NAMED_SOURCES]
+    named = [f"{words} ({size:.2g}{symbol})" for words, size in largest if size > least]
+    return f"; the most of it is {' and '.join(named)}" if named else ""
 
 
 def patent_reasons(

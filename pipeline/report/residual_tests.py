@@ -6,9 +6,9 @@ exceeds the tolerance, the chance that any row exceeds the limit is at most the 
 deviates.
 
 A deviation of a part of the points (a pass, a face, a step, one ping of two) is a hypothesis of its own, beside the
-parameters of table ``freed``. Its ``strength`` is comparable with theirs, value over sigma: the mean over its sigma,
-without tolerance; for a pass also the change of the mount without that pass, over all mount parameters (table
-``parts``), because a pass may be wrong in more ways than one mean shows.
+parameters of table ``freed``. Its ``strength`` is comparable with theirs: the mean over its sigma, without tolerance;
+for a pass also the change of the mount without that pass, over all mount parameters (table ``parts``), because a pass
+may be wrong in more ways than one mean shows.
 
 There is at most one reason for the passes, and one for all other variables. The first describes the row that deviates
 most, a pass or the drift in one. The second describes the strongest part of the points, or, if none deviates, the row

@@ -7,10 +7,10 @@ explain: its own, and those of others that look alike. All these tests have one 
 it with the chance ``adjust.test_level``. So with a hundred parameters it is 4.4 sigmas.
 
 One error often moves the estimates of several parameters. The report names the cause that explains most, by its
-strength: the root of the fall of the least sum of squares if it is freed. Where one parameter is contradicted, this may
-be another that is not: a fixed parameter with a large a-priori sigma, which explains the residuals without being off
-its setting. Or it is a set of parameters that are wrong all at once (table ``sets``): a set is a cause in place of its
-parameters where it is stronger than each of them. The data may also say that the INS drifts more than its figures say.
+strength: the root of the fall of the least sum of squares if nothing is known of it beforehand
+(:mod:`~pipeline.maths.adjustment.joint_tests`). It may be a set of parameters that are wrong all at once (table
+``sets``). A set is a cause where it is stronger than each of its parameters, in place of those that explain less by
+more than two sigmas. The data may also say that the INS drifts more than its figures say.
 Where one parameter explains more than that (column ``by_session``), all count with the drift as its figures say.
 """
 
@@ -26,6 +26,7 @@ from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.cause_words import words_of, words_of_set
 from pipeline.report.reason_codes import ReasonCode, Statement
 
+NEARLY_AS_WELL = 2.0  # a cause whose strength is smaller by no more is named beside the strongest
 OF_HEAD = "projector_"  # beginning of the names of parameters that a survey with the head has as well
 UNITS = {"sound_speed": "1"} | dict.fromkeys(("mbes_latency", "laser_latency"), "s")
 UNITS |= dict.fromkeys(("mbes_incidence", "mbes_level_range", "laser_incidence"), "m")
@@ -85,12 +86,13 @@ def suspected_causes(freed: pd.DataFrame, sets: pd.DataFrame, level: float) -> l
     causes = {
         name: SuspectedCause(name, words_of(row), strengths[name], bool(np.isfinite(row["by_session"])))
         for name, row in zip(strengths, tested, strict=True)
-        if strengths[name] > limit
+        if strengths[name] > limit or abs(row["value"]) > limit * row["expected"]
     }
     for row in sets.to_dict("records"):
         by_strength = sorted(row["parameters"].split(), key=lambda name: -strengths.get(name, 0.0))
         if _strength(row) > max(limit, strengths.get(by_strength[0], 0.0)):
-            causes = {name: cause for name, cause in causes.items() if name not in by_strength}
+            least = _strength(row) - NEARLY_AS_WELL
+            causes = {name: one for name, one in causes.items() if name not in by_strength or one.strength >= least}
             words, not_drift = words_of_set(row["set"], by_strength), bool(np.isfinite(row["by_session"]))
             causes[row["set"]] = SuspectedCause(row["set"], words, _strength(row), not_drift, is_set=True)
     return sorted(causes.values(), key=lambda cause: -cause.strength)

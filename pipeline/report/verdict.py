@@ -50,13 +50,12 @@ from pipeline.report.residual_tests import deviating_parts, deviations
 from pipeline.report.residual_words import ResidualTests
 from pipeline.report.sigma_sources import contributions
 from pipeline.report.suspected_causes import (
+    NEARLY_AS_WELL,
     SuspectedCause,
     estimated_parameters,
     significance_limit,
     suspected_causes,
 )
-
-NEARLY_AS_WELL = 2.0  # sigmas: a cause whose strength is smaller by no more is named beside the first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,12 +188,12 @@ def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Stat
         return []
     first = causes[0]
     rivals = [cause for cause in causes[1:] if first.strength - cause.strength <= NEARLY_AS_WELL]
-    nearly = "".join(f"; nearly as well ({cause.strength:.0f} sigma): {cause.words}" for cause in rivals)
+    nearly = "".join(f"; nearly as well (strength {cause.strength:.0f}): {cause.words}" for cause in rivals)
     others = len(causes) - 1 - len(rivals)
     rest = f"; {plural(others, 'other cause')} would explain it less well" if others else ""
     unless = ", unless the face, step, pass or ping named above is itself the cause" if is_second else ""
     given = "; a larger drift of the INS would explain less" if first.not_drift else ""
-    words = f"likely cause of residuals{unless} ({first.strength:.0f} sigma{given}): {first.words}{nearly}{rest}"
+    words = f"likely cause of residuals{unless} (strength {first.strength:.0f}{given}): {first.words}{nearly}{rest}"
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
 
 

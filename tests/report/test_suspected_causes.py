@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from pipeline.adjustment.parameter_strengths import SETS
 from pipeline.config.session import Drift
+from pipeline.report.cause_words import WORDS_OF_SETS
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.verdict import explanations, rejections
@@ -38,7 +40,7 @@ def test_of_several_causes_the_most_telling_is_named():
     freed = freed_table(sonar | {"value": 0.01}, laser | {"value": 0.002})
     (reason,) = judged(replace(evidence(), freed=freed))
     assert reason.code == ReasonCode.SUSPECTED_CAUSE
-    assert "20 sigma): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason.words
+    assert "strength 20): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason.words
 
 
 @pytest.mark.parametrize(("value", "is_named"), [(0.00181, True), (0.00179, False)])
@@ -48,32 +50,49 @@ def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_nam
     freed = freed_table(*(one | {"unknown": name, "value": value} for name, value in names))
     (reason,) = judged(replace(evidence(), freed=freed))
     words = reason.words
-    assert "(20 sigma): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words
-    assert ("longer; nearly as well (18 sigma): the laser's ranges: they should be +1.8 ± 0.1 mm" in words) == is_named
+    assert "(strength 20): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words
+    nearly = "longer; nearly as well (strength 18): the laser's ranges: they should be +1.8 ± 0.1 mm"
+    assert (nearly in words) == is_named
     assert words.endswith(f"; {'1 other cause' if is_named else '2 other causes'} would explain it less well")
 
 
 def test_a_known_error_is_as_strong_as_its_prior_information_lets_it_be():
-    """4 mm of a bow known to 1 mm, 20 sigmas of noise, explain less than 5 sigmas of a face, which is not known."""
+    """4 mm of a bow known to 1 mm, 20 sigmas of noise, explain less than 0.5 mm of a face, which is fixed."""
     bow = {"unknown": "wet_P2_bow", "value": 0.004, "sigma": 2e-4, "expected": 1.02e-3, "strength": 3.92}
-    face = {"unknown": "face_P1-0", "value": 0.0025, "sigma": 5e-4, "expected": 5e-4}
+    face = {"unknown": "face_P1-0", "value": 5e-4, "sigma": 1e-4, "expected": 1e-4}
     (reason,) = judged(replace(evidence(), freed=freed_table(bow, face)))
-    assert "(5 sigma): the target: face P1-0 stands out by +2.5 ± 0.5 mm" in reason.words
-    assert "nearly as well (4 sigma): the target: its wet faces of the wall are bowed outward" in reason.words
+    assert "(strength 5): the target: face P1-0 stands out by +0.5 ± 0.1 mm" in reason.words
+    assert "nearly as well (strength 4): the target: its wet faces of the wall are bowed outward" in reason.words
 
 
 @pytest.mark.parametrize(("strength", "is_named"), [(6.1, True), (5.9, False)])
 def test_a_set_stands_in_place_of_its_parameters_where_it_is_stronger_than_each(strength, is_named):
-    """Two faces of 6 and 5.5 sigmas."""
+    """Two bows of 6 and 5.5 sigmas."""
     one = {"expected": 1e-4, "sigma": 1e-4}
-    freed = freed_table(one | {"unknown": "face_P1-0", "value": 5.5e-4}, one | {"unknown": "face_P2", "value": 6e-4})
-    both = {"parameters": "face_P1-0 face_P2", "strength": strength}
+    bows = (("wet_P1_bow", 5.5e-4), ("wet_P2_bow", 6e-4))
+    freed = freed_table(*(one | {"unknown": name, "value": value} for name, value in bows))
+    both = {"parameters": "wet_P1_bow wet_P2_bow", "strength": strength}
     tables = replace(evidence(sets=[both]), freed=freed)
     (reason,) = judged(tables)
-    assert ("(6 sigma): the target: several faces stand off, each by its own (P2 and P1-0" in reason.words) == is_named
-    assert ("(6 sigma): the target: face P2 stands out by +0.6 ± 0.1 mm" in reason.words) != is_named
+    set_words = "wet faces of more than one family are bowed (P2 and P1 most)"
+    words = set_words if is_named else "its wet faces of the wall are bowed outward, by +0.6 ± 0.1 mm"
+    assert reason.words.startswith(f"likely cause of residuals (strength 6): the target: {words}")
+    assert (set_words in reason.words) == is_named
     found = [(one.kind, one.name) for one in explanations(tables, ADJUSTED)]
-    assert found == ([("set", "faces")] if is_named else [("parameter", "face_P2"), ("parameter", "face_P1-0")])
+    single = [("parameter", "wet_P2_bow"), ("parameter", "wet_P1_bow")]
+    assert found == ([("set", "wet_bows"), *single] if is_named else single)
+
+
+@pytest.mark.parametrize(("strength", "is_named"), [(7.99, True), (8.01, False)])
+def test_of_the_parameters_of_a_set_those_that_explain_nearly_as_well_are_named_too(strength, is_named):
+    one = {"unknown": "wet_P2_bow", "value": 6e-4, "expected": 1e-4, "sigma": 1e-4}
+    both = {"parameters": "wet_P1_bow wet_P2_bow", "strength": strength}
+    (reason,) = judged(replace(evidence(sets=[both]), freed=freed_table(one)))
+    assert ("nearly as well (strength 6): the target: its wet faces of the wall are bowed" in reason.words) == is_named
+
+
+def test_every_set_has_words():
+    assert set(WORDS_OF_SETS) == set(SETS)
 
 
 def test_a_set_alone_is_no_reason():
@@ -93,4 +112,4 @@ def test_what_explains_more_than_any_drift_is_not_laid_to_the_drift(by_session, 
     assert codes(reasons) == ([between, above, cause] if blames_drift else [cause, between])
     assert explanations(tables, ADJUSTED)[0].kind == ("drift" if blames_drift else "parameter")
     words = {reason.code: reason.words for reason in reasons}[cause]
-    assert ("(13 sigma; a larger drift of the INS would explain less): the sound speed" in words) != blames_drift
+    assert ("(strength 13; a larger drift of the INS would explain less): the sound speed" in words) != blames_drift

@@ -165,7 +165,7 @@ def test_a_sigma_above_its_limit_names_its_two_largest_sources():
         estimate=pd.DataFrame({"unknown": MOUNT_NAMES, "sigma": 4e-3, "sigma_total": 5e-3}),
     )
     (reason,) = judged(tables, replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=1.0, max_sigma_m=LIMITS[1][1])))
-    assert reason.words.endswith(", mostly from noise (0.004 m) and the sonar's ranges (0.003 m)")
+    assert reason.words.endswith("; the most of it is noise (0.004 m) and the sonar's ranges (0.003 m)")
 
 
 def test_an_ins_that_is_allowed_no_drift_is_named_beside_the_first_cause():
@@ -224,5 +224,5 @@ def test_steps_to_both_sides_are_transmit_sectors(family, mean_m, low, tilted):
 
 def test_what_only_shows_that_something_is_wrong_comes_after_the_cause():
     cause, residuals = judged(evidence(patterns=[OFF], freed={"value": 6e-4}))
-    assert "likely cause of residuals (6 sigma)" in cause.words
+    assert "likely cause of residuals (strength 6)" in cause.words
     assert residuals.code == ReasonCode.RESIDUALS_BY_ANGLE

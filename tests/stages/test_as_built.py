@@ -61,16 +61,15 @@ def test_a_wet_wall_pushed_back_by_the_water_is_found_and_allowed_for(bowed, err
     assert abs(errors_of(mbes, session.truth)[3]) < 3 * 1e3 * mbes["sigma_mount_total"]["x_m"]
 
 
-def test_blocks_that_are_off_one_by_one_are_named_together():
-    """By 1 to 5 mm, to the boat or away: each face explains a part, and so does a bow of one side."""
-    shifts = {"P1-1": 0.004, "P1-2": 0.005, "P1-3": -0.001, "P3-1": 0.005, "P3-2": -0.003, "P3-3": 0.004}
-    faults = [{"faces": [name], "part": "wet", "shift_m": by} for name, by in shifts.items()]
-    found = calibrated(made({"surroundings": {"face_faults": faults}}, seed=5))
+def test_wet_faces_that_are_all_bowed_are_named_together():
+    """By 9 mm, nine sigmas of each bow: P1, P2 and P3 explain a part each, and all of it together."""
+    fault = {"face_faults": [{"faces": ["P1", "P2", "P3"], "part": "wet", "bow_m": -0.009}]}
+    found = calibrated(made({"surroundings": fault}, seed=5))
     first = result(found)["hypotheses"][0]
-    assert (first["kind"], first["name"]) == ("set", "faces")
-    assert "several faces stand off, each by its own" in result(found)["reasons"][0]
+    assert (first["kind"], first["name"]) == ("set", "wet_bows")
+    assert "wet faces of more than one family are bowed" in result(found)["reasons"][0]
     tests = found["adjust/sets"].set_index("set")
-    assert tests.loc["faces", "strength"] > found["adjust/freed"]["strength"].max() + 1
+    assert tests.loc["wet_bows", "strength"] == first["sigmas"] > found["adjust/freed"]["strength"].max() + 2
 
 
 @pytest.mark.thorough

@@ -70,7 +70,7 @@ def evidence(
     )
     nothing: dict[str, Any] = {"unknown": "sound_speed", "estimated": False, "known": False}
     nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4, "by_session": np.nan}
-    of_set = {"set": "faces", "parameters": "face_P2", "strength": 0.0, "by_session": np.nan}
+    of_set = {"set": "wet_bows", "parameters": "wet_P2_bow", "strength": 0.0, "by_session": np.nan}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
     pattern["sigma_mean_m"] = 1e-4
     geometry = [("remedy", "two more passes at 3 m would do")]

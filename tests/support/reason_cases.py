@@ -131,7 +131,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"freed": {"value": 6e-4}},
         ReasonCode.SUSPECTED_CAUSE,
-        "likely cause of residuals (6 sigma): the sound speed: it is +0.06 ± 0.01 % above that recorded",
+        "likely cause of residuals (strength 6): the sound speed: it is +0.06 ± 0.01 % above that recorded",
     ),
     (
         {"freed": {"unknown": "mbes_latency", "value": 0.02}},

@@ -100,7 +100,7 @@ FREED = Artefact(
 SETS = Artefact(
     "adjust", "sets", "table", "joint test of each set of parameters that may all be wrong at once",
     (
-        Column("set", TEXT, "", "faces, wet_shifts, wet_turns, wet_bows or mbes_detection"),
+        Column("set", TEXT, "", "wet_shifts, wet_turns, wet_bows or mbes_detection"),
         Column("parameters", TEXT, "", "those of its parameters that the points determine, separated by blanks"),
         Column("fall", F64, "1", "fall of the least sum of squares if all are freed"),
         Column("dof", I64, "", "degrees of freedom of the fall"),

@@ -1,8 +1,8 @@
 """Tests of several parameters at once: how far the least sum of squares J falls if all of them are freed.
 
 A single-parameter test (:mod:`~pipeline.maths.adjustment.parameter_tests`) asks whether one error explains the
-residuals. Some errors are many at once: each face is off by its own, all wet faces are bowed. Then each single
-parameter explains a part, and another one that is not wrong may explain more than any of them.
+residuals. Some errors are many at once: all wet faces are bowed. Then each single parameter explains a part, and
+another one that is not wrong may explain more than any of them.
 
 Let h be fixed parameters, and k estimated ones with values known beforehand, all to be freed. To free k is to add to
 each of these values an unknown error β, fixed at zero before. The normal equations of h and β, with the parameters f

@@ -23,8 +23,9 @@ W_ii.
 
 If that parameter is freed, the least sum of squares J, in which the values known beforehand count as observations,
 falls by M_ii times the square of its value, or by W_ii times that. The root of this fall is the parameter's *strength*.
-All falls are from the same J. So the strengths of fixed parameters and of those with a value known beforehand can be
-compared (Teunissen 2018, "Distributional theory for the DIA method", 3.2).
+All falls are from the same J, so that strengths can be compared (Teunissen 2018, "Distributional theory for the DIA
+method", 3.2). Fixed parameters count as exact there: a strength says how much an error explains, not how likely it was
+before the measurements.
 """
 
 from dataclasses import dataclass
