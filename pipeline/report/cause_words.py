@@ -53,11 +53,11 @@ WORDS = {  # by parameter: scale and unit of its estimate, and the words round i
     ),
 }
 WORDS_OF_SETS = {  # with a place for the names of the strongest
-    "wet_shifts": "the target: wet faces of more than one family stand off against the dry ones ({} most); check its "
+    "wet_shifts": "the target: wet faces of more than one family stand off against the dry ones ({}); check its "
     "shape in the config, and its survey",
-    "wet_turns": "the target: wet faces are turned or lean against the dry ones, in more than one way ({} most); "
+    "wet_turns": "the target: wet faces are turned or lean against the dry ones, in more than one way ({}); "
     "survey them",
-    "wet_bows": "the target: wet faces of more than one family are bowed ({} most); survey them",
+    "wet_bows": "the target: wet faces of more than one family are bowed ({}); survey them",
     "mbes_detection": "the sonar's ranges go with the angle at which it sees a face, and are off on horizontal faces; "
     "look at its bottom detection, and at what coats the faces",
 }
@@ -116,11 +116,13 @@ def words_of_set(name: str, by_strength: Sequence[str]) -> str:
     by_strength : names of its parameters, the strongest first
 
     >>> words_of_set("wet_turns", ["wet_P1_turn_2", "wet_P1_turn_1", "wet_H_turn_1"]).partition(";")[0]
-    'the target: wet faces are turned or lean against the dry ones, in more than one way (P1 and H most)'
+    'the target: wet faces are turned or lean against the dry ones, in more than one way (P1 and H)'
     """
     places = [re.sub(r"_(shift|turn_.|bow)$", "", one.removeprefix("wet_")) for one in by_strength]
-    *others, last = list(dict.fromkeys(places))[:NAMED_OF_SET]
-    return WORDS_OF_SETS[name].format(f"{', '.join(others)} and {last}" if others else last)
+    places = list(dict.fromkeys(places))
+    *others, last = places[:NAMED_OF_SET]
+    most = " most" if len(places) > NAMED_OF_SET else ""
+    return WORDS_OF_SETS[name].format((f"{', '.join(others)} and {last}" if others else last) + most)
 
 
 def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:

@@ -74,7 +74,7 @@ def test_a_set_stands_in_place_of_its_parameters_where_it_is_stronger_than_each(
     both = {"parameters": "wet_P1_bow wet_P2_bow", "strength": strength}
     tables = replace(evidence(sets=[both]), freed=freed)
     (reason,) = judged(tables)
-    set_words = "wet faces of more than one family are bowed (P2 and P1 most)"
+    set_words = "wet faces of more than one family are bowed (P2 and P1)"
     words = set_words if is_named else "its wet faces of the wall are bowed outward, by +0.6 ± 0.1 mm"
     assert reason.words.startswith(f"likely cause of residuals (strength 6): the target: {words}")
     assert (set_words in reason.words) == is_named
