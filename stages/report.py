@@ -35,6 +35,7 @@ from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, u
 from pipeline.report.part_checks import parts_block
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sensor_report import SensorReport
+from pipeline.report.sigma_sources import laser_correlates
 from pipeline.report.sonar_report import SonarSettings, sonar_report
 from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.systematic_errors import systematic_block
@@ -176,5 +177,5 @@ def _criteria(config: Config, report: SensorReport) -> Criteria:
         shape=config.target.shape,
         sides=report.sides,
         held=report.held,
-        laser_correlates=config.calibrated == "mbes" and config.laser.mount_covariance is not None,
+        laser_correlates=laser_correlates(config.calibrated, config.laser.mount_covariance),
     )

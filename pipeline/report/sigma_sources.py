@@ -10,8 +10,13 @@ from pipeline.maths.mount_parameters import MOUNT_NAMES
 NOISE = "noise"  # the random sigma
 
 
+def laser_correlates(calibrated: str, laser_covariance: object | None) -> bool:
+    """Return whether errors of the laser's mount correlate: the sonar is calibrated, and the mount has a covariance."""
+    return calibrated == "mbes" and laser_covariance is not None
+
+
 def contributions(
-    freed: pd.DataFrame, estimate: pd.DataFrame, laser_correlates: bool
+    freed: pd.DataFrame, estimate: pd.DataFrame, correlated: bool
 ) -> dict[str, NDArray[np.float64]]:
     """Return the contribution (6,) of each source to the total sigmas, rad and m, by its words; noise comes first.
 
@@ -26,8 +31,8 @@ def contributions(
         The table of single-parameter tests, with the effect of each parameter's error on the mount.
     estimate
         The table of estimates, with random and total sigmas.
-    laser_correlates
-        Whether the sonar is calibrated, and the laser's mount has a covariance.
+    correlated
+        Whether the errors of the laser's mount correlate (:func:`laser_correlates`).
     """
     by_name = estimate.set_index("unknown").reindex(MOUNT_NAMES)
     noise, total = (by_name[name].to_numpy(np.float64) for name in ("sigma", "sigma_total"))
@@ -35,7 +40,7 @@ def contributions(
     source = freed["unknown"].map(lambda name: source_of(name).words)
     present = [one.words for one in ERROR_SOURCES if (source == one.words).any()]
     squares = {words: np.sum(effects[(source == words).to_numpy()] ** 2, axis=0) for words in present}
-    if laser_correlates:
+    if correlated:
         of_mount = {one.words for one in ERROR_SOURCES if one.owner == "laser_mount"}
         others = {words: square for words, square in squares.items() if words not in of_mount}
         left = total**2 - noise**2 - np.sum(list(others.values()), axis=0)

@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline.config.session import SessionConfig
 from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
-from pipeline.report.sigma_sources import NOISE, contributions
+from pipeline.report.sigma_sources import NOISE, contributions, laser_correlates
 
 Row = Mapping[str, Any]
 
@@ -25,7 +25,7 @@ def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: Sess
     session
         The session's settings.
     """
-    correlates = session.calibrated == "mbes" and session.laser.mount_covariance is not None
+    correlates = laser_correlates(session.calibrated, session.laser.mount_covariance)
     for words, of_source in contributions(tests, estimate, correlates).items():
         yield {
             "name": f"{NOISE} (the random sigma)" if words == NOISE else words,
