@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.report.limit_checks import LARGEST
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.sigma_sources import NOISE
 from tools.campaign_files import collect_rows
@@ -48,8 +49,8 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
 
     This is the strongest explanation of the residuals: a parameter, by its name and the parts of its name (the face
     among them), a set of parameters by its name, or a part of the points, by the code of its reason and by its face.
-    Without an explanation it is the first reason, by its code, and "noise" where this is a sigma that is mostly noise.
-    (That the adjustment did not converge names nothing.)
+    Without an explanation it is the first reason, by its code, and "noise" where this is a sigma whose largest source
+    is noise. (That the adjustment did not converge names nothing.)
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
     first = next((code for code in result["reason_codes"] if code != ReasonCode.NOT_CONVERGED), "")
     if not result["hypotheses"] or first not in (*codes.values(), ReasonCode.SUSPECTED_CAUSE):
         of_first = dict(zip(result["reason_codes"][::-1], result["reasons"][::-1], strict=True)).get(first, "")
-        return frozenset({first, NOISE} if f"the most of it is {NOISE}" in of_first else {first})
+        return frozenset({first, NOISE} if f"{LARGEST} {NOISE}" in of_first else {first})
     kind, name = result["hypotheses"][0]["kind"], result["hypotheses"][0]["name"]
     if kind == "parameter":
         of_face = {ReasonCode.RESIDUALS_BY_FACE} if name.startswith("face_") else set()

@@ -10,8 +10,10 @@ explain too much, as each face is off by its a-priori sigma.)
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pipeline.adjustment.face_errors import FinalSolution, final_solution
 from pipeline.adjustment.iteration import MountAdjustment
@@ -21,7 +23,8 @@ from pipeline.maths.adjustment.joint_tests import JointTest, joint_test
 from pipeline.maths.adjustment.parameter_tests import ParameterTest, prior_parameter_tests, single_parameter_tests
 from pipeline.maths.mount_parameters import N_MOUNT
 
-LEAST_GAIN = 9.0  # a fall of J, three sigmas squared; below it the drift's figures explain nothing worth comparing
+LEAST_DEVIATE = 3.0  # sigmas of noise and of what is known of a parameter: nearer to zero it explains nothing
+LEAST_GAIN = LEAST_DEVIATE**2  # a fall of J; below it the drift's figures explain nothing worth comparing
 SETS = {  # by name: pattern of its parameters' names
     "wet_shifts": re.compile("wet_.+_shift"),
     "wet_turns": re.compile("wet_.+_turn_[12]"),
@@ -83,12 +86,19 @@ def strengths_by_session(
     if figures.gain < LEAST_GAIN:
         return {}
     session = final_solution(problem, adjustment, sums_by_face, replace(problem.prior.noise, white=figures.noise.white))
-    found, estimated = (_strengths(of, parameter_tests(problem, of)) for of in (session, final))
+    found, estimated = (_strengths(problem, of) for of in (session, final))
     largest = max(found.values(), default=0.0)
     exceeds = largest**2 > figures.gain and largest > max(estimated.values(), default=0.0)
     return found if exceeds else {}
 
 
-def _strengths(final: FinalSolution, tests: Sequence[ParameterTest]) -> dict[str, float]:
-    of_single = {final.names[test.parameter]: test.strength for test in tests if test.parameter >= N_MOUNT}
+def _strengths(problem: CalibrationProblem, final: FinalSolution) -> dict[str, float]:
+    """Return the strengths of sets, and of the parameters that are not as they are known to be."""
+    tests, sigmas = parameter_tests(problem, final), problem.consider.sigmas
+    of_single = {
+        final.names[test.parameter]: test.strength
+        for test in tests
+        if test.parameter >= N_MOUNT
+        and abs(test.value) > LEAST_DEVIATE * np.hypot(test.sigma, sigmas[test.parameter])
+    }
     return of_single | {one.name: one.test.strength for one in set_tests(final, tests)}

@@ -1,9 +1,9 @@
 """Prediction of the normal equations of passes before they are sailed, from points without noise.
 
 It forms the same sums and equations as a session does. Candidates for a pass are computed one by one, and their normal
-equations are added. This is exact except for the drift, which goes on from one pass to the next. The laser's rays are
-thinned, and each has the weight of all rays that it represents. The INS records are not thinned, because each record
-has its own white noise.
+equations are added. This is exact except for the drift, which goes on from one pass to the next, and for the edge
+shares, which are each candidate's own and differ by some per cent. The laser's rays are thinned, and each has the
+weight of all rays that it represents. The INS records are not thinned, because each record has its own white noise.
 """
 
 from collections.abc import Sequence

@@ -107,22 +107,28 @@ def words_of(row: Mapping[Any, Any]) -> str:
     return _words_of_wet_faces(name, value, sigma)
 
 
-def words_of_set(name: str, by_strength: Sequence[str]) -> str:
+def words_of_set(name: str, by_strength: Sequence[str], most: Sequence[str]) -> str:
     """Return in words that a set of parameters is wrong.
 
     Parameters
     ----------
     name : of the set
     by_strength : names of its parameters, the strongest first
+    most : those of them that explain most; their families are named, three at most
 
-    >>> words_of_set("wet_turns", ["wet_P1_turn_2", "wet_P1_turn_1", "wet_H_turn_1"]).partition(";")[0]
+    >>> names = ["wet_P1_turn_2", "wet_P1_turn_1", "wet_H_turn_1"]
+    >>> words_of_set("wet_turns", names, names).partition(";")[0]
     'the target: wet faces are turned or lean against the dry ones, in more than one way (P1 and H)'
     """
-    places = [re.sub(r"_(shift|turn_.|bow)$", "", one.removeprefix("wet_")) for one in by_strength]
-    places = list(dict.fromkeys(places))
+    all_places, places = (list(dict.fromkeys(map(_place_of, names))) for names in (by_strength, most))
     *others, last = places[:NAMED_OF_SET]
-    most = " most" if len(places) > NAMED_OF_SET else ""
-    return WORDS_OF_SETS[name].format((f"{', '.join(others)} and {last}" if others else last) + most)
+    and_less = " most" if len(all_places) > len(places[:NAMED_OF_SET]) else ""
+    return WORDS_OF_SETS[name].format((f"{', '.join(others)} and {last}" if others else last) + and_less)
+
+
+def _place_of(name: str) -> str:
+    """Return the family of the wet faces that a parameter belongs to."""
+    return re.sub(r"_(shift|turn_.|bow)$", "", name.removeprefix("wet_"))
 
 
 def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:

@@ -11,6 +11,7 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 NAMED_SOURCES, LEAST_SHARE = 2, 0.15  # at most so many sources of a sigma are named, from this share of its square on
+LARGEST = "largest sources:"  # before their names, the largest first
 
 
 def sigmas_above_limit(
@@ -19,7 +20,7 @@ def sigmas_above_limit(
     held: Collection[str],
     sources: Mapping[str, NDArray[np.float64]],
 ) -> list[Statement]:
-    """Return a reason for each mount parameter whose total sigma is above its limit, with what makes it so large.
+    """Return a reason for each mount parameter whose total sigma is above its limit, with its largest sources.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def _largest(sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) 
     least = np.sqrt(LEAST_SHARE * sum(size**2 for size in sizes.values()))
     largest = sorted(sizes.items(), key=lambda item: -item[1])[:NAMED_SOURCES]
     named = [f"{words} ({size:.2g}{symbol})" for words, size in largest if size > least]
-    return f"; the most of it is {' and '.join(named)}" if named else ""
+    return f"; {LARGEST} {', '.join(named)}" if named else ""
 
 
 def patent_reasons(

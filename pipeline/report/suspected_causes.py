@@ -6,12 +6,14 @@ explain: its own, and those of others that look alike. All these tests have one 
 :func:`~pipeline.maths.adjustment.mean_tests.joint_limit`): if all errors are as the settings say, one of them exceeds
 it with the chance ``adjust.test_level``. So with a hundred parameters it is 4.4 sigmas.
 
-One error often moves the estimates of several parameters. The report names the cause that explains most, by its
-strength: the root of the fall of the least sum of squares if nothing is known of it beforehand
-(:mod:`~pipeline.maths.adjustment.joint_tests`). It may be a set of parameters that are wrong all at once (table
-``sets``). A set is a cause where it is stronger than each of its parameters, in place of those that explain less by
-more than two sigmas. The data may also say that the INS drifts more than its figures say.
-Where one parameter explains more than that (column ``by_session``), all count with the drift as its figures say.
+One error often moves the estimates of several parameters. A parameter is a cause if its estimate is farther from zero
+than noise and its own a-priori error explain: a face that stands out by its sigma is as it should be, however much that
+explains. The report names the cause that explains most, by its strength: the root of the fall of the least sum of
+squares if nothing is known of it beforehand (:mod:`~pipeline.maths.adjustment.joint_tests`). It may be a set of
+parameters that are wrong all at once (table ``sets``). A set is a cause where it is stronger than each of its
+parameters, in place of those that explain less by more than two sigmas. The data may also say that the INS drifts more
+than its figures say. Where one parameter or set explains more than that (column ``by_session``), all count with the
+drift as its figures say.
 """
 
 from collections.abc import Mapping
@@ -79,21 +81,23 @@ def suspected_causes(freed: pd.DataFrame, sets: pd.DataFrame, level: float) -> l
     mount that is an observation is judged by itself (:mod:`~pipeline.report.coarse_mount`).
     """
     limit = significance_limit(freed, level)
-    tested = freed[~freed["estimated"] & ~freed["unknown"].isin(MOUNT_NAMES)].to_dict("records")
+    is_tested = ~freed["estimated"] & ~freed["unknown"].isin(MOUNT_NAMES) & np.isfinite(freed["value"])
+    tested = freed[is_tested].to_dict("records")
     if not any(abs(row["value"]) > limit * row["expected"] for row in tested):
         return []
     strengths = {str(row["unknown"]): _strength(row) for row in tested}
     causes = {
         name: SuspectedCause(name, words_of(row), strengths[name], bool(np.isfinite(row["by_session"])))
         for name, row in zip(strengths, tested, strict=True)
-        if strengths[name] > limit or abs(row["value"]) > limit * row["expected"]
+        if abs(row["value"]) > limit * np.hypot(row["sigma"], row["considered"])
     }
     for row in sets.to_dict("records"):
         by_strength = sorted(row["parameters"].split(), key=lambda name: -strengths.get(name, 0.0))
         if _strength(row) > max(limit, strengths.get(by_strength[0], 0.0)):
             least = _strength(row) - NEARLY_AS_WELL
             causes = {name: one for name, one in causes.items() if name not in by_strength or one.strength >= least}
-            words, not_drift = words_of_set(row["set"], by_strength), bool(np.isfinite(row["by_session"]))
+            most = [name for name in by_strength if strengths.get(name, 0.0) >= strengths.get(by_strength[0], 0.0) / 2]
+            words, not_drift = words_of_set(row["set"], by_strength, most), bool(np.isfinite(row["by_session"]))
             causes[row["set"]] = SuspectedCause(row["set"], words, _strength(row), not_drift, is_set=True)
     return sorted(causes.values(), key=lambda cause: -cause.strength)
 

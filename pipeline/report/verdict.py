@@ -125,7 +125,7 @@ def rejections(
     if len(criteria.held) == len(PARAMETERS):
         words = "no mount parameter is good enough: none is within its limit and better than the coarse mount"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
-    sources = contributions(evidence.freed, evidence.estimate, criteria.laser_correlates)
+    sources = contributions(evidence.freed, methods["adjustment"], criteria.laser_correlates)
     wide = sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held, sources)
     reasons += [off_figures, *wide] if wide and off_figures is not None else wide
     if criteria.method != "adjustment" and evidence.corrections is not None:

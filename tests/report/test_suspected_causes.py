@@ -14,6 +14,8 @@ from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.verdict import explanations, rejections
 from tests.support.evidence import ADJUSTED, PASS_3, codes, drift, evidence, freed_table, judged, methods
 
+ONE = {"sigma": 1e-4, "expected": 1e-4}
+
 
 def test_both_sides_of_the_limit_of_one_parameter():
     """Noise and all a-priori sigmas count together; a normal deviate exceeds 3.29 with the chance 0.001."""
@@ -59,10 +61,38 @@ def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_nam
 def test_a_known_error_is_as_strong_as_its_prior_information_lets_it_be():
     """4 mm of a bow known to 1 mm, 20 sigmas of noise, explain less than 0.5 mm of a face, which is fixed."""
     bow = {"unknown": "wet_P2_bow", "value": 0.004, "sigma": 2e-4, "expected": 1.02e-3, "strength": 3.92}
+    bow |= {"considered": 1e-3}
     face = {"unknown": "face_P1-0", "value": 5e-4, "sigma": 1e-4, "expected": 1e-4}
     (reason,) = judged(replace(evidence(), freed=freed_table(bow, face)))
     assert "(strength 5): the target: face P1-0 stands out by +0.5 ± 0.1 mm" in reason.words
     assert "nearly as well (strength 4): the target: its wet faces of the wall are bowed outward" in reason.words
+
+
+@pytest.mark.parametrize(("share", "is_named"), [(0.99, False), (1.01, True)])
+def test_a_face_that_is_off_by_no_more_than_its_sigma_allows_is_no_cause(share, is_named):
+    """A face known to 0.5 mm: what it may be off explains more than a bow that is contradicted."""
+    bow = {"unknown": "wet_P2_bow", "value": 0.007, "sigma": 2e-4, "expected": 1e-3, "considered": 1e-3}
+    bow |= {"strength": 6.7}
+    shift_m = share * norm.isf((1 - 0.999**0.5) / 2) * np.hypot(1e-4, 0.5e-3)
+    face = {"unknown": "face_P1-0", "value": shift_m, "sigma": 1e-4, "considered": 0.5e-3}
+    (reason,) = judged(replace(evidence(), freed=freed_table(bow, face | {"expected": 6e-4})))
+    assert ("face P1-0 stands out" in reason.words) == is_named
+    assert ("(strength 7): the target: its wet faces of the wall are bowed" in reason.words) != is_named
+
+
+def test_of_a_set_those_that_explain_little_are_not_named():
+    one = {"expected": 1e-4, "sigma": 1e-4}
+    bows = (("wet_P1_bow", 8e-4), ("wet_P2_bow", 7e-4), ("wet_P3_bow", 1e-5))
+    freed = freed_table(*(one | {"unknown": name, "value": value} for name, value in bows))
+    every = {"parameters": " ".join(name for name, _ in bows), "strength": 11.0}
+    (reason,) = judged(replace(evidence(sets=[every]), freed=freed))
+    assert "are bowed (P1 and P2 most); survey them" in reason.words
+
+
+def test_a_parameter_that_only_the_session_s_drift_determines_is_no_cause():
+    unseen = {"unknown": "mbes_range", "value": np.nan, "sigma": np.nan, "expected": np.nan, "by_session": 50.0}
+    (reason,) = judged(replace(evidence(), freed=freed_table({"unknown": "laser_range", "value": 1e-3} | ONE, unseen)))
+    assert "(strength 10): the laser's ranges" in reason.words
 
 
 @pytest.mark.parametrize(("strength", "is_named"), [(6.1, True), (5.9, False)])

@@ -158,14 +158,31 @@ def test_what_was_freed_where_there_is_no_result():
     assert judged(evidence(freed=nothing)) == []
 
 
-def test_a_sigma_above_its_limit_names_its_two_largest_sources():
-    effects = {"effect_lever_arm_y": 0.003, "effect_lever_arm_x": 0.009}
-    tables = replace(
-        evidence(freed={"unknown": "mbes_range"} | effects),
-        estimate=pd.DataFrame({"unknown": MOUNT_NAMES, "sigma": 4e-3, "sigma_total": 5e-3}),
-    )
-    (reason,) = judged(tables, replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=1.0, max_sigma_m=LIMITS[1][1])))
-    assert reason.words.endswith("; the most of it is noise (0.004 m) and the sonar's ranges (0.003 m)")
+@pytest.mark.parametrize(("yaw_deg", "sources"), [(0.0, ("0.3", "0.4")), (90.0, ("0.4", "0.3"))])
+def test_a_sigma_above_its_limit_names_its_two_largest_sources(yaw_deg, sources):
+    """0.3° of noise about body y; 0.4° about body x by the sonar's ranges. With yaw 90°, roll turns about body x."""
+    noise, total = np.zeros((2, 6))
+    noise[:3], total[:3] = np.radians([0.001, 0.3, 0.001]), np.radians([0.4, 0.3, 0.001])
+    mount = dict.fromkeys(("roll_deg", "pitch_deg", "x_m", "y_m", "z_m"), 0.0) | {"yaw_deg": yaw_deg}
+    block = methods()["adjustment"] | {"mount": mount}
+    block |= {"covariance": np.diag(noise**2).tolist(), "covariance_total": np.diag(total**2).tolist()}
+    tables = evidence(freed={"unknown": "mbes_range", "effect_rotation_x": np.radians(0.4)})
+    limits = VerdictLimits(max_sigma_deg=1e-9, max_sigma_m=1.0)
+    reasons = rejections(tables, {"adjustment": block}, replace(ADJUSTED, limits=limits))
+    ending = {words.split()[3]: words.partition("; ")[2] for words in (reason.words for reason in reasons)}
+    pitch, roll = ("the sonar's ranges", "noise") if yaw_deg == 0 else ("noise", "the sonar's ranges")
+    assert ending["pitch"] == f"largest sources: {pitch} ({sources[1]}°)"
+    assert ending["roll"] == f"largest sources: {roll} ({sources[0]}°)"
+
+
+def test_of_the_sources_of_a_sigma_two_are_named():
+    mount = dict.fromkeys(("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m"), 0.0)
+    block = methods()["adjustment"] | {"mount": mount}
+    block |= {"covariance": (4e-3**2 * np.eye(6)).tolist(), "covariance_total": (5e-3**2 * np.eye(6)).tolist()}
+    tables = evidence(freed={"unknown": "mbes_range", "effect_lever_arm_y": 0.003, "effect_lever_arm_x": 0.009})
+    limits = VerdictLimits(max_sigma_deg=1.0, max_sigma_m=LIMITS[1][1])
+    (reason,) = rejections(tables, {"adjustment": block}, replace(ADJUSTED, limits=limits))
+    assert reason.words.endswith("; largest sources: noise (0.004 m), the sonar's ranges (0.003 m)")
 
 
 def test_an_ins_that_is_allowed_no_drift_is_named_beside_the_first_cause():

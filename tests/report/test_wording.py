@@ -61,7 +61,9 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
     ),
     (
         lambda: rejections(
-            evidence(), {"adjustment": {"sigma_mount_total": None, "correction": None}}, ADJUSTED
+            evidence(),
+            {"adjustment": dict.fromkeys(("sigma_mount_total", "covariance_total", "correction"))},
+            ADJUSTED,
         ),
         ReasonCode.NO_COVARIANCE,
         "the adjustment has no covariance",

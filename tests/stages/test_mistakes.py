@@ -77,7 +77,7 @@ def test_what_is_named_first(codes: list[str], explanations: list[tuple[str, str
 
 
 @pytest.mark.parametrize(("source", "is_named"), [("noise", True), ("the sonar's ranges", False)])
-def test_noise_is_named_where_a_sigma_is_mostly_noise(source: str, is_named: bool) -> None:
-    words = f"sigma of yaw is 0.06°, above 0.05°; the most of it is {source} (0.05°) and noise (0.03°)"
+def test_noise_is_named_where_it_is_the_largest_source_of_a_sigma(source: str, is_named: bool) -> None:
+    words = f"sigma of yaw is 0.06°, above 0.05°; largest sources: {source} (0.05°), noise (0.03°)"
     result = {"reason_codes": ["not_converged", "sigma_above_limit"], "reasons": ["", words], "hypotheses": []}
     assert ("noise" in named_first(result)) == is_named

@@ -29,7 +29,7 @@ ADJUSTED = Criteria(
 
 def methods(**patent: Any) -> dict[str, Any]:
     """Blocks of the adjustment and of a patent's form, the latter with another correction."""
-    adjustment = {"sigma_mount_total": SIGMA, "correction": ZERO}
+    adjustment = {"sigma_mount_total": SIGMA, "correction": ZERO, "covariance_total": None}
     return {"adjustment": adjustment, "patent_alternating": {"sigma_mount": None, "correction": ZERO | patent}}
 
 
@@ -98,7 +98,8 @@ def evidence(
 
 def freed_table(*rows: Mapping[str, Any]) -> pd.DataFrame:
     """The table of single-parameter tests; each strength is that of a fixed parameter, and no error moves the mount."""
-    usual = {"estimated": False, "by_session": np.nan} | {f"effect_{name}": 0.0 for name in MOUNT_NAMES}
+    usual = {"estimated": False, "considered": 0.0, "by_session": np.nan}
+    usual |= {f"effect_{name}": 0.0 for name in MOUNT_NAMES}
     return pd.DataFrame([usual | {"strength": abs(row["value"]) / row["sigma"]} | dict(row) for row in rows])
 
 

@@ -90,7 +90,7 @@ FREED = Artefact(
         Column("expected", F64, "rad, m, s, 1 or 1/s", "its standard deviation if all a-priori errors hold"),
         Column("strength", F64, "1", "root of the fall of the least sum of squares if it is freed"),
         Column("by_session", F64, "1",
-               "strength with the drift as configured, if a parameter explains more than any drift (else NaN)"),
+               "strength with the drift as configured, if a parameter or set explains more than any drift (else NaN)"),
         *(
             Column(f"effect_{kind}_{axis}", F64, unit, "change of the mount by an error of one a-priori sigma")
             for kind, unit in (("rotation", "rad"), ("lever_arm", "m")) for axis in "xyz"
@@ -106,7 +106,7 @@ SETS = Artefact(
         Column("dof", I64, "", "degrees of freedom of the fall"),
         Column("strength", F64, "1", "normal deviate that is as improbable as the fall"),
         Column("by_session", F64, "1",
-               "strength with the drift as configured, if a parameter explains more than any drift (else NaN)"),
+               "strength with the drift as configured, if a parameter or set explains more than any drift (else NaN)"),
     ),
 )
 SURFACES = Artefact(

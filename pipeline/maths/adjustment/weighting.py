@@ -15,10 +15,11 @@ sensor's other families: :func:`shrunk_factors`.
 its noise is σ, like that of any other. Weighted so, n points give a mean whose variance is not σ² / Σ e, but Σ (e σ)² /
 (Σ e)² = κ σ² / Σ e with the *edge share* κ = Σ e² / Σ e of the family. With weights divided by κ the inverse of the
 normal equations is the covariance again, so the weights of a family are e / (κ f σ²), and Σ e / κ is the effective
-number of its points. This is exact for means; for turns, for which points near the edges tell most, the sigmas stay a
-little too large. (κ is 0.86 on the default target's tops, 0.95 on its slanted faces. Without it, sigmas came out up to
-a tenth too large.) What is left of Σ w v² in an interval has the expectation (Σ e - rank Σ e² / Σ e) / κ, as if e did
-not depend on the place in the interval; where it does, f comes out up to 5 % too large.
+number of its points. This is exact for the mean of a family on which σ does not go with e; for turns, for which points
+near the edges tell most, the sigmas stay a little too large. (κ is 0.86 on the default target's tops, 0.95 on its
+slanted faces. Without it, sigmas came out up to a tenth too large.) What is left of Σ w v² in an interval has the
+expectation (Σ e - rank Σ e² / Σ e) / κ, as if e did not depend on the place in the interval; where it does, f comes out
+up to 5 % too large.
 
 **In common.** The points of an interval share errors: the white noise of the INS's records, whose variance factor
 follows from the laser's points (:mod:`~pipeline.maths.adjustment.record_noise`), and those that the soundings of a ping

@@ -124,7 +124,9 @@ def _result_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "by_method": [] if laser else list(method_rows(calibrations)),
         "planes": planes,
         "several_planes": list(dict.fromkeys(row["plane"] for row in planes if np.isnan(row["angle_deg"]))),
-        "sigma_sources": list(sigma_source_rows(tables.table(FREED), tables.table(ESTIMATE), settings.session)),
+        "sigma_sources": list(
+            sigma_source_rows(tables.table(FREED), result["methods"]["adjustment"], settings.session)
+        ),
         "slot_checks": slot_checks(tables.table(ESTIMATE)),
         "as_built": as_built_rows(result["target"]["as_found"], design_shape(target_of(settings.pool.target))),
         "correlations": correlation_rows(result),

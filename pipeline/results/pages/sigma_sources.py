@@ -13,20 +13,20 @@ from pipeline.report.sigma_sources import NOISE, contributions, laser_correlates
 Row = Mapping[str, Any]
 
 
-def sigma_source_rows(tests: pd.DataFrame, estimate: pd.DataFrame, session: SessionConfig) -> Iterator[Row]:
+def sigma_source_rows(tests: pd.DataFrame, block: Row, session: SessionConfig) -> Iterator[Row]:
     """Yield the contribution of each source of errors to the mount parameters' total sigmas; noise comes first.
 
     Parameters
     ----------
     tests
         The table of single-parameter tests, with the effect of each fixed parameter on the mount.
-    estimate
-        The table of estimates, with random and total sigmas.
+    block
+        The adjustment's block of calibration.json.
     session
         The session's settings.
     """
     correlates = laser_correlates(session.calibrated, session.laser.mount_covariance)
-    for words, of_source in contributions(tests, estimate, correlates).items():
+    for words, of_source in contributions(tests, block, correlates).items():
         yield {
             "name": f"{NOISE} (the random sigma)" if words == NOISE else words,
             "cells": [
