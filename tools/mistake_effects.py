@@ -149,13 +149,15 @@ EFFECTS = (
     _effect("sonar: noise × {:g} at 45° along track", 3, _mbes("slanted_noise"), "noise"),
     _effect("sonar: noise × {:g} at 45°", 2, _mbes("incidence_noise"), "noise"),
     _effect("sonar: near field, aperture {:g} m", 0.19, _near_field, "noise"),
-    _effect("sonar: near field, aperture {:g} m, not declared", 0.19, _near_field, session=_focused),
+    _effect(
+        "sonar: near field, aperture {:g} m, not declared", 0.19, _near_field, "residuals_by_height", session=_focused
+    ),
     _effect("sonar: {:g} of beams near corners by a side lobe", 0.1, _mbes("side_lobe_share")),
     _effect(
         "sonar: ranges near corners drawn {:g} of the way to the corner's", 0.3,
         _mbes("side_lobe_pull", side_lobe_share=1.0),
     ),
-    _effect("sonar: {:g} of beams near the water line by an image", 0.3, _mbes("image_share")),
+    _effect("sonar: {:g} of beams near the water line by an image", 0.3, _mbes("image_share"), "residuals_by_height"),
     _effect("transmitter {:g} mm to starboard", 20, _projector(0), "projector_x"),
     _effect("transmitter {:g} mm forward", 119, _projector(1), "projector_y"),
     _effect("transmitter {:g} mm up", 119, _projector(2), "projector_z"),
@@ -210,6 +212,8 @@ EFFECTS = (
     _effect("dry P1 and P3 {:g} mm to the boat", 3, _faces("P1", "P3", part="dry", shift_m=1e-3), *SIDES),
     _effect("laser: ranges of level faces {:g} mm short", 5, _of_laser("level_bias_m", -1e-3), "wet_H_shift"),
     _effect("laser: spot {:g} mm, 0.03°", 7, _of_laser("spot_m", 1e-3, spot_divergence_deg=0.03)),
-    _effect("laser: {:g} of the rays near the water end in drops", 0.2, _of_laser("splash_share")),
+    _effect(
+        "laser: {:g} of the rays near the water end in drops", 0.2, _of_laser("splash_share"), "residuals_by_height"
+    ),
 )  # fmt: skip
 MISTAKES = OF_THE_CREW | {words: kind for effect in EFFECTS for words, kind in effect.kinds().items()}

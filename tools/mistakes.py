@@ -60,6 +60,7 @@ def named_first(result: Mapping[str, Any]) -> frozenset[str]:
     codes = {
         "face": ReasonCode.RESIDUALS_BY_FACE,
         "step": ReasonCode.RESIDUALS_STEP,
+        "height": ReasonCode.RESIDUALS_BY_HEIGHT,
         "ping": ReasonCode.RESIDUALS_BY_PING,
         "pass": ReasonCode.PASSES_DISAGREE,
         "drift": ReasonCode.INS_DRIFT_BETWEEN_PASSES,

@@ -19,6 +19,7 @@ from pipeline.gps_time import NS
 from pipeline.maths.adjustment.design_matrix import FLATTEST
 from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums, merged
 from pipeline.maths.adjustment.mean_tests import normal_deviates
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
 from pipeline.maths.adjustment.residual_means import (
     BinMean,
@@ -35,9 +36,9 @@ from pipeline.maths.sonar.soundings import receive_angle
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-WIDTHS = {"face": 1.0, "angle": 2.0, "step": 1.0, "distance": 1.0, "time": 10.0, "pass": 1.0}  # of bins: degrees, m, s
+WIDTHS = {"angle": 2.0, "step": 1.0, "distance": 1.0, "height": 0.1, "time": 10.0}  # of bins: degrees, m, s; else 1
 CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may change its mode from ping to ping
-COMPARED: dict[str, Comparison] = {"pass": "rest", **dict.fromkeys(CYCLES, "rest"), "step": "steps"}  # else: bins
+COMPARED: dict[str, Comparison] = {"pass": "rest", **dict.fromkeys(CYCLES, "rest"), "step": "steps", "height": "steps"}
 TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # components of the drift
 KNOWN = 1e9  # degrees of freedom of a sigma that is not estimated
 Row = dict[str, Any]
@@ -100,16 +101,17 @@ def residual_statistics(
     samples: list[Batch] = []
     sums_by_face: dict[str, IntervalSums] = {}
     families = [surface.family for surface in adjustment.state.surfaces]
+    of_faces = [families[surface] for surface in problem.model.faces.surface]
     for sensor, stream in streams.items():
         step = sampling_step(adjustment.accumulation.observations(sensor))
         thinning = _Thinning(round(settings.moment_s * NS), step)
         pieces: dict[str, list[ResidualSums]] = {}
         by_face = []
-        for sums_by_variable, of_faces, sample in stream.fold(
+        for sums_by_variable, face_sums, sample in stream.fold(
             _batch, problem.model, sensor, adjustment.values, thinning
         ):
             samples.append(sample)
-            by_face.append(of_faces)
+            by_face.append(face_sums)
             for variable, sums in sums_by_variable.items():
                 pieces.setdefault(variable, []).append(sums)
         sums_by_face[sensor] = merged(by_face)
@@ -117,8 +119,9 @@ def residual_statistics(
             sums = merged_residual_sums(parts)
             if variable == "pass":
                 pass_means |= {(sensor, *mean.key): mean for mean in bin_means(sums)}
-            compared = COMPARED.get(variable, "bins")
-            patterns += [_row(variable, sensor, families[mean.key[0]], mean) for mean in tested_means(sums, compared)]
+            names = of_faces if variable == "height" else families
+            tested = tested_means(sums, COMPARED.get(variable, "bins"))
+            patterns += [_row(variable, sensor, names[mean.key[0]], mean) for mean in tested]
     patterns += _drift_rows(problem, adjustment, passes)
     return ResidualStatistics(
         pass_means=pass_means,
@@ -139,9 +142,10 @@ def _batch(
     normalised = np.where(robust > 0, np.abs(weighting.normalised(observations)), 0.0)
     slot = observations.points["t_ns"] // thinning.slot_ns
     sums = {}
-    for variable, column in _variables(sensor, observations):
+    face = observations.points["face"].astype(np.int64)
+    for variable, column in _variables(observations, _heights_of_feet(model, observations, values.state)):
         residuals = BinnedResiduals(
-            first=observations.surface,
+            first=face if variable == "height" else observations.surface,
             second=np.floor(column / WIDTHS.get(variable, 1.0)).astype(np.int64),
             slot=slot,
             weight=plain,
@@ -153,14 +157,17 @@ def _batch(
     return sums, observations.sums(weight, by_face=True), residual_sample(model, sensor, thinned, values)
 
 
-def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, Array | Integers]]:
+def _variables(observations: Observations, height_m: Array) -> Iterator[tuple[str, Array | Integers]]:
     """Yield each variable by which residuals are binned: its name, and its values (n,) for the points.
 
     The distance is that of the surface along the ray. By the measured range the noise would choose the bin: of a wall
     that begins at 4.0 m, only points that are measured too near lie below 4 m. On bottoms the cosine
     n · d is positive: their family's normal is that of the tops.
+
+    ``height_m`` (n,): of the points' feet. A step there tells what disturbs a sensor near the water, or where a face
+    ends. Each face is compared with itself, because faces end at different heights.
     """
-    batch = observations.points
+    sensor, batch = observations.sensor, observations.points
     own = point_array(batch, f"{sensor}_m")
     range_m = np.linalg.norm(own, axis=1)
     cosine = observations.features[N_MOVED]  # n · d
@@ -170,11 +177,21 @@ def _variables(sensor: str, observations: Observations) -> Iterator[tuple[str, A
     yield "face", batch["face"].astype(np.int64)
     yield "angle", angle
     yield "distance", reached_m
+    yield "height", height_m
     yield "time", batch["t_ns"] // NS
     if sensor == "mbes":
         yield "step", angle
         for name, pings in CYCLES.items():
             yield name, batch["ping"] % pings
+
+
+def _heights_of_feet(model: ObservationModel, observations: Observations, state: State) -> Array:
+    """Return the heights (n,) m above the water of the points' feet on their surfaces."""
+    points = observations.points
+    is_calibrated = observations.sensor == state.calibrated
+    in_target = model.points_in_target(points, state) if is_calibrated else point_array(points, "target_m")
+    upward = np.array([surface.normal[2] for surface in state.surfaces])[observations.surface]
+    return np.asarray(in_target[:, 2] - observations.v_m * upward - model.wet_heights_m[1])
 
 
 def _row(variable: str, sensor: str, family: str, mean: BinMean) -> Row:

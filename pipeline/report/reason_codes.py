@@ -46,6 +46,7 @@ class ReasonCode(StrEnum):
     RESIDUALS_BY_FACE = "residuals_by_face", "mean residuals differ from face to face"
     RESIDUALS_BY_ANGLE = "residuals_by_angle", "mean residuals depend on the beam's angle or elevation"
     RESIDUALS_STEP = "residuals_step", "mean residuals step at a receive angle"
+    RESIDUALS_BY_HEIGHT = "residuals_by_height", "mean residuals step at a height above or below the water"
     RESIDUALS_BY_PING = "residuals_by_ping", "mean residuals alternate from ping to ping"
     RESIDUALS_BY_DISTANCE = "residuals_by_distance", "mean residuals depend on the distance"
     RESIDUALS_BY_TIME = "residuals_by_time", "mean residuals lie off for some seconds"

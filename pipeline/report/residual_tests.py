@@ -5,10 +5,10 @@ deviate of the excess over the tolerance (``maths/adjustment/mean_tests.py``). A
 exceeds the tolerance, the chance that any row exceeds the limit is at most the test's level. A row beyond the limit
 deviates.
 
-A deviation of a part of the points (a pass, a face, a step, one ping of two) is a hypothesis of its own, beside the
-parameters of table ``freed``. Its ``strength`` is comparable with theirs: the mean over its sigma, without tolerance;
-for a pass also the change of the mount without that pass, over all mount parameters (table ``parts``), because a pass
-may be wrong in more ways than one mean shows.
+A deviation of a part of the points (a pass, a face, a step at an angle or height, one ping of two) is a hypothesis of
+its own, beside the parameters of table ``freed``. Its ``strength`` is comparable with theirs: the mean over its sigma,
+without tolerance; for a pass also the change of the mount without that pass, over all mount parameters (table
+``parts``), because a pass may be wrong in more ways than one mean shows.
 
 There is at most one reason for the passes, and one for all other variables. The first describes the row that deviates
 most, a pass or the drift in one. The second describes the strongest part of the points, or, if none deviates, the row
@@ -23,7 +23,8 @@ from pipeline.adjustment.pattern_tests import OF_PASSES, limit_for
 from pipeline.report.reason_codes import Statement
 from pipeline.report.residual_words import CYCLE, ExceededTests, ResidualTests, Row, describe_pass, describe_pattern
 
-LOCAL = ("face", "step", "pass", "ping_2", "ping_3", "ping_4")  # a deviation by these concerns a part of the points
+# A deviation by these concerns a part of the points.
+LOCAL = ("face", "step", "height", "pass", "ping_2", "ping_3", "ping_4")
 
 
 @dataclass(frozen=True)

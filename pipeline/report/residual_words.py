@@ -92,7 +92,7 @@ def _drift(row: Row, exceeded: ExceededTests) -> Statement:
 
 # --- everything else ---------------------------------------------------------------------------------------------
 def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
-    """Return a reason that describes a deviation by face, angle, ping, distance or time."""
+    """Return a reason that describes a deviation by face, angle, height, ping, distance or time."""
     variable, low, high = row["by"], row["low"], row["low"] + row["width"]
     if variable == "step":
         return _step(row, exceeded)
@@ -109,6 +109,8 @@ def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
         angles = "receive angles" if row["sensor"] == "mbes" else "elevations"
         words = f"residuals go with angle: between {angles} {low:.0f}° and {high:.0f}° {lies}"
         return Statement(ReasonCode.RESIDUALS_BY_ANGLE, words)
+    if variable == "height":
+        return _height(row, exceeded)
     if variable == "distance":
         words = f"residuals go with distance: from {low:.0f} to {high:.0f} m {lies}"
         return Statement(ReasonCode.RESIDUALS_BY_DISTANCE, words)
@@ -130,6 +132,23 @@ def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
         f"against the other pings ({exceeded.outcome(row)}); likely modes taken in turn (frequencies, swaths) whose "
         "transmit fans have different tilts: give each sounding its tilt (column transmit_tilt_deg of a table), or "
         "record in a single mode",
+    )
+
+
+def _height(row: Row, exceeded: ExceededTests) -> Statement:
+    """Return a reason that describes a step of a sensor's distances from one face at a height."""
+    side = "above" if row["low"] > 0 else "below"
+    if row["sensor"] == "mbes":
+        cause = (
+            "echoes by way of the water's surface, or from edges beside these soundings, or beams wider than "
+            "session.yaml says (mbes.focused, beam widths): keep off by segment.water_margin_m or margin_m"
+        )
+    else:
+        cause = "drops, weed or a wet surface near the water: keep off by segment.water_margin_m"
+    return Statement(
+        ReasonCode.RESIDUALS_BY_HEIGHT,
+        f"residuals go with height: {abs(row['low']):.1f} m {side} the water {SENSORS[row['sensor']]}'s distance from "
+        f"a face of {row['family']} steps by {1000 * row['mean_m']:+.1f} mm ({exceeded.outcome(row)}); likely {cause}",
     )
 
 

@@ -71,7 +71,7 @@ def test_what_was_judged_is_told(noisy_found):
     geometry = json.loads(noisy_found["report/calibration.json"])["geometry"]
     patterns = noisy_found["adjust/patterns"]
     assert {row["by"] for row in geometry["patterns"]} == {
-        "angle", "distance", "face", "pass", "ping_2", "ping_3", "ping_4", "step", "time",
+        "angle", "distance", "face", "height", "pass", "ping_2", "ping_3", "ping_4", "step", "time",
     }  # fmt: skip
     assert {row["limit"] for row in geometry["patterns"]} == {geometry["test"]["limit"]}
     assert sum(row["dof"] for row in geometry["patterns"]) == len(patterns)

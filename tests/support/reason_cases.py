@@ -99,6 +99,18 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         "residuals go with angle: between elevations 20° and 22° the laser lies",
     ),
     (
+        {"patterns": [OFF | {"by": "height", "low": -0.3}]},
+        ReasonCode.RESIDUALS_BY_HEIGHT,
+        "residuals go with height: 0.3 m below the water the sonar's distance from a face of P2 steps by +1.0 mm (3.5 "
+        "sigma",
+    ),
+    (
+        {"patterns": [OFF | {"by": "height", "low": 0.2, "sensor": "laser"}]},
+        ReasonCode.RESIDUALS_BY_HEIGHT,
+        "residuals go with height: 0.2 m above the water the laser's distance from a face of P2 steps by +1.0 mm (3.5 "
+        "sigma beyond 3 mm, limit 3.3); likely drops",
+    ),
+    (
         {"patterns": [OFF | {"by": "step"}]},
         ReasonCode.RESIDUALS_STEP,
         "residuals go with angle: at a receive angle of 20° the sonar's distance from P2 steps by +1.0 mm",

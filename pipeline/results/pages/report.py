@@ -50,6 +50,7 @@ SORTED_BY = {  # names in the report of the variables along which residuals are 
     "face": "face",
     "angle": "angle",
     "step": "step at a receive angle",
+    "height": "step at a height above the water",
     "ping_2": "ping, one of two against the other",
     "ping_3": "ping, one of three against the others",
     "ping_4": "ping, one of four against the others",
