@@ -30,7 +30,7 @@ from tools.campaigns import DRIFT, FOLDER, TASKS_OF_A_WORKER, THIN, WHITE
 Array = NDArray[np.float64]
 Raw = dict[str, NDArray[Any]]
 PATH = FOLDER / "residual_tests.parquet"
-BY = ("face", "angle", "step", "ping_2", "ping_3", "ping_4", "distance", "time", "pass", "drift")
+BY = ("face", "angle", "step", "height", "ping_2", "ping_3", "ping_4", "distance", "time", "pass", "drift")
 TILT_DEG = 0.254  # between the sectors of a real head
 APART_NS = 10 * 10**9  # a longer gap separates two passes
 LEVELS = (0.001, 0.05)

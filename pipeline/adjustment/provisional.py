@@ -57,9 +57,11 @@ def sample_near_target(stream: Stream, name: str, count: float, context: Labelli
     context
         The target's bounds and pose.
     """
-    pieces = list(stream.fold(_near_target, count / READ, context))
+    looked_at = max(1.0, count / READ)  # one in so many
+    pieces = list(stream.fold(_near_target, looked_at, context))
     columns = {column: np.concatenate([piece[column] for piece in pieces]) for column in pieces[0]}
-    return sample_rows(columns, len(columns["t_ns"]) / SAMPLE[name])
+    # the same hash chooses again, so its share is that of the whole stream
+    return sample_rows(columns, looked_at * max(1.0, len(columns["t_ns"]) / SAMPLE[name]))
 
 
 def _near_target(batch: Batch, one_in: float, context: LabellingContext) -> Batch:

@@ -101,7 +101,6 @@ def residual_statistics(
     samples: list[Batch] = []
     sums_by_face: dict[str, IntervalSums] = {}
     families = [surface.family for surface in adjustment.state.surfaces]
-    of_faces = [families[surface] for surface in problem.model.faces.surface]
     for sensor, stream in streams.items():
         step = sampling_step(adjustment.accumulation.observations(sensor))
         thinning = _Thinning(round(settings.moment_s * NS), step)
@@ -119,7 +118,7 @@ def residual_statistics(
             sums = merged_residual_sums(parts)
             if variable == "pass":
                 pass_means |= {(sensor, *mean.key): mean for mean in bin_means(sums)}
-            names = of_faces if variable == "height" else families
+            names = problem.model.faces.names if variable == "height" else families
             tested = tested_means(sums, COMPARED.get(variable, "bins"))
             patterns += [_row(variable, sensor, names[mean.key[0]], mean) for mean in tested]
     patterns += _drift_rows(problem, adjustment, passes)
@@ -143,29 +142,33 @@ def _batch(
     slot = observations.points["t_ns"] // thinning.slot_ns
     sums = {}
     face = observations.points["face"].astype(np.int64)
-    for variable, column in _variables(observations, _heights_of_feet(model, observations, values.state)):
+    upright = np.flatnonzero(~np.array([surface.level for surface in values.state.surfaces])[observations.surface])
+    for variable, column in _variables(model, observations, values.state):
+        use = upright if variable == "height" else slice(None)
         residuals = BinnedResiduals(
-            first=face if variable == "height" else observations.surface,
-            second=np.floor(column / WIDTHS.get(variable, 1.0)).astype(np.int64),
-            slot=slot,
-            weight=plain,
-            v_m=observations.v_m,
-            normalised=normalised,
+            first=(face if variable == "height" else observations.surface)[use],
+            second=np.floor(column / WIDTHS.get(variable, 1.0)).astype(np.int64)[use],
+            slot=slot[use],
+            weight=plain[use],
+            v_m=observations.v_m[use],
+            normalised=normalised[use],
         )
         sums[variable] = residual_sums(residuals)
     thinned = {name: column[:: thinning.step] for name, column in batch.items()}
     return sums, observations.sums(weight, by_face=True), residual_sample(model, sensor, thinned, values)
 
 
-def _variables(observations: Observations, height_m: Array) -> Iterator[tuple[str, Array | Integers]]:
+def _variables(
+    model: ObservationModel, observations: Observations, state: State
+) -> Iterator[tuple[str, Array | Integers]]:
     """Yield each variable by which residuals are binned: its name, and its values (n,) for the points.
 
-    The distance is that of the surface along the ray. By the measured range the noise would choose the bin: of a wall
-    that begins at 4.0 m, only points that are measured too near lie below 4 m. On bottoms the cosine
-    n · d is positive: their family's normal is that of the tops.
+    Distance and height above the water are those of the place where the ray meets the surface. By the measured range
+    the noise would choose the bin: of a wall that begins at 4.0 m, only points that are measured too near lie below
+    4 m. On bottoms the cosine n · d is positive: their family's normal is that of the tops.
 
-    ``height_m`` (n,): of the points' feet. A step there tells what disturbs a sensor near the water, or where a face
-    ends. Each face is compared with itself, because faces end at different heights.
+    A step at a height tells what disturbs a sensor near the water, or where a face ends. Each face is compared with
+    itself, because faces end at different heights. On a level face the height is that of the drift; it has no test.
     """
     sensor, batch = observations.sensor, observations.points
     own = point_array(batch, f"{sensor}_m")
@@ -177,7 +180,7 @@ def _variables(observations: Observations, height_m: Array) -> Iterator[tuple[st
     yield "face", batch["face"].astype(np.int64)
     yield "angle", angle
     yield "distance", reached_m
-    yield "height", height_m
+    yield "height", _heights(model, observations, state, reached_m / range_m)
     yield "time", batch["t_ns"] // NS
     if sensor == "mbes":
         yield "step", angle
@@ -185,13 +188,21 @@ def _variables(observations: Observations, height_m: Array) -> Iterator[tuple[st
             yield name, batch["ping"] % pings
 
 
-def _heights_of_feet(model: ObservationModel, observations: Observations, state: State) -> Array:
-    """Return the heights (n,) m above the water of the points' feet on their surfaces."""
-    points = observations.points
+def _heights(model: ObservationModel, observations: Observations, state: State, share: Array) -> Array:
+    """Return the heights (n,) m above the water of points on the rays, at a share (n,) of the measured range.
+
+    The sensor's height between two records is linear in time here: to a millimetre, where a bin is a decimetre.
+    """
+    points, body, record = observations.points, model.body, observations.record
     is_calibrated = observations.sensor == state.calibrated
-    in_target = model.points_in_target(points, state) if is_calibrated else point_array(points, "target_m")
-    upward = np.array([surface.normal[2] for surface in state.surfaces])[observations.surface]
-    return np.asarray(in_target[:, 2] - observations.v_m * upward - model.wet_heights_m[1])
+    measured = model.points_in_target(points, state) if is_calibrated else point_array(points, "target_m")
+    lever_arm = body.lever_arm(observations.sensor, state)
+    before, after = (
+        body.trajectory.positions_m[at, 2] + body.trajectory.R_frame_from_body[at, 2] @ lever_arm
+        for at in (record, record + 1)
+    )
+    start = before + observations.share * (after - before)
+    return np.asarray(start + share * (measured[:, 2] - start) - model.wet_heights_m[1])
 
 
 def _row(variable: str, sensor: str, family: str, mean: BinMean) -> Row:

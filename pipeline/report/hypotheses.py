@@ -24,7 +24,7 @@ PART_WORDS = {
     "pass": "pass {}",
     "face": "face {}",
     "step": "a step of the fan at {}°",
-    "height": "a step of a face at a height of {} m above the water",
+    "height": "a step on a face, {} m above the water (-: below)",
     "ping": "one ping of {}",
     "drift": "the INS in pass {}",
 }

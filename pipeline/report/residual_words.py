@@ -13,6 +13,7 @@ CYCLE = "ping_"  # before the length of the cycle in pings
 SENSORS = {"laser": "the laser", "mbes": "the sonar"}
 MAX_DRIFT_M = 0.05  # a larger mean residual is no effect of drift: the model is wrong
 SAME_STEP_DEG = 3.0  # steps at angles that differ by less are one step
+NEAR_WATER_M = 0.6  # a step farther from the water is not due to it
 TURNS = {"turn_x": "pitch", "turn_y": "roll", "turn_z": "heading"}  # the track runs along y of the target
 Row = Mapping[Any, Any]  # a row of the table patterns
 
@@ -137,18 +138,20 @@ def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
 
 def _height(row: Row, exceeded: ExceededTests) -> Statement:
     """Return a reason that describes a step of a sensor's distances from one face at a height."""
-    side = "above" if row["low"] > 0 else "below"
-    if row["sensor"] == "mbes":
-        cause = (
-            "echoes by way of the water's surface, or from edges beside these soundings, or beams wider than "
-            "session.yaml says (mbes.focused, beam widths): keep off by segment.water_margin_m or margin_m"
-        )
+    height_m = float(row["low"])
+    where = f"{abs(height_m):.1f} m {'above' if height_m > 0 else 'below'} the water"
+    if abs(height_m) > NEAR_WATER_M:
+        cause = "an edge beside these points, or what stands before the face: keep off by segment.margin_m"
+    elif row["sensor"] == "mbes":
+        cause = "echoes by way of the water's surface, or bubbles: keep off by segment.water_margin_m"
     else:
-        cause = "drops, weed or a wet surface near the water: keep off by segment.water_margin_m"
+        cause = "drops, weed or a wet face: keep off by segment.water_margin_m"
+    if row["sensor"] == "mbes":
+        cause += "; or beams wider than session.yaml says (mbes.focused, beam_deg)"
     return Statement(
         ReasonCode.RESIDUALS_BY_HEIGHT,
-        f"residuals go with height: {abs(row['low']):.1f} m {side} the water {SENSORS[row['sensor']]}'s distance from "
-        f"a face of {row['family']} steps by {1000 * row['mean_m']:+.1f} mm ({exceeded.outcome(row)}); likely {cause}",
+        f"residuals go with height: {where} {SENSORS[row['sensor']]}'s distance from face {row['family']} steps by "
+        f"{1000 * row['mean_m']:+.1f} mm, above less below ({exceeded.outcome(row)}); likely {cause}",
     )
 
 

@@ -89,7 +89,8 @@ def suspected_causes(freed: pd.DataFrame, sets: pd.DataFrame, level: float) -> l
     causes = {
         name: SuspectedCause(name, words_of(row), strengths[name], bool(np.isfinite(row["by_session"])))
         for name, row in zip(strengths, tested, strict=True)
-        if abs(row["value"]) > limit * np.hypot(row["sigma"], row["considered"])
+        if abs(row["value"]) > limit * min(row["expected"], np.hypot(row["sigma"], row["considered"]))
+        or row["by_session"] > limit
     }
     for row in sets.to_dict("records"):
         by_strength = sorted(row["parameters"].split(), key=lambda name: -strengths.get(name, 0.0))

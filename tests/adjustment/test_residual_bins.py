@@ -4,43 +4,61 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pipeline.adjustment.observation_model import Observations
-from pipeline.adjustment.residual_statistics import _heights_of_feet, _variables
+from pipeline.adjustment.residual_statistics import _variables
 
 WALL_M, SLANT = 4.02, np.radians(40.0)  # distance of the surface along the rays, and their incidence
+WATER_M, LEVER_ARM = 0.4, np.array([0.3, 0.2, -0.5])
+TURNS = Rotation.from_euler("y", [[0.0], [0.02]]).as_matrix()  # of the body at two INS records
+
+
+def variables(sensor, measured, along, noise_m, start_m, calibrated="mbes"):
+    """The variables of n points measured from ``start_m``, a third of the time between two records.
+
+    measured (n, 3): in the target's frame; along: n · d of all rays; noise_m (n,): of the ranges. From one record to
+    the next the sensor rises by 6 cm.
+    """
+    n = len(noise_m)
+    one, zero = np.ones(n), np.zeros(n, dtype=np.int64)
+    points = {f"{axis}_target_m": measured[:, k] for k, axis in enumerate("xyz")}
+    points |= {f"{axis}_{sensor}_m": np.linalg.norm(measured - start_m, axis=1) * (axis == "x") for axis in "xyz"}
+    points |= dict.fromkeys(("pass", "face", "t_ns", "ping"), zero)
+    features = np.stack([one, 0 * one, 0 * one, along * one])
+    observations = Observations(
+        sensor=sensor, points=points, record=zero, share=one / 3, surface=zero, v_m=along * noise_m, mean_m=0 * one,
+        sigma_m=one, common_m=0 * one, edge_weight=one, features=features, slopes=features[1:],
+    )  # fmt: skip
+    positions = np.zeros((2, 3))
+    positions[:, 2] = start_m[2] + np.array([-0.02, 0.04]) - (TURNS @ LEVER_ARM)[:, 2]
+    body = SimpleNamespace(
+        trajectory=SimpleNamespace(positions_m=positions, R_frame_from_body=TURNS),
+        lever_arm=lambda sensor, state: LEVER_ARM,
+    )
+    model = SimpleNamespace(body=body, wet_heights_m=(-4.0, WATER_M), points_in_target=lambda points, state: measured)
+    return dict(_variables(model, observations, SimpleNamespace(calibrated=calibrated)))
 
 
 @pytest.mark.parametrize("side", [-1, 1])  # of n · d: a face, or a bottom, whose family's normal is that of the tops
 @pytest.mark.parametrize("sensor", ["laser", "mbes"])
 def test_a_point_has_the_distance_of_its_surface_not_its_measured_range(sensor: str, side: int) -> None:
     """A range that is 10 cm short puts a point 10 cm · cos 40° before the wall; the wall stays at 4.02 m."""
-    n = 101
-    noise_m = np.linspace(-0.1, 0.1, n)
-    points = {f"{axis}_{sensor}_m": np.zeros(n) for axis in "xyz"} | {f"x_{sensor}_m": WALL_M + noise_m}
-    points |= dict.fromkeys(("pass", "face", "t_ns", "ping"), np.zeros(n, dtype=np.int64))
-    along, one = side * np.cos(SLANT), np.ones(n)
-    features = np.stack([one, 0 * one, 0 * one, along * one])
-    zero = np.zeros(n, dtype=np.int64)
-    observations = Observations(
-        sensor=sensor, points=points, record=zero, share=0 * one, surface=zero, v_m=along * noise_m, mean_m=0 * one,
-        sigma_m=one, common_m=0 * one, edge_weight=one, features=features, slopes=features[1:],
-    )  # fmt: skip
-    np.testing.assert_allclose(dict(_variables(observations, zero))["distance"], WALL_M, atol=1e-12)
+    noise_m = np.linspace(-0.1, 0.1, 101)
+    measured = (WALL_M + noise_m)[:, None] * np.array([1.0, 0.0, 0.0])
+    found = variables(sensor, measured, side * np.cos(SLANT), noise_m, np.zeros(3))
+    np.testing.assert_allclose(found["distance"], WALL_M, atol=1e-12)
 
 
-@pytest.mark.parametrize("slope_deg", [0.0, 45.0, 90.0])
 @pytest.mark.parametrize("calibrated", ["laser", "mbes"])
-def test_the_height_of_a_point_is_that_of_its_surface_above_the_water(slope_deg: float, calibrated: str) -> None:
-    """Points 7 cm off a level, a sloping and an upright face, 1.5 m below the water."""
+@pytest.mark.parametrize(("slope_deg", "steep"), [(90.0, -0.7), (90.0, 0.3), (60.0, -0.5)])
+def test_a_point_has_the_height_at_which_its_ray_meets_the_surface(
+    slope_deg: float, steep: float, calibrated: str
+) -> None:
+    """Rays to one place 1.5 m below the water, steep to the face; ranges up to 7 cm off."""
+    noise_m, at = np.linspace(-0.07, 0.07, 15), np.array([0.0, 0.2, WATER_M - 1.5])
     normal = np.array([-np.sin(np.radians(slope_deg)), 0.0, np.cos(np.radians(slope_deg))])
-    v_m = np.linspace(-0.07, 0.07, 15)
-    at = np.array([0.3, 0.2, -1.1]) + v_m[:, None] * normal
-    zero, one = np.zeros(15, dtype=np.int64), np.ones(15)
-    observations = Observations(
-        sensor="laser", points={f"{axis}_target_m": at[:, k] for k, axis in enumerate("xyz")}, record=zero, share=one,
-        surface=zero, v_m=v_m, mean_m=one, sigma_m=one, common_m=one, edge_weight=one, features=one, slopes=one,
-    )  # fmt: skip
-    model = SimpleNamespace(wet_heights_m=(-4.0, 0.4), points_in_target=lambda points, state: at)
-    state = SimpleNamespace(calibrated=calibrated, surfaces=[SimpleNamespace(normal=normal)])
-    np.testing.assert_allclose(_heights_of_feet(model, observations, state), -1.5, atol=1e-12)
+    ray = np.array([np.sqrt(1 - steep**2), 0.0, steep])
+    start = at - 5.0 * ray
+    found = variables("laser", start + (5.0 + noise_m)[:, None] * ray, normal @ ray, noise_m, start, calibrated)
+    np.testing.assert_allclose(found["height"], -1.5, atol=1e-12)

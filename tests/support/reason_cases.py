@@ -101,14 +101,20 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"patterns": [OFF | {"by": "height", "low": -0.3}]},
         ReasonCode.RESIDUALS_BY_HEIGHT,
-        "residuals go with height: 0.3 m below the water the sonar's distance from a face of P2 steps by +1.0 mm (3.5 "
-        "sigma",
+        "residuals go with height: 0.3 m below the water the sonar's distance from face P2 steps by +1.0 mm, above "
+        "less below (3.5 sigma beyond 3 mm, limit 3.3); likely echoes by way of the water's surface",
     ),
     (
         {"patterns": [OFF | {"by": "height", "low": 0.2, "sensor": "laser"}]},
         ReasonCode.RESIDUALS_BY_HEIGHT,
-        "residuals go with height: 0.2 m above the water the laser's distance from a face of P2 steps by +1.0 mm (3.5 "
-        "sigma beyond 3 mm, limit 3.3); likely drops",
+        "residuals go with height: 0.2 m above the water the laser's distance from face P2 steps by +1.0 mm, above "
+        "less below (3.5 sigma beyond 3 mm, limit 3.3); likely drops",
+    ),
+    (
+        {"patterns": [OFF | {"by": "height", "low": 3.8, "sensor": "laser"}]},
+        ReasonCode.RESIDUALS_BY_HEIGHT,
+        "residuals go with height: 3.8 m above the water the laser's distance from face P2 steps by +1.0 mm, above "
+        "less below (3.5 sigma beyond 3 mm, limit 3.3); likely an edge beside these points",
     ),
     (
         {"patterns": [OFF | {"by": "step"}]},

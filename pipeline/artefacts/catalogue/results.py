@@ -155,7 +155,8 @@ PATTERNS = Artefact(
                "face, angle (2 degrees), distance (1 m), time (10 s); differences: step, height, pass, ping_2 to 4, "
                "drift"),
         Column("sensor", TEXT, "", "laser or mbes; drift: ins"),
-        Column("family", TEXT, "", "P1, P2, P3 or H; drift: turn_x, turn_y or turn_z, about target axes"),
+        Column("family", TEXT, "", "P1, P2, P3 or H; height: the face; drift: turn_x, turn_y or turn_z, about target "
+               "axes"),
         Column("low", F64, "1, deg, m or s",
                "number of the face or pass, lower edge of the bin (time: GPS seconds); step, height: where it is; "
                "ping_n: the remainder of the ping's number divided by n"),
