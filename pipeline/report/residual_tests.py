@@ -46,7 +46,7 @@ class Deviation:
 
 @dataclass(frozen=True)
 class DeviatingPart:
-    """A part of the points that deviates: a pass, face, step, ping, or drift in a pass; which one; its strength."""
+    """A part of the points that deviates (pass, face, step, height, ping, drift in a pass), its name and strength."""
 
     kind: str
     name: str

@@ -95,6 +95,21 @@ def test_a_parameter_that_only_the_session_s_drift_determines_is_no_cause():
     assert "(strength 10): the laser's ranges" in reason.words
 
 
+def test_what_made_the_drift_less_likely_is_named_itself():
+    """With the larger drift a latency is 3.3 sigmas; with the session's own it explains most."""
+    latency = {"unknown": "mbes_latency", "value": 3.3e-4, "by_session": 30.0} | ONE
+    face = {"unknown": "face_P1-0", "value": 5e-4, "by_session": 8.0} | ONE
+    (reason,) = judged(replace(evidence(), freed=freed_table(latency, face)))
+    assert "(strength 30; a larger drift of the INS would explain less): the sonar's clock" in reason.words
+
+
+def test_a_contradicted_parameter_is_a_cause_where_errors_that_correlate_make_it_better_known():
+    """Its value is beyond the limit of what all errors together explain, not of its own."""
+    row = {"unknown": "laser_range", "value": 3e-3, "sigma": 2e-4, "considered": 1e-3, "expected": 4e-4}
+    (reason,) = judged(replace(evidence(), freed=freed_table(row)))
+    assert reason.code == ReasonCode.SUSPECTED_CAUSE
+
+
 @pytest.mark.parametrize(("strength", "is_named"), [(6.1, True), (5.9, False)])
 def test_a_set_stands_in_place_of_its_parameters_where_it_is_stronger_than_each(strength, is_named):
     """Two bows of 6 and 5.5 sigmas."""

@@ -45,6 +45,20 @@ def test_a_fault_is_named(noisy, noisy_found, fault, words):
     assert said.startswith(words)
 
 
+@pytest.mark.parametrize(
+    ("mbes", "laser", "words"),
+    [
+        ({"image_share": 0.5}, {}, "0.3 m below the water the sonar's distance from face P2 steps by -"),
+        ({}, {"splash_share": 0.6}, "0.2 m above the water the laser's distance from face P2 steps by -"),
+    ],
+)
+def test_what_disturbs_a_sensor_near_the_water_is_named(mbes, laser, words):
+    """An image lengthens the path, a drop shortens it. The wall is at x = 0, the boat at x < 0."""
+    session = made({"mbes": mbes, "laser": laser})
+    result = json.loads(calibrated(session)["report/calibration.json"])
+    assert result["reasons"][0].startswith(f"residuals go with height: {words}")
+
+
 @pytest.mark.thorough
 def test_sectors_of_different_tilt_that_the_file_does_not_tell(noisy):
     """The middle of the fan is that of the same session with the sonar turned about its own x."""
