@@ -181,8 +181,8 @@ def _residual_tests(evidence: Evidence, criteria: Criteria) -> ResidualTests:
 def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Statement]:
     """Return a reason with the parameter or set that explains the residuals best, and the number of the others.
 
-    Others that explain them nearly as well are named, too. ``is_second``: a face, step, pass or ping explains them
-    better.
+    Others that explain them nearly as well are named, too. ``is_second``: a face, step, height, pass or ping explains
+    them better.
     """
     if not causes:
         return []
@@ -191,7 +191,7 @@ def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Stat
     nearly = "".join(f"; nearly as well (strength {cause.strength:.0f}): {cause.words}" for cause in rivals)
     others = len(causes) - 1 - len(rivals)
     rest = f"; {plural(others, 'other cause')} would explain it less well" if others else ""
-    unless = ", unless the face, step, pass or ping named above is itself the cause" if is_second else ""
+    unless = ", unless the face, step, height, pass or ping named above is itself the cause" if is_second else ""
     given = "; a larger drift of the INS would explain less" if first.not_drift else ""
     words = f"likely cause of residuals{unless} (strength {first.strength:.0f}{given}): {first.words}{nearly}{rest}"
     return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]

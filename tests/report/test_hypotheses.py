@@ -16,7 +16,7 @@ def test_the_stronger_of_a_parameter_and_a_part_of_the_points_is_named_first(mea
     reasons = {reason.code: reason.words for reason in judged(tables)}
     in_order = [ReasonCode.RESIDUALS_STEP, ReasonCode.SUSPECTED_CAUSE]
     assert list(reasons) == (in_order if is_first else in_order[::-1])
-    unless = "unless the face, step, pass or ping named above is itself the cause (strength 6)"
+    unless = "unless the face, step, height, pass or ping named above is itself the cause (strength 6)"
     assert (unless in reasons[ReasonCode.SUSPECTED_CAUSE]) == is_first
     step = Hypothesis("step", "20", pytest.approx(1e4 * mean_m), "a step of the fan at 20°")
     words = suspected_causes(tables.freed, tables.sets, ADJUSTED.test_level)[0].words
