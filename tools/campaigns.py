@@ -90,7 +90,7 @@ CAMPAIGNS = (
     Campaign("finite beams, outliers, echoes", 600, 6000, {"ins": WHITE["ins"]}),
     Campaign("finite beams and INS white noise", 600, 7000, {}),
     Campaign("finite beams and INS drift", 600, 8000, {"ins": DRIFT}),
-    Campaign("twelve passes, INS drift", 160, 9000, {"ins": DRIFT, "track": TWELVE}),
+    Campaign("twelve passes, INS drift", 320, 9000, {"ins": DRIFT, "track": TWELVE}),
     Campaign("tilted sectors, border at 15", 24, 12000, _sectors(15.0)),
     Campaign("tilted sectors, border at 30", 24, 12100, _sectors(30.0)),
     Campaign("tilted sectors, border at 40", 24, 12200, _sectors(40.0)),
