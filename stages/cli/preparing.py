@@ -1,0 +1,50 @@
+"""Commands for the time before a calibration."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stages.cli.application import app
+from stages.cli.arguments import POOL_FILE, AsJson, Pool, Session, SessionYaml
+
+
+@app.command("check")
+def _check(
+    session: Session,
+    config: Annotated[
+        Path | None, typer.Option("--config", metavar="CONFIG", help=f"{POOL_FILE}: where it is")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Look into a session's files before calibrating, in seconds. Status 1 if something is wrong."""
+    from stages.commands import check
+
+    return check.command(session, config, as_json)
+
+
+@app.command("plan")
+def _plan(
+    file: Annotated[Path, typer.Argument(metavar="PLAN", help="YAML file of the plan; README.md lists its keys")],
+    session: SessionYaml,
+    config: Pool,
+    out: Annotated[Path | None, typer.Option("--yaml", metavar="FILE", help="write the prediction as YAML")] = None,
+    rrd: Annotated[Path | None, typer.Option("--rrd", metavar="FILE", help="write a recording of it")] = None,
+) -> int:
+    """Predict what passes will give, before any data, and choose better ones. Status 1 if they will not do."""
+    from stages.commands import plan
+
+    return plan.command(file, session, config, out, rrd)
+
+
+@app.command("coarse")
+def _coarse(
+    file: Annotated[Path, typer.Argument(metavar="MARKS", help="YAML file: marks as surveyed, and as drawn")],
+    session: SessionYaml,
+    out: Annotated[Path | None, typer.Option("--yaml", metavar="FILE", help="write all of it as YAML")] = None,
+    write: Annotated[bool, typer.Option("--write/--no-write", help="put the mounts into session.yaml")] = True,
+) -> int:
+    """Find coarse mounts from a survey of marks on bracket and instruments. Status 1 if the marks do not agree."""
+    from stages.commands import coarse
+
+    return coarse.command(file, session, out, write)
