@@ -88,7 +88,7 @@ def oblique_view(axis: Axes, model: TargetModel, letters: Letters) -> None:
     draw_water(axis, letters.water_level_m)
     flat = projection()
     axis.text(*(flat @ np.array([0, 0, 0.7 * a / 2])), "P2", ha="center", va="center", fontsize=10, color=INK)
-    measure(axis, (0, -b / 2 - 2.15, -a / 2), (0, -b / 2 - 1.75, a / 2), "a", (9, 0))
+    measure(axis, (0, -b / 2 - 2.0, -a / 2), (0, -b / 2 - 2.0, a / 2), "a", (9, 0))
     measure(axis, (0, -b / 2, a / 2 + 0.35), (0, b / 2, a / 2 + 0.35), "b", (0, 9))
     top = max(float(face.vertices_m[:, 2].max()) for face in model.faces if face.family == "P1")
     measure(axis, (c, -b / 2 - c - 0.2, top - e), (c, -b / 2 - c - 0.2, top), "e", (9, 0))
