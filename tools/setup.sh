@@ -1,7 +1,9 @@
 #!/bin/sh
 # make setup: a .venv in the repository's root with everything poolcal needs. Run again, it does nothing until
-# pyproject.toml, constraints.txt or this file change. PYTHON=/path/to/python3 chooses the interpreter.
+# pyproject.toml, constraints.txt or this file change. PYTHON=/path/to/python3 chooses the interpreter, EXTRAS=dev,docs
+# the optional packages: by default those of the tests; EXTRAS= installs the program alone.
 set -eu
+EXTRAS=${EXTRAS-dev}
 cd "$(dirname "$0")/.."
 root=$(pwd -P)
 stamp=.venv/.setup
@@ -35,7 +37,7 @@ done
 [ -n "$python" ] || fail "no Python 3.11 or newer (found: $(python3 --version 2>&1 || true)); install one, or name it: make setup PYTHON=/path/to/python3"
 
 # --- nothing to do? -----------------------------------------------------------------------------------------------------
-wanted="$root $(cat pyproject.toml constraints.txt tools/setup.sh | cksum)"
+wanted="$root [$EXTRAS] $(cat pyproject.toml constraints.txt tools/setup.sh | cksum)"
 if [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$wanted" ] && [ -x .venv/bin/poolcal ]; then
     touch "$stamp"
     exit 0
@@ -83,7 +85,7 @@ fi
 [ -x .venv/bin/python ] || "$python" -m venv .venv || { rm -rf .venv; fail "$python could not make .venv"; }
 echo "setup: installing packages into .venv (some minutes the first time)"
 pip() { .venv/bin/python -m pip --disable-pip-version-check "$@" </dev/null; }
-pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e '.[dev]' ||
+pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e ".${EXTRAS:+[$EXTRAS]}" ||
     fail "packages could not be installed (see above); correct this and run make setup again"
 # stage adjust loads the compiled loops of pipeline/maths/kernels: the first time they are compiled
 .venv/bin/python -c 'import open3d, pyarrow, rerun, stages.cli, stages.adjust' ||

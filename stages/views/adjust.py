@@ -1,4 +1,4 @@
-"""Stage adjust: soundings before and after, residuals as colours, as maps and over time, fans, correlations."""
+"""Stage adjust: soundings before and after and in between, residuals as colours, as maps and over time, the boat."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -9,7 +9,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
-from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.results import (
     COVARIANCE,
     ESTIMATE,
@@ -19,26 +18,25 @@ from pipeline.artefacts.catalogue.results import (
     RESIDUALS,
     SURFACES,
 )
-from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
-from pipeline.artefacts.from_tables import family_names, normal_of, normals_of, trajectory_in_target
+from pipeline.artefacts.catalogue.target import FACES
+from pipeline.artefacts.from_tables import family_names, normal_of, normals_of
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.face_grid import face_axes
-from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.mount import Mounted, mount_of
 from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
 from pipeline.text_table import text_table
+from stages.views.boat import log_boats
 from stages.views.ingest import time_column
-from stages.views.recording import COLOURS, DOT_M, GREY, LASER, SONAR, log_curve, text_document
+from stages.views.recording import COLOURS, DOT_M, LASER, SONAR, log_curve, text_document
 
 Array = NDArray[np.float64]
 Shades = dict[str, tuple[int, int, int]]  # by family
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
 SENSORS = {"laser": LASER, "mbes": SONAR}
-RAYS = 60  # most rays in a fan
-FAN_NS = NS // 50  # points of a fan lie within this time of its epoch
+PARTS = 20  # of the way from the coarse to the calibrated mount
+MOST_IN_REPLAY = 5000  # points of a family in one of its steps
 
 
 @dataclass(frozen=True)
@@ -64,14 +62,17 @@ class ResidualPoints:
 
 
 def log(recording: Any, tables: Tables) -> None:
-    """Log soundings before and after, residuals as colours, as maps and over time, fans, and a text."""
+    """Log soundings before, after and in between, residuals as colours, as maps and over time, boats, and a text."""
     faces, residuals = tables.table(FACES), tables.table(RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
     span, steps = _span(residuals), _steps(tables, residuals)
     shades = styles_of_families(family_names(faces), COLOURS)
-    _clouds(recording, tables, ResidualPoints(residuals, family, span, steps), shades)
+    points = ResidualPoints(residuals, family, span, steps)
+    _clouds(recording, tables, points, shades)
     _maps(recording, tables.table(RESIDUAL_MAP), faces, span)
-    _fans(recording, tables, residuals)
+    if read_settings(tables.run).session.calibrated == "mbes":
+        _replay(recording, tables, points, shades)
+    log_boats(recording, tables, residuals)
     _over_time(recording, tables.table(RESIDUAL_BINS), steps, shades)
     _log_text(recording, tables, span)
 
@@ -159,34 +160,23 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
             recording.log(f"maps/{sensor}/{name}", mesh, static=True)
 
 
-def _fans(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
-    """Log the rays from each sensor to its points of one epoch in the middle of each pass."""
+def _replay(recording: Any, tables: Tables, points: ResidualPoints, shades: Shades) -> None:
+    """Log the soundings on their way from the coarse to the calibrated mount, over the timeline ``iteration``.
+
+    The way is divided into equal parts. (The adjustment itself takes few steps, of which the first is nearly all.)
+    """
     import rerun as rr
 
-    session = read_settings(tables.run).session
-    trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
-    mounts = {"laser": mount_of(session.laser.mount)}
-    calibrated = session.calibrated
-    mounts[calibrated] = _calibrated(tables, mount_of((session.mbes or session.laser).mount))
-    for (sensor, number), rows in residuals.groupby(["sensor", "pass"], sort=True):
-        t_ns = rows["t_ns"].to_numpy()
-        middle = int(np.median(t_ns))
-        epoch = int(t_ns[np.argmin(np.abs(t_ns - middle))])
-        fan = rows[np.abs(t_ns - epoch) <= FAN_NS]
-        fan = fan.iloc[:: max(1, -(-len(fan) // RAYS))]
-        positions, R_target_from_body = trajectory.poses_at(fan["t_ns"].to_numpy())
-        origins = positions + R_target_from_body @ mounts[str(sensor)].lever_arm_body_m
-        rays = np.stack([origins, fan[XYZ].to_numpy(np.float64)], axis=1).astype(np.float32)
-        lines = rr.LineStrips3D(rays, radii=0.004, colors=SONAR if sensor == "mbes" else GREY)
-        recording.log(f"fans/{sensor}/pass_{number}", lines, static=True)
-
-
-def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
-    """Return the mount of the adjustment's estimate; the coarse mount if there is no estimate."""
-    values = tables.table(ESTIMATE)["value"].to_numpy()[:6]
-    if not np.all(np.isfinite(values)):
-        return coarse
-    return Mounted(exp_so3(values[:3]) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + values[3:])
+    if not np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all():
+        return
+    for name, colour in shades.items():
+        rows = points.residuals[(points.residuals["sensor"] == "mbes").to_numpy() & (points.family == name)]
+        rows = rows.iloc[:: max(1, -(-len(rows) // MOST_IN_REPLAY))]
+        coarse, calibrated = rows[[f"coarse_{column}" for column in XYZ]].to_numpy(), rows[XYZ].to_numpy()
+        for part in range(PARTS + 1 if len(rows) else 0):
+            recording.set_time("iteration", sequence=part)
+            where = (coarse + part / PARTS * (calibrated - coarse)).astype(np.float32)
+            recording.log(f"replay/{name}", rr.Points3D(where, radii=DOT_M, colors=colour))
 
 
 def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades: Shades) -> None:

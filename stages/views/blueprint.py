@@ -52,7 +52,7 @@ def run_blueprint(tabs: Sequence[str], model: TargetModel) -> Any:
     scene = partial(_scene_of, eye=_eye(model))
     every = (
         rrb.Horizontal(
-            _scene_of("The boat before the target", "/pool/**", "/target/**", "/fans/**"),
+            _scene_of("The boat before the target", "/pool/**", "/target/**", "/fans/**", "/boat/**"),
             _words("/tables/summary", "Summary"),
             column_shares=[3, 2],
             name=overview,
@@ -63,7 +63,10 @@ def run_blueprint(tabs: Sequence[str], model: TargetModel) -> Any:
             name=change,
         ),
         rrb.Horizontal(
-            scene("Step by step, offsets not yet applied", "/iteration/**", "/target/model/**"),
+            rrb.Vertical(
+                scene("The patent: step by step, offsets not yet applied", "/iteration/**", "/target/model/**"),
+                scene("The adjustment: from coarse to calibrated", "/replay/**", "/target/model/**"),
+            ),
             rrb.Vertical(
                 _curves("/curves/deviation", "Deviation of the sonar's planes, degrees"),
                 _curves("/curves/planes", "Angle between sonar's and laser's planes, degrees"),

@@ -1,4 +1,4 @@
-"""Stage fit_planes: the planes of laser and sonar (with the coarse mount), cut to the faces, and their normals."""
+"""Stage fit_planes: outlines of the planes of laser and sonar (with the coarse mount) on the faces, their normals."""
 
 from typing import Any
 
@@ -10,33 +10,69 @@ from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import family_names, planes_of_sensor
 from pipeline.maths.geometry.planes import Plane
 from pipeline.run.results import Tables
+from pipeline.run.settings import read_settings
 from stages.views.recording import GREY, SONAR
 
 SHOWN = {"laser": GREY, "mbes": SONAR}
+LINE_M = 0.012  # radius of an outline
 
 
 def log(recording: Any, tables: Tables) -> None:
-    """Log the planes of both sensors with their normals."""
+    """Log the planes of both sensors as outlines of what each can see, with their normals and names."""
     import rerun as rr
 
     faces, planes = tables.table(FACES), tables.table(PLANES)
+    water_level_m = read_settings(tables.run).pool.target.water_level_m
+    laser = planes_of_sensor(planes, "laser")
     for sensor, colour in SHOWN.items():
         fitted = planes_of_sensor(planes, sensor)
         for family in family_names(faces):
             plane = fitted.get((ALL_PASSES, family))
             if plane is None:
                 continue
-            polygons = faces_on_plane(faces, family, plane)
-            starts = np.cumsum([0, *(len(polygon) for polygon in polygons[:-1])])
-            triangles = np.concatenate([_fan(*pair) for pair in zip(polygons, starts.tolist(), strict=True)])
-            points = np.concatenate(polygons).astype(np.float32)
-            patch = rr.Mesh3D(vertex_positions=points, triangle_indices=triangles, albedo_factor=(*colour, 110))
-            recording.log(f"planes/{sensor}/{family}", patch, static=True)
+            parts = [part_of(face, water_level_m, sensor) for face in faces_on_plane(faces, family, plane)]
+            outlines = [np.vstack([part, part[:1]]).astype(np.float32) for part in parts if len(part)]
+            strips = rr.LineStrips3D(outlines, radii=LINE_M, colors=colour)
+            recording.log(f"planes/{sensor}/{family}", strips, static=True)
             arrow = rr.Arrows3D(origins=[plane.centroid_m], vectors=[plane.normal], radii=0.02, colors=colour)
             recording.log(f"planes/{sensor}/{family}/normal", arrow, static=True)
+            words = family if sensor == "laser" else _name(family, plane, laser.get((ALL_PASSES, family)))
             tip = plane.centroid_m + plane.normal  # a label has the colour of its point, and a grey ground
-            name = rr.Points3D([tip], radii=0.001, colors=(255, 255, 255), labels=family)
+            name = rr.Points3D([tip], radii=0.001, colors=(255, 255, 255), labels=words)
             recording.log(f"planes/{sensor}/{family}/normal/name", name, static=True)
+
+
+def _name(family: str, plane: Plane, laser: Plane | None) -> str:
+    """Return the family's name, and how far the sonar's plane lies from the laser's, along its normal."""
+    if laser is None:
+        return family
+    off_m = float(laser.normal @ plane.centroid_m) - laser.distance_m
+    return f"{family}: {1000 * off_m:+.0f} mm"
+
+
+def part_of(polygon: np.ndarray, water_level_m: float, sensor: str) -> np.ndarray:
+    """Return the corners (m, 3) of the part of a convex polygon that a sensor sees: below or above the water.
+
+    Each edge that crosses the water's surface is cut there (Sutherland and Hodgman's rule, for one plane).
+
+    Parameters
+    ----------
+    polygon
+        Corners (n, 3), target frame.
+    water_level_m
+        Height of the water in the target frame.
+    sensor
+        "mbes" sees what is below the water, "laser" what is above.
+    """
+    over = (polygon[:, 2] - water_level_m) * (-1.0 if sensor == "mbes" else 1.0)
+    kept: list[np.ndarray] = []
+    for k in range(len(polygon)):
+        here, following = over[k], over[(k + 1) % len(polygon)]
+        if here >= 0:
+            kept.append(polygon[k])
+        if here * following < 0:
+            kept.append(polygon[k] + here / (here - following) * (polygon[(k + 1) % len(polygon)] - polygon[k]))
+    return np.array(kept).reshape(-1, 3)
 
 
 def faces_on_plane(faces: pd.DataFrame, family: str, plane: Plane) -> list[np.ndarray]:
@@ -54,7 +90,3 @@ def faces_on_plane(faces: pd.DataFrame, family: str, plane: Plane) -> list[np.nd
     corners = [np.reshape(outline, (-1, 3)) for outline in faces.loc[faces["family"] == family, "vertices_target_m"]]
     return [points + np.outer(plane.distance_m - points @ plane.normal, plane.normal) for points in corners]
 
-
-def _fan(polygon: np.ndarray, start: int) -> np.ndarray:
-    """Return the triangles of a convex polygon whose first corner has the number ``start``."""
-    return np.array([(start, start + k, start + k + 1) for k in range(1, len(polygon) - 1)], dtype=np.uint32)

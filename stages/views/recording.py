@@ -9,16 +9,18 @@ frame ``target`` unless another is named. Entities with * are thinned: one in ``
     /pool/laser *, /pool/soundings *   georeference: points near the target, soundings with the coarse mount
     /target/model/<family>             segment: outlines of the faces by design
     /target/laser/<family> *           segment: labelled laser points
-    /planes/<sensor>/<family>          fit_planes: the fitted planes, cut to the faces; arrows: their normals
+    /planes/<sensor>/<family>          fit_planes: outlines of the fitted planes, of what each sensor sees; normals
     /before/<family> *, /after/<family> *   adjust: soundings with the coarse and with the calibrated mount
     /residuals/<sensor>/<family> *     adjust: points by distance from the adjusted surface
     /maps/<sensor>/<family>            adjust: mean residual of each cell of the faces
     /fans/<sensor>/pass_<n>            adjust: rays of one epoch in the middle of the pass
+    /boat/pass_<n>                     adjust: the boat, the INS's axes, scanner and head at that epoch
     /tables/<name>                     text and numbers
 
 Entities over the steps of the timeline ``iteration``:
 
     /iteration/soundings/<family> *, /iteration/planes/<family>, /iteration/normals/<sensor>   angle_iterate
+    /replay/<family> *                                             adjust: soundings from coarse to calibrated
     /curves/deviation/<axis>, /curves/planes/<family>              angle_iterate: degrees
     /curves/turns/<angles or offsets>                              offsets: change in each turn of the alternation
 

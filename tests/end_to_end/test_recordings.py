@@ -1,5 +1,6 @@
 """Recordings: drawn from Parquet, read back with the SDK."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,14 @@ def log_curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:
     rows = [chunk for chunk in chunks if "Scalars:scalars" in chunk.schema.names]
     values = np.concatenate([np.ravel(chunk.column("Scalars:scalars").to_pylist()) for chunk in rows])
     return values, [moment for chunk in rows for moment in chunk.column(timeline).to_pylist()]
+
+
+def placed(chunks: list[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the translation and the rotation matrix of a frame; a column after the other is stored."""
+    (chunk,) = [one for one in chunks if "Transform3D:translation" in one.schema.names]
+    (translation,) = chunk.column("Transform3D:translation").to_pylist()[0]
+    (matrix,) = chunk.column("Transform3D:mat3x3").to_pylist()[0]
+    return np.array(translation), np.reshape(matrix, (3, 3)).T
 
 
 def test_every_point_is_there(drawn: Path) -> None:
@@ -67,12 +76,17 @@ def test_planes_lie_on_the_planes(drawn: Path) -> None:
     for sensor in ("laser", "mbes"):
         for family in ("P1", "P2", "P3"):
             (chunk,) = found[f"/planes/{sensor}/{family}"]
-            corners = np.array(chunk.column("Mesh3D:vertex_positions").to_pylist()[0])
+            corners = np.concatenate(chunk.column("LineStrips3D:strips").to_pylist()[0])
             plane = planes.loc[(sensor, family)]
+            assert (np.sign(corners[:, 2].round(6)) * (1 if sensor == "laser" else -1) >= 0).all()  # the water is at 0
             normal = plane[[f"normal_{axis}_target_1" for axis in "xyz"]].to_numpy(dtype=float)
             np.testing.assert_allclose(corners @ normal, plane["distance_m"], atol=1e-5)
             (chunk,) = found[f"/planes/{sensor}/{family}/normal"]
             np.testing.assert_allclose(chunk.column("Arrows3D:vectors").to_pylist()[0][0], normal, atol=1e-6)
+    (chunk,) = found["/planes/mbes/P2/normal/name"]
+    off_mm = float(re.findall(r"^P2: ([+-]\d+) mm$", chunk.column("Points3D:labels").to_pylist()[0][0])[0])
+    sonar = planes.loc[("mbes", "P2")]
+    assert off_mm == pytest.approx(1000 * -sonar["centroid_x_target_m"], abs=2.0)  # outward of the wall is -x
 
 
 def test_before_after_residuals_maps_and_fans(drawn: Path) -> None:
@@ -112,11 +126,21 @@ def test_before_after_residuals_maps_and_fans(drawn: Path) -> None:
         red, blue = colours >> 24, (colours >> 8) & 255
         far = np.abs(rows["mean_m"].to_numpy()) > 0.001
         assert ((red > blue) == (rows["mean_m"].to_numpy() > 0))[far].all()  # red is plus: toward the boat
+    replay = pd.concat([chunk.to_pandas() for chunk in found["/replay/P2"]]).sort_values("iteration")
+    first, last = (np.stack(replay["Points3D:positions"].iloc[k]) for k in (0, -1))
+    assert np.abs(first[:, 0]).mean() == pytest.approx(wall[0], rel=0.05)
+    assert np.abs(last[:, 0]).mean() == pytest.approx(wall[1], rel=0.2)
     rows = [row for chunk in found["/fans/mbes/pass_0"] for row in chunk.column("LineStrips3D:strips").to_pylist()]
     rays = [ray for row in rows for ray in row]
     lengths = np.linalg.norm(np.diff(np.array(rays), axis=1)[:, 0], axis=1)
     assert lengths.min() > residuals["range_m"].min() - 0.01
     assert lengths.max() < residuals["range_m"].max() + 0.01
+    boat, head = (placed(found[f"/boat/pass_0{sensor}"]) for sensor in ("", "/head"))
+    here = boat[0] + boat[1] @ head[0]  # the sonar's acoustic centre, where its rays begin
+    assert np.linalg.norm(np.array(rays)[:, 0] - here, axis=1).min() < 0.02
+    down = boat[1] @ head[1] @ [0.0, 0.0, -1.0]  # the middle of its fan looks down and to the target, which is at +x
+    assert down[2] < -0.5
+    assert down[0] > 0.5
 
 
 def test_the_iteration_closes_the_planes(drawn: Path) -> None:
