@@ -1,4 +1,5 @@
-"""Write the pages of docs/reference that are made from the program itself: the commands, and the reasons by code.
+"""Write the pages of docs/reference that are made from the program itself: the commands, the reasons by code,
+and the pool's config.
 
 A test compares them with the program, so that a change of a command or of a reason asks for them anew:
 
@@ -27,6 +28,11 @@ REASONS = """# Reasons and warnings, by code
 calibration.json has `reason_codes` beside `reasons`, and `warning_codes` beside `warnings`: one code each, in the same
 order. A code never changes; the words beside it may. A reason rejects; a warning does not. The words in the report and
 in calibration.json say what was found in your session; this page says where it mostly comes from, and what to do.
+"""
+POOL = """# The pool's config
+
+`configs/defaults.yaml`, which has every key with its default and its meaning. Copy it and keep the lines that differ; the
+target's `a`, `b`, `c`, `e` and `origin` are required ([The target](../target.md)).
 """
 
 
@@ -62,11 +68,16 @@ def reasons_page() -> str:
     return "\n".join(parts)
 
 
-PAGES = {"reference/commands.md": commands_page, "reference/reasons.md": reasons_page}
+def pool_page() -> str:
+    """Return docs/reference/pool.md."""
+    return f"{POOL}\n```yaml\n{(DOCS.parent / 'configs' / 'defaults.yaml').read_text(encoding='utf-8')}```\n"
+
+
+PAGES = {"reference/pool.md": pool_page, "reference/commands.md": commands_page, "reference/reasons.md": reasons_page}
 
 
 def main() -> None:
-    """Write both pages."""
+    """Write all pages."""
     for name, page in PAGES.items():
         (DOCS / name).write_text(page(), encoding="utf-8")
 
