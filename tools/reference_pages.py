@@ -1,5 +1,4 @@
-"""Write the pages of docs/reference that are made from the program itself: the commands, the reasons by code,
-and the pool's config.
+"""Write the pages of docs/reference that are made from the program: commands, reasons by code, the pool's config.
 
 A test compares them with the program, so that a change of a command or of a reason asks for them anew:
 
@@ -31,8 +30,8 @@ in calibration.json say what was found in your session; this page says where it 
 """
 POOL = """# The pool's config
 
-`configs/defaults.yaml`, which has every key with its default and its meaning. Copy it and keep the lines that differ; the
-target's `a`, `b`, `c`, `e` and `origin` are required ([The target](../target.md)).
+`configs/defaults.yaml`, which has every key with its default and its meaning. Copy it and keep the lines that differ;
+the target's `a`, `b`, `c`, `e` and `origin` are required ([The target](../target.md)).
 """
 
 
