@@ -118,7 +118,7 @@ def write_mounts(folder: Path, text: str, content: Content, blocks: Mapping[str,
         By sensor, the keys to write, from :func:`mount_block`.
     """
     path = folder / "session.yaml"
-    if all(_is_same(content[name], block) for name, block in blocks.items()):
+    if all(_is_same(content.get(name, {}), block) for name, block in blocks.items()):
         return f"{path}: has these mounts already; not written"
     new = edit_mounts(text, blocks, path)
     _check(_without_unfilled_mounts(content_of(new, path)), folder)
