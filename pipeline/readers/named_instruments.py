@@ -16,8 +16,8 @@ _SYSTEM = (26, 32)  # "system identifier" in a LAS header: first byte, length (A
 def named_instrument(path: Path, name: str, kind: file_kind.FileKind) -> str:
     """Return the instrument's name by the file's header, such as ``R2Sonic 2024``; empty if it names none.
 
-    R2Sonic's packets hold the sonar's model number, a LAS header the scanner. The other formats say nothing that names
-    one instrument.
+    R2Sonic's packets hold the sonar's model number; a LAS header may hold a scanner of RIEGL. The other formats name no
+    instrument.
 
     Parameters
     ----------
@@ -30,7 +30,8 @@ def named_instrument(path: Path, name: str, kind: file_kind.FileKind) -> str:
         with opened(path, name) as file:
             if kind is file_kind.LAS:
                 start, length = _SYSTEM
-                return _words(read_at(file, start, length))
+                system = _words(read_at(file, start, length))
+                return system if system.startswith("RIEGL ") else ""  # others name programs, or processes (MERGE)
             if kind not in (file_kind.XTF, file_kind.R2SONIC_PACKETS):
                 return ""
             packets = (xtf_packets if kind is file_kind.XTF else bare_packets)(file, Counter())

@@ -36,7 +36,9 @@ class FolderFiles:
     Attributes
     ----------
     by_kind : dict
-        Names of the files that may be read, by their sensor and their kind.
+        Names of the files that may be read, by their sensor and the title of their kind.
+    kinds : dict
+        These kinds by their titles.
     accuracy : list of str
         Names of accuracy files (SMRMSG), which belong to an SBET.
     texts : list of str
@@ -45,7 +47,8 @@ class FolderFiles:
         The other files.
     """
 
-    by_kind: dict[tuple[str, FileKind], list[str]] = field(default_factory=dict)
+    by_kind: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    kinds: dict[str, FileKind] = field(default_factory=dict)
     accuracy: list[str] = field(default_factory=list)
     texts: list[LeftOut] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
@@ -81,7 +84,8 @@ def _sort(files: FolderFiles, path: Path, name: str) -> None:
     if kind in (file_kind.CSV, file_kind.PARQUET):
         sensors = [*sensors_of_table(path, name)]
     if len(sensors) == 1:
-        files.by_kind.setdefault((sensors[0], kind), []).append(name)
+        files.kinds[kind.title] = kind
+        files.by_kind.setdefault((sensors[0], kind.title), []).append(name)
     elif sensors:
         files.left_out.append(LeftOut(name, f"has the columns of {' and '.join(sensors)}; keep those of one sensor"))
     else:

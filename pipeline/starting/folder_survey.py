@@ -63,8 +63,9 @@ def survey_folder(folder: Path) -> FolderSurvey:
     left_out, found = list(files.left_out), list[FileGroup]()
     with temporary_folder() as copies:
         for sensor in SENSORS:
-            for kind in sorted((kind for of, kind in files.by_kind if of == sensor), key=lambda kind: kind.title):
-                group, unusable = survey_group(sensor, kind, files.by_kind[sensor, kind], folder, copies)
+            for title in sorted(title for of, title in files.by_kind if of == sensor):
+                names = files.by_kind[sensor, title]
+                group, unusable = survey_group(sensor, files.kinds[title], names, folder, copies)
                 left_out += unusable
                 found += [] if group is None else [group]
     found = with_weeks(found)
