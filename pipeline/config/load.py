@@ -11,11 +11,9 @@ from pipeline.config.instruments import merge_presets
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.target_mesh import with_mesh
-from pipeline.config.yaml_file import content_of, text_of
+from pipeline.config.yaml_file import SESSION_YAML, content_of, text_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
-
-SESSION_YAML = "session.yaml"
 
 
 def load_pool(path: Path) -> PoolConfig:

@@ -42,9 +42,9 @@ def named_instrument(path: Path, name: str, kind: file_kind.FileKind) -> str:
 
 
 def _words(text: bytes) -> str:
-    """Return the printable ASCII words that end at the first zero byte; empty if there are other letters.
+    r"""Return the printable ASCII words that end at the first zero byte; empty if there are other letters.
 
-    >>> _words(b"2024" + bytes(8)), _words(b"RIEGL  VZ-400i"), _words(b"\\xff")
+    >>> _words(b"2024" + bytes(8)), _words(b"RIEGL  VZ-400i"), _words(b"\xff")
     ('2024', 'RIEGL VZ-400i', '')
     """
     words = text.partition(b"\0")[0]

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from pipeline.config.load import SESSION_YAML
 from pipeline.config.recording import inside_session
+from pipeline.config.yaml_file import SESSION_YAML
 from pipeline.console import plural
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.readers import file_kind

@@ -1,4 +1,4 @@
-"""What a folder of raw files tells about a session: each sensor's files, casts, accuracy files, and what is left out."""
+"""What a folder of raw files tells about a session: each sensor's files, casts, accuracy files, and files left out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

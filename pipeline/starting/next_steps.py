@@ -62,8 +62,8 @@ def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path,
             lines = "\n".join(f"     {line}" for line in _by_block(others))
             steps.append(f"Fill in {path}:\n{lines}")
     config = pool or "POOL.yaml"
-    steps.append(f"See whether the files are good, best while the boat is still in the water\n     "
-                 f"{command('check', session, '--config', config)}")
+    check = command("check", session, "--config", config)
+    steps.append(f"See whether the files are good, best while the boat is still in the water\n     {check}")
     steps.append(f"Calibrate\n     {command('run', session, '--config', config, '--run', 'RUN')}")
     return "\n".join(["Left to be done:", *(f"{number}. {step}" for number, step in enumerate(steps, 1))])
 

@@ -5,10 +5,11 @@ from pipeline.starting.boat_track import BoatTrack
 from pipeline.starting.yaml_words import comment, to_fill_in
 
 _HEAD = (
-    f"The pool's config, begun by poolcal init. {MARK} marks what only a person knows. Every other key, with its default "
-    "and its meaning: configs/defaults.yaml. A target of another shape has faces in place of a, b, c, e and low_side: "
-    "README.md, \"Other targets\"."
+    f"The pool's config, begun by poolcal init. {MARK} marks what only a person knows. Every other key, with its "
+    "default and its meaning: configs/defaults.yaml. A target of another shape has faces in place of a, b, c, e and "
+    'low_side: README.md, "Other targets".'
 )
+_AZIMUTH = "  azimuth_deg: null             # of the target's +y, clockwise from north; null: by the boat's heading"
 _AS_BUILT = """\
 # as_built:                     # take the comment signs away, and say how the target was surveyed; these, the defaults,
 #   face_sigma_m: 0.0005        # are of faces surveyed one by one with the pool filled. For other cases the table in
@@ -26,7 +27,7 @@ def pool_text(track: BoatTrack | None) -> str:
     lines += _position(track)
     lines += [to_fill_in(name, "    ") for name in ("latitude_deg", "longitude_deg", "height_m")]
     lines += _azimuth(track)
-    lines += ["  azimuth_deg: null             # direction of the target's +y, clockwise from true north; null: from the boat"]
+    lines += [_AZIMUTH]
     lines += [to_fill_in("water_level_m", "  ", "target.water_level_m")]
     return "\n".join([*lines, _AS_BUILT]) + "\n"
 
@@ -36,8 +37,8 @@ def _position(track: BoatTrack | None) -> list[str]:
         return []
     return comment(
         f"To compare: the INS's mean position over the session is latitude {track.latitude_deg:.7f}, longitude "
-        f"{track.longitude_deg:.7f}, height {track.height_m:.2f}. The origin lies some metres from it, on the starboard "
-        "side of the passes.",
+        f"{track.longitude_deg:.7f}, height {track.height_m:.2f}. The origin lies some metres from it, on the "
+        "starboard side of the passes.",
         "    ",
     )
 

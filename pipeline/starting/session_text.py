@@ -11,13 +11,13 @@ from pipeline.starting.file_groups import FileGroup
 from pipeline.starting.folder_survey import FolderSurvey
 from pipeline.starting.presets import preset_of, presets_for
 from pipeline.starting.span_words import span_words
-from pipeline.starting.yaml_words import COMMENT_COLUMN, capped, comment, file_list, scalar, to_fill_in
+from pipeline.starting.yaml_words import beside, capped, comment, file_list, scalar, to_fill_in
 
 MOST_LEFT_OUT = 40  # files that are listed with their reasons
 _NAMES = {"ins": "the INS", "laser": "the laser", "mbes": "the sonar"}
 _HEAD = (
-    f"A session of poolcal, begun by poolcal init from the files in this folder. {MARK} marks what only a person knows: "
-    "poolcal says what is still to be filled in. All keys, and their defaults: README.md, \"session.yaml\"."
+    f"A session of poolcal, begun by poolcal init from the files in this folder. {MARK} marks what only a person "
+    'knows: poolcal says what is still to be filled in. All keys, and their defaults: README.md, "session.yaml".'
 )
 _BEGINNING_OF_MBES = (
     "No sonar file was found. To calibrate the sonar add a block mbes with files, format and mount; without it poolcal "
@@ -64,10 +64,10 @@ def _chosen(group: FileGroup, survey: FolderSurvey) -> Iterator[str]:
     yield from (line for doubt in survey.doubts if _is_about(doubt, group) for line in comment(f"Look: {doubt}", "  "))
     yield f"  files: {file_list(group.patterns)}".replace(": \n", ":\n")
     yield f"  format: {group.kind.format}"
-    if group.undated:
-        yield to_fill_in("gps_week", "  ") if group.gps_week is None else (
-            f"{f'  gps_week: {group.gps_week}':<{COMMENT_COLUMN}}# the files have seconds of the week; by the dates of the others"
-        )
+    if group.undated and group.gps_week is None:
+        yield to_fill_in("gps_week", "  ")
+    elif group.undated:
+        yield beside(f"  gps_week: {group.gps_week}", "the files have seconds of the week; from the other files' dates")
     yield from _instrument(group)
     if group.lacks_speed:
         yield to_fill_in("sound_speed_m_s", "  ")
@@ -81,7 +81,7 @@ def _instrument(group: FileGroup) -> Iterator[str]:
     """Yield the preset that the files name; without one, as a comment, those to choose from."""
     preset = preset_of(group.instrument)
     if preset:
-        yield f"{f'  instrument: {preset}':<{COMMENT_COLUMN}}# the files name it; its figures, and what is sure of them: configs/instruments"
+        yield beside(f"  instrument: {preset}", "the files name it; its figures are in configs/instruments")
         return
     named = f"The files name {group.instrument}, for which there is no preset. " if group.instrument else ""
     known = ", ".join(presets_for(group.sensor))
@@ -124,17 +124,17 @@ def _frame(survey: FolderSurvey) -> Iterator[str]:
     if proposal.heights is not None:
         yield to_fill_in("heights", "  ")
     elif proposal.frame == MARK and proposal.frame != LASER_FRAME:
-        yield f"{'  # heights: ellipsoidal':<{COMMENT_COLUMN}}# {WHAT['heights']}"
+        yield beside("  # heights: ellipsoidal", WHAT["heights"])
 
 
 def _casts(survey: FolderSurvey) -> Iterator[str]:
     for name in survey.casts:
-        yield from comment("A cast of sound speed was found. Take the comment sign away to trace rays through it:", "  ")
+        yield from comment("A cast of sound speed. Take the comment sign away to trace rays through it:", "  ")
         yield f"  # svp: {scalar(name)}"
 
 
 def _mount(sensor: Sensor) -> Iterator[str]:
-    yield f"  mount:                        # {WHAT[f'{sensor}.mount']}, or measure them"
+    yield beside("  mount:", f"{WHAT[f'{sensor}.mount']}, or measure them")
     if sensor == "mbes":
         yield from comment("At a roll of 0 the head looks down; to look to starboard its roll is -.", "    ")
     yield from (to_fill_in(key, "    ") for key in SETTINGS)

@@ -21,8 +21,8 @@ def _dated(group: FileGroup, dated: Sequence[tuple[int, int]]) -> FileGroup:
 def _weeks_later(span: tuple[int, int], dated: Iterable[tuple[int, int]]) -> set[int]:
     """Return by how many weeks a file must be moved to run at the same time as one of the dated files.
 
-    A file shorter than a week overlaps another, of whole weeks off, in one way at most if both together are shorter than
-    a week: with k weeks added its middle is then nearest to the other's.
+    Files that last less than a week together overlap for one number of weeks at most, for which their middles are
+    nearest to each other.
     """
     middle = sum(span) / 2
     found = set()

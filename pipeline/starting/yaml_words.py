@@ -8,7 +8,7 @@ import yaml
 from pipeline.config.fill_in import MARK, what
 from pipeline.console import plural, printable
 
-COMMENT_COLUMN = 30  # at which comments beside keys begin
+_COMMENT_COLUMN = 30  # at which comments beside keys begin
 _WIDTH = 116
 _NEVER_BROKEN = 1_000_000
 
@@ -57,7 +57,16 @@ def to_fill_in(name: str, indent: str, key: str = "") -> str:
     key
         The key with the blocks round it, by which the words are looked up; empty: ``name``.
     """
-    return f"{f'{indent}{name}: {MARK}':<{COMMENT_COLUMN}}# {what(key or name)}"
+    return beside(f"{indent}{name}: {MARK}", what(key or name))
+
+
+def beside(line: str, words: str) -> str:
+    """Return a line of YAML with a comment beside it.
+
+    >>> beside("  x_m: 0.3", "forward")
+    '  x_m: 0.3                    # forward'
+    """
+    return f"{line:<{_COMMENT_COLUMN}}# {words}"
 
 
 def capped(lines: Sequence[str], most: int, noun: str) -> list[str]:

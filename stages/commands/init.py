@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.atomic_files import write_text
 from pipeline.config.fill_in import unfilled
-from pipeline.config.load import SESSION_YAML
+from pipeline.config.yaml_file import SESSION_YAML
 from pipeline.console import plural, say
 from pipeline.errors import ConfigError
 from pipeline.starting.folder_survey import FolderSurvey, survey_folder
