@@ -11,7 +11,7 @@ from pipeline.starting.file_groups import FileGroup
 from pipeline.starting.folder_survey import FolderSurvey
 from pipeline.starting.presets import preset_of, presets_for
 from pipeline.starting.span_words import span_words
-from pipeline.starting.yaml_words import beside, capped, comment, file_list, scalar, to_fill_in
+from pipeline.starting.yaml_words import beside, capped, comment, file_list, list_in_brackets, scalar, to_fill_in
 
 MOST_LEFT_OUT = 40  # files that are listed with their reasons
 _NAMES = {"ins": "the INS", "laser": "the laser", "mbes": "the sonar"}
@@ -92,14 +92,15 @@ def _instrument(group: FileGroup) -> Iterator[str]:
 def _open(sensor: Sensor, groups: tuple[FileGroup, ...]) -> Iterator[str]:
     """Yield a sensor's files and format to fill in, below a comment with all groups that there are."""
     if groups:
-        yield from comment(f"Several kinds of files may be those of {_NAMES[sensor]}. Choose one of these:", "  ")
+        yield from comment(f"Several kinds of files may be those of {_NAMES[sensor]}. Choose one, for files and format below:", "  ")
     else:
         yield from comment(f"No file of {_NAMES[sensor]} was found that can be read.", "  ")
     for group in groups:
-        week = "" if group.gps_week is None else f", gps_week: {group.gps_week}"
         yield from comment(f"{group.kind.title}, {plural(len(group.files), 'file')}, {span_words(group)}:", "  ")
-        listed = capped([scalar(pattern) for pattern in group.patterns], MOST_LEFT_OUT, "file")
-        yield from comment(f"  files: [{', '.join(listed)}], format: {group.kind.format}{week}", "  ")
+        yield f"  #   files: {list_in_brackets(group.patterns)}"
+        yield f"  #   format: {group.kind.format}"
+        if group.gps_week is not None:
+            yield f"  #   gps_week: {group.gps_week}"
     yield to_fill_in("files", "  ")
     yield to_fill_in("format", "  ")
     if any(group.undated and group.gps_week is None for group in groups):
@@ -113,7 +114,8 @@ def _accuracy(survey: FolderSurvey) -> Iterator[str]:
     if group is not None and group.kind.format == "sbet":
         yield f"  accuracy: {file_list(survey.accuracy)}".replace(": \n", ":\n")
     else:
-        yield from comment(f"Accuracy files, which belong to an SBET: accuracy: {file_list(survey.accuracy)}", "  ")
+        yield from comment("Accuracy files, which belong to an SBET:", "  ")
+        yield f"  #   accuracy: {list_in_brackets(survey.accuracy)}"
 
 
 def _frame(survey: FolderSurvey) -> Iterator[str]:

@@ -31,11 +31,23 @@ def _in_quotes(text: str) -> str:
 def file_list(patterns: Sequence[str], indent: str = "  ") -> str:
     """Return the value of a key that lists files: in brackets if it is one, else one a line below the key."""
     if len(patterns) == 1:
-        inner = scalar(patterns[0])
-        bare = inner[:1] not in ("'", '"')
-        has_brackets = bool(set(inner) & set(",[]{}"))  # which have a meaning inside a list in brackets
-        return f"[{_in_quotes(patterns[0]) if bare and has_brackets else inner}]"
+        return list_in_brackets(patterns)
     return "".join(f"\n{indent}  - {scalar(pattern)}" for pattern in patterns)
+
+
+def list_in_brackets(patterns: Sequence[str]) -> str:
+    """Return texts as a YAML list on one line.
+
+    >>> list_in_brackets(["ins/*.gps", "a,b"])
+    '[ins/*.gps, "a,b"]'
+    """
+    bare = [(pattern, scalar(pattern)) for pattern in patterns]
+    return f"[{', '.join(_in_quotes(text) if _has_meaning(inner) else inner for text, inner in bare)}]"
+
+
+def _has_meaning(inner: str) -> bool:
+    """Return whether a value without quotes has letters that have a meaning in a list in brackets."""
+    return inner[:1] not in ("'", '"') and bool(set(inner) & set(",[]{}"))
 
 
 def comment(text: str, indent: str = "") -> list[str]:
