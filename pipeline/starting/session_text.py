@@ -92,7 +92,8 @@ def _instrument(group: FileGroup) -> Iterator[str]:
 def _open(sensor: Sensor, groups: tuple[FileGroup, ...]) -> Iterator[str]:
     """Yield a sensor's files and format to fill in, below a comment with all groups that there are."""
     if groups:
-        yield from comment(f"Several kinds of files may be those of {_NAMES[sensor]}. Choose one, for files and format below:", "  ")
+        several = f"Several kinds of files may be those of {_NAMES[sensor]}. Choose one, for files and format below:"
+        yield from comment(several, "  ")
     else:
         yield from comment(f"No file of {_NAMES[sensor]} was found that can be read.", "  ")
     for group in groups:
