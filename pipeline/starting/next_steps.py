@@ -47,8 +47,8 @@ def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path,
     open_keys
         The files that were written, each with its keys that are still to be filled in.
     """
-    steps = []
     mounts = [one for _, missing in open_keys for one in missing if ".mount." in one.key]
+    steps = _to_fill_in(open_keys, mounts)
     if mounts:
         sensors = " and ".join(sorted({one.key.partition(".")[0] for one in mounts}))
         steps.append(
@@ -56,16 +56,21 @@ def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path,
             f"     {command('coarse', 'MARKS.yaml', '--session', session)}\n"
             f"   or measure them, and fill them in by hand."
         )
-    for path, missing in open_keys:
-        others = [one for one in missing if one not in mounts]
-        if others:
-            lines = "\n".join(f"     {line}" for line in _by_block(others))
-            steps.append(f"Fill in {path}:\n{lines}")
     config = pool or "POOL.yaml"
     check = command("check", session, "--config", config)
     steps.append(f"See whether the files are good, best while the boat is still in the water\n     {check}")
     steps.append(f"Calibrate\n     {command('run', session, '--config', config, '--run', 'RUN')}")
     return "\n".join(["Left to be done:", *(f"{number}. {step}" for number, step in enumerate(steps, 1))])
+
+
+def _to_fill_in(open_keys: Sequence[tuple[Path, Sequence[Unfilled]]], mounts: Sequence[Unfilled]) -> list[str]:
+    """Return a step for each file in which keys other than mounts are open: poolcal coarse needs them filled in."""
+    steps = []
+    for path, missing in open_keys:
+        others = [one for one in missing if one not in mounts]
+        if others:
+            steps.append("\n".join([f"Fill in {path}:", *(f"     {line}" for line in _by_block(others))]))
+    return steps
 
 
 def _by_block(missing: Sequence[Unfilled]) -> list[str]:

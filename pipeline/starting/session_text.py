@@ -105,7 +105,7 @@ def _open(sensor: Sensor, groups: tuple[FileGroup, ...]) -> Iterator[str]:
     yield to_fill_in("files", "  ")
     yield to_fill_in("format", "  ")
     if any(group.undated and group.gps_week is None for group in groups):
-        yield f"  # {to_fill_in('gps_week', '')}; where the format chosen needs it"
+        yield beside("  # gps_week: NUMBER", f"{WHAT['gps_week']}; where the format chosen needs it")
 
 
 def _accuracy(survey: FolderSurvey) -> Iterator[str]:

@@ -9,6 +9,7 @@ from pipeline.config.fill_in import MARK, what
 from pipeline.console import plural, printable
 
 _COMMENT_COLUMN = 30  # at which comments beside keys begin
+_LONGEST = 120
 _WIDTH = 116
 _NEVER_BROKEN = 1_000_000
 
@@ -73,12 +74,14 @@ def to_fill_in(name: str, indent: str, key: str = "") -> str:
 
 
 def beside(line: str, words: str) -> str:
-    """Return a line of YAML with a comment beside it.
+    """Return a line of YAML with a comment beside it, or above it where both are too long for one line.
 
     >>> beside("  x_m: 0.3", "forward")
     '  x_m: 0.3                    # forward'
     """
-    return f"{line:<{_COMMENT_COLUMN}}# {words}"
+    whole = f"{line:<{_COMMENT_COLUMN}}# {words}"
+    indent = " " * (len(line) - len(line.lstrip()))
+    return whole if len(whole) <= _LONGEST else "\n".join([*comment(words, indent), line])
 
 
 def capped(lines: Sequence[str], most: int, noun: str) -> list[str]:

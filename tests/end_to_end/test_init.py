@@ -64,7 +64,7 @@ def test_from_raw_files_to_a_good_check(bare: Path, small: Path) -> None:
     told = poolcal("init", bare)
     assert told.status == 0, told.err
     assert "R2Sonic 2024" in told.out
-    assert "1. The mounts of laser and mbes" in told.out
+    assert "2. The mounts of laser and mbes" in told.out
     for words in (("check", bare), ("check", bare, "--config", bare / "pool.yaml")):
         one_line(poolcal(*words), "still to be filled in")
     for name in ("session.yaml", "pool.yaml"):
