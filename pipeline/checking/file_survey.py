@@ -23,6 +23,7 @@ from pipeline.readers.dispatch import SensorSettings, raw_files, raw_parts
 from pipeline.readers.file_summaries import thin_sigmas
 from pipeline.readers.las import LasPart
 from pipeline.readers.rates import rate_hz
+from pipeline.readers.session_files import as_pattern
 from pipeline.readers.smrmsg import SmrmsgPart
 
 Columns = dict[str, NDArray[Any]]
@@ -108,14 +109,32 @@ def survey_files(session: SessionConfig, folder: Path) -> tuple[list[SurveyedFil
             settings: SensorSettings | None = getattr(session, sensor)
             if settings is None:
                 continue
-            names, complaints = _listed(settings, folder)
+            surveyed, complaints = survey_sensor(sensor, settings, folder, copies)
             list_faults += complaints
-            sharing = SurveyedSensor(sensor=sensor, settings=settings, folder=folder, number=len(names), copies=copies)
-            for name, parts in _parts(sensor, settings, folder, names):
-                files.append(_survey_file(sharing, name, parts))
+            files += surveyed
     if session.ins.accuracy:
         files, list_faults = _with_accuracy(files, list_faults, session.ins, folder)
     return files, list_faults
+
+
+def survey_sensor(
+    sensor: Sensor, settings: SensorSettings, folder: Path, copies: Path
+) -> tuple[list[SurveyedFile], list[str]]:
+    """Return the survey of one sensor's files, and the faults in its list of files.
+
+    Parameters
+    ----------
+    sensor, settings
+        The sensor, and its block of session.yaml.
+    folder
+        The session folder.
+    copies
+        A folder for short copies of large files.
+    """
+    names, complaints = _listed(settings, folder)
+    sharing = SurveyedSensor(sensor=sensor, settings=settings, folder=folder, number=len(names), copies=copies)
+    parts_by_name = _parts(sensor, settings, folder, names)
+    return [_survey_file(sharing, name, parts) for name, parts in parts_by_name], complaints
 
 
 def _with_accuracy(
@@ -129,7 +148,7 @@ def _with_accuracy(
     if good is None:
         return list(files), list(list_faults)
     try:
-        alone = ins.model_copy(update={"files": [_escaped(files[good].name)]})
+        alone = ins.model_copy(update={"files": [as_pattern(files[good].name)]})
         parts = [part for part in raw_parts("ins", alone, folder) if isinstance(part, SmrmsgPart)]
         sigmas_by_chunk = [thin_sigmas(chunk.sigmas) for part in parts for chunk in part.chunks()]
     except (RawDataError, ConfigError) as error:
@@ -165,7 +184,7 @@ def _parts(
     without = _without_accuracy(settings)
 
     def parts_of(chosen: Sequence[str]) -> tuple[Part, ...]:
-        escaped = [_escaped(name) for name in chosen]
+        escaped = [as_pattern(name) for name in chosen]
         return raw_parts(sensor, settings.model_copy(update={"files": escaped} | without), folder)
 
     good, bad = list(names), dict[str, RawDataError]()
@@ -185,10 +204,6 @@ def _parts(
         by_path.setdefault(_path_of(part), []).append(part)
     for name in names:
         yield name, bad[name] if name in bad else by_path.get(folder / name, [])
-
-
-def _escaped(name: str) -> str:
-    return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
 
 
 def _survey_file(sharing: SurveyedSensor, name: str, parts: Sequence[Part] | RawDataError) -> SurveyedFile:

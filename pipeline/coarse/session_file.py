@@ -13,30 +13,42 @@ from numpy.typing import NDArray
 import pipeline
 from pipeline.atomic_files import sha256, write_bytes, writing
 from pipeline.coarse.session_edit import edit_mounts
+from pipeline.config.fill_in import is_unfilled, refuse_unfilled
 from pipeline.config.instruments import merge_presets
+from pipeline.config.load import session_yaml
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_file import content_of, text_of
 from pipeline.config.yaml_models import parse
-from pipeline.errors import ConfigError
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.mount import Mounted
 from pipeline.readers.casts import with_cast
 
 SENSORS = ("laser", "mbes")
+MOUNTS = tuple(f"{name}.mount" for name in SENSORS)
 ZERO_MOUNT = dict.fromkeys(SETTINGS, 0.0)
 Array = NDArray[np.float64]
 Content = dict[str, Any]
 
 
 def read_session(folder: Path) -> tuple[str, Content]:
-    """Return text and content of session.yaml. Everything in it is checked; only mounts may be missing."""
-    if not folder.is_dir():
-        raise ConfigError(f"{folder}: is no folder; SESSION is the folder that holds session.yaml")
-    path = folder / "session.yaml"
+    """Return text and content of session.yaml. Everything in it is checked; only mounts may be missing.
+
+    A mount that is still to be filled in counts as missing, and is not in the content.
+    """
+    path = session_yaml(folder)
     text = text_of(path)
-    content = content_of(text, path)
+    content = _without_unfilled_mounts(content_of(text, path))
+    refuse_unfilled(text, path, may_be=lambda one: one.block in MOUNTS or one.key in MOUNTS)
     _check(content, folder)
     return text, content
+
+
+def _without_unfilled_mounts(content: Content) -> Content:
+    blocks = {name: content[name] for name in SENSORS if isinstance(content.get(name), dict)}
+    return content | {
+        name: {key: value for key, value in block.items() if key != "mount" or not is_unfilled(value)}
+        for name, block in blocks.items()
+    }
 
 
 def _check(content: Content, folder: Path) -> SessionConfig:
@@ -106,10 +118,10 @@ def write_mounts(folder: Path, text: str, content: Content, blocks: Mapping[str,
         By sensor, the keys to write, from :func:`mount_block`.
     """
     path = folder / "session.yaml"
-    if all(_is_same(content[name], block) for name, block in blocks.items()):
+    if all(_is_same(content.get(name, {}), block) for name, block in blocks.items()):
         return f"{path}: has these mounts already; not written"
     new = edit_mounts(text, blocks, path)
-    _check(content_of(new, path), folder)
+    _check(_without_unfilled_mounts(content_of(new, path)), folder)
     kept = _replace_session(folder, text, new)
     return f"{path}: {' and '.join(f'{name}.mount' for name in blocks)} written; what was there is in {kept.name}"
 

@@ -9,6 +9,7 @@ import yaml
 from pipeline.atomic_files import read_regular
 from pipeline.errors import ConfigError
 
+SESSION_YAML = "session.yaml"  # in every session folder
 MAX_YAML_BYTES = 1_000_000
 MAX_INTEGER = 2**63
 

@@ -131,7 +131,7 @@ def las_parts(
         Coordinates are stored with too coarse a scale.
     """
     _refuse_coarse(header.scales, frame, name)
-    crs = _crs_of(path, name) if frame != LaserFrame() else ""
+    crs = declared_crs(path, name) if frame != LaserFrame() else ""
     starts = range(0, header.present, STRETCH_POINTS) or range(1)
     parts = []
     for k, start in enumerate(starts):
@@ -170,7 +170,7 @@ def _refuse_coarse(scales: tuple[float, ...], frame: LaserFrame, name: str) -> N
             )
 
 
-def _crs_of(path: Path, name: str) -> str:
+def declared_crs(path: Path, name: str) -> str:
     """Return the CRS in the file's variable-length records, WKT; empty if there is none that can be read."""
     import laspy
     from pyproj.exceptions import ProjError

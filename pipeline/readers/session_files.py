@@ -17,6 +17,15 @@ class SessionFile:
     path: Path
 
 
+def as_pattern(name: str) -> str:
+    """Return the pattern that matches the file of this name alone.
+
+    >>> as_pattern("ins/pass [1].gps")
+    'ins/pass [[]1].gps'
+    """
+    return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
+
+
 def files_matching(folder: Path, patterns: Sequence[str], key: str) -> list[SessionFile]:
     """Return the files that match, each once, in order of their names.
 

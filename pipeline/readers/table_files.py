@@ -3,6 +3,7 @@
 import io
 from collections import Counter
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import IO, BinaryIO, Literal, cast
 
 import pyarrow as pa
@@ -10,11 +11,12 @@ import pyarrow as pa
 from pipeline.artefacts.streams import BATCH_ROWS
 from pipeline.errors import RawDataError
 from pipeline.readers.claimed_counts import refuse_claim
-from pipeline.readers.raw_file import read_at, size_of
+from pipeline.readers.raw_file import opened, read_at, size_of
 from pipeline.readers.table_columns import FLOAT64_ONLY, WHOLE_NUMBERS, TableSensor, choose_columns, csv_header
 
 MAX_LINE = 65_536  # bytes
 CSV_BLOCK = 4 << 20  # bytes
+TABLE_SENSORS: tuple[TableSensor, ...] = ("ins", "laser", "mbes")
 
 
 def record_batches(
@@ -100,12 +102,7 @@ def _csv(file: BinaryIO, name: str, sensor: TableSensor, dropped: Counter[str]) 
     from pyarrow import csv
 
     size = size_of(file)
-    while (line := file.readline(MAX_LINE)).lstrip(b"\xef\xbb\xbf").startswith((b"#", b"//")) or line.isspace():
-        continue
-    header = csv_header(line.decode("utf-8-sig", "replace"))
-    if header is None or not line.endswith(b"\n"):
-        raise RawDataError(f"{name}: its first line names no column; name them as README.md has them")
-    separator, names = header
+    separator, names = _csv_names(file, name)
     chosen = choose_columns(names, name, sensor)
     start, stop = file.tell(), _last_line_end(file, size)
     if stop < size:
@@ -129,6 +126,47 @@ def _csv(file: BinaryIO, name: str, sensor: TableSensor, dropped: Counter[str]) 
         for batch in reader:
             for start in range(0, batch.num_rows, BATCH_ROWS):
                 yield batch.slice(start, BATCH_ROWS)
+
+
+def _csv_names(file: BinaryIO, name: str) -> tuple[str, list[str]]:
+    """Return separator and column names of a CSV file, which is then at the line behind them."""
+    while (line := file.readline(MAX_LINE)).lstrip(b"\xef\xbb\xbf").startswith((b"#", b"//")) or line.isspace():
+        continue
+    header = csv_header(line.decode("utf-8-sig", "replace"))
+    if header is None or not line.endswith(b"\n"):
+        raise RawDataError(f"{name}: its first line names no column; name them as README.md has them")
+    return header
+
+
+def sensors_of_table(path: Path, name: str) -> list[TableSensor]:
+    """Return the sensors whose columns a table has; ``name`` is the file's name in messages.
+
+    Raises
+    ------
+    RawDataError
+        The file cannot be read as a table, or has the columns of no sensor. The message names those that are missing of
+        the sensor that lacks fewest.
+    """
+    import pyarrow.parquet as pq
+
+    with opened(path, name) as file:
+        try:
+            parquet = read_at(file, 0, 4) == b"PAR1"
+            size_of(file)
+            names = list(pq.read_schema(file).names) if parquet else _csv_names(file, name)[1]
+        except (pa.ArrowException, ValueError, OverflowError, OSError) as error:
+            raise RawDataError(f"{name}: cannot be read as a table; check or export it again") from error
+    sensors: list[TableSensor] = []
+    refusals: list[RawDataError] = []
+    for sensor in TABLE_SENSORS:
+        try:
+            choose_columns(names, name, sensor)
+            sensors.append(sensor)
+        except RawDataError as error:
+            refusals.append(error)
+    if not sensors:
+        raise min(refusals, key=lambda error: str(error).partition(" (has")[0].count(","))
+    return sensors
 
 
 def _last_line_end(file: BinaryIO, size: int) -> int:

@@ -4,10 +4,11 @@ A command's module and its imports are loaded only when the command is called. T
 """
 
 import sys
+from pathlib import Path
 
 from stages.cli import calibrating, looking, preparing  # in this order the help lists their commands
 from stages.cli.application import app
-from stages.commands import entry
+from stages.commands import entry, guide
 
 __all__ = ["calibrating", "call", "looking", "main", "preparing"]
 
@@ -15,7 +16,10 @@ __all__ = ["calibrating", "call", "looking", "main", "preparing"]
 def call(arguments: list[str]) -> int:
     """Run a command line and return its exit status; no exception is raised."""
     debug = "--debug" in arguments  # may stand anywhere in the line
-    words = [word for word in arguments if word != "--debug"] or ["--help"]
+    words = [word for word in arguments if word != "--debug"]
+    if not words:
+        names = [info.name for info in app.registered_commands if info.name is not None]
+        return entry.status_of(lambda: guide.command(names, Path()), debug)
     return entry.status_of(lambda: app(words, prog_name="poolcal", standalone_mode=False), debug)
 
 

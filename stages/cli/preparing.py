@@ -9,6 +9,23 @@ from stages.cli.application import app
 from stages.cli.arguments import POOL_FILE, AsJson, Pool, Session, SessionYaml
 
 
+@app.command("init")
+def _init(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="folder with the raw files, of one session")],
+    pool: Annotated[
+        Path | None, typer.Option("--pool", metavar="FILE", help="pool's config to write; default: FOLDER/pool.yaml")
+    ] = None,
+    with_pool: Annotated[bool, typer.Option("--with-pool/--no-pool", help="write a pool's config as well")] = True,
+) -> int:
+    """Begin a session: write session.yaml from the raw files.
+
+    What only a person knows is marked FILL_IN there, and listed. No file is replaced.
+    """
+    from stages.commands import init
+
+    return init.command(folder, pool, with_pool)
+
+
 @app.command("check")
 def _check(
     session: Session,

@@ -33,7 +33,7 @@ def command(file: Path, session: Path, out: Path | None, write: bool) -> int:
     refuse_output("--yaml", out, session, begins=b"agrees:")
     text, content = read_session(session)
     path = session / "session.yaml"
-    settings = {name: content[name]["mount"] for name in SENSORS if "mount" in content[name]}
+    settings = {name: content[name]["mount"] for name in SENSORS if "mount" in content.get(name, {})}
     present = {name: mount_of(parse(Mount, mount, f"{path}: {name}.mount")) for name, mount in settings.items()}
     marks = load_marks(file)
     assessment = assess_marks(marks, str(file), present)
@@ -43,6 +43,6 @@ def command(file: Path, session: Path, out: Path | None, write: bool) -> int:
     if assessment.agrees:
         blocks = mount_blocks(assessment, mount_origin("coarse", file))
         lines.append(write_mounts(session, text, content, blocks) if write else f"{path}: not written (--no-write)")
-        missing = [name for name in SENSORS if name not in present and name not in blocks]
+        missing = [name for name in SENSORS if name in content and name not in present and name not in blocks]
         lines += [f"But {name} still has no mount there." for name in missing]
     return print_answer("\n".join(lines), assessment.agrees)

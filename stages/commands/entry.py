@@ -12,26 +12,12 @@ import typer
 
 from pipeline.console import say
 from pipeline.errors import PoolcalError
+from stages.commands.usage import usage_message
 
 INTERRUPTED = 130  # the exit status that typer returns after Ctrl-C
 STOPPED = "poolcal: interrupted; what was complete is kept"
 SPEAKERS = ("typer", "click", "rich")  # packages that print the help
 interrupts: list[int] = []
-WANTED = {  # by required option: the words for the message if it is missing
-    "--config": "--config FILE: the pool's YAML file, which says where the target is; begin with configs/defaults.yaml",
-    "--run": "--run RUN: the folder for the results, outside the session folder",
-    "--session": "--session SESSION: the folder with session.yaml",
-}
-
-
-def _usage(error: typer.TyperException) -> str:
-    """Return the message for a wrong command line, with the command that shows the help."""
-    command = getattr(getattr(error, "ctx", None), "command_path", "poolcal")
-    option = next(iter(getattr(getattr(error, "param", None), "opts", ())), "")
-    words = " ".join(error.format_message().split()).rstrip(".")
-    if words.startswith("Missing option") and option in WANTED:
-        words = f"missing: {WANTED[option]}"
-    return f"{words or 'nothing to do'}; see {command} --help"
 
 
 def status_of(command: Callable[[], Any], debug: bool) -> int:
@@ -47,7 +33,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
         say(f"poolcal: {error}", sys.stderr)
         return 2
     except typer.TyperException as error:
-        say(f"poolcal: {_usage(error)}", sys.stderr)
+        say(f"poolcal: {usage_message(error)}", sys.stderr)
         return 2
     except Exception as error:  # anything else is a bug of the program, status 3
         if interrupts:  # a library that was being loaded has raised another error instead

@@ -1,0 +1,65 @@
+"""YAML that init writes: patterns and names of every kind come back as they were; comments stay comments."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from pipeline.config.yaml_file import content_of
+from pipeline.readers.session_files import files_matching
+from pipeline.starting.file_patterns import patterns_for
+from pipeline.starting.pool_text import pool_text
+from pipeline.starting.yaml_words import capped, comment, file_list, scalar
+
+NAMES = [
+    "ins/a.gps", "ins/b c.gps", "水池/第一次.gps", "it's/\"x\".gps", "a,b/[1].gps", "*/?.gps", "x: y.gps", "# x.gps",
+    "yes", "2026", "- a", "{a}.gps", "a\tb.gps", "a\nb.gps", "\u2028.gps", "&a.gps", "!b", "|c", "~", "%d", "@e",
+    " a .gps", "🚤.gps", "null",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_come_back(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("x")
+    (path.parent / "other.txt").write_text("x")
+    patterns = patterns_for([name], tmp_path)
+    for listed in (patterns, [*patterns, "z"]):
+        text = f"files: {file_list(listed)}\nname: {scalar(name)}\n"
+        assert content_of(text, path) == {"files": listed, "name": name}
+    assert [file.name for file in files_matching(tmp_path, patterns, "ins.files")] == [name]
+
+
+def test_a_pattern_where_all_belong_together_else_a_list(tmp_path: Path) -> None:
+    for name in ("ins/a.gps", "ins/b.gps", "ins/c.out", "top.gps", "deep/er/d.gps"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("x")
+    assert patterns_for(["ins/a.gps", "ins/b.gps"], tmp_path) == ["ins/*.gps"]
+    assert patterns_for(["ins/b.gps"], tmp_path) == ["ins/b.gps"]
+    assert patterns_for(["top.gps", "ins/b.gps", "ins/a.gps", "deep/er/d.gps"], tmp_path) == [
+        "*.gps", "deep/er/*.gps", "ins/*.gps",
+    ]  # fmt: skip
+    (tmp_path / "ins" / "link.gps").symlink_to(tmp_path / "top.gps")  # the pattern would match it
+    assert patterns_for(["ins/a.gps", "ins/b.gps"], tmp_path) == ["ins/a.gps", "ins/b.gps"]
+
+
+@pytest.mark.parametrize("text", ["a\nb: 1", "x\u2028y: 2", "\x85z: 3", "\r\nevil: 1", "\x1b[2J", "long " * 200])
+def test_a_comment_never_becomes_a_key(text: str) -> None:
+    lines = comment(text, "  ")
+    assert all(line.startswith("  # ") and len(line) <= 120 for line in lines)
+    assert yaml.safe_load("\n".join(lines)) is None
+
+
+def test_long_lists_say_how_much_is_left_out() -> None:
+    assert capped(["a", "b"], 2, "file") == ["a", "b"]
+    assert capped(["a", "b", "c"], 2, "file") == ["a", "b", "and 1 file more"]
+
+
+def test_a_pools_config_without_a_track() -> None:
+    target = yaml.safe_load(pool_text(None))["target"]
+    assert {key: target[key] for key in ("a", "b", "c", "e", "low_side", "water_level_m")} == dict.fromkeys(
+        ("a", "b", "c", "e", "low_side", "water_level_m"), "FILL_IN"
+    )
+    assert set(target["origin"].values()) == {"FILL_IN"}
+    assert "To compare" not in pool_text(None)
