@@ -137,7 +137,7 @@ def _casts(survey: FolderSurvey) -> Iterator[str]:
 
 
 def _mount(sensor: Sensor) -> Iterator[str]:
-    yield beside("  mount:", f"{WHAT[f'{sensor}.mount']}, or measure them")
+    yield beside("  mount:", f"{WHAT[f'{sensor}.mount']}; or by hand")
     if sensor == "mbes":
         yield from comment("At a roll of 0 the head looks down; to look to starboard its roll is -.", "    ")
     yield from (to_fill_in(key, "    ") for key in SETTINGS)
