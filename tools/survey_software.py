@@ -173,7 +173,7 @@ def main() -> None:
     options = parser.parse_args()
     entry = entry_of(json.loads((options.run / "report" / "calibration.json").read_text(encoding="utf-8")))
     signs = (options.roll_sign, options.pitch_sign, options.heading_sign)
-    roll, pitch, heading = (sign * angle for sign, angle in zip(signs, entry.angles_deg, strict=True))
+    roll, pitch, heading = (float(angle) for angle in np.multiply(signs, entry.angles_deg))
     placed = georeferenced(
         recording(options.session), replace(entry, angles_deg=(roll, pitch, heading), order=options.order)
     )

@@ -58,10 +58,10 @@ def _not_found(path: Path, file: FileSide) -> str:
     says = f"{path}: its {len(file.points.row):,} soundings near the track are not found among the run's"
     cell = _cell_m(file)
     if cell is not None:
-        return f"{says}: they stand in a grid of {cell:.2f} m; export the single soundings, not a surface"
+        return f"{says}: they stand in a grid of {cell:.2f} m; export single soundings, not a surface"
     return (
-        f"{says}: is it the same session? Export its single soundings, neither gridded nor averaged, 3 decimals, in the "
-        "order of time"
+        f"{says}: is it the same session? Export its single soundings, neither gridded nor averaged, 3 decimals, in "
+        "the order of time"
     )
 
 

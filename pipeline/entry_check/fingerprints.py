@@ -2,8 +2,8 @@
 
 All soundings of a ping are placed with one pose and one mount. So the distances between neighbouring beams are the same
 in the run and in the file, however wrong the mount, the CRS's origin or the height reference is. Noise makes them as
-individual as a fingerprint: 5 neighbours have 10 distances, 9 neighbours 36. Exported files keep the order of pings and beams; where a
-file holds every n-th beam alone, beams n apart are compared.
+individual as a fingerprint: 5 neighbours have 10 distances, 9 neighbours 36. Exported files keep the order of pings
+and beams; where a file holds every n-th beam alone, beams n apart are compared.
 """
 
 from dataclasses import dataclass, replace
@@ -90,7 +90,7 @@ def _windows_of_file(file: FilePoints, beams: int) -> Integers:
     first = np.arange(max(len(file.row) - beams + 1, 0))
     rows = first[:, None] + np.arange(beams)
     rows = rows[file.row[rows[:, -1]] - file.row[first] == beams - 1]
-    return rows[:: max(1, len(rows) // (MOST_QUERIES if beams == WINDOW else MOST_WIDE_QUERIES))]
+    return np.asarray(rows)[:: max(1, len(rows) // (MOST_QUERIES if beams == WINDOW else MOST_WIDE_QUERIES))]
 
 
 def _alike(run: Array, file: Array, rounding_m: float) -> tuple[tuple[Integers, Integers], tuple[Integers, Integers]]:

@@ -26,7 +26,7 @@ TRIED_GATE_M = 0.008  # a start is exact, but for rounded settings
 BEST_STARTS = 6
 PROBE_M = np.array([[0.31, 0.0, 0.0], [0.0, 0.31, 0.0], [0.0, 0.0, 0.31], [-0.23, 0.19, 0.0]])
 LEAST_PAIRS = 60
-LEAST_SHARE, ABOVE_CHANCE = 0.02, 8.0  # of the run's soundings found again, and by what chance would find;
+LEAST_SHARE, ABOVE_CHANCE = 0.01, 8.0  # of the run's soundings found again, and by what chance would find;
 MOST, MOST_ABOVE_CHANCE = 0.4, 2.0  # or so many, where a file with rounded coordinates is met by chance often
 FITTED = 4000  # pairs of each step before the last
 LEVEL_SEARCH_M = 0.01  # horizontal distance of the points whose heights are compared
@@ -110,7 +110,8 @@ def _from_places(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mou
 
 
 def _placed(soundings: RunSoundings, start: Mounted, lift_m: float) -> Array:
-    return soundings.placed(start.R_body_from_sensor, start.lever_arm_body_m) + [0.0, 0.0, lift_m]
+    placed = soundings.placed(start.R_body_from_sensor, start.lever_arm_body_m)
+    return np.asarray(placed + np.array([0.0, 0.0, lift_m]))
 
 
 def _lift(some: RunSoundings, file: FilePoints, level: cKDTree, start: Mounted) -> float:

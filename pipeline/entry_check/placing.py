@@ -82,8 +82,8 @@ def placing_of(name: str, side: RunSide, swapped: bool = False) -> Placing:
         )
     except ProjError as error:
         raise ConfigError(
-            f"--crs {name}: no coordinate reference system is known by that name, or it cannot be used here; write a CRS "
-            "by its number, such as EPSG:32651 (UTM zone 51 north)"
+            f"--crs {name}: no coordinate reference system is known by that name, or it cannot be used here; write its "
+            "number, such as EPSG:32651 (UTM zone 51 north)"
         ) from error
 
 

@@ -53,7 +53,7 @@ class RunSoundings:
         """Return soundings in the order of their times and beams, with the poses of their times."""
         order = np.lexsort((beam, t_ns))
         t_ns, beam, points = t_ns[order], beam[order].astype(np.int64), points_mbes_m[order]
-        ping = np.cumsum(np.diff(t_ns, prepend=t_ns[:1]) > 0)
+        ping = np.cumsum(np.diff(t_ns, prepend=t_ns[:1]) > 0, dtype=np.int64)
         return cls(t_ns, ping, beam, points, *trajectory.poses_at(t_ns), trajectory)
 
     def later(self, delay_s: float) -> "RunSoundings":
@@ -65,13 +65,14 @@ class RunSoundings:
 
     def rows(self, rows: NDArray[Any]) -> "RunSoundings":
         """Return some of the soundings."""
-        columns = (self.t_ns, self.ping, self.beam, self.points_mbes_m, self.positions_m, self.R_pool_from_body)
-        return RunSoundings(*(column[rows] for column in columns), self.trajectory)
+        poses = self.positions_m[rows], self.R_pool_from_body[rows]
+        points = self.points_mbes_m[rows]
+        return RunSoundings(self.t_ns[rows], self.ping[rows], self.beam[rows], points, *poses, self.trajectory)
 
     def placed(self, R_body_from_mbes: Array, lever_arm_m: Array) -> Array:
         """Return the soundings (n, 3) m in the pool frame, placed with a mount."""
         body = self.points_mbes_m @ R_body_from_mbes.T + lever_arm_m
-        return self.positions_m + np.einsum("nij,nj->ni", self.R_pool_from_body, body)
+        return np.asarray(self.positions_m + np.einsum("nij,nj->ni", self.R_pool_from_body, body))
 
     def in_body(self, points_pool_m: Array) -> Array:
         """Return points (n, 3) m of the pool frame, one of each sounding, in the body frame of the sounding's pose."""

@@ -1,4 +1,4 @@
-"""The soundings of a file near the run's track, in the pool frame: XYZ text, CSV, LAS, LAZ or GSF, read batch by batch."""
+"""The soundings of a file near the run's track, in the pool frame: text, LAS, LAZ or GSF, read batch by batch."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -143,8 +143,8 @@ def _placing(path: Path, crs: str, coordinates: Array, side: RunSide, geographic
             likely = [one.name for one in hints(coordinates, side, 2000.0)]
             hint = f"; they would fit {' or '.join(dict.fromkeys(likely))}" if likely else ""
             raise RawDataError(
-                f"{path}: nothing says in which CRS its coordinates are ({shown}), and they lie near the target neither "
-                f"as degrees, UTM nor ECEF{hint}; name the CRS with --crs"
+                f"{path}: nothing says in which CRS its coordinates are ({shown}), and they lie near the target "
+                f"neither as degrees, UTM nor ECEF{hint}; name the CRS with --crs"
             )
         return placing
     placing = placing_of(crs, side)
@@ -172,13 +172,16 @@ def _elsewhere(path: Path, placing: Placing, coordinates: Array, count: int, sid
 
 
 def _step_m(coordinates: Array, placing: Placing) -> float:
-    """Return the step of the coordinates, m: the coarsest power of ten of which they are whole numbers."""
+    """Return the step of the coordinates, m: the largest power of ten of which they are whole multiples."""
     steps = []
     for values, unit_m in zip(
         coordinates.T, (DEGREE_M,) * 2 + (1.0,) if placing.geographic else (1.0,) * 3, strict=True
     ):
         some = values[:: max(1, len(values) // 1000)]
-        decimals = next((d for d in range(12) if np.all(np.abs(some - np.round(some, d)) < 1e-4 * 10.0**-d)), 12)
+        float_error = 4 * np.finfo(np.float64).eps * np.abs(some)
+        decimals = next(
+            (d for d in range(12) if np.all(np.abs(some - np.round(some, d)) <= 1e-9 * 10.0**-d + float_error)), 12
+        )
         steps.append(10.0**-decimals * unit_m)
     return max(steps)
 

@@ -38,13 +38,13 @@ def check_text(check: EntryCheck) -> str:
 def _answer(check: EntryCheck) -> Iterator[str]:
     answer, verdict = check.answer, verdict_of(check.answer)
     if verdict == "uncertain":
-        yield "Cannot be told: the soundings determine the entered mount too poorly. Export more of them, with 3 decimals."
+        yield "Cannot be told: the soundings determine the entered mount too poorly. Export more, with 3 decimals."
         return
     if verdict == "right":
         judged = np.array(answer.way.judged)
         but = "" if judged.all() else " (z not judged: the heights are above another surface)"
         most_mm = 1000 * float(np.abs(answer.lever_m[judged]).max())
-        yield f"Entered rightly: within {most_mm:.1f} mm, {answer.angle_deg:.3f}°{but}."
+        yield f"Entered rightly: within {max(most_mm, 0.1):.1f} mm, {max(answer.angle_deg, 0.001):.3f}°{but}."
         return
     if verdict == "undecidable":
         yield "Not entered rightly. These mistakes give the same numbers, and the soundings cannot tell which it was:"
@@ -64,8 +64,8 @@ def _unexplained(answer: Answer) -> Iterator[str]:
             "forward, up), and no known mistake explains it."
         )
         yield (
-            "It may be counted from another point than the INS's; or all positions are shifted so (another datum, or the "
-            "INS's own lever arm): passes of one heading cannot tell these apart."
+            "It may be counted from another point than the INS's; or all positions are shifted so (another datum, or "
+            "the INS's own lever arm): passes of one heading cannot tell these apart."
         )
     else:
         what = "the lever arm is right, but the angles are" if answer.lever_right else "angles and lever arm are"
@@ -94,15 +94,15 @@ def _table(check: EntryCheck) -> list[str]:
 def _basis(check: EntryCheck) -> Iterator[str]:
     pairs, file, fitted = check.pairs, check.file, check.answer.way.fitted
     yield (
-        f"{len(file.points.row):,} of the file's {plural(file.rows, 'sounding')} lie near the track; {pairs.found:,} of the "
-        f"run's {len(check.run.soundings.t_ns):,} that were taken were found again among them "
+        f"{len(file.points.row):,} of the file's {file.rows:,} soundings lie near the track; {pairs.found:,} of "
+        f"the run's {len(check.run.soundings.t_ns):,} that were taken were found again among them "
         f"({100 * pairs.share:.0f} %; by chance {100 * pairs.chance:.1f} %)."
     )
     swapped = ", first coordinate north" if file.placing.swapped else ""
     yield f"CRS: {file.placing.name} ({file.placing.title}){swapped}; heights {'down' if pairs.negated else 'up'}."
     yield (
-        f"Scatter of the found soundings: {1000 * fitted.scatter_m:.1f} mm in each coordinate; tolerance {TOLERANCE_DEG:g}° "
-        f"and {1000 * TOLERANCE_M:g} mm, and three sigmas."
+        f"Scatter of the found soundings: {1000 * fitted.scatter_m:.1f} mm in each coordinate; tolerance "
+        f"{TOLERANCE_DEG:g}° and {1000 * TOLERANCE_M:g} mm, and three sigmas."
     )
     if fitted.scatter_m > SCATTER_M:
         yield (
@@ -110,7 +110,7 @@ def _basis(check: EntryCheck) -> Iterator[str]:
             "other positions and attitudes than the run."
         )
     if check.heights_differ:
-        yield "Heights are above another surface than the ellipsoid: z was not judged. Export ellipsoidal heights for that."
+        yield "Heights are above another surface than the ellipsoid: z was not judged. Ellipsoidal heights would do."
     if file.lost:
         yield f"Left out: {plural(file.lost, 'row')} without three numbers."
 

@@ -151,7 +151,8 @@ def frame_transform(frame: LaserFrame) -> FrameTransform | None:
     _refuse_other_heights(crs, frame, where)
     box = None if crs.is_geocentric else _box(horizontal_part(crs))
     try:
-        return FrameTransform(to_ecef=ecef_function(crs), box=box, unit_m=_unit_m(crs), height_unit_m=height_unit_m(crs))
+        to_ecef = ecef_function(crs)
+        return FrameTransform(to_ecef=to_ecef, box=box, unit_m=_unit_m(crs), height_unit_m=height_unit_m(crs))
     except ProjError as error:
         raise ConfigError(
             f"{where}: {crs.name} cannot be turned into ECEF here; export the points in EPSG:4978 or EPSG:4979"

@@ -122,7 +122,7 @@ def _roles(names: list[str], path: Path) -> tuple[tuple[int, int, int], bool | N
     height = "z" if "z" in place else "depth"
     if not {*pair, height} <= place.keys():
         raise RawDataError(
-            f"{path}: its columns {', '.join(names)[:80]} name no x, y, z (or longitude, latitude, height); name them so"
+            f"{path}: its columns {', '.join(names)[:80]} name no x, y, z (or longitude, latitude, height)"
         )
     return (place[pair[0]], place[pair[1]], place[height]), pair[0] == "longitude", height == "depth"
 

@@ -1,7 +1,7 @@
 """Places of the soundings in a GSF file, as the software that wrote it placed them.
 
-Each ping has a position, a heading, and for each beam the distances along and across track and the depth. Their axes are
-level and follow the heading (forward, starboard, down; GSF specification 03.06, 4.3.4). The place of a beam is thus the
+Each ping has a position, a heading, and for each beam the distances along and across track and the depth. Their axes
+are level and follow the heading (forward, starboard, down; GSF specification 03.06, 4.3.4). The place of a beam is the
 ping's position, moved north by along · cos h - across · sin h and east by along · sin h + across · cos h, on the radii
 of curvature of WGS 84 at the ping's latitude. Depths count from the water, so the heights are those of another surface.
 Positions are whole 1e-7 degrees, 11 mm, and the heading is rounded to 0.01 degrees.
@@ -25,7 +25,7 @@ _COLUMNS = ("AlongTrack_m", "AcrossTrack_m", "Depth_m")
 
 
 def gsf_points(path: Path) -> Iterator[tuple[NDArray[np.float64], int]]:
-    """Yield longitude, latitude (degrees), height (m; minus the depth) of the beams (n, 3) of each ping, and those lost."""
+    """Yield longitude, latitude (degrees), height (m, minus the depth) of each ping's beams (n, 3), and those lost."""
     version, any_ping = 3, False
     scales: GsfScales = {}
     with opened(path, str(path)) as file:
