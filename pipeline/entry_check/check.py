@@ -3,8 +3,6 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from pipeline.entry_check.answer import Answer, answer_of
 from pipeline.entry_check.hypotheses import starts
 from pipeline.entry_check.identification import Pairs, identify
@@ -12,8 +10,6 @@ from pipeline.entry_check.run_soundings import EntrySource, RunSide, run_side
 from pipeline.entry_check.soundings_file import FileSide, file_side
 from pipeline.errors import RawDataError
 from pipeline.results.finished_run import FinishedRun
-
-GRID_STEP_M = 0.04  # cells of a grid are no smaller
 
 
 @dataclass(frozen=True)
@@ -56,22 +52,9 @@ def check_entry(run: FinishedRun, path: Path, crs: str | None, other_heights: bo
 
 def _not_found(path: Path, file: FileSide) -> str:
     says = f"{path}: its {len(file.points.row):,} soundings near the track are not found among the run's"
-    cell = _cell_m(file)
-    if cell is not None:
-        return f"{says}: they stand in a grid of {cell:.2f} m; export single soundings, not a surface"
+    if file.cell_m is not None:
+        return f"{says}: they stand in a grid of {file.cell_m:.2f} m; export single soundings, not a surface"
     return (
         f"{says}: is it the same session? Export its single soundings, neither gridded nor averaged, 3 decimals, in "
         "the order of time"
     )
-
-
-def _cell_m(file: FileSide) -> float | None:
-    """Return the cell of a grid in which the points stand, by the differences of their coordinates; None: no grid."""
-    points = file.points.points_m
-    cells = []
-    for angle in np.radians(np.arange(0.0, 90.0, 0.5)):  # the grid's axes are east and north, not the pool's
-        along = np.unique(np.round(points[:, 0] * np.cos(angle) + points[:, 1] * np.sin(angle), 3))
-        steps = np.diff(along)
-        if len(steps) > 3 and len(along) < len(points) / 20 and np.median(steps) >= GRID_STEP_M:
-            cells.append(float(np.median(steps)))
-    return min(cells, default=None)

@@ -5,8 +5,10 @@ points, which the answer shows.
 """
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,7 @@ Array = NDArray[np.float64]
 GEOGRAPHIC = "EPSG:4979"
 NEAR_M = 20_000.0  # a guessed CRS places the points within this of the target
 MOST_HINTS = 3
+SOME = 1000  # coordinates with which a CRS is tried
 
 
 @dataclass(frozen=True)
@@ -108,26 +111,27 @@ def guessed(coordinates: Array, side: RunSide, geographic: bool | None) -> Placi
     return best if distance_m(best, coordinates, side) < NEAR_M else None
 
 
-def hints(coordinates: Array, side: RunSide, within_m: float) -> Iterator[Placing]:
-    """Yield placings that would bring the points near the target: likely ones first, then all that PROJ knows there."""
+def hints(coordinates: Array, side: RunSide, within_m: float) -> list[Placing]:
+    """Return placings that would bring the points near the target: likely ones, or else some of all that PROJ knows."""
     from pyproj.aoi import AreaOfInterest
     from pyproj.database import query_crs_info
     from pyproj.enums import PJType
 
+    some = coordinates[:: max(1, len(coordinates) // SOME)]
+    found = list(_fitting((GEOGRAPHIC, utm_of(side), utm_of(side, -1), utm_of(side, 1), ECEF), some, side, within_m))
+    if found:
+        return found
     east, north = side.longitude_deg, side.latitude_deg
-    names = [GEOGRAPHIC, utm_of(side), utm_of(side, -1), utm_of(side, 1), ECEF]
     here = AreaOfInterest(east - 0.01, north - 0.01, east + 0.01, north + 0.01)
-    names += [f"{info.auth_name}:{info.code}" for info in query_crs_info(
-        auth_name="EPSG", pj_types=PJType.PROJECTED_CRS, area_of_interest=here, contains=True)]  # fmt: skip
-    yielded = 0
-    for name in dict.fromkeys(names):
+    known = query_crs_info("EPSG", PJType.PROJECTED_CRS, area_of_interest=here, contains=True)
+    names = [f"{info.auth_name}:{info.code}" for info in known]
+    return list(islice(_fitting(names, some, side, within_m), MOST_HINTS))
+
+
+def _fitting(names: Sequence[str], coordinates: Array, side: RunSide, within_m: float) -> Iterator[Placing]:
+    for name in names:
         for swapped in (False, True):
-            try:
+            with suppress(ConfigError):
                 placing = placing_of(name, side, swapped)
-            except ConfigError:
-                continue
-            if distance_m(placing, coordinates, side) < within_m:
-                yield placing
-                yielded += 1
-        if yielded >= MOST_HINTS:
-            return
+                if distance_m(placing, coordinates, side) < within_m:
+                    yield placing

@@ -30,6 +30,7 @@ BLOCK_ROWS = 512
 MARGIN_M = 10.0  # by how much a lever arm may be wrong
 LEAST_POINTS = 60
 COARSEST_M = 0.1
+GRID_STEP_M, GRID_ROUNDING = 0.04, 0.1  # least cell of a grid; of multiples of the cell, as a share of it
 TEXTS = (CSV, TEXT, FLOAT32_TEXT, TRAJECTORY_TEXT)
 
 
@@ -72,6 +73,8 @@ class FileSide:
         Number of rows with three numbers, and of rows without.
     depths
         Whether its heights are depths below the water.
+    cell_m
+        Cell of a grid in which the points stand; None: they stand in none.
     """
 
     points: FilePoints
@@ -79,6 +82,7 @@ class FileSide:
     rows: int
     lost: int
     depths: bool
+    cell_m: float | None
 
 
 def opened_source(path: Path) -> Source:
@@ -132,7 +136,7 @@ def file_side(path: Path, crs: str | None, side: RunSide) -> FileSide:
     step_m = max(source.step_m, _step_m(first, placing))
     if step_m > COARSEST_M * 1.01:
         raise RawDataError(f"{path}: its coordinates are whole steps of {step_m:.2g} m; export 3 decimals of a metre")
-    return FileSide(FilePoints(points, row, step_m / 2), placing, rows, lost, source.depths)
+    return FileSide(FilePoints(points, row, step_m / 2), placing, rows, lost, source.depths, _cell_m(first, placing))
 
 
 def _placing(path: Path, crs: str, coordinates: Array, side: RunSide, geographic: bool | None) -> Placing:
@@ -163,7 +167,7 @@ def _elsewhere(path: Path, placing: Placing, coordinates: Array, count: int, sid
     """Return the message that the points lie elsewhere, and in which CRS they would lie at the target."""
     away = _nearest_m(placing, coordinates, side)
     says = f"{path}: {count or 'no'} soundings lie near the run's track in {placing.name} ({placing.title})"
-    found = list(hints(coordinates, side, 500.0))
+    found = hints(coordinates, side, 500.0)
     if found:
         names = [f"{one.name} ({one.title}{', x and y exchanged' if one.swapped else ''})" for one in found]
         return f"{says}; they would in {' or '.join(names)}: name that with --crs"
@@ -184,6 +188,18 @@ def _step_m(coordinates: Array, placing: Placing) -> float:
         )
         steps.append(10.0**-decimals * unit_m)
     return max(steps)
+
+
+def _cell_m(coordinates: Array, placing: Placing) -> float | None:
+    """Return the least step between different coordinates, m, if all steps are whole multiples of it; else None."""
+    cells = []
+    for values in coordinates[:, :2].T:
+        steps = np.diff(np.unique(values))
+        steps = steps[steps > 1e-9 * max(float(np.abs(values).max()), 1.0)]
+        if not len(steps) or np.abs(steps / steps.min() - np.round(steps / steps.min())).max() > GRID_ROUNDING:
+            return None
+        cells.append(float(steps.min()) * (DEGREE_M if placing.geographic else 1.0))
+    return min(cells) if min(cells) >= GRID_STEP_M else None
 
 
 class _Near:

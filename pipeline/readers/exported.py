@@ -74,7 +74,7 @@ def text_layout(path: Path) -> TextLayout:
         raise RawDataError(f"{path}: is no text of 8 bits a letter, no LAS, LAZ or GSF; export it as XYZ text in UTF-8")
     lines = head.decode("utf-8", errors="replace").splitlines()
     lines = lines[:-1] if len(head) == HEAD_BYTES else lines
-    for separator, decimal in ((r";", ","), (r"\t", ","), (r"\s+", ","), (r";", "."), (r",", "."), (r"\s+", ".")):
+    for separator, decimal in ((r";", ","), ("\t", ","), (r"\s+", ","), (r";", "."), (r",", "."), (r"\s+", ".")):
         first = next((k for k, line in enumerate(lines) if _numbers(line, separator, decimal) >= 3), None)
         if first is not None:
             words = len(_words(lines[first], separator))
@@ -135,7 +135,7 @@ def text_points(path: Path, layout: TextLayout) -> Iterator[tuple[NDArray[np.flo
             path, sep=layout.separator, decimal=layout.decimal, skiprows=layout.header_lines, header=None,
             names=list(range(layout.words)), usecols=wanted, index_col=False, chunksize=ROWS, on_bad_lines="skip",
             encoding="utf-8", encoding_errors="replace", skipinitialspace=True, low_memory=False,
-            engine="c" if len(layout.separator) == 1 or layout.separator in (r"\s+", r"\t") else "python",
+            engine="c" if len(layout.separator) == 1 or layout.separator == r"\s+" else "python",
         )  # fmt: skip
         with batches:
             for table in batches:
