@@ -173,10 +173,9 @@ def main() -> None:
     options = parser.parse_args()
     entry = entry_of(json.loads((options.run / "report" / "calibration.json").read_text(encoding="utf-8")))
     signs = (options.roll_sign, options.pitch_sign, options.heading_sign)
-    roll, pitch, heading = (float(angle) for angle in np.multiply(signs, entry.angles_deg))
-    placed = georeferenced(
-        recording(options.session), replace(entry, angles_deg=(roll, pitch, heading), order=options.order)
-    )
+    turned = np.multiply(signs, entry.angles_deg)
+    angles = (float(turned[0]), float(turned[1]), float(turned[2]))
+    placed = georeferenced(recording(options.session), replace(entry, angles_deg=angles, order=options.order))
     from pyproj import CRS
 
     geographic = CRS.from_user_input(options.crs).is_geographic
