@@ -137,8 +137,9 @@ def in_crs(ecef_m: Array, crs: str, lift_m: float = 0.0) -> Array:
     target = CRS.from_user_input(crs)
     if target.is_geocentric:
         return ecef_m
-    x, y, z = Transformer.from_crs("EPSG:4978", target.to_3d(), always_xy=True).transform(*ecef_m.T)
-    return np.stack([x, y, z + lift_m], 1)
+    x, y, z = ecef_m.T
+    places = Transformer.from_crs("EPSG:4978", target.to_3d(), always_xy=True).transform(x, y, z)
+    return np.stack(places, axis=1) + np.array([0.0, 0.0, lift_m])
 
 
 def write_points(path: Path, points: Array, decimals: int, geographic: bool = False, header: str = "") -> None:
