@@ -151,7 +151,8 @@ def frame_transform(frame: LaserFrame) -> FrameTransform | None:
     _refuse_other_heights(crs, frame, where)
     box = None if crs.is_geocentric else _box(horizontal_part(crs))
     try:
-        return FrameTransform(to_ecef=_to_ecef(crs), box=box, unit_m=_unit_m(crs), height_unit_m=height_unit_m(crs))
+        to_ecef = ecef_function(crs)
+        return FrameTransform(to_ecef=to_ecef, box=box, unit_m=_unit_m(crs), height_unit_m=height_unit_m(crs))
     except ProjError as error:
         raise ConfigError(
             f"{where}: {crs.name} cannot be turned into ECEF here; export the points in EPSG:4978 or EPSG:4979"
@@ -185,7 +186,7 @@ def height_unit_m(crs: Any) -> float:
     return 1.0 if crs.is_geographic else _unit_m(crs)
 
 
-def _to_ecef(crs: Any) -> ToEcef:
+def ecef_function(crs: Any) -> ToEcef:
     """Return a function that transforms x (east or longitude), y (north or latitude), z to ECEF of the same datum."""
     from pyproj import Transformer
 

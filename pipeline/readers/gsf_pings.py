@@ -54,6 +54,19 @@ def major_version(header: bytes) -> int:
 
 
 @np.errstate(all="ignore")
+def decoded_record(body: bytes, version: int, scales: GsfScales) -> dict[str, Any] | None:
+    """Return a ping record as gsfu decodes it; None if the record is damaged. Parameters as of decode_gsf_ping."""
+    from GSFU.gsfu import _decode_swath_bathymetry_ping
+
+    try:
+        TIME.unpack_from(body)
+        record: dict[str, Any] = _decode_swath_bathymetry_ping(body, version, scales)
+    except (struct.error, LookupError, ValueError, OverflowError, ArithmeticError, OSError):
+        return None
+    return record
+
+
+@np.errstate(all="ignore")
 def decode_gsf_ping(body: bytes, version: int, scales: GsfScales) -> GsfPing | None:
     """Return a ping record's contents; None if the record is damaged.
 
@@ -66,13 +79,10 @@ def decode_gsf_ping(body: bytes, version: int, scales: GsfScales) -> GsfPing | N
     scales
         Scale factors of the preceding pings; changed in place if the record has its own.
     """
-    from GSFU.gsfu import _decode_swath_bathymetry_ping
-
-    try:
-        seconds, nanoseconds = TIME.unpack_from(body)
-        record: dict[str, Any] = _decode_swath_bathymetry_ping(body, version, scales)
-    except (struct.error, LookupError, ValueError, OverflowError, ArithmeticError, OSError):
+    record = decoded_record(body, version, scales)
+    if record is None:
         return None
+    seconds, nanoseconds = TIME.unpack_from(body)
     beams, count = record["Beams"], record["NumberBeams"]
     undecoded = " ".join(record["Notes"])
     t_ns = int(gps_ns_from_unix_utc(np.array([seconds]), np.array([nanoseconds]))[0])

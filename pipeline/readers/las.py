@@ -73,7 +73,7 @@ class LasPart:
             return iter(())
         if self.compressed:
             return decompressed_points(self.path, self.name, self.start, self.stop, BATCH_ROWS)
-        return _las_points(file, self.name, self.start, self.stop)
+        return las_points(file, self.name, self.start, self.stop)
 
     @np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
     def _chunk(self, points: DecodedColumns, dropped: Counter[str], first: bool) -> Chunk:
@@ -131,7 +131,7 @@ def las_parts(
         Coordinates are stored with too coarse a scale.
     """
     _refuse_coarse(header.scales, frame, name)
-    crs = declared_crs(path, name) if frame != LaserFrame() else ""
+    crs = crs_of_las(path, name) if frame != LaserFrame() else ""
     starts = range(0, header.present, STRETCH_POINTS) or range(1)
     parts = []
     for k, start in enumerate(starts):
@@ -170,7 +170,7 @@ def _refuse_coarse(scales: tuple[float, ...], frame: LaserFrame, name: str) -> N
             )
 
 
-def declared_crs(path: Path, name: str) -> str:
+def crs_of_las(path: Path, name: str) -> str:
     """Return the CRS in the file's variable-length records, WKT; empty if there is none that can be read."""
     import laspy
     from pyproj.exceptions import ProjError
@@ -183,8 +183,8 @@ def declared_crs(path: Path, name: str) -> str:
     return "" if crs is None else str(crs.to_wkt())
 
 
-def _las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[DecodedColumns]:
-    """Yield GPS time, x, y, z of points ``start`` to ``stop``, batch by batch."""
+def las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[DecodedColumns]:
+    """Yield GPS time (0 without one), x, y, z of points ``start`` to ``stop``, batch by batch."""
     import laspy
 
     try:
@@ -195,7 +195,9 @@ def _las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[De
             points = reader.read_points(min(BATCH_ROWS, stop - start))
             if not len(points):
                 return
-            yield tuple(np.asarray(values, np.float64) for values in (points.gps_time, points.x, points.y, points.z))
+            timed = "gps_time" in points.point_format.dimension_names
+            times = points.gps_time if timed else np.zeros(len(points))
+            yield tuple(np.asarray(values, np.float64) for values in (times, points.x, points.y, points.z))
             start += len(points)
     except (laspy.LaspyException, ValueError, LookupError, OverflowError, struct.error) as error:
         raise RawDataError(f"{name}: is damaged ({error}); copy or export it again") from error

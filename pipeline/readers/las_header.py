@@ -37,7 +37,7 @@ class LasHeader:
     scales: tuple[float, ...]
 
 
-def read_header(path: Path, name: str, declared_time: LasTime = None) -> LasHeader:
+def read_header(path: Path, name: str, declared_time: LasTime = None, timed: bool = True) -> LasHeader:
     """Read and check a file's header.
 
     Parameters
@@ -48,6 +48,8 @@ def read_header(path: Path, name: str, declared_time: LasTime = None) -> LasHead
         Its path in the session folder, for messages.
     declared_time : LasTime
         ``laser.time`` of session.yaml; None: the header's flag decides.
+    timed : bool
+        Whether a point format without GPS time is refused.
 
     Raises
     ------
@@ -68,7 +70,7 @@ def read_header(path: Path, name: str, declared_time: LasTime = None) -> LasHead
         sound = sound and 54 * records <= offset - header_size
         if not sound or not all(np.isfinite(scale) and scale > 0 for scale in scales):
             raise RawDataError(f"{name}: its LAS header is damaged, or cut off; copy or export it again")
-        if point_format not in TIMED_FORMATS:
+        if timed and point_format not in TIMED_FORMATS:
             raise RawDataError(
                 f"{name}: its point format {point_format} has no GPS time; export it again in point format 1, 3 or 6 "
                 "to 10"

@@ -31,7 +31,8 @@ def _main(path: str, start: int, stop: int, batch: int) -> None:
             if not len(points):
                 break
             out.write(np.int64(len(points)).tobytes())
-            for values in (points.gps_time, points.x, points.y, points.z):
+            timed = "gps_time" in points.point_format.dimension_names
+            for values in (points.gps_time if timed else np.zeros(len(points)), points.x, points.y, points.z):
                 out.write(np.ascontiguousarray(values, dtype=np.float64).tobytes())
             start += len(points)
     out.write(np.int64(0).tobytes())

@@ -13,7 +13,7 @@ from pipeline.readers import file_kind
 from pipeline.readers.crs import ECEF, LASER_FRAME, LaserFrame, frame_transform
 from pipeline.readers.declared_crs import CLEARLY_ELSEWHERE_M
 from pipeline.readers.e57_scans import read_scans
-from pipeline.readers.las import declared_crs
+from pipeline.readers.las import crs_of_las
 from pipeline.starting.boat_track import BoatTrack
 from pipeline.starting.file_groups import FileGroup
 
@@ -89,7 +89,7 @@ def _declared(group: FileGroup, folder: Path, name: str) -> str:
     """Return the CRS that a file declares, WKT; empty without one."""
     try:
         if group.kind is file_kind.LAS:
-            return declared_crs(folder / name, name)
+            return crs_of_las(folder / name, name)
         return read_scans(folder / name, name)[1] if group.kind is file_kind.E57 else ""
     except RawDataError:
         return ""

@@ -13,6 +13,7 @@ from stages.cli import call
 
 COMMANDS = (
     "init", "simulate", "run", "stage", "verify", "view", "diff", "history", "check", "plan", "coarse", "compare",
+    "check-entry",
 )  # fmt: skip
 
 

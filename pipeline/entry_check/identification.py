@@ -1,0 +1,168 @@
+"""Identify single soundings of the file with soundings of the run, however the mount was entered.
+
+The start comes from :mod:`pipeline.entry_check.fingerprints`, or else from the hypothesis whose placing of some of the
+run's soundings meets most points of the file. From there on, nearest points and the fit of a mount and a shift take
+turns, with a narrower gate each time (iterative closest points).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipeline.entry_check.fingerprints import FilePoints, matched_windows
+from pipeline.entry_check.mount_fit import FREE_ALL, SIZE, FittedMount, fit_mount
+from pipeline.entry_check.run_soundings import RunSoundings
+from pipeline.mount import Mounted
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+GATES_M = (0.2, 0.1, 0.05, 0.03)
+TRIED = 600  # soundings with which a start is tried
+TRIED_GATE_M = 0.008  # a start is exact, but for rounded settings
+BEST_STARTS = 6
+PROBE_M = np.array([[0.31, 0.0, 0.0], [0.0, 0.31, 0.0], [0.0, 0.0, 0.31], [-0.23, 0.19, 0.0]])
+LEAST_PAIRS = 60
+LEAST_SHARE, ABOVE_CHANCE = 0.01, 8.0  # of the run's soundings found again, and by what chance would find;
+MOST, MOST_ABOVE_CHANCE = 0.4, 2.0  # or so many, where a file with rounded coordinates is met by chance often
+FITTED = 4000  # pairs of each step before the last
+LEVEL_SEARCH_M = 0.01  # horizontal distance of the points whose heights are compared
+LEVEL_BIN_M = 0.01
+LEVEL_TRIED = 150
+WITHOUT_HEIGHTS = 150  # starts that are tried with other heights
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Soundings of the run and where the file has them.
+
+    Attributes
+    ----------
+    soundings
+        The n soundings that were found again.
+    points_pool_m
+        (n, 3): the file's points.
+    found
+        Number of the run's soundings that were found again.
+    share, chance
+        Their share, and the share that a placing at a wrong place would have found.
+    negated
+        Whether the file's heights are depths, positive down.
+    how
+        "order" (of pings and beams in the file) or "places".
+    """
+
+    soundings: RunSoundings
+    points_pool_m: Array
+    found: int
+    share: float
+    chance: float
+    negated: bool
+    how: str
+
+
+def identify(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted]) -> Pairs | None:
+    """Return the pairs; None if the file's soundings are not found among the run's.
+
+    Parameters
+    ----------
+    soundings
+        The run's.
+    file
+        The file's points near the track.
+    starts
+        Mounts that may have been entered, the likeliest first.
+    """
+    own, other, negated = matched_windows(soundings, file)
+    if len(own):
+        turned = file.with_depths() if negated else file
+        fitted = fit_mount(soundings.rows(own), turned.points_m[other], FREE_ALL)
+        pairs = _refined(soundings, turned, fitted, Way(negated, "order", GATES_M))
+        if pairs is not None:
+            return pairs
+    both = (_from_places(soundings, turned, starts, turned is not file) for turned in (file, file.with_depths()))
+    return next((pairs for pairs in both if pairs is not None), None)
+
+
+def _from_places(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted], negated: bool) -> Pairs | None:
+    some = soundings.rows(np.linspace(0, len(soundings.t_ns) - 1, TRIED).astype(int))
+    tree, level = cKDTree(file.points_m), cKDTree(file.points_m[:, :2])
+    gate = TRIED_GATE_M + 1.8 * file.rounding_m
+    for with_heights in (True, False):
+        scored = []
+        for number, start in enumerate(starts if with_heights else starts[:WITHOUT_HEIGHTS]):
+            lift = 0.0 if with_heights else _lift(some, file, level, start)
+            distance, _ = tree.query(_placed(some, start, lift), distance_upper_bound=gate)
+            scored.append((-int(np.isfinite(distance).sum()), number, lift))
+        for _, number, lift in sorted(scored)[:BEST_STARTS]:
+            start = starts[number]
+            fitted = FittedMount(
+                start.R_body_from_sensor, start.lever_arm_body_m, np.array([0.0, 0.0, lift]), 1.0,
+                np.zeros((SIZE, SIZE)), 0.0, np.empty(0),
+            )  # fmt: skip
+            pairs = _refined(soundings, file, fitted, Way(negated, "places", (2 * gate, gate)))
+            if pairs is not None:
+                return pairs
+    return None
+
+
+def _placed(soundings: RunSoundings, start: Mounted, lift_m: float) -> Array:
+    placed = soundings.placed(start.R_body_from_sensor, start.lever_arm_body_m)
+    return np.asarray(placed + np.array([0.0, 0.0, lift_m]))
+
+
+def _lift(some: RunSoundings, file: FilePoints, level: cKDTree, start: Mounted) -> float:
+    """Return the height difference that most points below or above a placed sounding have in common."""
+    placed = _placed(some.rows(np.arange(0, TRIED, TRIED // LEVEL_TRIED)), start, 0.0)
+    near = level.query_ball_point(placed[:, :2], LEVEL_SEARCH_M + file.rounding_m)
+    counts = np.array([len(rows) for rows in near])
+    if not counts.sum():
+        return 0.0
+    lifts = file.points_m[np.concatenate([np.array(rows, dtype=int) for rows in near]), 2] - np.repeat(
+        placed[:, 2], counts
+    )
+    bins, number = np.unique(np.round(lifts / LEVEL_BIN_M), return_counts=True)
+    likely = lifts[np.abs(lifts - bins[np.argmax(number)] * LEVEL_BIN_M) <= LEVEL_BIN_M]
+    return float(np.median(likely))
+
+
+@dataclass(frozen=True)
+class Way:
+    """How the start was found, and the gates of the iteration that follows; ``negated``, ``how`` as in Pairs."""
+
+    negated: bool
+    how: str
+    gates_m: tuple[float, ...]
+
+
+def _refined(soundings: RunSoundings, file: FilePoints, fitted: FittedMount, way: Way) -> Pairs | None:
+    """Return the pairs at the end of the iteration; None if no more are found than by chance."""
+    tree = cKDTree(file.points_m)
+    thin = soundings.rows(np.arange(0, len(soundings.t_ns), max(1, len(soundings.t_ns) // (4 * FITTED))))
+    for gate in way.gates_m:
+        own, other = _nearest(tree, fitted.predicted(thin), gate)
+        if len(own) < LEAST_PAIRS:
+            return None
+        step = max(1, len(own) // FITTED)
+        fitted = fit_mount(thin.rows(own[::step]), file.points_m[other[::step]], FREE_ALL)
+    gate = float(np.clip(3 * fitted.scatter_m, 1.8 * file.rounding_m + 0.002, GATES_M[-1]))
+    predicted = fitted.predicted(soundings)
+    own, other = _nearest(tree, predicted, gate)
+    by_chance = max(len(_nearest(tree, predicted + probe, gate)[0]) for probe in PROBE_M) / len(predicted)
+    share = len(own) / len(predicted)
+    clear = share >= max(LEAST_SHARE, ABOVE_CHANCE * by_chance) or share >= max(MOST, MOST_ABOVE_CHANCE * by_chance)
+    if len(own) < LEAST_PAIRS or not clear:
+        return None
+    return Pairs(soundings.rows(own), file.points_m[other], len(own), share, by_chance, way.negated, way.how)
+
+
+def _nearest(tree: cKDTree, predicted: Array, gate_m: float) -> tuple[Integers, Integers]:
+    """Return the numbers of predicted points and of the file's points that are each other's nearest within a gate."""
+    distance, place = tree.query(predicted, distance_upper_bound=gate_m)
+    own = np.flatnonzero(np.isfinite(distance))
+    order = own[np.argsort(distance[own], kind="stable")]
+    other, first = np.unique(place[order], return_index=True)
+    return order[first], other
