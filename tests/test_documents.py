@@ -61,7 +61,8 @@ def test_commands_are_the_programs(page: Path) -> None:
         words = shlex.split(re.split(r"\s{3,}|\s#", line)[0].replace("…", "").replace("'", ""))
         name = words[0]
         assert name in known, (page, line)
-        options = {option for parameter in known[name].params for option in (*parameter.opts, *parameter.secondary_opts)}
+        parameters = known[name].params
+        options = {option for one in parameters for option in (*one.opts, *one.secondary_opts)}
         given = {word.partition("=")[0] for word in words[1:] if word.startswith("--")}
         assert given - options - {"--help", "--debug"} == set(), (page, line)
 

@@ -1,9 +1,10 @@
 """Find the sentence of a catalogue that a text is, and put its values into the translation.
 
 An entry of the catalogue is a sentence with places for values, such as ``{0} scatter {1} times as much as {2} says``.
-A text matches it if it has the same words with any values between them. The values are translated in the same way. Where
-several entries match, the one with the most letters of its own is taken. A text that no entry matches is taken apart at
-semicolons, colons and commas, and its parts are translated; what then remains stays as it is.
+A text matches it if it has the same words with any values between them. The values are translated in the same way.
+Where several entries match, the one that leaves the fewest words untranslated is taken, and of these the one with the
+most words of its own. A text that no entry matches is taken apart at semicolons, colons and commas, and its parts are
+translated; what then remains stays as it is.
 """
 
 import re
@@ -57,7 +58,7 @@ class Catalogue:
             return found
         if core[-1] in FULL_STOP and len(core) > 1 and (found := self._whole(core[:-1].rstrip())) is not None:
             return found + FULL_STOP[core[-1]]
-        parts = next((core.split(mark, 1) + [mark] for mark in BREAKS if mark in core.strip(mark)), None)
+        parts = next(([*core.split(mark, 1), mark] for mark in BREAKS if mark in core.strip(mark)), None)
         if parts is None:
             return core
         first, second, mark = parts
@@ -90,7 +91,7 @@ class Catalogue:
 def _pattern(key: str) -> re.Pattern[str]:
     """Return the expression that a text with this sentence matches; its groups are the values, in order of their number.
 
-    Blanks match any blanks. The first letter may be large or small, because sentences are put together from parts.
+    Blanks match any blanks. The first letter may be large or small, because sentences are made from parts.
     """
     pieces = PLACE.split(key)
     out = []

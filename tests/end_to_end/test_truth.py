@@ -32,7 +32,7 @@ def test_no_other_module_names_the_truth() -> None:
         text = path.read_text(encoding="utf-8")
         if name.startswith("pipeline/simulation/") or name == "stages/commands/compare.py":
             continue
-        if name.startswith("stages/cli/"):  # its help names the file; it hands the path to stages.commands.compare alone
+        if name.startswith("stages/cli/"):  # the help names the file; stages.commands.compare alone gets the path
             assert text.count("read_truth") == 0
             continue
         assert "truth.json" not in text, name
