@@ -89,7 +89,7 @@ class Catalogue:
 
 
 def _pattern(key: str) -> re.Pattern[str]:
-    """Return the expression that a text with this sentence matches; its groups are the values, in order of their number.
+    """Return the expression that a text with this sentence matches; its groups are the values, by their numbers.
 
     Blanks match any blanks. The first letter may be large or small, because sentences are made from parts.
     """
