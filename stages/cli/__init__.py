@@ -5,11 +5,11 @@ A command's module and its imports are loaded only when the command is called. T
 
 import sys
 
-from stages.cli import calibrating, looking, preparing  # in this order the help lists their commands
+from stages.cli import calibrating, looking, preparing, surveying  # in this order the help lists their commands
 from stages.cli.application import app
 from stages.commands import entry
 
-__all__ = ["calibrating", "call", "looking", "main", "preparing"]
+__all__ = ["calibrating", "call", "looking", "main", "preparing", "surveying"]
 
 
 def call(arguments: list[str]) -> int:
