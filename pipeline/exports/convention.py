@@ -40,7 +40,7 @@ ROLL_WORDS = {1: "starboard side down +", -1: "starboard side up +"}
 PITCH_WORDS = {1: "bow up +", -1: "bow down +"}
 YAW_WORDS = {1: "bow to port +, counter-clockwise from above", -1: "bow to starboard +, clockwise from above"}
 CERTAINTY_WORDS = {
-    "code": "read in the program's own source, and compared with it in numbers",
+    "code": "read in the program's own source",
     "official": "by the maker's own text",
     "secondary": "by another maker's manual or by a third party's code: check with a patch test before you rely on it",
 }

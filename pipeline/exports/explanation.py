@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import pipeline
 from pipeline.exports.convention import CERTAINTY_WORDS
-from pipeline.exports.mounting import SENSOR_WORDS, Mounting
+from pipeline.exports.mounting import OF_INS, SENSOR_WORDS, Mounting
 from pipeline.exports.order_check import spread_sentence
 from pipeline.exports.target import Options, Target
 
@@ -46,7 +46,7 @@ def explanation(target: Target, mounting: Mounting, options: Options, zeros: str
     lines = [
         "These are totals: they replace what stands there. Do not add them to anything.",
         *([zeros] if zeros else []),
-        mounting.frame.sentence(),
+        OF_INS if target.counts_from == "ins" else mounting.frame.sentence(),
         "Signs: " + ", ".join(f"{role} {words[role]}" for role in ("x", "y", "z", "roll", "pitch")) + f", heading: "
         f"{words['yaw']}.",
         f"Order of rotations: {order} (Y heading, P pitch, R roll; the leftmost is outermost).",

@@ -71,9 +71,10 @@ class VesselFrame:
     @classmethod
     def stated_in(cls, text: str, where: str) -> "VesselFrame | None":
         """Return the frame that a text states in the words of :meth:`sentence`; None if it states none."""
-        found = set(_STATED.findall(text))
+        words = " ".join(text.split())  # sheets break their lines
+        found = set(_STATED.findall(words))
         if not found:
-            return cls() if OF_INS in text else None
+            return cls() if OF_INS in words else None
         if len(found) > 1:
             raise ConfigError(f"{where}: states two places of the INS; export the file again")
         try:

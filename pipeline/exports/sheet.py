@@ -5,6 +5,7 @@ without it was cut off, perhaps within a number.
 """
 
 import re
+import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -18,6 +19,8 @@ from pipeline.mount import Mounted
 
 DECIMALS = 4  # of degrees and metres: rounding is below 0.00005 degrees, 0.05 mm
 END = "End of sheet."
+WIDTH = 120
+_KEPT = {"break_on_hyphens": False, "break_long_words": False}
 _FIELD = re.compile(r"  (?P<field>[^:]*\S): +(?P<value>\S+)(?: .*)?")
 Groups = tuple[tuple[str, dict[str, str]], ...]  # title of a group, and its fields by role
 
@@ -59,7 +62,8 @@ class Sheet:
                 lines.append(f"  {label:<58}{value}   {sigma_text(sigmas, role)}".rstrip())
         if self.extra is not None:
             lines += ["", *self.extra(target, mounting, options)]
-        lines += ["", *explanation(target, mounting, options, self.zeros), *self.notes, END]
+        sentences = [*explanation(target, mounting, options, self.zeros), *self.notes]
+        lines += ["", *(line for sentence in sentences for line in textwrap.wrap(sentence, WIDTH, **_KEPT)), END]
         return "\n".join(lines) + "\n"
 
     def read(self, target: Target, text: str, where: str, options: Options) -> Mounted:
@@ -96,7 +100,7 @@ def stated_order(text: str, target: Target, where: str, options: Options) -> str
     target, options
         The program, and what the user told.
     """
-    stated = set(re.findall(r"Order of rotations: ([YPR]{3})\b", text)) & set(ORDERS)
+    stated = set(re.findall(r"Order of rotations: ([YPR]{3})\b", " ".join(text.split()))) & set(ORDERS)
     if target.convention.order is not None or not stated:
         return options.order
     if len(stated) > 1 or (options.order is not None and {options.order} != stated):

@@ -22,7 +22,7 @@ Order = Annotated[
 ]
 Serial = Annotated[str | None, typer.Option("--serial", metavar="N", help="the sonar's serial number, for kluster")]
 InsHeight = Annotated[
-    float | None, typer.Option("--ins-height", metavar="H", help="height of the INS above the water, m, for hypack")
+    float | None, typer.Option("--ins-height", metavar="H", help="height of the INS above the water, m, for hypack, kluster")
 ]
 
 

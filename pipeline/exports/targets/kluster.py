@@ -2,7 +2,8 @@
 
 Kluster's build_rot_mat is Rz(h) · Ry(p) · Rx(r) in forward, starboard, down, for transmitter (tx) and receiver (rx) apart.
 All keys of a sonar need the same seconds. ``latency`` is added to the times of pings when attitude and positions are looked
-up, so it has the sign opposite to ours (true time = recorded time - latency_s).
+up, so it has the sign opposite to ours (true time = recorded time - latency_s). ``waterline`` is how far the water lies below
+the reference point; it is written if the height of the INS above the water is told. The errors are one sigma.
 """
 
 import json
@@ -34,6 +35,8 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
         values = target.convention.numbers(mounted).by_role()
         keys |= {f"{prefix}_{letter}": written(values[role], DECIMALS) for role, letter in LETTERS.items()}
     keys |= {"latency": written(-mounting.latency_s, DECIMALS)}
+    if options.ins_height_m is not None:
+        keys |= {"waterline": written(options.ins_height_m - mounting.frame.ins_point_m[2], DECIMALS)}
     sigmas = sigmas_of(target, mounting, options)
     if sigmas is not None:
         keys |= {name: round(sigmas[role], 6) for role, name in PATCH_ERRORS.items()}
@@ -84,6 +87,6 @@ TARGET = Target(
     write=_write,
     read=_read,
     sensor="mbes",
-    uses=frozenset({"serial"}),
+    uses=frozenset({"serial", "ins_height"}),
     has_marks=False,
 )

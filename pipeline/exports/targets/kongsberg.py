@@ -21,7 +21,6 @@ DECIMALS = 9
 LETTERS = {"x": "X", "y": "Y", "z": "Z", "roll": "R", "pitch": "P", "yaw": "H"}
 _GROUP = re.compile(r"TRAI_(?:RX|HD)(\d):([^,\n]*)[,\n]")
 _FLAT = re.compile(r"\bS2([XYZRPH])=([^,\n]*)[,\n]")
-AFT_DEG = (90.0, 270.0)  # headings of an array that looks aft
 
 
 def _extra(target: Target, mounting: Mounting, options: Options) -> list[str]:
@@ -58,10 +57,6 @@ def _read(target: Target, text: str, where: str, _: Options) -> Mounted:
         if len(given) != 1:
             raise ConfigError(f"{where}: {letter} of the receiver is there {len(given)} times; correct the text")
         values[role] = number(given.pop(), letter, where)
-    if AFT_DEG[0] < values["yaw"] % 360.0 < AFT_DEG[1]:
-        raise ConfigError(
-            f"{where}: the receiver looks aft (H={values['yaw']:g}); poolcal's sonar frame looks forward: turn it by hand"
-        )
     return target.convention.mounted(numbers_of(values))
 
 
