@@ -1,11 +1,11 @@
 """The calibrated points of both sensors as LAS or LAZ, batch by batch, each with its face and its distance from it.
 
 The points are those that the calibration used: labelled by the target's faces. They lie where the calibrated mount, the
-INS's poses and their estimated slow errors put them, in the pool frame or in a CRS. Extra dimensions: ``residual_mm``, the
-distance from the adjusted surface along its normal (toward the boat, or up), and ``face``, the number of the face, whose
-name stands in a record of the header. What is estimated beside the mount, such as biases of ranges, is not taken out of the
-points: it is part of their distances. ``user_data`` is 1 for the laser and 2 for the sonar, ``point_source_id`` the number
-of the pass plus 1.
+INS's poses and their estimated slow errors put them, in the pool frame or in a CRS. Extra dimensions: ``residual_mm``,
+the distance from the adjusted surface along its normal (toward the boat, or up), and ``face``, the number of the face,
+whose name stands in a record of the header. What is estimated beside the mount, such as biases of ranges, is not taken
+out of the points: it is part of their distances. ``user_data`` is 1 for the laser and 2 for the sonar,
+``point_source_id`` the number of the pass plus 1.
 """
 
 from datetime import date
@@ -17,8 +17,8 @@ from laspy.header import GpsTimeType
 
 import pipeline
 from pipeline.atomic_files import flush_file, replacing
-from pipeline.exports.cloud_points import CalibratedPoints, PlacedPoints
 from pipeline.exports.cloud_frame import CloudFrame
+from pipeline.exports.cloud_points import CalibratedPoints, PlacedPoints
 from pipeline.exports.explanation import REJECTED
 from pipeline.exports.mounting import Origin
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS
@@ -64,7 +64,9 @@ def _header(points: CalibratedPoints, frame: CloudFrame, origin: Origin) -> lasp
     )
     header.scales, header.offsets = np.full(3, SCALE_M), frame.offset
     header.global_encoding.gps_time_type = GpsTimeType.STANDARD
-    header.creation_date = date.fromisoformat((origin.start_utc or "1980-01-06")[:10])  # the same run gives the same bytes
+    header.creation_date = date.fromisoformat(
+        (origin.start_utc or "1980-01-06")[:10]
+    )  # the same run gives the same bytes
     header.generating_software = f"poolcal {pipeline.__version__}"
     header.system_identifier = REJECTED if origin.rejected is not None else "poolcal export"
     if frame.crs is not None:

@@ -44,7 +44,8 @@ def cloud_frame(name: str | None, target: TargetFrame, pool_frame: pd.DataFrame)
     Parameters
     ----------
     name
-        A projected CRS, such as EPSG:32651. Its datum is taken to be that of the INS's positions; heights are ellipsoidal.
+        A projected CRS, such as EPSG:32651. Its datum is taken to be that of the INS's positions; heights are
+        ellipsoidal.
     target
         The target in the pool frame.
     pool_frame

@@ -1,9 +1,9 @@
 """The labelled points of a run, placed with the calibrated mount, and their distances from the adjusted surfaces.
 
-A point x of a sensor with the mount (R, t) lies at X = p + R_target_from_body (R x + t). The slow error (δ, ω) of the pose,
-estimated at knots and linear between them (``maths/adjustment/pose_errors.py``), puts it at X + δ + ω × r, r its vector
-from the INS. Its distance is n · X - d - h, with the adjusted plane (n, d) of its family and the height h of its face above
-the plane.
+A point x of a sensor with the mount (R, t) lies at X = p + R_target_from_body (R x + t). The slow error (δ, ω) of the
+pose, estimated at knots and linear between them (``maths/adjustment/pose_errors.py``), puts it at X + δ + ω × r, r its
+vector from the INS. Its distance is n · X - d - h, with the adjusted plane (n, d) of its family and the height h of its
+face above the plane.
 """
 
 from collections.abc import Iterator, Mapping
@@ -82,7 +82,9 @@ class CalibratedPoints:
     face_names: tuple[str, ...]
 
     @classmethod
-    def of(cls, tables: Tables, mounts: Mapping[Calibrated, Mounted], as_built: Mapping[str, float]) -> "CalibratedPoints":
+    def of(
+        cls, tables: Tables, mounts: Mapping[Calibrated, Mounted], as_built: Mapping[str, float]
+    ) -> "CalibratedPoints":
         """Return the points of a run folder, placed with these mounts.
 
         Parameters
@@ -125,7 +127,8 @@ class CalibratedPoints:
         since, knots = ((times - start).astype(np.float64) for times in (t_ns, self.drift["t_ns"].to_numpy()))
         names = [f"{axis}_target_m" for axis in "xyz"], [f"turn_{axis}_target_deg" for axis in "xyz"]
         shift, turn = (
-            np.column_stack([np.interp(since, knots, self.drift[name].to_numpy()) for name in columns]) for columns in names
+            np.column_stack([np.interp(since, knots, self.drift[name].to_numpy()) for name in columns])
+            for columns in names
         )
         records = (self.trajectory.t_ns - start).astype(np.float64)
         ins = np.column_stack([np.interp(since, records, column) for column in self.trajectory.positions_m.T])

@@ -1,16 +1,16 @@
 """Axes, signs, order and units with which another program takes a mount, and the numbers of a mount in them.
 
-Why one form covers all: every program here composes elementary rotations about its own axes, which are ours (x starboard,
-y forward, z up), exchanged or turned round. Let the rows of P be the program's axes in ours: x' = P x. Then a rotation R
-is P R Pᵀ for the program, a product of elementary rotations becomes the product of the turned ones in the same order, and
-a turn about one of our axes is a turn about ± one of the program's. So a program that composes Rz·Ry·Rx in forward,
-starboard, down (P = [[0,1,0],[1,0,0],[0,0,-1]]) has
+Why one form covers all: every program here composes elementary rotations about its own axes, which are ours (x
+starboard, y forward, z up), exchanged or turned round. Let the rows of P be the program's axes in ours: x' = P x. Then
+a rotation R is P R Pᵀ for the program, a product of elementary rotations becomes the product of the turned ones in the
+same order, and a turn about one of our axes is a turn about ± one of the program's. So a program that composes Rz·Ry·Rx
+in forward, starboard, down (P = [[0,1,0],[1,0,0],[0,0,-1]]) has
 
     P · Rz(yaw) Rx(pitch) Ry(roll) · Pᵀ = Rz(-yaw) · Ry(pitch) · Rx(roll)
 
 exactly, at any tilt: our order, with the sign of yaw turned. What remains of a convention is thus P, three signs, the
-order by the letters of :mod:`pipeline.exports.orders`, and units. (CARIS's axes starboard, forward, down are left-handed:
-there the angles are defined by words, not by a hand, and P serves the positions alone.)
+order by the letters of :mod:`pipeline.exports.orders`, and units. (CARIS's axes starboard, forward, down are
+left-handed: there the angles are defined by words, not by a hand, and P serves the positions alone.)
 """
 
 from dataclasses import dataclass

@@ -57,12 +57,14 @@ def explanation(target: Target, mounting: Mounting, options: Options, zeros: str
         lines.append(f"Not good enough by the run itself: {', '.join(mounting.origin.held)}.")
     if mounting.latency_s:
         lines.append(
-            f"Latency: the {SENSOR_WORDS[mounting.sensor]}'s times are {mounting.latency_s:.6f} s late against the INS's "
+            f"Latency: the {SENSOR_WORDS[mounting.sensor]}'s times are {mounting.latency_s:.6f} s late against the "
+            "INS's "
             "(subtract this from them). Check that it is set, with the program's own sign."
         )
     if mounting.covariance is not None:
         lines.append(
-            "Sigmas are total, one standard deviation (68 %). Where the program asks for 95 %, enter 1.96 times as much."
+            "Sigmas are total, one standard deviation (68 %). Where the program asks for 95 %, enter 1.96 times as "
+            "much."
         )
     certainty = f"Certainty: {convention.certainty}, {CERTAINTY_WORDS[convention.certainty]}."
     return [*lines, certainty, f"Source: {convention.source}."]

@@ -1,4 +1,4 @@
-"""The mount to be written: a sensor's rotation, lever arm and covariance, and the vessel's frame that it is written in."""
+"""The mount to be written: a sensor's rotation, lever arm and covariance, and the vessel's frame for it."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -23,9 +23,9 @@ _STATED = re.compile(rf"the INS stands at {_THREE} m \(starboard, forward, up\),
 class VesselFrame:
     """The INS in the frame of the program: where its point is, and how its body is turned against the vessel.
 
-    The program's reference point is the origin; axes are starboard, forward, up. ``ins_turn_deg``: roll, pitch, yaw of the
-    INS's body in the vessel, signs and order as those of a mount. Zero: the program takes the INS's attitude for the
-    vessel's, which is usual.
+    The program's reference point is the origin; axes are starboard, forward, up. ``ins_turn_deg``: roll, pitch, yaw of
+    the INS's body in the vessel, signs and order as those of a mount. Zero: the program takes the INS's attitude for
+    the vessel's, which is usual.
     """
 
     ins_point_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -58,13 +58,17 @@ class VesselFrame:
         """Return a sentence that says what positions and angles count from."""
         if self.is_ins:
             return (
-                f"{OF_INS} If the program counts from another point, or turns the INS itself, export again with --ins-point, "
+                f"{OF_INS} If the program counts from another point, or turns the INS itself, export again with "
+                "--ins-point, "
                 "--ins-turn."
             )
-        point, turn = (" ".join(f"{value:.10g}" for value in values) for values in (self.ins_point_m, self.ins_turn_deg))
+        point, turn = (
+            " ".join(f"{value:.10g}" for value in values) for values in (self.ins_point_m, self.ins_turn_deg)
+        )
         return (
             f"Positions count from the vessel's reference point, from which the INS stands at {point} m (starboard, "
-            f"forward, up), turned by {turn} degrees (roll, pitch, yaw): as told by the options of poolcal export. Their "
+            f"forward, up), turned by {turn} degrees (roll, pitch, yaw): as told by the options of poolcal export. "
+            "Their "
             "errors are in no sigma here."
         )
 
@@ -147,8 +151,8 @@ class Mounting:
     def arrays(self) -> tuple[Mounted, Mounted]:
         """Return the mounts of transmitter and receiver in the vessel's frame; both have the same rotation.
 
-        With the offset o of the transmitter from the receiver, in the sonar's frame, the receiver is at the lever arm t and
-        the transmitter at t + R o. If the lever arm has y of the transmitter (``split``), the receiver is at
+        With the offset o of the transmitter from the receiver, in the sonar's frame, the receiver is at the lever arm
+        t and the transmitter at t + R o. If the lever arm has y of the transmitter (``split``), the receiver is at
         t - R (0, o_y, 0) and the transmitter at t + R (o_x, 0, o_z). Without an offset both are at t.
 
         Raises
@@ -158,8 +162,10 @@ class Mounting:
         """
         if self.projector_offset_m is None and self.split:
             raise ConfigError(
-                "--projector-offset: is needed: this sonar's files have transmitter and receiver apart, and the lever arm "
-                "found has x and z of the receiver, y of the transmitter; give the transmitter's place from the receiver "
+                "--projector-offset: is needed: this sonar's files have transmitter and receiver apart, and the lever "
+                "arm "
+                "found has x and z of the receiver, y of the transmitter; give the transmitter's place from the "
+                "receiver "
                 "(starboard, forward, up, m), such as 0 0 0"
             )
         offset = np.array(self.projector_offset_m or (0.0, 0.0, 0.0))

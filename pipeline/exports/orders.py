@@ -1,7 +1,8 @@
 """The six orders in which a program may compose roll, pitch and yaw, and the angles of one rotation in each of them.
 
-An order is a word of three letters, from the outermost (leftmost) factor to the innermost: ``YPR`` is Rz(yaw) · Rx(pitch)
-· Ry(roll), the order of this project (CONVENTIONS.md). Axes are starboard, forward, up; all angles are right-handed.
+An order is a word of three letters, from the outermost (leftmost) factor to the innermost: ``YPR`` is Rz(yaw) ·
+Rx(pitch) · Ry(roll), the order of this project (CONVENTIONS.md). Axes are starboard, forward, up; all angles are
+right-handed.
 """
 
 import warnings
@@ -47,9 +48,9 @@ def decomposed(R: Array, order: str) -> Angles:
 def partials(angles: Angles, order: str) -> dict[str, Array]:
     """Return by letter the derivatives ∂angle/∂ε (3,) of R' = Exp(ε) · R, ε about the fixed axes.
 
-    In R = R1(a1) R2(a2) R3(a3) each angle turns about its own axis as the factors before it have turned it: ε = e1 da1 +
-    R1 e2 da2 + R1 R2 e3 da3. With these axes as columns of A, the partials are the rows of A⁻¹. (Where the middle angle is
-    ±90° A has none; its pseudo-inverse is taken.)
+    In R = R1(a1) R2(a2) R3(a3) each angle turns about its own axis as the factors before it turned it: ε = e1 da1 +
+    R1 e2 da2 + R1 R2 e3 da3. With these axes as columns of A, the partials are the rows of A⁻¹. (Where the middle
+    angle is ±90° A has none; its pseudo-inverse is taken.)
     """
     turned, axes = np.eye(3), []
     for letter in order:
@@ -62,11 +63,8 @@ def partials(angles: Angles, order: str) -> dict[str, Array]:
 def errors_by_order(R: Array, printed: str) -> dict[str, float]:
     """Return by order the angle (degrees) between R and what a program makes of the numbers printed for it.
 
-    The numbers are the roll, pitch and yaw of R (3, 3) in the order ``printed``; the program composes them in each of the
-    six orders. In the order printed the error is zero.
+    The numbers are the roll, pitch and yaw of R (3, 3) in the order ``printed``; the program composes them in each of
+    the six orders. In the order printed the error is zero.
     """
     angles = decomposed(R, printed)
-    return {
-        order: float(np.degrees(np.linalg.norm(log_so3(composed(angles, order) @ R.T))))
-        for order in ORDERS
-    }
+    return {order: float(np.degrees(np.linalg.norm(log_so3(composed(angles, order) @ R.T)))) for order in ORDERS}

@@ -6,7 +6,7 @@ from pipeline.text_table import text_table
 
 
 def change_table(sensor: str, found: Mounted, present: Mounted | None) -> list[str]:
-    """Return lines with the six values of a sensor's mount: in session.yaml (None: not there), in the file, the change."""
+    """Return lines with the six values of a mount: in session.yaml (None: not there), in the file, the change."""
     new, old = found.settings(), None if present is None else present.settings()
     rows = []
     for name, _, key, unit_of_setting in PARAMETERS:

@@ -42,7 +42,9 @@ def one(found: list[str] | list[tuple[str, ...]], what: str, where: str) -> tupl
     if not found:
         raise ConfigError(f"{where}: has no {what}; is it the file meant, and whole?")
     if len(set(found)) > 1:
-        raise ConfigError(f"{where}: has {len(found)} different {what}; leave one, for poolcal reads one head at a time")
+        raise ConfigError(
+            f"{where}: has {len(found)} different {what}; leave one, for poolcal reads one head at a time"
+        )
     return (found[0],) if isinstance(found[0], str) else found[0]
 
 

@@ -24,9 +24,9 @@ from pipeline.text_table import text_table
 TARGETS = {
     target.name: target
     for target in (
-        qps.QINSY, qps.QIMERA, kluster.TARGET, kongsberg.TARGET, posmv.TARGET, caris.TARGET, caris_hvf.TARGET, hypack.TARGET,
-        mbsystem.TARGET, novatel.TARGET, ros.TARGET, pdal.TARGET, mbes_lib.TARGET, xsf.TARGET, generic.JSON, generic.YAML,
-        generic.CSV,
+        qps.QINSY, qps.QIMERA, kluster.TARGET, kongsberg.TARGET, posmv.TARGET, caris.TARGET, caris_hvf.TARGET,
+        hypack.TARGET, mbsystem.TARGET, novatel.TARGET, ros.TARGET, pdal.TARGET, mbes_lib.TARGET, xsf.TARGET,
+        generic.JSON, generic.YAML, generic.CSV,
     )
 }  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Entry sheets: plain text for a person who types the numbers into a program, under the program's own field names.
 
-A sheet has fixed lines ``Field (positive sense): value unit``, so that it can be read back. Its last line is END: a sheet
-without it was cut off, perhaps within a number.
+A sheet has fixed lines ``Field (positive sense): value unit``, so that it can be read back. Its last line is END: a
+sheet without it was cut off, perhaps within a number.
 """
 
 import re
@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pipeline.errors import ConfigError
 from pipeline.exports.explanation import explanation, heading, sigmas_of
 from pipeline.exports.mounting import Mounting, sigma_text
-from pipeline.exports.orders import ORDERS
 from pipeline.exports.reading import ROLES, number, numbers_of, whole_lines, written
 from pipeline.exports.target import Options, Target
 from pipeline.mount import Mounted
@@ -20,7 +19,7 @@ from pipeline.mount import Mounted
 DECIMALS = 4  # of degrees and metres: rounding is below 0.00005 degrees, 0.05 mm
 END = "End of sheet."
 WIDTH = 120
-_KEPT = {"break_on_hyphens": False, "break_long_words": False}
+_LINES = textwrap.TextWrapper(WIDTH, break_on_hyphens=False, break_long_words=False)
 _FIELD = re.compile(r"  (?P<field>[^:]*\S): +(?P<value>\S+)(?: .*)?")
 Groups = tuple[tuple[str, dict[str, str]], ...]  # title of a group, and its fields by role
 
@@ -63,7 +62,7 @@ class Sheet:
         if self.extra is not None:
             lines += ["", *self.extra(target, mounting, options)]
         sentences = [*explanation(target, mounting, options, self.zeros), *self.notes]
-        lines += ["", *(line for sentence in sentences for line in textwrap.wrap(sentence, WIDTH, **_KEPT)), END]
+        lines += ["", *(line for sentence in sentences for line in _LINES.wrap(sentence)), END]
         return "\n".join(lines) + "\n"
 
     def read(self, target: Target, text: str, where: str, options: Options) -> Mounted:
@@ -78,7 +77,6 @@ class Sheet:
             match = _FIELD.fullmatch(line)
             if match:
                 found.setdefault(match["field"].partition(" (")[0], []).append(match["value"])
-        order = stated_order(text, target, where, options)
         names = {role: name for _, fields in self.groups for role, name in fields.items()}
         values = {}
         for role in ROLES:
@@ -87,22 +85,4 @@ class Sheet:
                 reason = "is missing" if not given else f"is there {len(given)} times"
                 raise ConfigError(f"{where}: {names[role]}: {reason}; export the sheet again")
             values[role] = number(given[0], names[role], where)
-        return target.convention.mounted(numbers_of(values), order)
-
-
-def stated_order(text: str, target: Target, where: str, options: Options) -> str | None:
-    """Return the order of rotations that a text of poolcal's states, or the one told by the user.
-
-    Parameters
-    ----------
-    text, where
-        The text, and its file for messages.
-    target, options
-        The program, and what the user told.
-    """
-    stated = set(re.findall(r"Order of rotations: ([YPR]{3})\b", " ".join(text.split()))) & set(ORDERS)
-    if target.convention.order is not None or not stated:
-        return options.order
-    if len(stated) > 1 or (options.order is not None and {options.order} != stated):
-        raise ConfigError(f"{where}: states the order {', '.join(sorted(stated))}; leave --order out, or export again")
-    return stated.pop()
+        return target.convention.mounted(numbers_of(values), options.order)

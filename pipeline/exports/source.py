@@ -27,8 +27,8 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
     run
         The run.
     sensor
-        The sensor to write; None: the one that the run calibrates. From a sonar's run "laser" is the laser's mount in its
-        settings, which the calibration rests on.
+        The sensor to write; None: the one that the run calibrates. From a sonar's run "laser" is the laser's mount in
+        its settings, which the calibration rests on.
     although_rejected
         Whether a rejected result may be taken.
 
@@ -59,7 +59,7 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
         if sensor in (None, calibrated):
             mounting = _calibrated(run.path, run.result[calibrated], calibrated, origin)
         elif sensor == "laser":
-            kind = "the laser's mount in the run's settings, on which the sonar's calibration rests (no result of this run)"
+            kind = "the laser's mount by the settings, on which the sonar's calibration rests (no result of this run)"
             mounting = _laser_setting(session, replace(origin, kind=kind, held=()))
         else:
             raise ConfigError(f"{run.path}: calibrates the laser alone, and holds no sonar; name a sonar's run")
@@ -108,8 +108,8 @@ def _laser_setting(session: SessionConfig, origin: Origin) -> Mounting:
 def _with_settings(mounting: Mounting, session: SessionConfig) -> Mounting:
     """Return the mount with the sensor's clock against the INS's, and the place of the transmitter.
 
-    True time = recorded - latency for either. So the sonar's recorded time t is t - latency_sonar + latency_ins by the INS's
-    clock as recorded.
+    True time = recorded - latency for either. So the sonar's recorded time t is t - latency_sonar + latency_ins by the
+    INS's clock as recorded.
     """
     if mounting.sensor == "laser":
         return replace(mounting, latency_s=session.laser.latency_s - session.ins.latency_s)

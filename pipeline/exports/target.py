@@ -19,8 +19,8 @@ SERIAL = re.compile(r"[A-Za-z0-9_.-]{1,50}")
 class Options:
     """What the user tells of a program.
 
-    order: its order of rotations, where that is not known; serial: the sonar's serial number; ins_height_m: height of the
-    INS's point above the water at rest.
+    order: its order of rotations, where that is not known; serial: the sonar's serial number; ins_height_m: height of
+    the INS's point above the water at rest.
     """
 
     order: str | None = None
@@ -49,8 +49,8 @@ class Target:
     sensor
         The sensor that the program wants; None: the one that the run calibrates.
     counts_from
-        "ins": the program counts from the INS itself, so that no other frame can be meant. "water": its vertical offsets
-        count from the waterline.
+        "ins": the program counts from the INS itself, so that no other frame can be meant. "water": its vertical
+        offsets count from the waterline.
     uses
         Options that it needs or takes beside ``order``.
     has_marks
@@ -76,7 +76,8 @@ class Target:
                 raise ConfigError(f"--order {options.order}: is none of {', '.join(ORDERS)} (leftmost is outermost)")
             if self.convention.order is not None:
                 raise ConfigError(
-                    f"--order {options.order}: {self.name} turns in the order {self.convention.order}; leave --order out"
+                    f"--order {options.order}: {self.name} turns in the order {self.convention.order}; leave --order "
+                    "out"
                 )
         if options.serial is not None:
             if "serial" not in self.uses:

@@ -6,7 +6,7 @@ from pipeline.config.mount import Mount
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.exports.mounting import Mounting, VesselFrame
-from pipeline.exports.order_check import refuse_spread
+from pipeline.exports.order_check import refuse_spread, stated_order
 from pipeline.exports.target import Options, Target
 from pipeline.mount import Mounted, mount_of
 
@@ -24,7 +24,8 @@ def export_text(target: Target, mounting: Mounting, options: Options) -> str:
     target.check_frame(mounting)
     if mounting.origin.rejected is not None and not target.has_marks:
         raise ConfigError(
-            f"--although-rejected: the form of {target.name} has no place that says that the run was rejected; export it "
+            f"--although-rejected: the form of {target.name} has no place that says that the run was rejected; export "
+            "it "
             "to json, or type the values by hand"
         )
     placed = replace(mounting, frame=frame_of(target, mounting.frame, options))
@@ -70,6 +71,7 @@ def mount_in(target: Target, text: str, where: str, told: VesselFrame | None, op
     frame = stated or told or VesselFrame()
     if target.counts_from == "ins" and not frame.is_ins:
         raise ConfigError(f"--ins-point, --ins-turn: {target.name} counts from the INS itself; leave them out")
+    options = replace(options, order=stated_order(text, target, where, options))
     vessel = target.read(target, text, where, options)
     refuse_spread(target, vessel.R_body_from_sensor, options)
     return mount_of(parse(Mount, frame.to_body(vessel).settings(), where))

@@ -1,7 +1,7 @@
 """XML written and read: comments that cannot end early, and no document types (their entities may expand hugely)."""
 
 import re
-import xml.etree.ElementTree as ET  # noqa: N817
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 from pipeline.errors import ConfigError

@@ -242,15 +242,17 @@ def projected_from_ecef(name: str, option: str) -> tuple[Any, Callable[[Array], 
     except ProjError as error:
         raise ConfigError(f"{option} {name}: no CRS is known by that name; write one such as EPSG:32651") from error
     if not crs.is_projected or crs.is_compound or _unit_m(crs) != 1.0:
-        raise ConfigError(f"{option} {name}: {crs.name} is no projected CRS in metres without heights; name one, such as UTM")
+        raise ConfigError(f"{option} {name}: {crs.name} is no projected CRS in metres without heights; name one, such "
+        "as UTM")
     if (reason := unusable_reason(crs)) is not None:
         raise ConfigError(f"{option} {name}: {crs.name} {reason}")
     try:
         transformer = Transformer.from_crs(geocentric_crs(crs), crs.to_3d(), always_xy=True, allow_ballpark=False)
     except ProjError as error:
-        raise ConfigError(f"{option} {name}: PROJ cannot compute coordinates in {crs.name}; name another CRS") from error
+        raise ConfigError(f"{option} {name}: PROJ cannot turn points into {crs.name}; name another") from error
 
     def from_ecef(points_ecef_m: Array) -> Array:
-        return np.column_stack(transformer.transform(*points_ecef_m.T.copy(), inplace=False))
+        x, y, z = points_ecef_m.T.copy()
+        return np.column_stack(transformer.transform(x, y, z, inplace=False))
 
     return crs, from_ecef

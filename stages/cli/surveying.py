@@ -11,27 +11,38 @@ from stages.cli.arguments import SessionYaml
 Three = tuple[float, float, float]
 InsPoint = Annotated[
     Three | None,
-    typer.Option("--ins-point", metavar="X Y Z", help="INS from the program's reference point: starboard, forward, up, m"),
+    typer.Option(
+        "--ins-point", metavar="X Y Z", help="INS from the program's reference point: starboard, forward, up, m"
+    ),
 ]
 InsTurn = Annotated[
     Three | None,
-    typer.Option("--ins-turn", metavar="ROLL PITCH YAW", help="turn of the INS in the vessel, if the program has one, degrees"),
+    typer.Option(
+        "--ins-turn", metavar="ROLL PITCH YAW", help="turn of the INS in the vessel, if the program has one, degrees"
+    ),
 ]
 Order = Annotated[
     str | None, typer.Option("--order", metavar="YPR", help="order of rotations, where the maker does not state it")
 ]
 Serial = Annotated[str | None, typer.Option("--serial", metavar="N", help="the sonar's serial number, for kluster")]
 InsHeight = Annotated[
-    float | None, typer.Option("--ins-height", metavar="H", help="height of the INS above the water, m, for hypack, kluster")
+    float | None,
+    typer.Option("--ins-height", metavar="H", help="height of the INS above the water, m, for hypack, kluster"),
 ]
 
 
 @app.command("export")
 def _export(
-    run_folder: Annotated[Path | None, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")] = None,
+    run_folder: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help="run folder, as given to poolcal run")
+    ] = None,
     target: Annotated[str | None, typer.Option("--to", metavar="NAME", help="the program; --list shows all")] = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="file to write; default: the screen")] = None,
-    show_list: Annotated[bool, typer.Option("--list", help="list all programs, and how sure their conventions are")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="file to write; default: the screen")
+    ] = None,
+    show_list: Annotated[
+        bool, typer.Option("--list", help="list all programs, and how sure their conventions are")
+    ] = False,
     ins_point: InsPoint = None,
     ins_turn: InsTurn = None,
     order: Order = None,
@@ -41,15 +52,17 @@ def _export(
         Three | None,
         typer.Option("--projector-offset", metavar="X Y Z", help="transmitter from receiver in the sonar's frame, m"),
     ] = None,
-    crs: Annotated[str | None, typer.Option("--crs", metavar="EPSG:N", help="projected CRS of the points, for las, laz")] = None,
+    crs: Annotated[
+        str | None, typer.Option("--crs", metavar="EPSG:N", help="projected CRS of the points, for las, laz")
+    ] = None,
     although_rejected: Annotated[
         bool, typer.Option("--although-rejected", help="export a rejected run too, marked as such")
     ] = False,
 ) -> int:
     """Write the mount in another program's form and signs.
 
-    Also the calibrated points as LAS or LAZ (--to las, --to laz). The numbers are totals: they replace what stands in the
-    program.
+    Also the calibrated points as LAS or LAZ (--to las, --to laz). The numbers are totals: they replace what stands in
+    the program.
     """
     from stages.commands import export
 
@@ -64,7 +77,9 @@ def _mount(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="file of the program, or of poolcal export")],
     source: Annotated[str, typer.Option("--from", metavar="NAME", help="the program; poolcal export --list shows all")],
     session: SessionYaml,
-    sensor: Annotated[str | None, typer.Option("--sensor", metavar="NAME", help="mbes or laser; default: by the file")] = None,
+    sensor: Annotated[
+        str | None, typer.Option("--sensor", metavar="NAME", help="mbes or laser; default: by the file")
+    ] = None,
     ins_point: InsPoint = None,
     ins_turn: InsTurn = None,
     order: Order = None,

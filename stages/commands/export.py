@@ -8,6 +8,7 @@ from pipeline.artefacts.catalogue.points import POOL_FRAME
 from pipeline.artefacts.catalogue.target import TARGET_POSE
 from pipeline.artefacts.from_tables import target_frame
 from pipeline.atomic_files import write_text
+from pipeline.config.session import Calibrated
 from pipeline.console import plural, say
 from pipeline.errors import ConfigError
 from pipeline.exports.cloud import CLOUDS, write_cloud
@@ -18,7 +19,7 @@ from pipeline.exports.registry import list_text, target_named
 from pipeline.exports.source import mounting_of
 from pipeline.exports.target import Options
 from pipeline.exports.writing import export_text
-from pipeline.mount import mount_of
+from pipeline.mount import Mounted, mount_of
 from pipeline.results.finished_run import FinishedRun
 from pipeline.run.output_files import refuse_output
 from pipeline.run.results import Tables
@@ -99,14 +100,24 @@ def _placed(mounting: Mounting, choices: Choices) -> Mounting:
 
 def _export_points(run: FinishedRun, name: str, out: Path | None, choices: Choices) -> int:
     """Write the calibrated points of both sensors as LAS or LAZ."""
-    given = (choices.ins_point, choices.ins_turn, choices.order, choices.serial, choices.ins_height, choices.projector_offset)
+    given = (
+        choices.ins_point,
+        choices.ins_turn,
+        choices.order,
+        choices.serial,
+        choices.ins_height,
+        choices.projector_offset,
+    )
     if any(choice is not None for choice in given):
-        raise ConfigError(f"--to {name}: writes points; of the options only --out, --crs and --although-rejected belong to it")
+        raise ConfigError(
+            f"--to {name}: writes points; of the options only --out, --crs and --although-rejected belong to it"
+        )
     if out is None:
         raise ConfigError(f"--to {name}: writes points; name the file: --out FILE.{name}")
     refuse_output("--out", out, run.path, run.settings.session_folder, suffix=f".{name}", holds=WRITTEN)
     mounting = mounting_of(run, None, choices.although_rejected)
-    mounts = {"laser": mount_of(run.settings.session.laser.mount)} | {mounting.sensor: mounting.body}
+    mounts: dict[Calibrated, Mounted] = {"laser": mount_of(run.settings.session.laser.mount)}
+    mounts[mounting.sensor] = mounting.body
     tables = Tables(run.path)
     frame = cloud_frame(choices.crs, target_frame(tables.table(TARGET_POSE)), tables.table(POOL_FRAME))
     points = CalibratedPoints.of(tables, mounts, run.settings.pool.as_built.faces)

@@ -92,4 +92,6 @@ def _text_of(file: Path) -> str:
     except OSError as error:
         raise ConfigError(f"{file}: cannot be read ({error.strerror}); check the path") from error
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{file}: byte {error.start} is not UTF-8: no text; save the part with the mount as text") from error
+        raise ConfigError(
+            f"{file}: byte {error.start} is not UTF-8: no text; save the part with the mount as text"
+        ) from error

@@ -27,9 +27,15 @@ from tests.support.mountings import ORIGIN, mounted
 POOL = CloudFrame("pool", None, np.zeros(3), lambda points: points)
 T0 = 1_462_608_000 * 10**9
 STEP_NS = 10 * 10**9
-MOUNTS: dict[str, Mounted] = {"laser": mounted(1.0, 2.0, 3.0, 0.2, 0.5, 1.1), "mbes": mounted(-48.8, 1.2, -2.0, 0.3, 0.2, -2.0)}
+MOUNTS: dict[str, Mounted] = {
+    "laser": mounted(1.0, 2.0, 3.0, 0.2, 0.5, 1.1),
+    "mbes": mounted(-48.8, 1.2, -2.0, 0.3, 0.2, -2.0),
+}
 NORMAL = np.array([-0.6, 0.8, 0.0])
-DRIFTED = {"shift": np.array([[0.01, 0.0, -0.02], [0.03, 0.02, 0.0]]), "turn": np.array([[0.0, 0.1, 0.0], [0.2, 0.1, -0.3]])}
+DRIFTED = {
+    "shift": np.array([[0.01, 0.0, -0.02], [0.03, 0.02, 0.0]]),
+    "turn": np.array([[0.0, 0.1, 0.0], [0.2, 0.1, -0.3]]),
+}
 POSITIONS = np.array([[-4.0, -3.0, 1.0], [-4.2, 3.0, 1.1]])
 ATTITUDES = Rotation.from_euler("ZXY", [[-163.0, 1.0, 2.0], [-160.0, -1.0, 3.0]], degrees=True)
 
@@ -54,7 +60,11 @@ def stream(run: Path, artefact: Artefact, sensor: str, rows: int) -> dict[str, n
     random = np.random.default_rng(rows)
     columns: dict[str, np.ndarray] = {column.name: np.zeros(rows) for column in artefact.columns}
     columns |= {f"{axis}_{sensor}_m": random.uniform(-9, 9, rows).astype(np.float32) for axis in "xyz"}
-    columns |= {"t_ns": T0 + np.linspace(0, STEP_NS, rows).astype(np.int64), "pass": np.arange(rows) % 3, "face": np.arange(rows) % 2}
+    columns |= {
+        "t_ns": T0 + np.linspace(0, STEP_NS, rows).astype(np.int64),
+        "pass": np.arange(rows) % 3,
+        "face": np.arange(rows) % 2,
+    }
     for name in ("pass", "face", "ping", "beam"):
         if name in columns:
             columns[name] = columns[name].astype(np.int64 if name == "ping" else np.int16)
@@ -72,14 +82,21 @@ def made_up(run: Path, rows: int) -> tuple[CalibratedPoints, dict[str, dict[str,
     poses |= {f"q{axis}": quaternions[:, k] for k, axis in enumerate("wxyz")} | {"t_ns": [T0, T0 + STEP_NS]}
     table(run, POSES, poses)
     table(run, TARGET_POSE, {"R_target_from_pool": [np.eye(3).ravel().tolist()]})
-    planes = {"normal_x_target_1": [NORMAL[0], 0.0], "normal_y_target_1": [NORMAL[1], 0.0], "normal_z_target_1": [NORMAL[2], 1.0]}
+    planes = {
+        "normal_x_target_1": [NORMAL[0], 0.0],
+        "normal_y_target_1": [NORMAL[1], 0.0],
+        "normal_z_target_1": [NORMAL[2], 1.0],
+    }
     table(run, FACES, planes | {"face": [0, 1], "name": ["wall", "top 水"], "family": ["P1", "H"],
                                 "sense": [1.0, -1.0], "offset_m": [0.0, -3.5]})  # fmt: skip
     table(run, SURFACES, planes | {"family": ["P1", "H"], "distance_m": [0.25, 0.002]})
     drift = {f"{axis}_target_m": DRIFTED["shift"][:, k] for k, axis in enumerate("xyz")}
     drift |= {f"turn_{axis}_target_deg": DRIFTED["turn"][:, k] for k, axis in enumerate("xyz")}
     table(run, DRIFT, drift | {"t_ns": [T0, T0 + STEP_NS]})
-    points = {"laser": stream(run, LASER_LABELLED, "laser", rows), "mbes": stream(run, SOUNDINGS_LABELLED, "mbes", rows // 4)}
+    points = {
+        "laser": stream(run, LASER_LABELLED, "laser", rows),
+        "mbes": stream(run, SOUNDINGS_LABELLED, "mbes", rows // 4),
+    }
     return CalibratedPoints.of(Tables(run), MOUNTS, {"top 水": 0.004}), points  # type: ignore[arg-type]
 
 
@@ -161,14 +178,16 @@ def test_frames_that_cannot_be_are_refused(name: str, said: str) -> None:
 
 
 def test_a_projected_frame_has_the_places_of_the_pool() -> None:
-    """The target's y axis points at azimuth 163°: 10 m along it go south and a little east, on the grid turned and scaled."""
+    """The target's y axis points at azimuth 163°: 10 m along it go south and a little east."""
     import pyproj
 
     pool = pd.DataFrame({"latitude_deg": [36.0], "longitude_deg": [120.1], "height_m": [12.0], "azimuth_deg": [163.0]})
     frame = cloud_frame("EPSG:32651", TargetFrame(np.eye(3), np.zeros(3)), pool)
     x, y, z = frame.coordinates(np.array([[0.0, 0.0, 0.0], [0.0, 10.0, 0.0], [10.0, 0.0, 0.0], [0.0, 0.0, -2.0]]))
     longitude, latitude = pyproj.Transformer.from_crs("EPSG:32651", "EPSG:4326", always_xy=True).transform(x, y)
-    azimuth, _, length = pyproj.Geod(ellps="WGS84").inv(longitude[[0, 0]], latitude[[0, 0]], longitude[1:3], latitude[1:3])
+    azimuth, _, length = pyproj.Geod(ellps="WGS84").inv(
+        longitude[[0, 0]], latitude[[0, 0]], longitude[1:3], latitude[1:3]
+    )
     np.testing.assert_allclose((longitude[0], latitude[0], z[0]), (120.1, 36.0, 12.0), atol=1e-9)
     np.testing.assert_allclose(np.mod(azimuth, 360.0), [163.0, 253.0], atol=1e-3)
     np.testing.assert_allclose(length, 10.0, atol=1e-4)

@@ -57,7 +57,7 @@ def test_numbers_that_are_none(name: str, word: str) -> None:
     """In place of the roll, wherever it stands."""
     text = text_of(name)
     roll = {"ros": "-0.851938", "json": "-48.8125", "yaml": "-48.8125"}.get(name, "-48.8125")
-    spoilt = re.sub(rf'{re.escape(roll)}\d*', word, text)
+    spoilt = re.sub(rf"{re.escape(roll)}\d*", word, text)
     assert spoilt != text
     refused(name, spoilt)
 

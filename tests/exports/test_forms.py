@@ -1,7 +1,7 @@
-"""What a form says beside its numbers: marks of a rejected run, latency, uncertainties, certainty; other parsers' view."""
+"""What a form says beside its numbers: marks of a rejected run, latency, uncertainties, certainty; other parsers."""
 
 import json
-import xml.etree.ElementTree as ET  # noqa: N817
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import numpy as np
@@ -70,7 +70,7 @@ def test_the_list_has_every_target_and_its_certainty() -> None:
 
 
 def test_latency_has_the_programs_sign() -> None:
-    """The sonar's times 12 ms late: Kluster looks attitude up at time + latency, so it must be -0.012; PDAL adds too."""
+    """The sonar's times 12 ms late: Kluster looks attitude up at time + latency, so -0.012; PDAL adds too."""
     late = {"latency_s": 0.012}
     block = json.loads(text_of("kluster", **late))["7"]
     assert float(*block["latency"].values()) == -0.012
@@ -147,7 +147,7 @@ def test_programs_that_count_from_the_ins_take_no_other_frame(name: str) -> None
     [
         ("qinsy", Options(serial="7"), "--serial: qinsy has no place for it"),
         ("kluster", Options(), "--serial: is needed"),
-        ("kluster", Options(serial='7"'), "--serial 7\": must be letters"),
+        ("kluster", Options(serial='7"'), '--serial 7": must be letters'),
         ("qinsy", Options(ins_height_m=1.0), "--ins-height: qinsy has no place"),
         ("hypack", Options(order="YPR", ins_height_m=float("nan")), "--ins-height nan: must be within"),
     ],

@@ -1,4 +1,4 @@
-"""Programs whose order of rotations nobody states: refused above 0.02°, on both sides; told by --order; what it costs."""
+"""Programs whose order of rotations nobody states: refused above 0.02°; told by --order; what it costs."""
 
 from itertools import permutations
 

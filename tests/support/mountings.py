@@ -1,5 +1,6 @@
 """Random mounts to export: 200, with tilts up to ±80°, and the vessel's frames in which they are written."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ def mounted(roll: float, pitch: float, yaw: float, *lever_arm: float) -> Mounted
 
 
 def mounting(body: Mounted, **more: Any) -> Mounting:
-    return Mounting(**({"sensor": "mbes", "body": body, "covariance": None, "origin": ORIGIN} | more))
+    return replace(Mounting("mbes", body, None, ORIGIN), **more)
 
 
 def random_mounts(number: int = 200) -> list[Mounted]:

@@ -1,14 +1,15 @@
 """What other programs make of the numbers that they are given: readers of their forms, apart from pipeline/exports.
 
-Each reader parses a form and returns rotation and position in axes starboard, forward, up. Rotations are built here from what
-the program's documents say that an angle does ("the bow goes to starboard"), or from the elements in its source.
+Each reader parses a form and returns rotation and position in axes starboard, forward, up. Rotations are built here
+from what the program's documents say that an angle does ("the bow goes to starboard"), or from the elements in its
+source.
 """
 
 import csv
 import io
 import json
 import re
-import xml.etree.ElementTree as ET  # noqa: N817
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from math import cos, radians, sin
 
@@ -28,7 +29,7 @@ def moving(start: Array, end: Array, angle_deg: float) -> Array:
 
 
 def sfu_rotation(order: str, roll: float, pitch: float, yaw: float) -> Array:
-    """Roll: starboard goes down; pitch: the bow goes up; yaw: the bow goes to port. Leftmost of ``order`` is outermost."""
+    """Roll: starboard goes down; pitch: the bow goes up; yaw: the bow goes to port. Leftmost is outermost."""
     turns = {
         "R": moving(STARBOARD, -UP, roll),
         "P": moving(FORWARD, UP, pitch),
@@ -93,14 +94,15 @@ def caris(text: str, order: str) -> Read:
 def caris_hvf(text: str, order: str) -> Read:
     root = ET.fromstring(text)
     paths = ("SVPSensor/TimeStamp", "DepthSensor/TimeStamp/TransducerEntries/Transducer")
-    (svp, swath) = (root.find(path) for path in paths)
-    assert svp is not None
-    assert swath is not None
-    offsets = [[float(place.find("Offsets").get(axis)) for axis in "XYZ"] for place in (svp, swath)]
+    offsets, angles = [], []
+    for path in paths:
+        (of,) = root.findall(f"{path}/Offsets")
+        (turn,) = root.findall(f"{path}/MountAngle")
+        offsets.append([float(of.attrib[axis]) for axis in "XYZ"])
+        angles.append(np.array([float(turn.attrib[name]) for name in ("Roll", "Pitch", "Azimuth")]))
     assert offsets[0] == offsets[1]
-    angles = [[float(place.find("MountAngle").get(n)) for n in ("Roll", "Pitch", "Azimuth")] for place in (svp, swath)]
-    assert not any(angles[0]) or not any(angles[1])
-    roll, pitch, yaw = np.add(*angles)
+    assert not angles[0].any() or not angles[1].any()
+    roll, pitch, yaw = angles[0] + angles[1]
     x, y, z = offsets[0]
     return sfu_rotation(order, roll, pitch, -yaw), np.array([x, y, -z])
 

@@ -5,7 +5,7 @@
 TILTED_DEG of roll or pitch. The offsets stand in both.
 """
 
-import xml.etree.ElementTree as ET  # noqa: N817
+import xml.etree.ElementTree as ET
 from datetime import UTC, datetime
 from xml.sax.saxutils import quoteattr
 
@@ -13,7 +13,6 @@ from pipeline.errors import ConfigError
 from pipeline.exports.explanation import explanation, heading
 from pipeline.exports.mounting import Mounting
 from pipeline.exports.reading import number, numbers_of, written
-from pipeline.exports.sheet import stated_order
 from pipeline.exports.target import Options, Target
 from pipeline.exports.targets import caris
 from pipeline.exports.targets.kluster import utc_second
@@ -32,14 +31,16 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
     offsets = _attributes({role.upper(): values[role] for role in "xyz"})
     angles = _attributes({name: values[role] for role, name in ATTRIBUTES.items()})
     none = _attributes(dict.fromkeys(ATTRIBUTES.values(), 0.0))
-    second = _attributes({name: 0.0 for name in ("X2", "Y2", "Z2")}), _attributes(
-        {f"{name}2": 0.0 for name in ATTRIBUTES.values()}
+    second = (
+        _attributes(dict.fromkeys(("X2", "Y2", "Z2"), 0.0)),
+        _attributes({f"{name}2": 0.0 for name in ATTRIBUTES.values()}),
     )
     where = "SVPSensor, for this head is tilted" if tilted else "DepthSensor, for this head is near level"
     about = [
         *heading(target, mounting),
         "A fragment, no whole vessel file: copy the two sensors' values into your vessel file by its editor.",
-        f"The angles stand in {where} (limit here: {TILTED_DEG:g} degrees of roll or pitch); the other place has zeros. How "
+        f"The angles stand in {where} (limit here: {TILTED_DEG:g} degrees of roll or pitch); the other place has "
+        "zeros. How "
         "HIPS puts the two together is not documented in what was found: check a line of known depth.",
         "Latency is written as zero: its sign in HIPS was not found.",
         *explanation(target, mounting, options, "Must be zero: the 'Error' of the sensors Gyro, Pitch and Roll."),
@@ -91,11 +92,12 @@ def _read(target: Target, text: str, where: str, options: Options) -> Mounted:
     held = [name for name, values in angles.items() if any(values.values())] or ["DepthSensor"]
     if len(held) > 1:
         raise ConfigError(
-            f"{where}: both SVPSensor and DepthSensor have mounting angles, and how HIPS puts them together is not known: "
+            f"{where}: both SVPSensor and DepthSensor have mounting angles, and how HIPS puts them together is not "
+            "known: "
             "enter the mount by hand"
         )
     values = offsets["DepthSensor"] | angles[held[0]]
-    return target.convention.mounted(numbers_of(values), stated_order(text, target, where, options))
+    return target.convention.mounted(numbers_of(values), options.order)
 
 
 def _values(place: ET.Element, tag: str, names: dict[str, str], where: str) -> dict[str, float]:

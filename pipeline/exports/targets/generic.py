@@ -1,4 +1,4 @@
-"""JSON, YAML and CSV of poolcal's own: settings, matrices, quaternions, covariance, of the INS's body and of the vessel."""
+"""JSON, YAML and CSV of poolcal's own: settings, matrices, quaternions, covariance, on INS and vessel."""
 
 import csv
 import io
@@ -81,7 +81,7 @@ def mount_of_content(found: Mapping[str, Any], where: str) -> Mounted:
 
 
 def stated_in(target: Target, text: str, where: str) -> tuple[str | None, np.ndarray | None]:
-    """Return the sensor and the covariance (6, 6) on the INS's body that a file of these forms states; None: it does not.
+    """Return the sensor and the covariance (6, 6) that a file of these forms states; None: it does not.
 
     Parameters
     ----------

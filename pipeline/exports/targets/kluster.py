@@ -1,9 +1,10 @@
 """Kluster's vessel file (.kfc): JSON, serial number of the sonar, then key, then UTC second, then value as text.
 
-Kluster's build_rot_mat is Rz(h) · Ry(p) · Rx(r) in forward, starboard, down, for transmitter (tx) and receiver (rx) apart.
-All keys of a sonar need the same seconds. ``latency`` is added to the times of pings when attitude and positions are looked
-up, so it has the sign opposite to ours (true time = recorded time - latency_s). ``waterline`` is how far the water lies below
-the reference point; it is written if the height of the INS above the water is told. The errors are one sigma.
+Kluster's build_rot_mat is Rz(h) · Ry(p) · Rx(r) in forward, starboard, down, for transmitter (tx) and receiver (rx)
+apart. All keys of a sonar need the same seconds. ``latency`` is added to the times of pings when attitude and positions
+are looked up, so it has the sign opposite to ours (true time = recorded time - latency_s). ``waterline`` is how far the
+water lies below the reference point; it is written if the height of the INS above the water is told. The errors are one
+sigma.
 """
 
 import json
@@ -71,7 +72,9 @@ def _newest(block: Mapping[str, Any], prefix: str, where: str) -> dict[str, floa
         name = f"{prefix}_{letter}"
         entry = block.get(name)
         if not (isinstance(entry, dict) and entry and all(key.isdecimal() for key in entry)):
-            raise ConfigError(f"{where}: {name}: is missing, or without a UTC second; poolcal reads one head, tx_ and rx_")
+            raise ConfigError(
+                f"{where}: {name}: is missing, or without a UTC second; poolcal reads one head, tx_ and rx_"
+            )
         values[role] = number(entry[max(entry, key=int)], name, where)
     return values
 
@@ -82,7 +85,11 @@ TARGET = Target(
     writes="vessel file (.kfc)",
     suffix=".kfc",
     convention=Convention(
-        FRD, (1, 1, -1), "YPR", "code", "Kluster, HSTB/kluster/rotations.py, fqpr_vessel.py, fqpr_generation.py (latency)"
+        FRD,
+        (1, 1, -1),
+        "YPR",
+        "code",
+        "Kluster, HSTB/kluster/rotations.py, fqpr_vessel.py, fqpr_generation.py (latency)",
     ),
     write=_write,
     read=_read,

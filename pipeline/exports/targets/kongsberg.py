@@ -29,7 +29,9 @@ def _extra(target: Target, mounting: Mounting, options: Options) -> list[str]:
     for place, (name, mounted) in enumerate(zip(("TX", "RX"), mounting.arrays(), strict=True), start=1):
         values = target.convention.numbers(mounted).by_role()
         parts = {letter: written(values[role], DECIMALS) for role, letter in LETTERS.items()}
-        groups.append(f"TRAI_{name}1:N={place};" + ";".join(f"{letter}={value}" for letter, value in parts.items()) + ",")
+        groups.append(
+            f"TRAI_{name}1:N={place};" + ";".join(f"{letter}={value}" for letter, value in parts.items()) + ","
+        )
         flat += [f"S{place}{letter}={value}," for letter, value in parts.items()]
     return [
         "The same as text of #IIP (.kmall), transmitter TX1 and receiver RX1:",
@@ -45,7 +47,7 @@ def _read(target: Target, text: str, where: str, _: Options) -> Mounted:
     if len({name for name, _ in found}) > 1:
         raise ConfigError(f"{where}: has two heads or receivers; leave one, for poolcal reads one head at a time")
     if found:
-        _, group = one(found, "receivers", where)
+        group = one(found, "receivers", where)[1]
         entries = [tuple(part.split("=", 1)) for part in group.split(";") if "=" in part]
     else:
         entries = _FLAT.findall(text)
@@ -73,14 +75,16 @@ _SHEET = Sheet(
          {"roll": "Roll (R)", "pitch": "Pitch (P)", "yaw": "Heading (H)"}),
     ),
     zeros=(
-        "Once only: if patch-test results stand at the motion sensor (ATTI_1 R, P, H), the heads must keep their old values; "
+        "Once only: if patch-test results stand at the motion sensor (ATTI_1 R, P, H), the heads must keep their old "
+        "values; "
         "with these values at the heads, the motion sensor's own must be those of its alignment alone."
     ),
     notes=(
         "A transmitter mounted looking aft has a heading near 180: enter for it -R, -P and H + 180.",
         "SIS adds the inner offsets of each array (IX, ICX and so on) itself: poolcal's place is the acoustic centre; "
         "subtract them.",
-        "Tilts of transmit sectors that the files record are not in these values. A fixed tilt of the fan that the files do "
+        "Tilts of transmit sectors that the files record are not in these values. A fixed tilt of the fan that the "
+        "files do "
         "not record is part of the pitch and yaw found: subtract it from what goes to SIS.",
         "The waterline (EMXI:SWLZ) stays as it is. Never rewrite recorded files.",
     ),
@@ -97,7 +101,8 @@ TARGET = Target(
         (1, 1, -1),
         "YPR",
         "secondary",
-        "Kongsberg .kmall format, rev. J (axes, signs); the order is that of Kluster's and MB-System's code, not of the "
+        "Kongsberg .kmall format, rev. J (axes, signs); the order is that of Kluster's and MB-System's code, not of "
+        "the "
         "maker's text",
         zero_to_360=True,
     ),

@@ -52,7 +52,11 @@ TARGET = Target(
     writes="command line",
     suffix=".txt",
     convention=Convention(
-        FRD, (1, 1, -1), "YPR", "code", "MBES-lib, src/math/Boresight.hpp, CoordinateTransform.hpp, examples/georeference.cpp"
+        FRD,
+        (1, 1, -1),
+        "YPR",
+        "code",
+        "MBES-lib, src/math/Boresight.hpp, CoordinateTransform.hpp, examples/georeference.cpp",
     ),
     write=_write,
     read=_read,

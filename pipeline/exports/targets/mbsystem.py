@@ -1,8 +1,8 @@
 """MB-System's platform file (.plf).
 
-mb_platform_math_rph2rot is Rz(heading) · Ry(pitch) · Rx(roll) in forward, starboard, down; positions are starboard, forward,
-up. The first offset of a multibeam is its transmitter, the second its receiver. The manual of mbmakeplatform calls roll
-"positive starboard up"; the code has starboard down, as written here.
+mb_platform_math_rph2rot is Rz(heading) · Ry(pitch) · Rx(roll) in forward, starboard, down; positions are starboard,
+forward, up. The first offset of a multibeam is its transmitter, the second its receiver. The manual of mbmakeplatform
+calls roll "positive starboard up"; the code has starboard down, as written here.
 """
 
 import numpy as np
@@ -49,7 +49,8 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
         *heading(target, mounting),
         *explanation(target, mounting, options),
         "The manual of mbmakeplatform calls roll positive starboard up; MB-System's code has starboard down, as here.",
-        "Few formats of MB-System use a platform file. Its corrections by mbset (PITCHBIAS) are no rigid turn: do not use them "
+        "Few formats of MB-System use a platform file. Its corrections by mbset (PITCHBIAS) are no rigid turn: do not "
+        "use them "
         "for a tilted head.",
         "The latency is written as zero. Offset 0 of the sonar is its transmitter, offset 1 its receiver.",
     ]
@@ -78,14 +79,14 @@ def _read(target: Target, text: str, where: str, _: Options) -> Mounted:
     return target.convention.mounted(numbers_of(values))
 
 
-def _last_offset(
-    lines: list[list[str]], key: str, sensor: str, roles: tuple[str, ...], where: str
-) -> dict[str, float]:
+def _last_offset(lines: list[list[str]], key: str, sensor: str, roles: tuple[str, ...], where: str) -> dict[str, float]:
     """Return the numbers of a sensor's receiver: of its last offset."""
     found = [words[2:] for words in lines if words[:2] == [key, sensor]]
     places = [words[0] for words in found if words]
     if sorted(places) not in (["0"], ["0", "1"]):
-        raise ConfigError(f"{where}: sensor {sensor} has {len(found)} lines {key}: one, or two for transmitter and receiver")
+        raise ConfigError(
+            f"{where}: sensor {sensor} has {len(found)} lines {key}: one, or two for transmitter and receiver"
+        )
     numbers = max(found, key=lambda words: words[0])[1:]
     if len(numbers) != len(roles):
         raise ConfigError(f"{where}: {key} of sensor {sensor} has {len(numbers)} numbers, not {len(roles)}; correct it")
@@ -98,7 +99,11 @@ TARGET = Target(
     writes="platform file (.plf)",
     suffix=".plf",
     convention=Convention(
-        SFU, (1, 1, -1), "YPR", "code", "MB-System, src/mbio/mb_platform.c, mb_platform_math.c (the manual differs on roll)"
+        SFU,
+        (1, 1, -1),
+        "YPR",
+        "code",
+        "MB-System, src/mbio/mb_platform.c, mb_platform_math.c (the manual differs on roll)",
     ),
     write=_write,
     read=_read,

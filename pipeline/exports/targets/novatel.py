@@ -1,7 +1,7 @@
 """NovAtel SPAN: commands that make it output position and attitude of the head.
 
-Rotations are about Z, X, Y, right-handed, in the vehicle frame x starboard, y forward, z up: ours. The fields stand in the
-order X, Y, Z: pitch, roll, yaw.
+Rotations are about Z, X, Y, right-handed, in the vehicle frame x starboard, y forward, z up: ours. The fields stand in
+the order X, Y, Z: pitch, roll, yaw.
 """
 
 from pipeline.errors import ConfigError
@@ -22,7 +22,8 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
     about = [
         *heading(target, mounting),
         *explanation(target, mounting, options, zeros),
-        "Only with RBV = 0 (SETINSROTATION RBV 0 0 0; INSCONFIG shows it): with another, it is not certain from which frame "
+        "Only with RBV = 0 (SETINSROTATION RBV 0 0 0; INSCONFIG shows it): with another, it is not certain from which "
+        "frame "
         "USER counts, and these commands must not be used.",
         "The lever arm counts from the IMU's centre, if that is the point whose positions the log holds.",
     ]
@@ -35,8 +36,10 @@ def _read(target: Target, text: str, where: str, _: Options) -> Mounted:
     lines = [tuple(line.upper().split()) for line in whole_lines(text, where) if not line.startswith("#")]
     for words in lines:
         if words[:2] == ("SETINSROTATION", "RBV") and any(number(word, "RBV", where) for word in words[2:5]):
-            raise ConfigError(f"{where}: RBV is not zero: from which frame USER counts is then not certain; enter it by hand")
-    values = {}
+            raise ConfigError(
+                f"{where}: RBV is not zero: from which frame USER counts is then not certain; enter it by hand"
+            )
+    values: dict[str, float] = {}
     for command, roles in (("SETINSTRANSLATION", ("x", "y", "z")), ("SETINSROTATION", ROTATION)):
         words = one([words for words in lines if words[:2] == (command, "USER")], f"commands {command} USER", where)
         if len(words) < 5:
@@ -53,7 +56,11 @@ TARGET = Target(
     writes="commands, output at the head",
     suffix=".txt",
     convention=Convention(
-        SFU, (1, 1, 1), "YPR", "official", "docs.novatel.com OEM7, SETINSROTATION, SETINSTRANSLATION; valid with RBV = 0"
+        SFU,
+        (1, 1, 1),
+        "YPR",
+        "official",
+        "docs.novatel.com OEM7, SETINSROTATION, SETINSTRANSLATION; valid with RBV = 0",
     ),
     write=_write,
     read=_read,

@@ -1,9 +1,9 @@
 """PDAL filters.georeference: the laser's mount as a matrix ``scan2imu``, row by row.
 
 PDAL's IMU axes are forward, starboard, down; the scanner's own axes are those of its files. With P the exchange of axes
-(:mod:`pipeline.exports.convention`) the matrix is [P · R_body_from_laser | P · t; 0 0 0 1]. ``time_offset`` is added to the
-points' times, so it has the sign opposite to ours. Only ``coordinate_system`` NED is right with an SBET: with ENU the code
-takes the azimuth for a counter-clockwise angle.
+(:mod:`pipeline.exports.convention`) the matrix is [P · R_body_from_laser | P · t; 0 0 0 1]. ``time_offset`` is added
+to the points' times, so it has the sign opposite to ours. Only ``coordinate_system`` NED is right with an SBET: with
+ENU the code takes the azimuth for a counter-clockwise angle.
 """
 
 import json
@@ -31,7 +31,8 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
     about = [
         *heading(target, mounting),
         *explanation(target, mounting, options),
-        "Add the trajectory (trajectory_file, an SBET). Leave coordinate_system at NED: with ENU the result is wrong by metres.",
+        "Add the trajectory (trajectory_file, an SBET). Leave coordinate_system at NED: with ENU the result is wrong "
+        "by metres.",
         "Only for points in the scanner's own frame. Fields of this filter are the laser's, never the sonar's.",
     ]
     stage = {

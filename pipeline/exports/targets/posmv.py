@@ -1,7 +1,7 @@
 """Applanix POS MV: sensor 1 with respect to the reference point, a sheet.
 
-The maker's angles bring the reference frame to the sensor's: first about z, then about the turned y, then about the twice
-turned x: R_reference_from_sensor = Rz(Z) · Ry(Y) · Rx(X) in forward, starboard, down.
+The maker's angles bring the reference frame to the sensor's: first about z, then about the turned y, then about the
+twice turned x: R_reference_from_sensor = Rz(Z) · Ry(Y) · Rx(X) in forward, starboard, down.
 """
 
 from pipeline.exports.convention import FRD, Convention
@@ -17,7 +17,8 @@ _SHEET = Sheet(
         ("Sensor 1 Frame w.r.t. Ref. Frame", {"roll": "Angle X", "pitch": "Angle Y", "yaw": "Angle Z"}),
     ),
     zeros=(
-        "Once only: if POS MV outputs position and attitude at sensor 1, the processing program must have a zero mount; if "
+        "Once only: if POS MV outputs position and attitude at sensor 1, the processing program must have a zero "
+        "mount; if "
         "the mount is in the processing program, leave sensor 1 as it was."
     ),
     notes=(
@@ -32,7 +33,11 @@ TARGET = Target(
     writes="entry sheet, sensor 1",
     suffix=".txt",
     convention=Convention(
-        FRD, (1, 1, -1), "YPR", "official", "POS MV V5 guide, pp. 2-27 and 2-31; Applanix ICD 004089, messages 20 and 120"
+        FRD,
+        (1, 1, -1),
+        "YPR",
+        "official",
+        "POS MV V5 guide, pp. 2-27 and 2-31; Applanix ICD 004089, messages 20 and 120",
     ),
     write=_SHEET.write,
     read=_SHEET.read,

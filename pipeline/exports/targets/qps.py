@@ -1,6 +1,7 @@
 """QPS Qinsy and Qimera: sheets, for their files are their own.
 
-Both compose x' = H · P · R · x, heading about z, pitch about the turned x, roll about the turned y; heading + to starboard.
+Both compose x' = H · P · R · x, heading about z, pitch about the turned x, roll about the turned y; heading + to
+starboard.
 """
 
 from pipeline.exports.convention import SFU, Convention
@@ -8,7 +9,9 @@ from pipeline.exports.sheet import Sheet
 from pipeline.exports.target import Target
 
 ORDER_SOURCE = "QPS, How-to Qinsy sign conventions and How-to Qinsy rotation matrices (signs, order)"
-AXES_SOURCE = "the axes are shown there in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, Y+ forward, Z+ up"
+AXES_SOURCE = (
+    "the axes are shown there in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, Y+ forward, Z+ up"
+)
 CONVENTION = Convention(SFU, (1, 1, -1), "YPR", "secondary", f"{ORDER_SOURCE}; {AXES_SOURCE}")
 POSITION = {"x": "X", "y": "Y", "z": "Z"}
 ANGLES = {"roll": "Roll", "pitch": "Pitch", "yaw": "Heading"}
@@ -18,7 +21,7 @@ _QINSY = Sheet(
         ("Template, object (vessel): node of the sonar, e.g. MBES", POSITION),
         ("Template, system (multibeam echosounder): mounting angles", ANGLES),
     ),
-    zeros="Must be zero: other corrections of roll, pitch and heading at the multibeam, those of an earlier patch test.",
+    zeros="Must be zero: other corrections of roll, pitch and heading at the multibeam, as of an earlier patch test.",
     notes=(
         "The INS's node stands at the INS's point; its own mounting angles stay as they are.",
         "Sigmas: enter them as the SD of the node and of the mounting angles (1 sigma).",

@@ -1,8 +1,8 @@
 """ROS: a URDF of a fixed joint from the INS to the sensor.
 
 REP 103: x forward, y left, z up, for parent and child alike; rpy in rad is about the parent's fixed x, y, z: R =
-Rz(yaw) · Ry(pitch) · Rx(roll). With Q = [[0,1,0],[-1,0,0],[0,0,1]] the rotation is Q R Qᵀ, whose angles are our roll, minus
-our pitch, our yaw.
+Rz(yaw) · Ry(pitch) · Rx(roll). With Q = [[0,1,0],[-1,0,0],[0,0,1]] the rotation is Q R Qᵀ, whose angles are our roll,
+minus our pitch, our yaw.
 """
 
 import numpy as np
@@ -33,7 +33,8 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
     about = [
         *heading(target, mounting),
         *explanation(target, mounting, options),
-        f"Links: {parent} and {child}, both x forward, y left, z up (REP 103); rpy in rad. A driver that publishes the sensor's "
+        f"Links: {parent} and {child}, both x forward, y left, z up (REP 103); rpy in rad. A driver that publishes the "
+        "sensor's "
         "own axes (x starboard, y forward, z up) needs a further joint.",
         f"Static transform, parent {parent}, child {child}: translation {xyz}, quaternion x y z w {quaternion}.",
         "Use the quaternion: the order of angles of static_transform_publisher has changed between versions.",

@@ -1,7 +1,7 @@
 """SONAR-netCDF4 (XSF): variables of group Platform, as JSON.
 
-Rotations are those that turn the transducer's axes onto the platform's (forward, starboard, down), Rz · Ry · Rx, degrees,
-calibration included.
+Rotations are those that turn the transducer's axes onto the platform's (forward, starboard, down), Rz · Ry · Rx,
+degrees, calibration included.
 """
 
 import json
@@ -46,9 +46,13 @@ def _read(target: Target, text: str, where: str, _: Options) -> Mounted:
     if not isinstance(platform, dict):
         raise ConfigError(f"{where}: has no group Platform; write its variables as JSON")
     functions = platform.get("transducer_function")
-    receivers = [place for place, value in enumerate(functions) if value != TRANSMITTER] if isinstance(functions, list) else []
+    receivers = (
+        [place for place, value in enumerate(functions) if value != TRANSMITTER] if isinstance(functions, list) else []
+    )
     if len(receivers) != 1:
-        raise ConfigError(f"{where}: transducer_function has {len(receivers)} receivers; poolcal reads one head at a time")
+        raise ConfigError(
+            f"{where}: transducer_function has {len(receivers)} receivers; poolcal reads one head at a time"
+        )
     numbers = {}
     for role, name in NAMES.items():
         entries = platform.get(name)
