@@ -1,4 +1,4 @@
-"""The list of all targets."""
+"""The list of all programs that a mount can be written for."""
 
 from pipeline.errors import ConfigError
 from pipeline.exports.cloud import CLOUDS
@@ -32,15 +32,15 @@ TARGETS = {
 
 
 def target_named(name: str, option: str) -> Target:
-    """Return a target by its name; raise ConfigError if there is none. ``option``: the one that names it."""
+    """Return a program by its name; raise ConfigError if there is none. ``option``: the one that names it."""
     if name not in TARGETS:
         known = ", ".join((*TARGETS, *CLOUDS)) if option == "--to" else ", ".join(TARGETS)
-        raise ConfigError(f"{option} {name}: is no target; the targets are {known}")
+        raise ConfigError(f"{option} {name}: is no program known here; the programs are {known}")
     return TARGETS[name]
 
 
 def list_text() -> str:
-    """Return a table of all targets: name, program, what is written, certainty."""
+    """Return a table of all programs: name, program, what is written, certainty."""
     rows = [
         (target.name, target.title, target.writes, target.convention.certainty + _order_words(target))
         for target in TARGETS.values()

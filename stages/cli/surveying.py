@@ -87,7 +87,7 @@ def _mount(
     ins_height: InsHeight = None,
     write: Annotated[bool, typer.Option("--write/--no-write", help="put the mount into session.yaml")] = True,
 ) -> int:
-    """Read a mount from another program's file, as the coarse mount."""
+    """Read a coarse mount from another program's file."""
     from stages.commands import mount
 
     options = mount.ReadOptions(sensor, ins_point, ins_turn, order, serial, ins_height)

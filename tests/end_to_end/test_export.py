@@ -165,7 +165,7 @@ def test_files_that_must_stay(undisturbed: tuple[Path, Told], place: Place) -> N
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--to", "sonarwiz"), "--to sonarwiz: is no target; the targets are qinsy, qimera"),
+        (("--to", "sonarwiz"), "--to sonarwiz: is no program known here; the programs are qinsy, qimera"),
         ((), "give RUN and --to NAME"),
         (("--to", "caris"), "--order: is needed"),
         (("--to", "qinsy", "--crs", "EPSG:32651"), "--crs: qinsy is a mount"),
@@ -207,7 +207,7 @@ def test_list_and_files_that_are_no_text(place: Place, tmp_path: Path) -> None:
     for words, said in (
         ((binary, "--from", "kongsberg"), "is not UTF-8"),
         ((tmp_path / "missing", "--from", "qinsy"), "cannot be read"),
-        ((binary, "--from", "las"), "--from las: is no target"),
+        ((binary, "--from", "las"), "--from las: is no program known here"),
     ):
         told = poolcal("mount", *words, "--session", place.session)
         assert (told.status, told.err.count("\n")) == (2, 1)

@@ -119,6 +119,26 @@ def test_pykmall_reads_the_installation_text() -> None:
         assert (of["_roll_angle"], of["_pitch_angle"], of["_heading_angle"]) == (-48.8, 1.2, 2.0)
 
 
+def test_the_programs_own_code_makes_the_mount_of_the_numbers() -> None:
+    """What two programs' own functions returned for the numbers of BODY's forms, roll -48.8, pitch 1.2, heading 2.0.
+
+    mb_platform_math_rph2rot of MB-System (59becf9), compiled, and build_rot_mat of Kluster (b6667cb) agree. Axes
+    are forward, starboard, down.
+    """
+    theirs = np.array(
+        [
+            [0.999171644096, -0.038735720614, -0.012472753653],
+            [0.034891842666, 0.657738279353, 0.752437980959],
+            [-0.020942419883, -0.752249891872, 0.658544998635],
+        ]
+    )
+    exchange = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    np.testing.assert_allclose(exchange @ theirs @ exchange, BODY.R_body_from_sensor, atol=1e-11)
+    block = json.loads(text_of("kluster"))["7"]
+    assert [float(*block[f"rx_{key}"].values()) for key in "rph"] == [-48.8, 1.2, 2.0]
+    assert "OFFSET_ATTITUDE  1 1  2.000000000 -48.800000000 1.200000000 ##" in text_of("mbsystem")
+
+
 @pytest.mark.parametrize(("roll", "place"), [(4.9, "DepthSensor"), (-5.1, "SVPSensor")])
 def test_hvf_has_the_angles_in_one_place_and_the_time_of_the_first_pass(roll: float, place: str) -> None:
     text = export_text(TARGETS["caris-hvf"], mounting(mounted(roll, 0.0, 0.0)), Options())

@@ -48,4 +48,5 @@ TARGET = Target(
     convention=CONVENTION,
     write=_SHEET.write,
     read=_SHEET.read,
+    sensor="mbes",
 )

@@ -121,4 +121,5 @@ TARGET = Target(
     convention=caris.CONVENTION,
     write=_write,
     read=_read,
+    sensor="mbes",
 )

@@ -91,6 +91,7 @@ TARGET = Target(
     ),
     write=_SHEET.write,
     read=_read,
+    sensor="mbes",
     counts_from="water",
     uses=frozenset({"ins_height"}),
 )

@@ -60,5 +60,6 @@ TARGET = Target(
     ),
     write=_write,
     read=_read,
+    sensor="mbes",
     counts_from="ins",
 )

@@ -31,8 +31,8 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
     about = [
         *heading(target, mounting),
         *explanation(target, mounting, options),
-        "Add the trajectory (trajectory_file, an SBET). Leave coordinate_system at NED: with ENU the result is wrong "
-        "by metres.",
+        "Add the trajectory, an SBET (option trajectory or trajectory_file, by PDAL's version). Leave "
+        "coordinate_system at NED: with ENU the result is wrong by metres.",
         "Only for points in the scanner's own frame. Fields of this filter are the laser's, never the sonar's.",
     ]
     stage = {

@@ -46,6 +46,7 @@ QINSY = Target(
     convention=CONVENTION,
     write=_QINSY.write,
     read=_QINSY.read,
+    sensor="mbes",
 )
 QIMERA = Target(
     name="qimera",
@@ -55,4 +56,5 @@ QIMERA = Target(
     convention=CONVENTION,
     write=_QIMERA.write,
     read=_QIMERA.read,
+    sensor="mbes",
 )
