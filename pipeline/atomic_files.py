@@ -64,16 +64,25 @@ def write_bytes(path: Path, content: bytes) -> None:
     The content goes to a new file in the same folder, and to the disk. Then the new file is renamed to ``path``. A
     symbolic link at ``path`` is replaced, not followed.
     """
+    with replacing(path) as beside, beside.open("xb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield the path of a new file in the same folder, which is renamed to ``path`` if the block ends without an error.
+
+    The block must write the new file, to the disk. After an error, Ctrl-C included, the new file is removed.
+    """
     beside = path.with_name(path.name + ".new")
     with writing(path):
         try:
             beside.unlink(missing_ok=True)
-            with beside.open("xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
+            yield beside
             beside.replace(path)
-        except OSError:
+        except BaseException:
             with contextlib.suppress(OSError):
                 beside.unlink()
             raise
@@ -100,6 +109,12 @@ def flush_to_disk(folder: Path) -> None:
             for name in names:
                 _sync(os.path.join(parent, name))
             flush_names(Path(parent))
+
+
+def flush_file(path: Path) -> None:
+    """Write a finished file to the disk, before a rename puts it in its place."""
+    with writing(path):
+        _sync(path)
 
 
 def flush_names(folder: Path) -> None:

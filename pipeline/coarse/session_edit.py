@@ -36,6 +36,7 @@ MARKER = re.compile("([\U000f0000-\U0010fffd])\\1*")
 TEXT_BLOCK = ("|", ">")
 TAGS = {str: "tag:yaml.org,2002:str", float: "tag:yaml.org,2002:float", dict: "tag:yaml.org,2002:map",
         list: "tag:yaml.org,2002:seq"}  # fmt: skip
+NULL = "tag:yaml.org,2002:null"
 DIGITS = dict.fromkeys(("mount_covariance", "covariance"), ".9e")  # with a decimal point: YAML reads 1e-06 as text
 
 
@@ -229,6 +230,8 @@ def _new(value: Any, key: str) -> Node:
     if isinstance(value, list):
         matrix = bool(value) and isinstance(value[0], list)
         return SequenceNode(TAGS[list], [_new(entry, key) for entry in value], flow_style=not matrix)
+    if value is None:
+        return ScalarNode(NULL, "null")
     if isinstance(value, float):
         return ScalarNode(TAGS[float], format(value, DIGITS.get(key, ".6f")))
     return ScalarNode(TAGS[str], value, style='"')

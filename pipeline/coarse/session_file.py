@@ -1,4 +1,4 @@
-"""Reading session.yaml, and writing mounts into it, for ``poolcal coarse`` and ``poolcal laser``."""
+"""Reading session.yaml, and writing mounts into it, for ``poolcal coarse``, ``poolcal laser``, ``poolcal mount``."""
 
 import itertools
 import os
@@ -78,7 +78,7 @@ def mount_origin(method: str, file: Path, **more: Any) -> Content:
     return {"method": method, "file": name, "sha256": sha256(file), "date": today, "software": software} | more
 
 
-def mount_block(mounted: Mounted, covariance: Array, origin: Content) -> Content:
+def mount_block(mounted: Mounted, covariance: Array | None, origin: Content) -> Content:
     """Return the keys of a sensor's block that hold a mount, with numbers rounded as they will be written.
 
     Parameters
@@ -86,16 +86,13 @@ def mount_block(mounted: Mounted, covariance: Array, origin: Content) -> Content
     mounted
         The mount.
     covariance
-        Its covariance, (6, 6): rotation x, y, z and lever arm x, y, z in body axes; rad and m.
+        Its covariance, (6, 6): rotation x, y, z and lever arm x, y, z in body axes; rad and m. None: not known.
     origin
         Source of the mount, from :func:`mount_origin`.
     """
     mount = {key: round(value, 6) + 0.0 for key, value in mounted.settings().items()}
-    return {
-        "mount": mount,
-        "mount_origin": origin | {"mount": mount},
-        "mount_covariance": written_covariance(covariance),
-    }
+    block: Content = {"mount": mount, "mount_origin": origin | {"mount": mount}}
+    return block if covariance is None else block | {"mount_covariance": written_covariance(covariance)}
 
 
 def written_covariance(covariance: Array) -> list[list[float]]:
@@ -129,7 +126,7 @@ def write_mounts(folder: Path, text: str, content: Content, blocks: Mapping[str,
 def _is_same(present: Content, block: Content) -> bool:
     old, new = (side.get("mount_origin") or {} for side in (present, block))
     same_source = old.get("sha256") == new["sha256"] and old.get("method") == new["method"]
-    return same_source and all(present.get(key) == block[key] for key in ("mount", "mount_covariance"))
+    return same_source and all(present.get(key) == value for key, value in block.items() if key != "mount_origin")
 
 
 def _replace_session(folder: Path, old: str, new: str) -> Path:

@@ -12,6 +12,17 @@ from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_
 Array = NDArray[np.float64]
 
 
+def pool_frame_of(pool_frame: pd.DataFrame) -> PoolFrame:
+    """Return the pool frame from its table (one row)."""
+    origin = pool_frame.iloc[0]
+    return PoolFrame.at(
+        np.radians(origin["latitude_deg"]),
+        np.radians(origin["longitude_deg"]),
+        float(origin["height_m"]),
+        np.radians(origin["azimuth_deg"]),
+    )
+
+
 @dataclass(frozen=True)
 class PoolContext:
     """The pool frame, the trajectory in it, the passes, and the box round the target (pool frame)."""
@@ -40,13 +51,7 @@ class PoolContext:
         box_m
             Lowest and highest corner (3,) of the box, pool frame.
         """
-        origin = pool_frame.iloc[0]
-        frame = PoolFrame.at(
-            np.radians(origin["latitude_deg"]),
-            np.radians(origin["longitude_deg"]),
-            float(origin["height_m"]),
-            np.radians(origin["azimuth_deg"]),
-        )
+        frame = pool_frame_of(pool_frame)
         names = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
         positions, R_pool_from_body = poses_in_pool(
             frame, GeodeticPoses(**{name: ins[name].to_numpy() for name in names})

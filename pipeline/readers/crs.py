@@ -221,3 +221,39 @@ def _box(crs: Any) -> Box | None:
     flat = crs.to_2d()
     box = Transformer.from_crs(flat.geodetic_crs, flat, always_xy=True).transform_bounds(*bounds)
     return box if np.all(np.isfinite(box)) else None
+
+
+def projected_from_ecef(name: str, option: str) -> tuple[Any, Callable[[Array], Array]]:
+    """Return a projected CRS, and a function that turns points (n, 3) m in ECEF into x, y, height (n, 3) in it.
+
+    Heights are ellipsoidal, m. The datum stays: ECEF is that of the CRS's own datum.
+
+    Parameters
+    ----------
+    name
+        The CRS, such as EPSG:32651.
+    option
+        The option that names it, for messages.
+    """
+    from pyproj import CRS, Transformer
+    from pyproj.exceptions import ProjError
+
+    try:
+        crs = CRS.from_user_input(name)
+    except ProjError as error:
+        raise ConfigError(f"{option} {name}: no CRS is known by that name; write one such as EPSG:32651") from error
+    if not crs.is_projected or crs.is_compound or _unit_m(crs) != 1.0:
+        raise ConfigError(f"{option} {name}: {crs.name} is no projected CRS in metres without heights; name one, such "
+        "as UTM")
+    if (reason := unusable_reason(crs)) is not None:
+        raise ConfigError(f"{option} {name}: {crs.name} {reason}")
+    try:
+        transformer = Transformer.from_crs(geocentric_crs(crs), crs.to_3d(), always_xy=True, allow_ballpark=False)
+    except ProjError as error:
+        raise ConfigError(f"{option} {name}: PROJ cannot turn points into {crs.name}; name another") from error
+
+    def from_ecef(points_ecef_m: Array) -> Array:
+        x, y, z = points_ecef_m.T.copy()
+        return np.column_stack(transformer.transform(x, y, z, inplace=False))
+
+    return crs, from_ecef

@@ -7,6 +7,8 @@ from pathlib import Path
 from pipeline.atomic_files import writing
 from pipeline.errors import ArtefactError, ConfigError
 
+HEAD_BYTES = 65_536
+
 
 @contextlib.contextmanager
 def as_written(run: Path) -> Iterator[None]:
@@ -17,23 +19,29 @@ def as_written(run: Path) -> Iterator[None]:
         raise ArtefactError(f"{run}: its calibration.json is not as poolcal writes it; run it again") from error
 
 
-def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b"") -> None:
+def refuse_output(
+    option: str, file: Path | None, *runs: Path, begins: bytes = b"", suffix: str | None = None, holds: bytes = b""
+) -> None:
     """Raise a ConfigError if a command must not write ``file``.
 
     Parameters
     ----------
     option
-        The option with the path, for example ``--html``. The file must then have the suffix ``.html``.
+        The option with the path, for example ``--html``.
     file
         The path of the file; None: no file is written.
     runs
         Folders with a run's results or a session's files. The file must not lie in them.
     begins
         An existing file is replaced only if it begins with these bytes, as files that poolcal writes do.
+    suffix
+        The suffix that the file must have; None: that of the option's name, such as ``.html``.
+    holds
+        An existing file is replaced only if these bytes stand in its first HEAD_BYTES.
     """
     if file is None:
         return
-    suffix = option.replace("--", ".")
+    suffix = suffix or option.replace("--", ".")
     if file.suffix != suffix:
         raise ConfigError(f"{option} {file}: name a file that ends in {suffix}")
     if file.exists() and not file.is_file():
@@ -41,7 +49,8 @@ def refuse_output(option: str, file: Path | None, *runs: Path, begins: bytes = b
     for run_folder in runs:
         if file.resolve().is_relative_to(run_folder.resolve()):
             raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")
-    if begins and file.is_file():
+    if (begins or holds) and file.is_file():
         with writing(file), file.open("rb") as there:
-            if there.read(len(begins)) != begins:
-                raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")
+            head = there.read(HEAD_BYTES)
+        if not head.startswith(begins) or holds not in head:
+            raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")

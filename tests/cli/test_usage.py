@@ -13,7 +13,7 @@ from stages.cli import call
 
 COMMANDS = (
     "init", "simulate", "run", "stage", "verify", "view", "diff", "history", "check", "plan", "coarse", "compare",
-    "check-entry",
+    "export", "check-entry", "mount",
 )  # fmt: skip
 
 
@@ -59,6 +59,11 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
         (["coarse", "marks.yaml"], "missing: --session SESSION: the folder with session.yaml"),
         (["coarse", "marks.yaml", "--session", "missing"], "missing: is no folder; SESSION is the folder that holds"),
         (["compare", "z", "truth.json"], "calibration.json: cannot be read"),
+        (["export"], "export: give RUN and --to NAME; poolcal export --list shows the names"),
+        (["export", "z", "--to", "qinsy"], "z: holds no run.yaml"),
+        (["export", "z", "--to", "qinsy", "--ins-point", "1", "2"], "--ins-point"),
+        (["mount", "f", "--from", "qinsy"], "missing: --session SESSION: the folder with session.yaml"),
+        (["mount", "f", "--from", "qinsy", "--session", "missing"], "missing: is no folder"),
         (["--wrong"], "No such option"),
     ],
 )

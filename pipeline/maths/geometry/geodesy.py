@@ -89,3 +89,7 @@ class PoolFrame:
     def points_from_ecef(self, points_ecef_m: Array) -> Array:
         """Return the pool coordinates (n, 3) m of points (n, 3) m in ECEF."""
         return (points_ecef_m - self.origin_ecef_m) @ self.R_pool_from_ecef.T
+
+    def points_to_ecef(self, points_pool_m: Array) -> Array:
+        """Return the coordinates (n, 3) m in ECEF of points (n, 3) m in the pool frame."""
+        return points_pool_m @ self.R_pool_from_ecef + self.origin_ecef_m

@@ -1,0 +1,1 @@
+"""Forms of other programs, one module a program; :mod:`pipeline.exports.registry` lists them."""
