@@ -16,9 +16,9 @@ TURNING = frozenset("\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u206
 
 
 def _plain(text: str) -> str:
-    """Return a text in one line, without blanks at its ends; raise ValueError if a letter of it cannot be printed.
+    r"""Return a text in one line, without blanks at its ends; raise ValueError if a letter of it cannot be printed.
 
-    >>> _plain(" Haida  7\\n")
+    >>> _plain(" Haida  7\n")
     'Haida 7'
     """
     line = " ".join(text.split())

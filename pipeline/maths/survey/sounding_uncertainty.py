@@ -1,13 +1,13 @@
 """What the uncertainty of the sonar's mount does to a sounding, by depth and beam angle.
 
-With R_true = Exp(ε) R and l_true = l + δ (body axes), a sounding at x in the sonar's frame lies at R x + l from the INS,
-body axes. With v = R x, the vector from the sonar to the sounding, its error is to first order
+With R_true = Exp(ε) R and l_true = l + δ (body axes), a sounding at x in the sonar's frame lies at R x + l from the
+INS, body axes. With v = R x, the vector from the sonar to the sounding, its error is to first order
 
     e = ε × v + δ = J [ε; δ],    J = [-[v]×, I]    (3, 6),
 
-and its covariance J C Jᵀ, C being the covariance (6, 6) of [ε; δ]. The boat lies level here, so that body axes are level
-axes: x to starboard, y forward, z up. A beam at the angle θ from the vertical, across track, meets a level bottom d
-below the sonar at v = d (± tan θ, 0, -1): + to starboard, - to port. Where the head is turned in its bracket does not
+and its covariance J C Jᵀ, where C is the covariance (6, 6) of [ε; δ]. The boat lies level here, so that body axes are
+level axes: x to starboard, y forward, z up. A beam at the angle θ from the vertical, across track, meets a level bottom
+d below the sonar at v = d (± tan θ, 0, -1): + to starboard, - to port. Where the head is turned in its bracket does not
 matter, because ε and δ are in body axes.
 
 Only the mount counts: errors of position, attitude, sound speed, ranges, clocks and tides come on top.
@@ -23,7 +23,7 @@ from scipy.special import chdtri
 from pipeline.maths.geometry.rotations import skew
 
 Array = NDArray[np.float64]
-# A normal error is within so many sigmas with a probability of 95 %: on a line 1.96, in a plane, with equal sigmas, 2.45.
+# A normal error is within so many sigmas with a probability of 95 %: on a line 1.96; in a plane, if equal, 2.45.
 ON_A_LINE, IN_A_PLANE = (float(np.sqrt(chdtri(dimensions, 0.05))) for dimensions in (1, 2))
 
 
@@ -63,8 +63,8 @@ class SoundingUncertainty:
 def sounding_uncertainty(covariance: Array, depth_m: float, angle_deg: float) -> SoundingUncertainty:
     """Return the uncertainty of a sounding, on the side, port or starboard, where it is larger.
 
-    At 95 %, as S-44 has it: 1.96 sigmas in height, 2.45 in the plane. The horizontal circle has the radius of :data:`IN_A_PLANE` times the standard deviation in the direction in
-    which it is largest, so that at least 95 % of the errors lie within it.
+    At 95 %, as S-44 has it: 1.96 sigmas in height, 2.45 in the plane. The radius of the horizontal circle is 2.45 times
+    the largest standard deviation in any direction, so that at least 95 % of the errors lie within it.
 
     Parameters
     ----------

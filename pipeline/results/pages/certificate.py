@@ -112,14 +112,14 @@ def instruments_on_board(session: SessionConfig) -> list[Row]:
 def _soundings(covariance: Sequence[Sequence[float]]) -> Row:
     """Return the uncertainties of soundings in mm, beside what S-44 allows, and the largest share of that."""
     table = table_of_soundings(np.array(covariance), DEPTHS_M, ANGLES_DEG)
+    largest_m = {depth: max(one.vertical_m for one in row) for depth, row in zip(DEPTHS_M, table, strict=True)}
     shares = {
-        order.name: max(one.vertical_m / order.vertical_m(d) for d, row in zip(DEPTHS_M, table, strict=True) for one in row)
-        for order in ORDERS
+        order.name: max(size_m / order.vertical_m(depth) for depth, size_m in largest_m.items()) for order in ORDERS
     }
     return {
         "angles": ["straight down" if angle == 0 else f"at {angle:g}°" for angle in ANGLES_DEG],
         "orders": ORDERS,
-        "shares": {name: f"{100 * share:.0f} %" for name, share in shares.items()},
+        "shares": {name: f"{100 * share:.0f}\u00a0%" for name, share in shares.items()},
         "rows": [
             {
                 "depth": f"{depth:g} m",

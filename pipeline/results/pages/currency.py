@@ -15,7 +15,7 @@ HEAD = 2000  # bytes at the start of the page that contain its digest
 
 
 def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
-    """Return a digest of the results, settings and raw files on the page, and of the files of this program that draw it.
+    """Return a digest of the results, settings and raw files on the page, and of the program's files that draw it.
 
     Parameters
     ----------

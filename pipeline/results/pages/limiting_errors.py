@@ -61,4 +61,5 @@ def limiting_sentences(
         share = "most" if squares[largest] >= MOST * sum(squares.values()) else "the largest part"
         half_width = Quantity(WITHIN_95 * row["sigma_total"].number, unit).small()
         name = MOUNT_WORDS[place]
-        yield f"{name[0].upper()}{name[1:]} is known to ±{half_width} (95 %); {share} of that comes from {source}: {remedy}"
+        known = f"{name[0].upper()}{name[1:]} is known to ±{half_width} (95 %)"
+        yield f"{known}; {share} of that comes from {source}: {remedy}"

@@ -72,9 +72,9 @@ def _printed(browser: str, page: Path, place: Path) -> bytes:
         "--no-pdf-header-footer", f"--print-to-pdf={made}", page.absolute().as_uri(),
     ]  # fmt: skip
     try:
-        done = subprocess.run(
-            command, capture_output=True, timeout=TIMEOUT_S, check=False, env=os.environ | {"HOME": str(place)}
-        )
+        nowhere = subprocess.DEVNULL
+        silent: dict[str, Any] = {"stdin": nowhere, "stdout": nowhere, "stderr": nowhere}
+        done = subprocess.run(command, **silent, timeout=TIMEOUT_S, check=False, env=os.environ | {"HOME": str(place)})
         content = read_regular(made, MOST_BYTES)
     except subprocess.TimeoutExpired as error:
         raise ArtefactError(f"{browser}: wrote no PDF within {TIMEOUT_S:.0f} s; print {page} by hand") from error

@@ -1,7 +1,7 @@
 """The signs of the mount as a drawing: the boat from behind, from its side and from above, by the program's own model.
 
-The curved arrows are points that the rotation of a mount turns by a growing angle, so that the drawing cannot say another
-sign than the numbers. The boat is a symbol; the lever arm, and the way the sonar looks, are those of the mount.
+The curved arrows are points that the rotation of a mount turns by a growing angle, so that the drawing cannot say
+another sign than the numbers. The boat is a symbol; the lever arm and the way the sonar looks are those of the mount.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,20 +26,24 @@ PROW = ((-34, 66), (34, 66), (34, -50), (0, -84), (-34, -50))
 
 @dataclass(frozen=True)
 class View:
-    """A view of the boat: its name, body axes to the right and up, its angle, where the arrow begins, the outline."""
+    """A view of the boat: its name, body axes to the right and up, the angle that it shows, and the boat's outline.
+
+    ``begins``: the point, in body axes, that the angle's arrow follows.
+    """
 
     name: str
     right: int
     up: int
     angle: str
     begins: tuple[float, float, float]
-    outline: Sequence[tuple[float, float]]  # in units of the drawing, right and down
+    label: tuple[float, float]  # from the arrow's end to the middle of its name, in units of the drawing: right, down
+    outline: Sequence[tuple[float, float]]  # in the same units
 
 
 VIEWS = (
-    View("from behind", 0, 2, "roll", (1, 0, 0), ((-46, -16), (46, -16), (34, 24), (-34, 24))),
-    View("from starboard", 1, 2, "pitch", (0, 1, 0), ((-66, -16), (84, -16), (56, 24), (-60, 24))),
-    View("from above", 0, 1, "yaw", (0, 1, 0), PROW),
+    View("from behind", 0, 2, "roll", (1, 0, 0), (6, 24), ((-46, -16), (46, -16), (34, 24), (-34, 24))),
+    View("from starboard", 1, 2, "pitch", (0, 1, 0), (6, -12), ((-66, -16), (84, -16), (56, 24), (-60, 24))),
+    View("from above", 0, 1, "yaw", (0, 1, 0), (-14, 22), PROW),
 )
 
 
@@ -78,17 +82,17 @@ def _svg(view: View, mount: Mounted, sonar: bool) -> Markup:
     for axis in (view.right, view.up):
         end = _flat(view, 54.0 * np.eye(3)[axis])
         shapes += _arrow([np.zeros(2), end], INK, 1.2)
-        shapes.append(_letter(f"{LETTERS[axis]} +", end * 1.2 + (0, 4), INK))
+        shapes.append(_letter(f"{LETTERS[axis]} +", 1.36 * end + (0, 5), INK))
     arc = [_flat(view, RADIUS * turned(view.angle, degrees, np.array(view.begins))) for degrees in _steps()]
     shapes += _arrow(arc, colour, 2.4)
-    beside = arc[-1] + (12.0 if view.angle == "roll" else -6.0) * np.array([0.0, 1.0])
-    shapes.append(_letter(f"{view.angle} +", np.array([min(beside[0], 74.0), beside[1]]), colour))
+    shapes.append(_letter(f"{view.angle} +", arc[-1] + view.label, colour))
     shapes.append(f'<line {_line(np.zeros(2), sensor)} stroke="{SONAR}" stroke-dasharray="4 3" stroke-width="1.4"/>')
     if sonar:
         look = sensor + _flat(view, LOOK * mount.R_body_from_sensor @ np.array([0.0, 0.0, -1.0]))
         shapes.append(f'<line {_line(sensor, look)} stroke="{SONAR}" stroke-width="2"/>')
     shapes.append(f'<circle cx="0" cy="0" r="4" fill="{INK}"/>')
-    shapes.append(f'<circle cx="{sensor[0]:.1f}" cy="{sensor[1]:.1f}" r="5" fill="#fff" stroke="{SONAR}" stroke-width="2"/>')
+    place = f'cx="{sensor[0]:.1f}" cy="{sensor[1]:.1f}"'
+    shapes.append(f'<circle {place} r="5" fill="#fff" stroke="{SONAR}" stroke-width="2"/>')
     label = f"the boat {view.name}: {view.angle} is positive {POSITIVE[view.angle]}"
     head = f'<svg viewBox="-100 -100 200 200" width="200" height="200" role="img" aria-label="{label}">'
     return Markup(head + "".join(shapes) + "</svg>")  # numbers and this program's words alone
