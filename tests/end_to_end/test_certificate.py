@@ -83,7 +83,7 @@ def test_the_sentence_names_the_largest_row_of_the_composition(undisturbed: tupl
 def test_soundings_by_the_results_covariance(undisturbed: tuple[Path, Told]) -> None:
     """Straight down, 50 m: height by the lever arm alone; the largest of the plane's sigmas, by hand, for the rest."""
     run = undisturbed[0]
-    rows = {row[0]: row[1:] for row in Page(html_of(run)).table("depth below the sonar", "straight down, mm")}
+    rows = {row[0]: row[1:] for row in Page(html_of(run)).table("depth below the sonar", "straight down")}
     assert list(rows) == ["5 m", "10 m", "20 m", "50 m"]
     C = np.array(result_of(run)["mbes"]["covariance_total"])
     vertical, horizontal = (float(number) for number in rows["50 m"][0].split(" / "))

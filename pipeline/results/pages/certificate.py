@@ -96,7 +96,7 @@ def identity_rows(about: About) -> list[Row]:
 
 def instruments_on_board(session: SessionConfig) -> list[Row]:
     """Return a row for each instrument: the words of ``about``, or else the title of the session's preset."""
-    rows = []
+    rows: list[Row] = []
     for key, sensor in SENSORS.items():
         about = getattr(session.about.instruments, key)
         block = getattr(session, key, None)

@@ -83,7 +83,8 @@ def _svg(view: View, mount: Mounted, sonar: bool) -> Markup:
         end = _flat(view, 54.0 * np.eye(3)[axis])
         shapes += _arrow([np.zeros(2), end], INK, 1.2)
         shapes.append(_letter(f"{LETTERS[axis]} +", 1.36 * end + (0, 5), INK))
-    arc = [_flat(view, RADIUS * turned(view.angle, degrees, np.array(view.begins))) for degrees in _steps()]
+    steps = np.linspace(0.0, TURN_DEG, 21)
+    arc = [_flat(view, RADIUS * turned(view.angle, float(degrees), np.array(view.begins))) for degrees in steps]
     shapes += _arrow(arc, colour, 2.4)
     shapes.append(_letter(f"{view.angle} +", arc[-1] + view.label, colour))
     shapes.append(f'<line {_line(np.zeros(2), sensor)} stroke="{SONAR}" stroke-dasharray="4 3" stroke-width="1.4"/>')
@@ -96,10 +97,6 @@ def _svg(view: View, mount: Mounted, sonar: bool) -> Markup:
     label = f"the boat {view.name}: {view.angle} is positive {POSITIVE[view.angle]}"
     head = f'<svg viewBox="-100 -100 200 200" width="200" height="200" role="img" aria-label="{label}">'
     return Markup(head + "".join(shapes) + "</svg>")  # numbers and this program's words alone
-
-
-def _steps() -> list[float]:
-    return np.linspace(0.0, TURN_DEG, 21).tolist()
 
 
 def _flat(view: View, point: Array) -> Array:
