@@ -1,6 +1,8 @@
 """The block about of session.yaml: free text, but text; and nothing of it is computed with."""
 
 import datetime
+import re
+import textwrap
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -8,10 +10,11 @@ from typing import Any
 import pytest
 import yaml
 
-from pipeline.config.about import LONGEST, About
+from pipeline.config.about import LONGEST, About, AboutInstruments
 from pipeline.config.load import load_session
 from pipeline.errors import ConfigError
 from stages import LASER, ORDER, load
+from tests.support.roots import ROOT
 
 MOUNT = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": -1.0}
 SESSION: dict[str, Any] = {
@@ -74,6 +77,15 @@ def test_what_is_no_text_is_refused_in_one_line(tmp_path: Path, about: Any, word
     (line,) = str(error.value).splitlines()
     assert line.startswith(f"{tmp_path / 'session.yaml'}: about")
     assert words in line
+
+
+def test_the_document_shows_every_key(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "certificate.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^    about:\n(?:      .*\n)+", page, re.MULTILINE)
+    shown = yaml.safe_load(textwrap.dedent(block))["about"]
+    assert set(shown) == set(About.model_fields)
+    assert set(shown["instruments"]) == set(AboutInstruments.model_fields)
+    assert read(tmp_path, shown).vessel == shown["vessel"]
 
 
 def test_no_stage_has_it_in_its_settings() -> None:

@@ -11,6 +11,7 @@ from pipeline.artefacts.catalogue.points import PASSES
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.config.about import About
 from pipeline.config.session import SessionConfig
+from pipeline.console import plural
 from pipeline.maths.survey.sounding_uncertainty import ORDERS, table_of_soundings
 from pipeline.mount import WITHIN_95, mount_of
 from pipeline.report.method_blocks import mounted_of
@@ -75,6 +76,7 @@ def certificate_values(
         ],
         "drawings": sign_drawings(mounted_of(block) if block["mount"] else coarse, sonar),
         "soundings": _soundings(block["covariance_total"]) if sonar and block["covariance_total"] else None,
+        "done": _done(result, sonar),
         "speed": _speed(tables.table(PASSES)),
         "digests": _digests(manifests, result, settings),
     }
@@ -129,6 +131,19 @@ def _soundings(covariance: Sequence[Sequence[float]]) -> Row:
             for depth, row in zip(DEPTHS_M, table, strict=True)
         ],
     }
+
+
+def _done(result: Row, sonar: bool) -> str:
+    """Return in words how many passes saw the target, from where, and with how many points on it."""
+    seen = [row for row in result["passes"] if row["soundings"] or row["laser_points"]]
+    if not seen:
+        return ""
+    distances = [row["distance_m"] for row in seen if row["distance_m"] is not None] or [np.nan]
+    ends = dict.fromkeys(f"{end(distances):.1f}" for end in (min, max))
+    points = {"soundings": "soundings"} if sonar else {}
+    points |= {"laser_points": "laser points"}
+    counts = [f"{sum(row[key] for row in seen):,} {words}" for key, words in points.items()]
+    return f"{plural(len(seen), 'pass')}, {' to '.join(ends)} m from the target, with {' and '.join(counts)} on it"
 
 
 def _speed(passes: pd.DataFrame) -> str:
