@@ -12,6 +12,8 @@ LETTERS = tuple(f"target.{letter}" for letter in "abce")
 FOOT_M = 0.3048
 SENTENCES = {  # in place of pydantic's, which are for programmers
     "too_short": "has too few entries: {actual_length} of at least {min_length}",
+    "string_type": "should be text: put it in quotes",
+    "string_too_long": "has more than {max_length} characters",
     "too_long": "has more entries than {max_length}; a decimal comma makes two of one",
     "union_tag_invalid": "has kind {tag}, which is none of {expected_tags}",
 }
@@ -39,7 +41,7 @@ def fault_line(model: type[BaseModel], faults: Sequence[Any], where: str) -> str
         return f"{where}: {key}: unknown key; {meant}known here: {known}"
     if fault["type"] == "missing":
         return f"{where}: {key}: is missing; {_missing(model, fault['loc'])}"
-    message = SENTENCES[fault["type"]].format(**fault["ctx"]) if fault["type"] in SENTENCES else fault["msg"]
+    message = SENTENCES[fault["type"]].format(**fault.get("ctx", {})) if fault["type"] in SENTENCES else fault["msg"]
     message = message.removeprefix("Value error, ").replace("a valid array", "a list, in square brackets")
     if fault["type"] == "float_type" and "," in str(fault["input"]):
         message += ", with a point where the comma is"

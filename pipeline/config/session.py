@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from pipeline.config.about import About, AboutBlock
 from pipeline.config.mount import Covariance, Mount, MountOrigin, MountSigma
 from pipeline.config.quantities import (
     BeamWidth,
@@ -172,6 +173,7 @@ class SessionConfig(Model):
     ins: Ins
     laser: Laser
     mbes: Mbes | None = None  # None: the laser is calibrated
+    about: AboutBlock = About()  # for the certificate alone
 
     @property
     def calibrated(self) -> Calibrated:

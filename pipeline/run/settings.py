@@ -1,12 +1,13 @@
 """Settings of a run. They are read from YAML, kept in run.yaml, and refused if they cannot be correct."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from pipeline.atomic_files import write_text
+from pipeline.atomic_files import sha256, write_text
 from pipeline.config.load import load_pool, load_session
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
@@ -23,11 +24,15 @@ RUN_YAML = "run.yaml"
 
 @dataclass(frozen=True)
 class Settings:
-    """The checked settings of a run, of the pool and of the session, and the folder with the raw files."""
+    """The checked settings of a run, of the pool and of the session, and the folder with the raw files.
+
+    ``files``: SHA-256 of the files that they were read from, by ``session`` and ``config``. An older run.yaml has none.
+    """
 
     session_folder: Path
     pool: PoolConfig
     session: SessionConfig
+    files: Mapping[str, str] = field(default_factory=dict)
 
     def resolved(self) -> dict[str, Any]:
         """Return every setting by the name under which a stage's Config asks for it."""
@@ -65,7 +70,8 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
         refuse_shallow_cast(pool.target, session.mbes, session_folder / "session.yaml")
-    return Settings(session_folder.resolve(), pool, session)
+    files = {"session": sha256(session_folder / "session.yaml"), "config": sha256(config_path)}
+    return Settings(session_folder.resolve(), pool, session, files)
 
 
 def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:
@@ -138,6 +144,7 @@ def write_settings(run: Path, settings: Settings) -> None:
     """Write run.yaml."""
     content = {
         "session_folder": str(settings.session_folder),
+        "files": dict(settings.files),
         "config": settings.pool.model_dump(mode="json"),
         "session": settings.session.model_dump(mode="json"),
     }
@@ -151,11 +158,13 @@ def read_settings(run: Path) -> Settings:
     if not path.is_file():
         raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
     content = read_yaml(path)
-    folder = content.get("session_folder")
-    if set(content) != {"session_folder", "config", "session"} or not isinstance(folder, str):
+    folder, files = content.get("session_folder"), content.get("files", {})
+    if {*content, "files"} != {"session_folder", "files", "config", "session"} or not isinstance(folder, str):
         raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
+    if not isinstance(files, dict) or not all(isinstance(digest, str) for digest in files.values()):
+        raise ConfigError(f"{path}: files: must hold digests of files; run poolcal run again")
     pool = parse(PoolConfig, content["config"], f"{path}: config")
-    return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"))
+    return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"), files)
 
 
 def calibrated_in(run: Path) -> Calibrated:

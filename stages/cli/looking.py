@@ -26,6 +26,20 @@ def _view(
     return view.command(first, second, stage)
 
 
+@app.command("report")
+def _report(
+    run_folder: RunFolder,
+    pdf: Annotated[Path | None, typer.Option(metavar="FILE", help="write it as PDF as well, for print")] = None,
+) -> int:
+    """Draw the report of a finished run, certificate first.
+
+    PDF needs WeasyPrint (pip install 'poolcal[pdf]') or Chromium.
+    """
+    from stages.commands import report
+
+    return report.command(run_folder, pdf)
+
+
 @app.command("diff")
 def _diff(
     first: Annotated[Path, typer.Argument(metavar="A", help="run folder")],

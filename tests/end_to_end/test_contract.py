@@ -9,10 +9,8 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from pipeline.simulation.scenario import load_scenario
-from pipeline.simulation.session import simulate_session as simulate_in_memory
 from tests.support.places import Place, Told, poolcal, result_of
-from tests.support.tables import place_soundings, write_tables
+from tests.support.weak_sessions import only_the_wall
 
 KEYS = {"schema", "session", "verdict", "reasons", "reason_codes", "mbes", "methods", "inputs", "software"}
 BLOCK = {"R_body_from_mbes", "lever_arm_m", "mount", "correction", "sigma", "covariance"}
@@ -201,19 +199,6 @@ def test_weak_geometry_is_an_answer_with_values(small: Path, tmp_path: Path) -> 
     assert result["verdict"] == "rejected"
     assert np.shape(result["mbes"]["covariance"]) == (6, 6)
     assert any("yaw" in reason or "lever arm y" in reason for reason in result["reasons"])
-
-
-def only_the_wall(small: Path, folder: Path) -> Place:
-    """A session of tables that keeps, of the soundings, those on the centre wall and off its edges."""
-    scenario = load_scenario(small.with_name("session.scenario.yaml"))
-    simulated = simulate_in_memory(scenario, 1)
-    points, target = place_soundings(simulated), scenario.target
-    keep = (np.abs(points[:, 0]) < 0.1) & (np.abs(points[:, 1]) < target.b / 2 - 0.3)
-    keep &= (points[:, 2] < -0.2) & (points[:, 2] > -target.a / 2 + 0.3)
-    place = Place(small, folder)
-    write_tables(simulated, place.session, "parquet", keep)
-    shutil.copy(small / "pool.yaml", place.config)
-    return place
 
 
 def test_verify_of_a_real_run(undisturbed: tuple[Path, Told]) -> None:

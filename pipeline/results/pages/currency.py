@@ -1,10 +1,12 @@
 """Whether RUN/report/report.html shows the present state of the run."""
 
+import functools
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from pipeline.atomic_files import sha256
 from pipeline.run import manifest
 from pipeline.run.results import PAGE, agreeing
 from pipeline.run.settings import read_settings
@@ -13,10 +15,26 @@ HEAD = 2000  # bytes at the start of the page that contain its digest
 
 
 def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
-    """Return a digest of the results, settings and raw files on the page; ``manifests``: one for each stage."""
+    """Return a digest of the results, settings and raw files on the page, and of the program's files that draw it.
+
+    Parameters
+    ----------
+    run
+        The run folder.
+    manifests
+        The manifests of all stages.
+    """
     shown = [[stage, of_stage.outputs, of_stage.key.raw] for stage, of_stage in manifests.items()]
-    settings = read_settings(run).as_json()
-    return hashlib.sha256(json.dumps([shown, settings], sort_keys=True).encode()).hexdigest()
+    settings = read_settings(run)
+    content = [shown, settings.as_json(), dict(settings.files), _drawn_by()]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+@functools.cache
+def _drawn_by() -> list[str]:
+    """Return the digests of the files in this folder: a newer program draws the page anew."""
+    files = sorted(path for path in Path(__file__).parent.iterdir() if path.suffix in (".py", ".html"))
+    return [sha256(path) for path in files]
 
 
 def is_page_outdated(run: Path, stages: Sequence[str]) -> bool:

@@ -23,10 +23,10 @@ FAMILY = {"P1": "#0072b2", "P2": "#e6a000", "P3": "#009e73", "H": "#b2569a", "ot
 AXIS = {"roll": "#0072b2", "pitch": "#e6a000", "yaw": "#009e73"}
 MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s", "other": "D", "more": "X"}
 WIDTH_IN = 7.2  # width of every picture
-SMALLEST_PT = 7  # size of the smallest letters in a picture
+SMALLEST_PT = 8  # size of the smallest letters in a picture
 DPI = 200  # resolution of point clouds, which are drawn as pixels in the vector picture
 HEAD_LETTERS = 70  # length of the running head of a printed page
-MARGIN_TEXT = "font-size: 8pt; color: #50555d;"
+MARGIN_TEXT = "font: 8pt system-ui, 'Noto Sans', 'Noto Sans CJK SC', sans-serif; color: #50555d;"
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "poolcal",
@@ -62,7 +62,7 @@ def render_page(template: str, **values: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters["breakable"] = breakable
-    fixed = {"css": css_text, "picture_px": round(96 * WIDTH_IN), "margin_text": MARGIN_TEXT}
+    fixed = {"css": css_text, "picture_px": round(96 * WIDTH_IN), "margin_text": Markup(MARGIN_TEXT)}
     return environment.get_template(template).render(**fixed, **values)
 
 

@@ -31,8 +31,11 @@ from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import design_shape
 from pipeline.report.reason_codes import verdict_in_words
+from pipeline.report.sigma_sources import contributions, laser_correlates
+from pipeline.results.pages.certificate import certificate_values
 from pipeline.results.pages.currency import page_digest
 from pipeline.results.pages.instrument_table import instrument_rows
+from pipeline.results.pages.limiting_errors import limiting_sentences
 from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows, part_rows
 from pipeline.results.pages.parameter_tests import parameter_test_rows, untold_parameters
 from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_rows
@@ -94,7 +97,7 @@ def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pict
         result=result,
         methods=METHODS,
         laser=settings.session.calibrated == "laser",
-        **_result_values(tables, result, settings),
+        **_result_values(tables, manifests, result, settings),
         **_residual_values(tables, result, settings),
         **_data_values(tables, manifests, settings),
         drawn_from=page_digest(tables.run, manifests),
@@ -102,19 +105,26 @@ def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pict
     )
 
 
-def _result_values(tables: Tables, result: Row, settings: Settings) -> Row:
-    """Return the template's values about the mount and the target."""
+def _result_values(
+    tables: Tables, manifests: Mapping[str, manifest.Manifest], result: Row, settings: Settings
+) -> Row:
+    """Return the template's values about the mount and the target, and those of the certificate."""
     laser = settings.session.calibrated == "laser"
     held = result.get("held", {})
     passes, calibrations = tables.table(PASSES), tables.table(CALIBRATION)
     planes = [] if laser else plane_agreement_rows(tables)
     methods = [method for method in METHODS if method in result["methods"]]
+    rows = parameter_rows(calibrations, result["result"], settings.pool.verdict, held)
+    correlates = laser_correlates(settings.session.calibrated, settings.session.laser.mount_covariance)
+    sources = contributions(tables.table(FREED), result["methods"]["adjustment"], correlates)
     return {
+        "certificate": certificate_values(tables, manifests, result, settings, rows),
+        "limiting": list(limiting_sentences(sources, rows)),
         "held": [] if result["reasons"] else list(held),
         "verdict": verdict_in_words(result["verdict"], held),
         "run": tables.run.absolute().name,
         "date": str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
-        "parameters": parameter_rows(calibrations, result["result"], settings.pool.verdict, held),
+        "parameters": rows,
         "names": [name for name, *_ in PARAMETERS],
         "frame": tables.table(POOL_FRAME).to_dict("records")[0],
         "traced": not laser and settings.session.sonar.svp is not None,
@@ -125,9 +135,7 @@ def _result_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "by_method": [] if laser else list(method_rows(calibrations)),
         "planes": planes,
         "several_planes": list(dict.fromkeys(row["plane"] for row in planes if np.isnan(row["angle_deg"]))),
-        "sigma_sources": list(
-            sigma_source_rows(tables.table(FREED), result["methods"]["adjustment"], settings.session)
-        ),
+        "sigma_sources": list(sigma_source_rows(sources)),
         "slot_checks": slot_checks(tables.table(ESTIMATE)),
         "as_built": as_built_rows(result["target"]["as_found"], design_shape(target_of(settings.pool.target))),
         "correlations": correlation_rows(result),
@@ -167,10 +175,10 @@ def _data_values(tables: Tables, manifests: Mapping[str, manifest.Manifest], set
     }
 
 
-def _largest(cells: pd.DataFrame) -> Row:
-    """Return the row of ``cells`` with the largest mean residual, whatever its sign."""
+def _largest(cells: pd.DataFrame) -> Row | None:
+    """Return the row of ``cells`` with the largest mean residual, whatever its sign; None if there are none."""
     if not len(cells):
-        return {"mean_m": np.nan, "sensor": "no points", "family": "", "pass": ""}
+        return None
     rows: list[Any] = cells.to_dict("records")
     return dict(max(rows, key=lambda row: abs(row["mean_m"])))
 
@@ -193,6 +201,6 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
         {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
         for where, model in (("pool", settings.pool), ("session", settings.session))
         for key, default, value in changed_settings(model)
-        if ".instrument." not in key  # the table of instruments has these
+        if ".instrument." not in key and not key.startswith("about.")  # these stand elsewhere on the page
     ]
     return sorted(rows, key=lambda row: not row["default"])

@@ -5,28 +5,20 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from pipeline.config.session import SessionConfig
 from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
-from pipeline.report.sigma_sources import NOISE, contributions, laser_correlates
+from pipeline.report.sigma_sources import NOISE
 
 Row = Mapping[str, Any]
 
 
-def sigma_source_rows(tests: pd.DataFrame, block: Row, session: SessionConfig) -> Iterator[Row]:
-    """Yield the contribution of each source of errors to the mount parameters' total sigmas; noise comes first.
+def sigma_source_rows(sources: Mapping[str, NDArray[np.float64]]) -> Iterator[Row]:
+    """Yield the contribution of each source of errors to the mount parameters' total sigmas.
 
-    Parameters
-    ----------
-    tests
-        The table of single-parameter tests, with the effect of each fixed parameter on the mount.
-    block
-        The adjustment's block of calibration.json.
-    session
-        The session's settings.
+    ``sources``: as of :func:`~pipeline.report.sigma_sources.contributions`.
     """
-    correlates = laser_correlates(session.calibrated, session.laser.mount_covariance)
-    for words, of_source in contributions(tests, block, correlates).items():
+    for words, of_source in sources.items():
         yield {
             "name": f"{NOISE} (the random sigma)" if words == NOISE else words,
             "cells": [

@@ -1,0 +1,43 @@
+"""``poolcal report``: the report's page, whose first two pages are the certificate, and the same as PDF."""
+
+import sys
+from pathlib import Path
+
+from pipeline.console import say
+from pipeline.errors import ArtefactError
+from pipeline.run.output_files import refuse_output
+from pipeline.run.results import PAGE, agreeing, calibration
+from pipeline.run.settings import read_settings
+from stages import names_in
+from stages.commands.answer import say_failures
+from stages.commands.draw import Drawings, draw_missing
+
+
+def command(run: Path, pdf: Path | None) -> int:
+    """Draw the page of a finished run, if it is missing or out of date, and write it as PDF.
+
+    Parameters
+    ----------
+    run
+        The run folder. Its results are only read.
+    pdf
+        The PDF file; None: none is written.
+    """
+    settings = read_settings(run)
+    refuse_output("--pdf", pdf, run, settings.session_folder, begins=b"%PDF")
+    calibration(run)
+    done = agreeing(run, names_in(run))
+    for stage in names_in(run):
+        if stage not in done:
+            raise ArtefactError(f"{run}: {stage} is not finished, or of other settings than run.yaml's; run it again")
+    failures = draw_missing(run, Drawings(report=True, recordings=False))
+    if failures:
+        say_failures(failures)
+        raise ArtefactError(f"{run}: its report could not be drawn; see above")
+    page = run / "report" / PAGE
+    say(f"Report: {page}", sys.stdout)
+    if pdf is not None:
+        from pipeline.results.pages.pdf import write_pdf
+
+        say(f"PDF: {pdf} (by {write_pdf(page, pdf)})", sys.stdout)
+    return 0
