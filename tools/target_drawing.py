@@ -141,7 +141,7 @@ def picture(path: Path) -> None:
         left, right = views[0].get_xlim()
         views[0].set(xlim=(left, right + 0.8))
         views[1].set(xlim=(-3.2, 1.8), ylim=(-3.6, 4.0))
-        figure.tight_layout()
+        figure.tight_layout(rect=(0, 0, 1, 0.97))
         figure.savefig(path, metadata={"Date": None, "Creator": None})
 
 
