@@ -11,7 +11,9 @@ import pipeline
 from stages import ORDER
 from stages.cli import call
 
-COMMANDS = ("simulate", "run", "stage", "verify", "view", "diff", "history", "check", "plan", "coarse", "compare")
+COMMANDS = (
+    "simulate", "run", "repeat", "stage", "verify", "view", "diff", "history", "check", "plan", "coarse", "compare",
+)  # fmt: skip
 
 
 # --- answering -------------------------------------------------------------------------------------------------------
