@@ -7,13 +7,13 @@ from typing import Annotated
 import yaml
 from pydantic import Field, model_validator
 
-from pipeline.config.quantities import Model, Printable
+from pipeline.config.quantities import PRINTABLE, Model
 from pipeline.config.session import Calibrated
 from pipeline.config.yaml_file import compose, content_of, line_of, text_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
-PathText = Annotated[Printable, Field(min_length=1, max_length=4000)]
+PathText = Annotated[str, Field(min_length=1, max_length=4000), PRINTABLE]
 
 
 class ListedSession(Model):

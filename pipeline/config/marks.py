@@ -5,12 +5,12 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from pipeline.config.quantities import Model, Printable
+from pipeline.config.quantities import PRINTABLE, Model
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
-Name = Annotated[Printable, Field(min_length=1, max_length=40)]
+Name = Annotated[str, Field(min_length=1, max_length=40), PRINTABLE]
 Coordinate = Annotated[float, Field(ge=-1e7, le=1e7)]
 Sigma = Annotated[float, Field(ge=1e-5, le=1)]
 Sigmas = tuple[Sigma, Sigma, Sigma]

@@ -27,7 +27,7 @@ def _printable(text: str) -> str:
     return text
 
 
-Printable = Annotated[str, AfterValidator(_printable)]
+PRINTABLE = AfterValidator(_printable)
 
 
 class Model(BaseModel):

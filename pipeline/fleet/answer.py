@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.reason_codes import verdict_in_words
 
 ACCEPTED, REJECTED, COULD_NOT_RUN, BUG = range(4)  # the exit statuses of poolcal run
-ENDED_FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+INTERRUPTED = 130  # exit code of a process after SIGINT
+ENDED_FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Answer:
     ran
         The names of the stages that were run, in order.
     reason
-        One line on why the session could not be calibrated; else empty.
+        One line on why there is no accepted calibration; else empty.
     verdict
         The verdict in words.
     mount
@@ -50,17 +52,25 @@ class Answer:
         return cls(**json.loads(line))
 
 
-def mount_to_use(result: Mapping[str, Any]) -> dict[str, float]:
-    """Return the values of an accepted calibration.json that are good enough; of a rejected one there are none."""
+def answer_about(result: Mapping[str, Any], ran: list[str], not_drawn: list[str]) -> Answer:
+    """Return the answer about a finished calibration.
+
+    Parameters
+    ----------
+    result
+        The content of calibration.json. Of a rejected calibration no value may be used; of one accepted in part, only
+        those that are good enough.
+    ran, not_drawn
+        As in Answer.
+    """
+    held, reasons = result.get("held", {}), result["reasons"]
+    verdict = verdict_in_words(result["verdict"], held).partition(":")[0]  # the mount shows which values
     if result["verdict"] != "accepted":
-        return {}
-    mount, held = result[result.get("calibrated", "mbes")]["mount"] or {}, result.get("held", {})
-    return {key: float(mount[key]) for name, _, key, _ in PARAMETERS if name not in held and key in mount}
-
-
-def verdict_of(result: Mapping[str, Any]) -> str:
-    """Return the verdict of a calibration.json in words; for values in part the table shows which."""
-    return verdict_in_words(result["verdict"], result.get("held", {})).partition(":")[0]
+        more = f"; and {plural(len(reasons) - 1, 'other reason')}" if len(reasons) > 1 else ""
+        return Answer(REJECTED, ran, reasons[0] + more, verdict, not_drawn=not_drawn)
+    mount = result[result.get("calibrated", "mbes")]["mount"] or {}
+    good = {key: float(mount[key]) for name, _, key, _ in PARAMETERS if key in mount and name not in held}
+    return Answer(ACCEPTED, ran, verdict=verdict, mount=good, not_drawn=not_drawn)
 
 
 def answer_of_ended(exit_code: int) -> Answer:
@@ -71,6 +81,8 @@ def answer_of_ended(exit_code: int) -> Answer:
     exit_code
         The exit code of the process, or minus the number of the signal that ended it.
     """
+    if exit_code == INTERRUPTED:
+        return Answer(COULD_NOT_RUN, reason="its process was interrupted; run again")
     if exit_code >= 0:
         return Answer(BUG, reason=f"its process ended with status {exit_code}")
     number = signal.Signals(-exit_code) if -exit_code in list(signal.Signals) else None

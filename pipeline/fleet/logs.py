@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pipeline.atomic_files import write_text, writing
+from pipeline.atomic_files import read_regular, write_text, writing
 from pipeline.console import printable
 from pipeline.errors import ArtefactError, PoolcalError
 
@@ -36,7 +36,7 @@ def write_log(run: Path, label: str, said: str) -> str:
     try:
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            if path.is_file() and path.open("rb").read(len(HEAD)) != HEAD.encode():
+            if path.exists() and not read_regular(path, len(HEAD)).startswith(HEAD.encode()):
                 raise ArtefactError(f"{path}: is there, and poolcal did not write it; move it")
         write_text(path, f"{HEAD}{label}\n" + "\n".join(lines))
     except PoolcalError as error:

@@ -12,8 +12,9 @@ from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.results.history import History
 from pipeline.text_table import text_table
 
-LAYOUT = "<12  <8" + " >9" * 6 + "  <12 >9  <1"
+LAYOUT = "<12  <8" + " >8" * 6 + "  <12 >8  <1"
 MOST_NAMED = 3  # stages; of more than these the table shows the first and the last
+BAD = {REJECTED: "rejected", COULD_NOT_RUN: "refused", BUG: "bug"}
 COUNTED = {ACCEPTED: "accepted", REJECTED: "rejected", COULD_NOT_RUN: "could not run", BUG: "ended by a bug"}
 
 
@@ -25,23 +26,32 @@ class Outcome:
     answer: Answer
     seconds: float
 
+    @property
     def done(self) -> str:
-        """Return in words what was done."""
+        """In words what was done."""
         answer = self.answer
-        if answer.status == COULD_NOT_RUN:
-            return f"refused: {answer.reason}"
-        if answer.status == BUG:
-            return f"bug: {answer.reason}; see {shown(log_of(self.session.run))}"
+        if answer.status in (COULD_NOT_RUN, BUG):
+            return BAD[answer.status]
         ran = ", ".join(answer.ran)
         if len(answer.ran) > MOST_NAMED:
-            ran = f"{len(answer.ran)} stages, {answer.ran[0]} to {answer.ran[-1]}"
-        words = [f"ran {ran}" if ran else "up to date", *(f"{kind} not drawn" for kind in answer.not_drawn)]
-        return "; ".join(words)
+            ran = f"{answer.ran[0]} to {answer.ran[-1]}"
+        return "; ".join([f"ran {ran}" if ran else "up to date", *(f"{kind} not drawn" for kind in answer.not_drawn)])
 
+    @property
+    def complaint(self) -> str:
+        """The line with the reason why there is no accepted calibration; empty if there is one."""
+        answer = self.answer
+        if answer.status == ACCEPTED:
+            return ""
+        where = f"; see {shown(log_of(self.session.run))}" if answer.status == BUG else ""
+        return f"{self.session.label}: {BAD[answer.status]}: {answer.reason}{where}"
+
+    @property
     def line(self) -> str:
-        """Return the line about the end of the session."""
-        verdict = f"{self.answer.verdict}, " if self.answer.verdict else ""
-        return f"{self.session.label}: {verdict}{self.done()}, {self.seconds:.1f} s"
+        """The line about the end of the session."""
+        words = self.complaint or f"{self.session.label}: {self.answer.verdict}"
+        done = f"; {self.done}" if self.answer.status in (ACCEPTED, REJECTED) else ""
+        return f"{words}{done} ({self.seconds:.1f} s)"
 
 
 def movements(history: History, folder: Path) -> dict[Path, str]:
@@ -52,7 +62,7 @@ def movements(history: History, folder: Path) -> dict[Path, str]:
 
 
 def outcome_table(outcomes: Sequence[Outcome], moved: Mapping[Path, str]) -> list[str]:
-    """Return the table's lines.
+    """Return the table's lines, and below them one for each session that has no accepted calibration.
 
     Parameters
     ----------
@@ -68,9 +78,11 @@ def outcome_table(outcomes: Sequence[Outcome], moved: Mapping[Path, str]) -> lis
         answer = outcome.answer
         values = [f"{answer.mount[key]:.4f}" if key in answer.mount else "-" for *_, key, _ in PARAMETERS]
         since = moved.get(outcome.session.run, "-") if answer.status == ACCEPTED else "-"
-        row = (outcome.session.label, answer.verdict or "-", *values, since, f"{outcome.seconds:.1f} s", outcome.done())
+        row = (outcome.session.label, answer.verdict or "-", *values, since, f"{outcome.seconds:.1f} s", outcome.done)
         rows.append(row)
-    return text_table(LAYOUT, ("session", "verdict", *heads, "since before", "time", "done"), rows)
+    table = text_table(LAYOUT, ("session", "verdict", *heads, "since before", "time", "done"), rows)
+    complaints = [outcome.complaint for outcome in outcomes if outcome.complaint]
+    return [*table, *([""] if complaints else []), *complaints]
 
 
 def count_line(outcomes: Sequence[Outcome]) -> str:

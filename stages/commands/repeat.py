@@ -7,7 +7,7 @@ from pathlib import Path
 from pipeline.config.fleet import load_fleet
 from pipeline.console import say
 from pipeline.errors import PoolcalError
-from pipeline.fleet.answer import COULD_NOT_RUN, Answer, answer_of_ended, overall_status
+from pipeline.fleet.answer import BUG, COULD_NOT_RUN, Answer, answer_of_ended, overall_status
 from pipeline.fleet.logs import write_log
 from pipeline.fleet.processes import Command, Reply, ask_all
 from pipeline.fleet.session_list import FleetSession, list_sessions, shown
@@ -77,10 +77,10 @@ def _calibrate(
     def replied(number: int, reply: Reply) -> bool:
         answer = answer_of_ended(reply.exit_code) if reply.line is None else Answer.from_line(reply.line)
         outcome = outcomes[number] = Outcome(sessions[number], answer, reply.seconds)
-        say(outcome.line(), sys.stderr)
+        say(outcome.line, sys.stderr)
         if problem := write_log(outcome.session.run, outcome.session.label, reply.said):
             say(f"{outcome.session.label}: no log: {problem}", sys.stderr)
-        return answer.status < COULD_NOT_RUN
+        return answer.status != BUG
 
     command = Command(WORKER, child.environment() | {"PYTHONIOENCODING": "utf-8"})
     ask_all(command, [request.as_line() for request in requests], jobs, begun, replied)

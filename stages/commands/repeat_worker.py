@@ -14,7 +14,7 @@ from queue import SimpleQueue
 
 from pipeline.config.session import Calibrated
 from pipeline.errors import PoolcalError
-from pipeline.fleet.answer import Answer, mount_to_use, verdict_of
+from pipeline.fleet.answer import Answer, answer_about
 from pipeline.run.results import calibration
 from stages.commands import run
 from stages.commands.draw import Drawings
@@ -50,14 +50,13 @@ def answer(request: Request) -> Answer:
         try:
             done = run.calibrate(Path(request.session), Path(request.config), folder, request.sensor, options)
             result = calibration(folder)
-            verdict, mount = verdict_of(result), mount_to_use(result)
+            answers.append(answer_about(result, done.ran, done.not_drawn))
         except PoolcalError as error:
             reasons.append(str(error))
             raise
         except Exception as error:
             reasons.append(f"{type(error).__name__}: {error}".partition("\n")[0])
             raise
-        answers.append(Answer(done.status, done.ran, verdict=verdict, mount=mount, not_drawn=done.not_drawn))
         return done.status
 
     status = status_of(calibrate, debug=False)

@@ -1,5 +1,5 @@
 """poolcal with toy stages: python toy_poolcal.py ARGUMENTS. verdict.max_sigma_m sets what the toy report does:
-1: accepted, 2: rejected, 3: a bug, 4: Ctrl-C, 5: hangs, 6: crashes, 7: killed from outside.
+1: accepted, 2: rejected, 3: a bug, 4: Ctrl-C, 5: hangs, 6: crashes.
 """
 
 import importlib
@@ -52,8 +52,8 @@ def _run(inputs: Inputs, config: Config) -> Outputs:
     code = round(config.verdict.max_sigma_m)
     if code == 3:
         raise ZeroDivisionError("a toy bug")
-    if code in (6, 7):
-        os.kill(os.getpid(), signal.SIGSEGV if code == 6 else signal.SIGKILL)
+    if code == 6:
+        os.kill(os.getpid(), signal.SIGSEGV)
     if code == 4:
         os.kill(os.getpid(), signal.SIGINT)
     if code in (4, 5):
