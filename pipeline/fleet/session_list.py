@@ -10,6 +10,8 @@ from pipeline.config.fleet import FleetFile, ListedSession
 from pipeline.config.session import Calibrated
 from pipeline.errors import ConfigError
 
+HISTORY = "history"  # the folder beside the run folders for the page with all of them
+
 
 @dataclass(frozen=True)
 class FleetSession:
@@ -69,7 +71,7 @@ def list_sessions(file: FleetFile) -> SessionList:
         passed_over += [folder for folder in folders if folder not in found]
         sessions += _with_runs(file, number, listed, found)
     _refuse_common_run_folders(file, sessions)
-    _refuse_nested_run_folders(file, sessions)
+    _refuse_wrong_run_folders(file, sessions)
     return SessionList(tuple(sessions), tuple(dict.fromkeys(passed_over)))
 
 
@@ -116,13 +118,15 @@ def _refuse_common_run_folders(file: FleetFile, sessions: Sequence[FleetSession]
             )
 
 
-def _refuse_nested_run_folders(file: FleetFile, sessions: Sequence[FleetSession]) -> None:
-    """Raise a ConfigError if a run folder lies in a session folder or round it, or lies in another run folder."""
+def _refuse_wrong_run_folders(file: FleetFile, sessions: Sequence[FleetSession]) -> None:
+    """Raise a ConfigError if a run folder lies in a session folder or round it, in another, or where a history goes."""
     runs, folders = {session.run for session in sessions}, {_real(session.session) for session in sessions}
     inside = {parent: folder for folder in sorted(folders) for parent in folder.parents}
     for session in sessions:
         run = session.run
         within = (run, *run.parents)
+        if run.name == HISTORY:
+            raise _fault(file, session, f"{shown(run)} is where the history page goes; name another run folder")
         outer = next((place for place in run.parents if place in runs), None)
         if outer is not None:
             raise _fault(file, session, f"{shown(run)} lies in another run folder, {shown(outer)}; name one apart")

@@ -10,9 +10,9 @@ from pipeline.errors import PoolcalError
 from pipeline.fleet.answer import BUG, COULD_NOT_RUN, Answer, answer_of_ended, overall_status
 from pipeline.fleet.logs import write_log
 from pipeline.fleet.processes import Command, Reply, ask_all
-from pipeline.fleet.session_list import FleetSession, list_sessions, shown
+from pipeline.fleet.session_list import HISTORY, FleetSession, list_sessions, shown
 from pipeline.fleet.table import Outcome, count_line, movements, outcome_table
-from pipeline.results.history import SessionFilter, read_history
+from pipeline.results.history import History, SessionFilter, read_history
 from pipeline.run.settings import holds_run
 from pipeline.run.workers import default_jobs, workers
 from stages.commands import child, history
@@ -60,17 +60,6 @@ def _calibrate(
 ) -> list[Outcome]:
     """Calibrate all sessions, ``jobs`` at a time, and say when each begins and ends."""
     outcomes: dict[int, Outcome] = {}
-    requests = [
-        Request(
-            *(shown(path) for path in (one.session, one.config, one.run)),
-            one.sensor,
-            executor,
-            drawings.report,
-            drawings.recordings,
-        )
-        for one in sessions
-    ]
-
     def begun(number: int) -> None:
         say(f"{sessions[number].label}: begins, {number + 1} of {len(sessions)}", sys.stderr)
 
@@ -83,21 +72,36 @@ def _calibrate(
         return answer.status != BUG
 
     command = Command(WORKER, child.environment() | {"PYTHONIOENCODING": "utf-8"})
-    ask_all(command, [request.as_line() for request in requests], jobs, begun, replied)
+    requests = [_request(session, executor, drawings).as_line() for session in sessions]
+    ask_all(command, requests, jobs, begun, replied)
     return [outcomes[number] for number in range(len(sessions))]
 
 
+def _request(session: FleetSession, executor: str | None, drawings: Drawings) -> Request:
+    return Request(
+        session=shown(session.session),
+        config=shown(session.config),
+        run=shown(session.run),
+        sensor=session.sensor,
+        executor=executor,
+        report=drawings.report,
+        recordings=drawings.recordings,
+    )
+
+
 def _show(outcomes: Sequence[Outcome]) -> bool:
-    """Print the table, and write the history of each folder with run folders; return whether all were written."""
-    runs = [outcome.session.run for outcome in outcomes]
-    histories, moved, all_written = {}, {}, True
+    """Print the table, and write the history of each folder with runs of the sonar; return whether all were written."""
+    runs = [outcome.session.run for outcome in outcomes if outcome.session.sensor == "mbes"]
+    histories: dict[Path, History] = {}
+    moved: dict[Path, str] = {}
+    all_written = True
     for folder in sorted({run.parent for run in runs if holds_run(run)}):
-        histories[folder] = read_history(folder, SessionFilter())
+        histories[folder] = read_history(Path(shown(folder)), SessionFilter())
         moved |= movements(histories[folder], folder)
     say("\n".join([*outcome_table(outcomes, moved), "", count_line(outcomes)]), sys.stdout)
     for folder, one in histories.items():
         try:
-            history.write(one, Path(shown(folder)) / "history", SessionFilter())
+            history.write(one, Path(shown(folder)) / HISTORY, SessionFilter())
         except PoolcalError as error:
             say(f"no history: {error}", sys.stderr)
             all_written = False

@@ -124,6 +124,10 @@ SESSIONS = "sessions:\n  - {session: ../data/boat_a/05-12, config: a}\n  - {sess
             "runs: ../runs\n" + SESSIONS % ("boat_b/05-20", ", run: ../runs/05-12/adjust"),
             "line 4: sessions.1.run = '../runs/05-12/adjust': runs/05-12/adjust lies in another run folder, runs/05-12",
         ),
+        (
+            "runs: ../runs\n" + SESSIONS % ("boat_b/05-20", ", run: ../runs/history"),
+            "line 4: sessions.1.run = '../runs/history': runs/history is where the history page goes; name another",
+        ),
     ],
 )
 def test_refused_before_anything_runs(text: str, line: str, place: Path) -> None:
