@@ -60,6 +60,7 @@ def _calibrate(
 ) -> list[Outcome]:
     """Calibrate all sessions, ``jobs`` at a time, and say when each begins and ends."""
     outcomes: dict[int, Outcome] = {}
+
     def begun(number: int) -> None:
         say(f"{sessions[number].label}: begins, {number + 1} of {len(sessions)}", sys.stderr)
 
@@ -94,15 +95,20 @@ def _show(outcomes: Sequence[Outcome]) -> bool:
     runs = [outcome.session.run for outcome in outcomes if outcome.session.sensor == "mbes"]
     histories: dict[Path, History] = {}
     moved: dict[Path, str] = {}
-    all_written = True
+    problems: list[PoolcalError] = []
     for folder in sorted({run.parent for run in runs if holds_run(run)}):
-        histories[folder] = read_history(Path(shown(folder)), SessionFilter())
-        moved |= movements(histories[folder], folder)
+        try:
+            histories[folder] = read_history(Path(shown(folder)), SessionFilter())
+        except PoolcalError as error:
+            problems.append(error)
+        else:
+            moved |= movements(histories[folder], folder)
     say("\n".join([*outcome_table(outcomes, moved), "", count_line(outcomes)]), sys.stdout)
     for folder, one in histories.items():
         try:
             history.write(one, Path(shown(folder)) / HISTORY, SessionFilter())
         except PoolcalError as error:
-            say(f"no history: {error}", sys.stderr)
-            all_written = False
-    return all_written
+            problems.append(error)
+    for problem in problems:
+        say(f"no history: {problem}", sys.stderr)
+    return not problems

@@ -106,8 +106,11 @@ def test_all_kinds_of_ends_then_a_second_call(fleet: Fleet, toy: Toy) -> None:
 
 
 def _second_call(fleet: Fleet, toy: Toy) -> None:
-    for name in ("bug", "crash"):
+    """All is mended but one session, which stays rejected; that the history cannot be written makes it status 2."""
+    for name in ("bug", "crash", "lost"):
         fleet.set(name, 1)
+    shutil.rmtree(fleet.folder / "runs" / "history")
+    (fleet.folder / "runs" / "history").touch()
     before = {path: path.read_bytes() for path in fleet.run("good").glob("*/**/*") if path.is_file()}
     told = toy(*fleet.words())
     assert told.status == 2
@@ -115,7 +118,9 @@ def _second_call(fleet: Fleet, toy: Toy) -> None:
     assert cells["good"] == ("accepted", "up to date")
     assert cells["bad"] == ("rejected", "up to date")
     assert cells["bug"] == cells["crash"] == ("accepted", "ran report")
-    assert cells["locked"] == ("accepted", "ran take, sift, report")
+    assert cells["lost"] == cells["locked"] == ("accepted", "ran take, sift, report")
+    assert told.out.splitlines()[-1] == "7 sessions: 6 accepted, 1 rejected."
+    assert "no history: runs/history: cannot be written" in told.err
     assert {path: path.read_bytes() for path in before} == before
     assert {path.name for path in before} >= {"calibration.json", "means.parquet", "manifest.json"}
 
