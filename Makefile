@@ -5,6 +5,7 @@
 SESSION  =
 CONFIG   =
 RUN      =
+FLEET    =
 A        =
 B        =
 JOBS     =
@@ -20,7 +21,7 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help setup setup-visual demo calibrate stages diff view test thorough lint format bench pictures montecarlo clean
+.PHONY: help setup setup-visual demo calibrate repeat stages diff view test thorough lint format bench pictures montecarlo clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
@@ -49,6 +50,10 @@ GIVEN = $(foreach name,SESSION CONFIG RUN,$(if $($(name)),,$(error $(name)= is m
 calibrate: $(SETUP) ## all stages that are out of date: SESSION= CONFIG= RUN=
 	@:$(GIVEN)
 	$(POOLCAL) run '$(SESSION)' --config '$(CONFIG)' --run '$(RUN)' $(if $(JOBS),--jobs $(JOBS)) $(if $(OVERWRITE),--overwrite)
+
+repeat: $(SETUP) ## all sessions of a list that are out of date, then one table: FLEET=
+	@:$(if $(FLEET),,$(error FLEET= is missing: make repeat FLEET=configs/fleet.yaml))
+	$(POOLCAL) repeat '$(FLEET)' $(if $(JOBS),--jobs $(JOBS))
 
 diff: $(SETUP) ## compare two runs: A= B=
 	@:$(foreach name,A B,$(if $($(name)),,$(error $(name)= is missing: make diff A=runs/x B=runs/y)))

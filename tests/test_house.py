@@ -112,14 +112,15 @@ def _make(*words: str) -> str:
 
 def test_make_explains_itself() -> None:
     shown = _make()
-    for target in ("setup", "demo", "calibrate", "test", "lint", "bench", "montecarlo"):
+    for target in ("setup", "demo", "calibrate", "repeat", "test", "lint", "bench", "montecarlo"):
         assert f"make {target} " in shown
 
 
-def test_make_calibrate_takes_blanks() -> None:
+def test_make_calibrate_and_repeat_take_blanks() -> None:
     shown = _make("-n", "calibrate", "SESSION=my pool", "CONFIG=a b.yaml", "RUN=runs/c d", "JOBS=2")
     assert "run 'my pool' --config 'a b.yaml' --run 'runs/c d' --jobs 2" in shown
     assert "--overwrite" not in shown
+    assert "repeat 'my fleet.yaml' --jobs 2" in _make("-n", "repeat", "FLEET=my fleet.yaml", "JOBS=2")
     words = ("SESSION=a", "CONFIG=b", "RUN=c", "OVERWRITE=1")
     assert "run 'a' --config 'b' --run 'c'  --overwrite" in _make("-n", "calibrate", *words)
 

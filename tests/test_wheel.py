@@ -40,7 +40,7 @@ def test_the_wheel_has_every_file_of_the_program(wheel: Path) -> None:
         held = {name for name in file.namelist() if ".dist-info/" not in name}
     kinds = {"pipeline": "*", "stages": "*", "configs/instruments": "*.yaml", "configs/scenarios": "*.yaml"}
     paths = [path for folder, kind in kinds.items() for path in (ROOT / folder).rglob(kind)]
-    paths += [ROOT / "configs" / "defaults.yaml", ROOT / "configs" / "marks.yaml"]
+    paths += [ROOT / "configs" / name for name in ("defaults.yaml", "fleet.yaml", "marks.yaml")]
     ours = {
         path.relative_to(ROOT).as_posix() for path in paths if path.is_file() and "__pycache__" not in path.parts
     }

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any
 
+import yaml
 from pydantic import BaseModel
 
 from pipeline.config.model_fields import Location, field_names, known_keys, without_tags
+from pipeline.config.yaml_file import line_of
 
 LETTERS = tuple(f"target.{letter}" for letter in "abce")
 FOOT_M = 0.3048
@@ -20,7 +22,7 @@ SENTENCES = {  # in place of pydantic's, which are for programmers
 OUT_OF_BOUNDS = ("less_than_equal", "greater_than_equal")
 
 
-def fault_line(model: type[BaseModel], faults: Sequence[Any], where: str) -> str:
+def fault_line(model: type[BaseModel], faults: Sequence[Any], where: str, root: yaml.Node | None = None) -> str:
     """Return the message about the first fault that matters.
 
     Parameters
@@ -31,8 +33,11 @@ def fault_line(model: type[BaseModel], faults: Sequence[Any], where: str) -> str
         The faults as pydantic lists them, each a mapping with ``type``, ``loc``, ``input`` and ``msg``.
     where : str
         The file, and the block within it.
+    root : yaml.Node, optional
+        The content with its places in the file; without it the message has no line.
     """
     fault = _first(faults)
+    where += "" if root is None else f": line {line_of(root, fault['loc'])}"
     place = without_tags(model, fault["loc"])
     key = ".".join(str(part) for part in place if part not in ("function-after", "[key]")) or "(whole file)"
     if fault["type"] == "extra_forbidden":

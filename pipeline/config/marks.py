@@ -3,21 +3,14 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from pipeline.config.quantities import Model
+from pipeline.config.quantities import PRINTABLE, Model
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
-
-def _printable(name: str) -> str:
-    if not name.isprintable():
-        raise ValueError("must have no control characters")
-    return name
-
-
-Name = Annotated[str, Field(min_length=1, max_length=40), AfterValidator(_printable)]
+Name = Annotated[str, Field(min_length=1, max_length=40), PRINTABLE]
 Coordinate = Annotated[float, Field(ge=-1e7, le=1e7)]
 Sigma = Annotated[float, Field(ge=1e-5, le=1)]
 Sigmas = tuple[Sigma, Sigma, Sigma]

@@ -16,6 +16,8 @@ def field_names(model: type[BaseModel], location: Location) -> list[str]:
     """Return the keys of the model at this place, in the model's order; an empty list if there is no model."""
     current: Any = model
     for part in location:
+        if isinstance(part, int) and isinstance(current, type):  # an item of a list of such models
+            continue
         field = getattr(current, "model_fields", {}).get(part)
         current = field.annotation if field is not None else _tagged(current).get(part)
         members = get_args(current)

@@ -1,4 +1,4 @@
-"""Parts of which settings are made: a strict model, and numbers within plausible bounds."""
+"""Parts of which settings are made: a strict model, printable text, and numbers within plausible bounds."""
 
 from typing import Annotated
 
@@ -19,6 +19,15 @@ Lever = Annotated[float, Field(ge=-100, le=100)]
 Depth = Annotated[float, Field(ge=0, le=200)]
 SoundSpeed = Annotated[float, Field(ge=1300, le=1700)]
 Latency = Annotated[float, Field(ge=-10, le=10)]
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must have no control characters")
+    return text
+
+
+PRINTABLE = AfterValidator(_printable)
 
 
 class Model(BaseModel):

@@ -1,6 +1,6 @@
 """Strict reading of a YAML file. Every failure is an error of one line that names the file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +75,21 @@ def compose(text: str, path: Path) -> yaml.Node:
     """Return the root node of a YAML text; all nodes know their places in it. ``path`` is the file for messages."""
     node: yaml.Node = _loaded(text, path, _StrictLoader.get_single_node)
     return node
+
+
+def line_of(root: yaml.Node, location: Sequence[int | str]) -> int:
+    """Return the line, counted from 1, of the key or list item at a location; if it is missing, that of its block."""
+    node, line = root, root.start_mark.line
+    for part in location:
+        if isinstance(node, yaml.MappingNode):
+            found = [(key, value) for key, value in node.value if key.value == part]
+        else:
+            items = node.value if isinstance(node, yaml.SequenceNode) else []
+            found = [(item, item) for place, item in enumerate(items) if place == part]
+        if not found:
+            break
+        line, node = found[0][0].start_mark.line, found[0][1]
+    return line + 1
 
 
 def _loaded(text: str, path: Path, load: Callable[[_StrictLoader], Any]) -> Any:

@@ -4,6 +4,7 @@ import json
 import math
 from typing import Any, TypeVar
 
+import yaml
 from pydantic import BaseModel, ValidationError
 
 from pipeline.config.faults import fault_line
@@ -12,7 +13,7 @@ from pipeline.errors import ConfigError
 M = TypeVar("M", bound=BaseModel)
 
 
-def parse(model: type[M], content: dict[str, Any], where: str) -> M:
+def parse(model: type[M], content: dict[str, Any], where: str, root: yaml.Node | None = None) -> M:
     """Check the content of a file against a model.
 
     Parameters
@@ -23,6 +24,8 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
         The mapping that the file holds.
     where : str
         The file, and the block within it, for messages.
+    root : yaml.Node, optional
+        The same content with its places in the file, so that the message has the line as well.
 
     Returns
     -------
@@ -37,7 +40,7 @@ def parse(model: type[M], content: dict[str, Any], where: str) -> M:
     try:
         return model.model_validate_json(_to_json(content, where), strict=True)
     except ValidationError as error:
-        raise ConfigError(fault_line(model, error.errors(include_url=False), where)) from error
+        raise ConfigError(fault_line(model, error.errors(include_url=False), where, root)) from error
 
 
 def _to_json(content: dict[str, Any], where: str) -> str:

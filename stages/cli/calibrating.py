@@ -1,4 +1,4 @@
-"""Commands that make results: a simulated session, a run, one stage."""
+"""Commands that make results: a simulated session, a run, many runs, one stage."""
 
 from pathlib import Path
 from typing import Annotated
@@ -70,6 +70,28 @@ def _laser(
 
     options = RunOptions(jobs, executor, Drawings(report, recordings), overwrite)
     return laser.command(session, config, run_folder, write, options)
+
+
+@app.command("repeat")
+def _repeat(
+    fleet: Annotated[Path, typer.Argument(metavar="FLEET", help="YAML file that lists them, as configs/fleet.yaml")],
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", metavar="N", min=1, help="sessions at a time; default: one a core, at most 4"),
+    ] = None,
+    executor: Address = None,
+    recordings: Recordings = True,
+    report: Report = True,
+) -> int:
+    """Bring many sessions up to date, then show one table.
+
+    Goes on past a session that is refused. Status 1 if any was rejected, 2 if any could not run. A second call
+    computes only what is out of date.
+    """
+    from stages.commands import repeat
+    from stages.commands.draw import Drawings
+
+    return repeat.command(fleet, jobs, executor, Drawings(report, recordings))
 
 
 @app.command("stage")

@@ -6,9 +6,7 @@ Drawing begins when the answer is on the screen. With two jobs or more, separate
 
 import contextlib
 import json
-import os
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,10 +16,11 @@ from pipeline.run import folder
 from pipeline.run.results import PAGE, agreeing, recording_path
 from pipeline.run.settings import read_settings
 from stages import ORDER, names_in
+from stages.commands import child
 from stages.commands.one_drawing import RECORDINGS, DrawingFailure, draw_one, kind_of_drawing
 
 DECIDES = "angle_iterate"  # its result decides which tabs there are
-WORKER = [sys.executable, "-P", "-m", "stages.commands.draw_worker"]  # -P: nothing is imported from the working folder
+WORKER = (*child.PYTHON, "stages.commands.draw_worker")
 
 
 @dataclass(frozen=True)
@@ -106,9 +105,9 @@ def _drawn_by_workers(run: Path, shares: Sequence[Sequence[str]]) -> list[Drawin
 
 
 def _started(command: Sequence[str]) -> "subprocess.Popen[str]":
-    pipe = subprocess.PIPE
+    pipe, env = subprocess.PIPE, child.environment()
     return subprocess.Popen(
-        command, stdin=pipe, stdout=pipe, encoding="utf-8", errors="replace", start_new_session=True, env=_environment()
+        command, stdin=pipe, stdout=pipe, encoding="utf-8", errors="replace", start_new_session=True, env=env
     )
 
 
@@ -118,10 +117,3 @@ def _answer(worker: "subprocess.Popen[str]", share: Sequence[str]) -> list[Drawi
     if not last:
         return [DrawingFailure(" and ".join(dict.fromkeys(map(kind_of_drawing, share))), "its process has ended")]
     return [DrawingFailure(**failure) for failure in json.loads(last)]
-
-
-def _environment() -> dict[str, str]:
-    """Return this process's environment, with the program's root first in PYTHONPATH in case it is not installed."""
-    root = str(Path(__file__).parents[2])
-    path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-    return os.environ | {"PYTHONPATH": path}

@@ -23,8 +23,22 @@ class RunOptions:
     overwrite: bool  # True: replace another session's run
 
 
+@dataclass(frozen=True)
+class Done:
+    """What a run did: its exit status, the names of the stages that were run, the kinds of drawings that failed."""
+
+    status: int  # 0: accepted, 1: rejected
+    ran: list[str]
+    not_drawn: list[str]
+
+
 def command(session: Path, config: Path, run: Path, calibrated: Calibrated, options: RunOptions) -> int:
-    """Calibrate a session.
+    """Calibrate a session as :func:`calibrate` does; return 0: accepted, 1: rejected."""
+    return calibrate(session, config, run, calibrated, options).status
+
+
+def calibrate(session: Path, config: Path, run: Path, calibrated: Calibrated, options: RunOptions) -> Done:
+    """Calibrate a session, print the answer, and draw.
 
     Parameters
     ----------
@@ -38,14 +52,9 @@ def command(session: Path, config: Path, run: Path, calibrated: Calibrated, opti
         The sensor that is calibrated.
     options
         Workers, drawings and overwriting.
-
-    Returns
-    -------
-    int
-        0: accepted, 1: rejected.
     """
     with workers(options.jobs, options.executor) as pool:
-        runner.run(
+        ran = runner.run(
             load(calibrated),
             session,
             config,
@@ -58,7 +67,8 @@ def command(session: Path, config: Path, run: Path, calibrated: Calibrated, opti
         )
         status = print_result(run)
         jobs = pool.jobs
-    say_failures(draw_missing(run, options.drawings, jobs), "; the calibration is complete")
+    failures = draw_missing(run, options.drawings, jobs)
+    say_failures(failures, "; the calibration is complete")
     raise_if_interrupted()
     say_where(run)
-    return status
+    return Done(status, ran, [failure.kind for failure in failures])

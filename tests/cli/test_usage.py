@@ -13,7 +13,7 @@ from stages.cli import call
 
 COMMANDS = (
     "init", "simulate", "run", "stage", "verify", "view", "diff", "history", "check", "plan", "coarse", "compare",
-    "export", "check-entry", "mount",
+    "export", "check-entry", "mount", "repeat", "report",
 )  # fmt: skip
 
 
@@ -52,6 +52,8 @@ def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixtu
         (["run", "x", "--config", "y", "--run", "z", "--jobs", "many"], "--jobs"),
         (["run", "x", "--config", "y", "--run", "z", "--jobs", "0"], "--jobs 0: must be 1 or more"),
         (["run", "x", "--config", "missing.yaml", "--run", "z"], "missing.yaml: cannot be read"),
+        (["repeat", "missing.yaml"], "missing.yaml: cannot be read"),
+        (["repeat", "x", "--jobs", "0"], "--jobs"),
         (["stage", "wash", "z"], "NAME 'wash': is no stage; the stages are ingest"),
         (["stage", "ingest", "z", "--session", "x"], "--session and --config: give both"),
         (["simulate", "x", "--seed", "-1"], "--seed -1: must not be negative"),

@@ -1,7 +1,8 @@
 """poolcal with toy stages: python toy_poolcal.py ARGUMENTS. verdict.max_sigma_m sets what the toy report does:
-1: accepted, 2: rejected, 3: a bug, 4: Ctrl-C, 5: hangs.
+1: accepted, 2: rejected, 3: a bug, 4: Ctrl-C, 5: hangs, 6: crashes.
 """
 
+import importlib
 import os
 import signal
 import sys
@@ -24,6 +25,8 @@ from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.artefacts.schema import Provenance
 from pipeline.config.pool import VerdictLimits
 from tests.support import toys
+
+REPEAT_WORKER = "as-a-worker-of-poolcal-repeat"
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ def _run(inputs: Inputs, config: Config) -> Outputs:
     code = round(config.verdict.max_sigma_m)
     if code == 3:
         raise ZeroDivisionError("a toy bug")
+    if code == 6:
+        os.kill(os.getpid(), signal.SIGSEGV)
     if code == 4:
         os.kill(os.getpid(), signal.SIGINT)
     if code in (4, 5):
@@ -56,7 +61,7 @@ def _run(inputs: Inputs, config: Config) -> Outputs:
     result = {
         "schema": 1, "session": config.name, "verdict": "rejected" if code == 2 else "accepted",
         "reasons": ["toy"] if code == 2 else [], "inputs": inputs.provenance["inputs"],
-        "software": inputs.provenance["software"],
+        "software": inputs.provenance["software"], "mbes": {"mount": None},
     }  # fmt: skip
     return Outputs(json.dumps(result) + "\n")
 
@@ -76,12 +81,16 @@ def install(put: Callable[[object, str, object], object]) -> dict[str, types.Mod
     put(stages, "ORDER", ("take", "sift", "report"))
     put(pipeline.readers.dispatch, "raw_files", toys.raw_files)
     put(pipeline.readers.dispatch, "raw_parts", toys.raw_parts)
+    repeat = importlib.import_module("stages.commands.repeat")  # not before the toys are in their places
+    put(repeat, "WORKER", [sys.executable, __file__, REPEAT_WORKER])
     return {module.__name__: module for module in (take, sift, report)}
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal: a job in the background ignores it
     sys.modules |= install(setattr)
-    from stages.cli import main
-
+    if sys.argv[1] == REPEAT_WORKER:
+        from stages.commands.repeat_worker import main
+    else:
+        from stages.cli import main
     main()
