@@ -19,7 +19,7 @@ DOCS = ROOT / "docs"
 PAGES_AND_README = [ROOT / "README.md", ROOT / "CONVENTIONS.md", *sorted(DOCS.rglob("*.md"))]
 LINK = re.compile(r"\]\((?!https?:|mailto:)([^)\s#]*)(?:#([^)\s]+))?\)")
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-COMMAND = re.compile(r"^(?: {4}|\$ )?(?:\.venv/bin/)?poolcal ([a-z].*)$", re.MULTILINE)
+COMMAND = re.compile(r"^(?: {4}|\$ |\.venv/bin/)(?:\.venv/bin/)?poolcal ([a-z].*)$", re.MULTILINE)
 INLINE = re.compile(r"`poolcal ([a-z][^`]*)`")
 MOST_LINES_OF_README = 150
 

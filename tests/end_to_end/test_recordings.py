@@ -18,21 +18,13 @@ import stages.views.recording
 from stages.commands.draw import Drawings, draw_missing
 from stages.views.blueprint import tabs_of
 from tests.support.places import Told, poolcal
-from tests.support.recordings import Chunks, points, read, rows_in, text
+from tests.support.recordings import Chunks, placed, points, read, rows_in, text
 
 
 def log_curve(chunks: list[Any], timeline: str) -> tuple[np.ndarray, list[Any]]:
     rows = [chunk for chunk in chunks if "Scalars:scalars" in chunk.schema.names]
     values = np.concatenate([np.ravel(chunk.column("Scalars:scalars").to_pylist()) for chunk in rows])
     return values, [moment for chunk in rows for moment in chunk.column(timeline).to_pylist()]
-
-
-def placed(chunks: list[Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the translation and the rotation matrix of a frame; a column after the other is stored."""
-    (chunk,) = [one for one in chunks if "Transform3D:translation" in one.schema.names]
-    (translation,) = chunk.column("Transform3D:translation").to_pylist()[0]
-    (matrix,) = chunk.column("Transform3D:mat3x3").to_pylist()[0]
-    return np.array(translation), np.reshape(matrix, (3, 3)).T
 
 
 def test_every_point_is_there(drawn: Path) -> None:

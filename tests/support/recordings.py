@@ -31,3 +31,11 @@ def text(found: Chunks, path: str) -> str:
     (chunk,) = found[path]
     ((written,),) = chunk.column("TextDocument:text").to_pylist()
     return str(written)
+
+
+def placed(chunks: list[Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the translation and the rotation matrix of a frame; a column after the other is stored."""
+    (chunk,) = [one for one in chunks if "Transform3D:translation" in one.schema.names]
+    (translation,) = chunk.column("Transform3D:translation").to_pylist()[0]
+    (matrix,) = chunk.column("Transform3D:mat3x3").to_pylist()[0]
+    return np.array(translation), np.reshape(matrix, (3, 3)).T
