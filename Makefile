@@ -109,7 +109,7 @@ thorough: lint ## every test, with more draws, kills and damaged files than a us
 bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare decoding
 	$(PY) -m tools.bench
 
-pictures: $(DEMO)/.simulated ## the README's pictures, anew (after make setup-visual)
+pictures: $(DEMO)/.simulated ## the documents' pictures, anew (after make setup-visual)
 	$(POOLCAL) run $(DEMO) --config $(DEMO)/pool.yaml --run runs/demo
 	$(PY) -m tools.pictures runs/demo docs/pictures
 

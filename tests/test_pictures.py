@@ -1,4 +1,4 @@
-"""The README's pictures are those of today's program."""
+"""The documents' pictures are those of today's program."""
 
 from tools.pictures import DRAWN_FROM, ROOT, drawn_from
 

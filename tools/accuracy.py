@@ -2,7 +2,7 @@
 
 The program reads the rows that ``tools.montecarlo`` and ``tools.mistakes`` have written, and computes the Cramér-Rao
 bound for each kind of noise (``tools.bound``). A campaign whose systematic errors are drawn is judged by its total
-sigmas, and has no bound. The program prints the README's table and writes runs/montecarlo/accuracy.html.
+sigmas, and has no bound. The program prints the table of docs/theory/accuracy.md and writes runs/montecarlo/accuracy.html.
 
     python -m tools.accuracy [runs/montecarlo | docs/accuracy] [--bounds 24] [--jobs 2]
 """
@@ -147,7 +147,7 @@ def _bound(campaign: Campaign, number: int) -> Array:
 
 
 def markdown(results: list[Result]) -> str:
-    """Return the README's table."""
+    """Return the table of docs/theory/accuracy.md."""
     lines = ["| | pitch ° | roll ° | yaw ° | x mm | y mm | z mm |", "|---|---:|---:|---:|---:|---:|---:|"]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for result in results for row in result.rows()])
 

@@ -1,4 +1,4 @@
-"""Draw the README's pictures without a screen: the tabs of a run's recordings, its report, and the pipeline.
+"""Draw the documents' pictures without a screen: the tabs of a run's recordings, its report, and the pipeline.
 
     make setup-visual
     make pictures
@@ -139,7 +139,7 @@ def drawn_from() -> str:
     """Return one line for the report and one for the recordings: the SHA-256 of all sources that draw it.
 
     A digest changes whenever the pictures may change. tests/test_pictures.py compares it with the digest stored beside
-    the README's pictures.
+    the documents' pictures.
     """
     digests = {}
     for kind, folder in SOURCES.items():
@@ -170,7 +170,7 @@ def main() -> None:
 
 
 def _lighten(path: Path) -> None:
-    """Replace a picture by a WebP, as wide as a README shows it and a tenth of the size."""
+    """Replace a picture by a WebP, as wide as a page shows it and a tenth of the size."""
     from PIL import Image
 
     image = Image.open(path).convert("RGB")

@@ -9,7 +9,7 @@ Location = tuple[int | str, ...]  # place of a value in a file, as pydantic repo
 
 def known_keys(model: type[BaseModel], location: Location) -> list[str]:
     """Return the keys known at this place, sorted, for a message."""
-    return sorted(field_names(model, location)) or ["see README.md"]
+    return sorted(field_names(model, location)) or ["see docs/reference"]
 
 
 def field_names(model: type[BaseModel], location: Location) -> list[str]:

@@ -65,9 +65,9 @@ def content_of(text: str, path: Path) -> dict[str, Any]:
     """Return the mapping that a YAML text holds; ``path`` is the file that messages name."""
     content = _loaded(text, path, _StrictLoader.get_single_data)
     if content is None:
-        raise ConfigError(f"{path}: is empty; see README.md for what it must say")
+        raise ConfigError(f"{path}: is empty; see docs/reference for what it must say")
     if not isinstance(content, dict):
-        raise ConfigError(f"{path}: holds {type(content).__name__}, not a mapping of keys; see README.md")
+        raise ConfigError(f"{path}: holds {type(content).__name__}, not a mapping of keys; see docs/reference")
     return content
 
 

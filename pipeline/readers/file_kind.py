@@ -54,19 +54,19 @@ SMRMSG = FileKind(
 )
 FLOAT32_TEXT = FileKind(
     "a text whose numbers went through float32: times and positions have lost their digits",
-    advice="export it again in double precision, as LAS or as a table with the columns that README.md names",
+    advice="export it again in double precision, as LAS or as a table with the columns that docs/your-files.md names",
 )
 TEXT = FileKind(
     "a text without the columns of a table",
-    advice="name the columns in its first line as README.md has them, or export it in a format of the instrument",
+    advice="name the columns in its first line as docs/your-files.md has them, or export it in a format of the instrument",
 )
 TRAJECTORY_TEXT = FileKind(
     "a trajectory as text, of a layout that is not read",
     advice="export it as SBET (POSPac, Qinertia, Delph INS, OxTS and Inertial Explorer have it), or as a table with "
-    "the columns that README.md names; if it is Inertial Explorer's, export it with its header",
+    "the columns that docs/your-files.md names; if it is Inertial Explorer's, export it with its header",
 )
 UTF16_TEXT = FileKind("a text in UTF-16", advice="save it as UTF-8")
 UNKNOWN = FileKind(
     "of no kind that is read",
-    advice="export it in one of the formats that README.md names; if it should be one of them, copy it again",
+    advice="export it in one of the formats that docs/your-files.md names; if it should be one of them, copy it again",
 )

@@ -134,7 +134,7 @@ def _csv_names(file: BinaryIO, name: str) -> tuple[str, list[str]]:
         continue
     header = csv_header(line.decode("utf-8-sig", "replace"))
     if header is None or not line.endswith(b"\n"):
-        raise RawDataError(f"{name}: its first line names no column; name them as README.md has them")
+        raise RawDataError(f"{name}: its first line names no column; name them as docs/your-files.md has them")
     return header
 
 

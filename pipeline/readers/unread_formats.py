@@ -18,19 +18,19 @@ EXPORT_PINGS = (
     "angles, of one head"
 )
 EXPORT_SOLUTION = (
-    "export the INS's solution as SBET, as a text of Inertial Explorer, or as a table with README.md's columns"
+    "export the INS's solution as SBET, as a text of Inertial Explorer, or as a table with docs/your-files.md's columns"
 )
 EXPORT_BY_SENSOR = {"ins": EXPORT_SOLUTION, "laser": EXPORT_LAS, "mbes": EXPORT_PINGS}
 PROCESS_GNSS = (
     "process it together with the IMU's data (Inertial Explorer, POSPac, Qinertia and the like), and export the "
-    "solution as SBET, as a text of Inertial Explorer, or as a table with README.md's columns"
+    "solution as SBET, as a text of Inertial Explorer, or as a table with docs/your-files.md's columns"
 )
 
 
 def _recorded(title: str) -> FileKind:
     """Return a kind of file that may hold the data of any sensor."""
     return FileKind(
-        title, advice="export each sensor's data in a format that README.md names", advice_by_sensor=EXPORT_BY_SENSOR
+        title, advice="export each sensor's data in a format that docs/your-files.md names", advice_by_sensor=EXPORT_BY_SENSOR
     )
 
 
@@ -40,7 +40,7 @@ def _packed(title: str) -> FileKind:
 
 CAPTURE = FileKind(
     "a capture of network traffic",
-    advice="export each sensor's data in a format that README.md names",
+    advice="export each sensor's data in a format that docs/your-files.md names",
     advice_by_sensor=EXPORT_BY_SENSOR
     | {
         "laser": f"{EXPORT_LAS} by the scanner's own software (of Velodyne, Hesai, Ouster, Livox and the like)",

@@ -7,13 +7,13 @@ from pipeline.starting.yaml_words import comment, to_fill_in
 _HEAD = (
     f"The pool's config, begun by poolcal init. {MARK} marks what only a person knows. Every other key, with its "
     "default and its meaning: configs/defaults.yaml. A target of another shape has faces in place of a, b, c, e and "
-    'low_side: README.md, "Other targets".'
+    'low_side: docs/target.md.'
 )
 _AZIMUTH = "  azimuth_deg: null             # of the target's +y, clockwise from north; null: by the boat's heading"
 _AS_BUILT = """\
 # as_built:                     # take the comment signs away, and say how the target was surveyed; these, the defaults,
 #   face_sigma_m: 0.0005        # are of faces surveyed one by one with the pool filled. For other cases the table in
-#   offset_sigma_m: 0.001       # README.md, "The pool's config", has the figures
+#   offset_sigma_m: 0.001       # docs/target.md has the figures
 #   angle_sigma_deg: 0.01
 #   bow_sigma_m: 0.001"""
 

@@ -17,7 +17,7 @@ MOST_LEFT_OUT = 40  # files that are listed with their reasons
 _NAMES = {"ins": "the INS", "laser": "the laser", "mbes": "the sonar"}
 _HEAD = (
     f"A session of poolcal, begun by poolcal init from the files in this folder. {MARK} marks what only a person "
-    'knows: poolcal says what is still to be filled in. All keys, and their defaults: README.md, "session.yaml".'
+    'knows: poolcal says what is still to be filled in. All keys, and their defaults: docs/reference/session.md.'
 )
 _BEGINNING_OF_MBES = (
     "No sonar file was found. To calibrate the sonar add a block mbes with files, format and mount; without it poolcal "

@@ -32,7 +32,7 @@ def test_the_example_loads() -> None:
         ),
         ("sessions:\n  - {session: '', config: b}\n", "line 2: sessions.0.session = '': string should have at least"),
         ('sessions:\n  - {session: "a\\0", config: b}\n', "sessions.0.session = 'a\\x00': must have no control"),
-        ("sessions:\n  - {session: 2026, config: b}\n", "sessions.0.session = 2026: input should be a valid string"),
+        ("sessions:\n  - {session: 2026, config: b}\n", "sessions.0.session = 2026: should be text: put it in quotes"),
         (
             "sessions:\n  - session: a\n    config: b\n    run: c\n    runs: d\n",
             "line 2: sessions.0 = {'session': 'a', 'config': 'b', 'run': 'c', 'runs': 'd'}: has both run and runs;",

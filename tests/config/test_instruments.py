@@ -102,8 +102,8 @@ def test_each_stands_over_the_defaults_and_under_the_session(path: Path, tmp_pat
         assert getattr(found, sensor).instrument is None
 
 
-def test_readme_lists_them() -> None:
-    text = (PRESETS.parents[1] / "README.md").read_text(encoding="utf-8")
+def test_their_page_lists_them() -> None:
+    text = (PRESETS.parents[1] / "docs" / "reference" / "instruments.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| (\w+) \| (.+?) \|$", text, flags=re.MULTILINE)
     assert sorted(rows) == [(path.stem, (one := load_instrument(path)).sensor, one.title) for path in FILES]
 

@@ -1,4 +1,4 @@
-"""The README's table of accuracy judges drawn errors by total sigmas, and all others against the bound."""
+"""The documents' table of accuracy judges drawn errors by total sigmas, and all others against the bound."""
 
 import numpy as np
 import pandas as pd

@@ -24,7 +24,7 @@ def _proposed(
     columns = {axis: np.array([value, value + 1.0]) for axis, value in zip(("x_m", "y_m", "z_m"), point, strict=True)}
     file = SurveyedFile("laser", "a.las", 1, records=2, columns=columns)
     wkt = CRS.from_user_input(declared).to_wkt() if declared else ""
-    monkeypatch.setattr(laser_frame, "declared_crs", lambda *_: wkt)
+    monkeypatch.setattr(laser_frame, "crs_of_las", lambda *_: wkt)
     return propose_frame(FileGroup("laser", LAS, (file,), ("a.las",)), Path(), track)
 
 
