@@ -2,7 +2,8 @@
 
 The program reads the rows that ``tools.montecarlo`` and ``tools.mistakes`` have written, and computes the Cramér-Rao
 bound for each kind of noise (``tools.bound``). A campaign whose systematic errors are drawn is judged by its total
-sigmas, and has no bound. The program prints the table of docs/theory/accuracy.md and writes runs/montecarlo/accuracy.html.
+sigmas, and has no bound. The program prints the table of docs/theory/accuracy.md and writes
+runs/montecarlo/accuracy.html.
 
     python -m tools.accuracy [runs/montecarlo | docs/accuracy] [--bounds 24] [--jobs 2]
 """

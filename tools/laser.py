@@ -130,7 +130,7 @@ def laser_bound_of(number: int) -> Array:
 
 
 def report(table: pd.DataFrame, bound: Array) -> str:
-    """Return the table of docs/theory/accuracy.md: RMS errors, the bound and the total sigmas, and the laser's verdicts."""
+    """Return the table of docs/theory/accuracy.md: RMS errors, bound and total sigmas, and the laser's verdicts."""
     n = len(table)
     low, high = nse_band(n)
     least = np.sqrt(np.diag(bound)) / UNITS

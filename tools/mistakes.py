@@ -5,8 +5,8 @@ Each line of the table is the default scenario, thinned, with one kind of error 
 accepted and the adjustment's largest errors in angles and lever arm. For the accepted sessions it also shows the
 largest normalised squared error by the total covariance and the largest error in total sigmas; for the rejected ones,
 in how many of them what is named first is what was planted.
-Above the table stand the same figures of all sessions together. The README must name every mistake that the verdict
-does not notice. Each session is a row of runs/montecarlo/mistakes.parquet. All kinds are simulated with the first seed,
+Above the table stand the same figures of all sessions together. docs/theory/mistakes.md must name every mistake that
+the verdict does not notice. Each session is a row of runs/montecarlo/mistakes.parquet. All kinds are simulated with the first seed,
 then with the second, and so on.
 
     python -m tools.mistakes [--jobs 2] [--seeds 25] [--only NAME ...] [--resume]

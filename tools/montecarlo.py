@@ -4,8 +4,8 @@ For each campaign the program prints the errors of the six mount parameters, the
 mean normalised squared error with its 99 % band; the expectation of the latter is 6 if the covariance is right. Seeds
 are fixed. In every session the coarse mount is wrong by 2.5° and 0.25 m on every axis at once, and the signs of these
 errors go through all 64 combinations. Each session is a row of a file in runs/montecarlo/ (``tools.campaign_files``).
-``tools.accuracy`` makes the table of docs/theory/accuracy.md and an HTML page from these files, ``tools.stress`` the table of the
-campaigns under noise that the settings do not describe (``tools.stress_campaigns``).
+``tools.accuracy`` makes the table of docs/theory/accuracy.md and an HTML page from these files, ``tools.stress`` the
+table of the campaigns under noise that the settings do not describe (``tools.stress_campaigns``).
 
     python -m tools.montecarlo [--only NAME ...] [--share 0.1] [--jobs 2] [--resume]
     python -m tools.montecarlo --seeds 8030 9012

@@ -26,8 +26,8 @@ PAGE_HEAD = """# Campaigns under noise that the settings do not describe
 
 NSE: normalised squared error of the six mount parameters by their random covariance (of the laser: by the total one,
 with the coarse mount), 6 on average if it is true; in brackets the band of its mean with 99 % probability. σ: the
-sigma by the same covariance. No systematic errors are simulated, so that the NSE by total sigmas is smaller. README,
-"Accuracy", says what each campaign simulates.
+sigma by the same covariance. No systematic errors are simulated, so that the NSE by total sigmas is smaller.
+docs/theory/accuracy.md says what each campaign simulates.
 """
 
 

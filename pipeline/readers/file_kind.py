@@ -58,7 +58,8 @@ FLOAT32_TEXT = FileKind(
 )
 TEXT = FileKind(
     "a text without the columns of a table",
-    advice="name the columns in its first line as docs/your-files.md has them, or export it in a format of the instrument",
+    advice="name the columns in its first line as docs/your-files.md has them, or export it in a format of the "
+    "instrument",
 )
 TRAJECTORY_TEXT = FileKind(
     "a trajectory as text, of a layout that is not read",

@@ -30,7 +30,9 @@ PROCESS_GNSS = (
 def _recorded(title: str) -> FileKind:
     """Return a kind of file that may hold the data of any sensor."""
     return FileKind(
-        title, advice="export each sensor's data in a format that docs/your-files.md names", advice_by_sensor=EXPORT_BY_SENSOR
+        title,
+        advice="export each sensor's data in a format that docs/your-files.md names",
+        advice_by_sensor=EXPORT_BY_SENSOR,
     )
 
 

@@ -42,7 +42,7 @@ def _check(
 
 @app.command("plan")
 def _plan(
-    file: Annotated[Path, typer.Argument(metavar="PLAN", help="YAML file of the plan; docs/before-sailing.md lists its keys")],
+    file: Annotated[Path, typer.Argument(metavar="PLAN", help="YAML file of the plan; keys: docs/before-sailing.md")],
     session: SessionYaml,
     config: Pool,
     out: Annotated[Path | None, typer.Option("--yaml", metavar="FILE", help="write the prediction as YAML")] = None,
