@@ -6,8 +6,8 @@ accepted and the adjustment's largest errors in angles and lever arm. For the ac
 largest normalised squared error by the total covariance and the largest error in total sigmas; for the rejected ones,
 in how many of them what is named first is what was planted.
 Above the table stand the same figures of all sessions together. docs/theory/mistakes.md must name every mistake that
-the verdict does not notice. Each session is a row of runs/montecarlo/mistakes.parquet. All kinds are simulated with the first seed,
-then with the second, and so on.
+the verdict does not notice. Each session is a row of runs/montecarlo/mistakes.parquet. All kinds are simulated with the
+first seed, then with the second, and so on.
 
     python -m tools.mistakes [--jobs 2] [--seeds 25] [--only NAME ...] [--resume]
     python -m tools.mistakes --rows docs/accuracy/mistakes.parquet [--page docs/accuracy/mistakes.md]
