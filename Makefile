@@ -21,7 +21,7 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: help setup setup-visual demo calibrate repeat stages diff view test thorough lint format bench pictures montecarlo clean
+.PHONY: docs help setup setup-visual demo calibrate repeat stages diff view test thorough lint format bench pictures montecarlo clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
@@ -112,6 +112,10 @@ bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare de
 pictures: $(DEMO)/.simulated ## the documents' pictures, anew (after make setup-visual)
 	$(POOLCAL) run $(DEMO) --config $(DEMO)/pool.yaml --run runs/demo
 	$(PY) -m tools.pictures runs/demo docs/pictures
+
+docs: $(SETUP) ## the documents as a site in runs/site, to be read without a network
+	@$(PY) -c 'import mkdocs, material' 2>/dev/null || $(PY) -m pip --disable-pip-version-check install -q -c constraints.txt -e '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build -q --strict
 
 montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.montecarlo

@@ -3,9 +3,12 @@
 import re
 from collections.abc import Iterable, Sequence
 
+from pipeline.language import letters
+from pipeline.language.chosen import translated
+
 
 def text_table(layout: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    r"""Return a table's lines, the header first.
+    r"""Return a table's lines, the header first, each cell in the language of this process.
 
     A column becomes wider where a cell does not fit. At least one blank is left between two columns, except between a
     flush-right column and a flush-left one for which the layout has no blank.
@@ -25,16 +28,16 @@ def text_table(layout: str, header: Sequence[str], rows: Iterable[Sequence[str]]
       x      0.0000003 m
     """
     columns = [(len(gap), side, int(width)) for gap, side, width in re.findall(r"( *)([<>])(\d+)", layout)]
-    lines = [[*row, *[""] * (len(columns) - len(row))] for row in (header, *rows)]
+    lines = [[*map(translated, row), *[""] * (len(columns) - len(row))] for row in (header, *rows)]
     widths = []
     for place, (gap, side, width) in enumerate(columns):
         following = columns[place + 1] if place + 1 < len(columns) else None
         before = side == ">" and place > 0 and gap == 0
         behind = side == "<" and following is not None and following[:2] == (0, "<")
-        widths.append(max(width, max(len(line[place]) for line in lines) + before + behind))
+        widths.append(max(width, max(letters.width(line[place]) for line in lines) + before + behind))
     return [
         "".join(
-            f"{'':{gap}}{cell:{side}{width}}"
+            f"{'':{gap}}{letters.padded(cell, side, width)}"
             for (gap, side, _), width, cell in zip(columns, widths, line, strict=True)
         ).rstrip()
         for line in lines

@@ -30,6 +30,9 @@ def _options(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="print the version and end")
     ] = False,
+    lang: Annotated[
+        str | None, typer.Option("--lang", metavar="CODE", help="language, en or zh; default: the locale's")
+    ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of bad input as well")] = False,
 ) -> None:
     """Options of every command."""

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from stages.commands.one_drawing import DrawingFailure
 
 
-def print_answer(text: str, is_yes: bool) -> int:
-    """Print an answer and return the exit status: 0 for yes, 1 for no."""
-    say(text, sys.stdout)
+def print_answer(text: str, is_yes: bool, as_is: bool = False) -> int:
+    """Print an answer and return the exit status: 0 for yes, 1 for no; ``as_is``: it is JSON, never translated."""
+    say(text, sys.stdout, as_is)
     return 0 if is_yes else 1
 
 
@@ -42,5 +42,5 @@ def say_failures(failures: "Sequence[DrawingFailure]", but: str = "") -> None:
     """Print which drawings failed, and why; ``but``: text at the end of each line. The result stays valid."""
     for failure in failures:
         if failure.trace:
-            say(failure.trace, sys.stderr)
+            say(failure.trace, sys.stderr, as_is=True)
         say(f"{failure.kind}: not drawn ({failure.reason}){but}", sys.stderr)

@@ -37,7 +37,7 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     findings = check_session(session, content, pool, _calibrated)
     if as_json:
-        return print_answer(rendering.check_json(findings), not findings.faulty)
+        return print_answer(rendering.check_json(findings), not findings.faulty, as_is=True)
     used = None if content.mbes is None else content.mbes.svp_from
     cast = "" if used is None else f"mbes.svp: {describe_cast(used)}\n\n"
     unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"

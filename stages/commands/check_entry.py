@@ -33,4 +33,4 @@ def command(run: Path, soundings: Path, crs: str | None, other_heights: bool, as
     """
     check = check_entry(FinishedRun.read(run, ORDER), soundings, crs, other_heights)
     text = json.dumps(check_json(check), indent=1, ensure_ascii=False) if as_json else check_text(check)
-    return print_answer(text, check.answer.is_right)
+    return print_answer(text, check.answer.is_right, as_is=as_json)

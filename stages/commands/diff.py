@@ -53,7 +53,7 @@ def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutp
     if outputs.rrd is not None:
         write_two_runs(first, second, difference, outputs.rrd)
     text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else difference_text(difference)
-    say(text, sys.stdout)
+    say(text, sys.stdout, as_is=outputs.as_json)
     return 1 if is_moved(difference) else 0
 
 

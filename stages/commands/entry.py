@@ -20,6 +20,14 @@ SPEAKERS = ("typer", "click", "rich")  # packages that print the help
 interrupts: list[int] = []
 
 
+def refused(error: PoolcalError, debug: bool) -> int:
+    """Print the line of a refusal, with ``debug`` its traceback too, and return the exit status."""
+    if debug:
+        say(traceback.format_exc().rstrip(), sys.stderr, as_is=True)
+    say(f"poolcal: {error}", sys.stderr)
+    return 2
+
+
 def status_of(command: Callable[[], Any], debug: bool) -> int:
     """Call a command and return its exit status. Exceptions end here. ``debug``: show tracebacks of bad input too."""
     try:
@@ -28,10 +36,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
             say(STOPPED, sys.stderr)
         return status
     except PoolcalError as error:
-        if debug:
-            say(traceback.format_exc().rstrip(), sys.stderr)
-        say(f"poolcal: {error}", sys.stderr)
-        return 2
+        return refused(error, debug)
     except typer.TyperException as error:
         say(f"poolcal: {usage_message(error)}", sys.stderr)
         return 2
@@ -42,7 +47,7 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
         if isinstance(error, OSError) and _raised_in(error).startswith(SPEAKERS):
             say(f"poolcal: {_refusal(error)}", sys.stderr)
             return 2
-        say(traceback.format_exc().rstrip(), sys.stderr)
+        say(traceback.format_exc().rstrip(), sys.stderr, as_is=True)
         say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
         return 3
 

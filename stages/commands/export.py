@@ -79,7 +79,7 @@ def command(run_folder: Path | None, name: str | None, out: Path | None, choices
     mounting = _placed(mounting_of(run, target.sensor, choices.although_rejected), choices)
     text = export_text(target, mounting, Options(choices.order, choices.serial, choices.ins_height))
     if out is None:
-        say(text.removesuffix("\n"), sys.stdout)
+        say(text.removesuffix("\n"), sys.stdout, as_is=True)
         return 0
     write_text(out, text)
     say(f"{out}: the {mounting.sensor}'s mount for {target.title}; totals, which replace what stands there", sys.stdout)

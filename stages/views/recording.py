@@ -38,6 +38,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import ArtefactError
+from pipeline.language.chosen import in_english
 from pipeline.run.results import Tables, agreeing, recording_path
 from pipeline.run.settings import read_settings
 from pipeline.target.design import target_of
@@ -141,7 +142,8 @@ def recording_content(identity: str, blueprint: Any, draw: Callable[[Any], None]
     recording = rerun.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
     memory = recording.memory_recording()
     recording.send_blueprint(blueprint, make_active=False, make_default=True)
-    draw(recording)
+    with in_english():
+        draw(recording)
     recording.flush()
     return bytes(memory.drain_as_bytes())
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pipeline.atomic_files import sha256
+from pipeline.language.chosen import language
 from pipeline.run import manifest
 from pipeline.run.results import PAGE, agreeing
 from pipeline.run.settings import read_settings
@@ -15,7 +16,7 @@ HEAD = 2000  # bytes at the start of the page that contain its digest
 
 
 def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
-    """Return a digest of the results, settings and raw files on the page, and of the program's files that draw it.
+    """Return a digest of the results, settings and raw files on the page, of what draws it, and of its language.
 
     Parameters
     ----------
@@ -26,7 +27,7 @@ def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
     """
     shown = [[stage, of_stage.outputs, of_stage.key.raw] for stage, of_stage in manifests.items()]
     settings = read_settings(run)
-    content = [shown, settings.as_json(), dict(settings.files), _drawn_by()]
+    content = [shown, settings.as_json(), dict(settings.files), _drawn_by(), language()]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

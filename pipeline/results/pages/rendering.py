@@ -6,6 +6,7 @@ words of this program, and names of families, which have only letters, digits, h
 
 import base64
 import contextlib
+import functools
 import io
 import re
 from collections.abc import Iterator
@@ -14,7 +15,12 @@ from typing import Any
 import jinja2
 import matplotlib
 from markupsafe import Markup
+from matplotlib import font_manager
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from pipeline.language.chosen import ENGLISH, language, translated
+from pipeline.language.html_text import translated_page
 
 # Colours after Okabe and Ito, distinct for colour-blind readers, also in grey print.
 INK, QUIET, ALARM = "#1a1a1a", "#8a8f98", "#b00020"
@@ -25,6 +31,12 @@ MARKS = {"P1": "v", "P2": "o", "P3": "^", "H": "s", "other": "D", "more": "X"}
 WIDTH_IN = 7.2  # width of every picture
 SMALLEST_PT = 8  # size of the smallest letters in a picture
 DPI = 200  # resolution of point clouds, which are drawn as pixels in the vector picture
+FONTS = {  # with Chinese letters, by the names that they have on Linux and Windows
+    "zh": (
+        "Noto Sans CJK SC", "Noto Sans SC", "Source Han Sans SC", "WenQuanYi Micro Hei", "WenQuanYi Zen Hei",
+        "Droid Sans Fallback", "Microsoft YaHei", "SimHei",
+    ),
+}  # fmt: skip
 HEAD_LETTERS = 70  # length of the running head of a printed page
 MARGIN_TEXT = "font: 8pt system-ui, 'Noto Sans', 'Noto Sans CJK SC', sans-serif; color: #50555d;"
 STYLE: dict[Any, Any] = {
@@ -63,7 +75,7 @@ def render_page(template: str, **values: Any) -> str:
     )
     environment.filters["breakable"] = breakable
     fixed = {"css": css_text, "picture_px": round(96 * WIDTH_IN), "margin_text": Markup(MARGIN_TEXT)}
-    return environment.get_template(template).render(**fixed, **values)
+    return translated_page(environment.get_template(template).render(**fixed, **values))
 
 
 def css_text(text: str) -> Markup:
@@ -86,8 +98,27 @@ def breakable(text: str) -> Markup:
     return Markup("<wbr>").join(Markup.escape(part) for part in re.split(r"(?<=[_-])", text))
 
 
+def _translate(figure: Figure) -> None:
+    """Translate the texts of a figure, if a font on this machine has the letters; else they stay English."""
+    if language() == ENGLISH or not (fonts := fonts_of(language())):
+        return
+    for text in figure.findobj(Text):
+        words = translated(text.get_text())
+        if words != text.get_text():
+            text.set_text(words)
+            text.set_fontfamily([*fonts, *text.get_fontfamily()])
+
+
+@functools.cache
+def fonts_of(code: str) -> list[str]:
+    """Return the names of this machine's fonts with the letters of a language, the usual ones first."""
+    there = {font.name for font in font_manager.fontManager.ttflist}
+    return [name for name in FONTS.get(code, ()) if name in there]
+
+
 def picture(figure: Figure, label: str) -> Markup:
     """Return the figure as an HTML image; ``label``: its description for readers who cannot see it."""
+    _translate(figure)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", dpi=DPI, metadata={"Date": None, "Creator": None})
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
