@@ -68,7 +68,7 @@ def texts_of(path: Path) -> Iterator[tuple[str, int]]:
         if isinstance(node, ast.JoinedStr) and _is_text(text := template_of(node)):
             yield text, node.lineno
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            text = node.value
+            text = numbered(node.value)
             if _is_text(text) or (id(node) in values and re.fullmatch(r"[a-z ]{3,}", text)):
                 yield text, node.lineno
 
@@ -91,6 +91,16 @@ def template_of(node: ast.JoinedStr) -> str:
     return "".join(
         str(part.value) if isinstance(part, ast.Constant) else f"{{{next(numbers)}}}" for part in node.values
     )
+
+
+def numbered(text: str) -> str:
+    """Return a text for ``str.format`` with its places numbered.
+
+    >>> numbered("{} of {name} is {:+.2f}")
+    '{0} of {1} is {2}'
+    """
+    numbers = itertools.count()
+    return re.sub(r"\{[a-z_]*(?::[^{}]*)?\}", lambda _: f"{{{next(numbers)}}}", text)
 
 
 def template_texts(source: str) -> Iterator[str]:
@@ -138,7 +148,7 @@ def main() -> None:
     for folder in sorted(path for path in LANGUAGE.iterdir() if path.is_dir() and not path.name.startswith("_")):
         catalogue = updated(folder.name)
         with (folder / "poolcal.po").open("wb") as file:
-            write_po(file, catalogue, width=0, omit_header=False, sort_output=False)
+            write_po(file, catalogue, width=0, omit_header=True)
         print(f"{folder.name}: {len(catalogue)} texts, {sum(not one.string for one in catalogue if one.id)} open")
 
 

@@ -3,8 +3,9 @@
 An entry of the catalogue is a sentence with places for values, such as ``{0} scatter {1} times as much as {2} says``.
 A text matches it if it has the same words with any values between them. The values are translated in the same way.
 Where several entries match, the one that leaves the fewest words untranslated is taken, and of these the one with the
-most words of its own. A text that no entry matches is taken apart at semicolons, colons and commas, and its parts are
-translated; what then remains stays as it is.
+most words of its own; one that leaves more words than it has matches by chance, and is not taken. A text that no
+entry matches is taken apart at full stops, semicolons, colons and commas, and its parts are translated; but a
+sentence of which a third would remain English stays English.
 """
 
 import re
@@ -14,7 +15,14 @@ from functools import lru_cache
 
 PLACE = re.compile(r"\{(\d+)\}")
 WORD = re.compile(r"[A-Za-z]{2,}")
-BREAKS = ("\n", ". ", "; ", ": ", " (", ", ", " and ", " or ")  # where a text may be taken apart, coarse ones first
+PLAIN = re.compile(r"(?<![\w./:=-])[a-z]{2,}(?![\w/:=-]|\.\w)")  # a word of a sentence: no part of a path or of a key
+BREAKS = {  # where a text may be taken apart, coarse ones first, and what stands there then
+    "\n": "\n", ". ": "。", "; ": "；", ": ": "：", ", ": "，", " and ": "、", " or ": "或",
+}  # fmt: skip
+BRACKET = re.compile(r"([^()]*) \(([^()]*)\)(.*)", re.DOTALL)
+NUMBER = re.compile(  # words before a number, or behind it
+    r"([A-Za-z][A-Za-z, ]*?|[-+±]?\d[^A-Za-z]*) ((?<=[a-z] )[-+±]?\d.*|(?<![a-z] )[A-Za-z].*)", re.DOTALL
+)
 FULL_STOP = {".": "。", ":": "：", ";": "；", "?": "？", "!": "！"}
 MOST_LETTERS = 5000  # of a text that is taken apart: longer ones are data
 
@@ -30,8 +38,10 @@ class Catalogue:
     """
 
     def __init__(self, entries: Mapping[str, str]) -> None:
+        entries = sentences_of(entries) | dict(entries)
         self._exact = {key: value for key, value in entries.items() if not PLACE.search(key)}
-        self._patterns = {key: (_pattern(key), value) for key, value in entries.items() if PLACE.search(key)}
+        with_places = (key for key in entries if PLACE.search(key) and WORD.search(PLACE.sub(" ", key)))
+        self._patterns = {key: (_pattern(key), entries[key]) for key in with_places}
         self._by_word: dict[str, list[str]] = defaultdict(list)
         counts: dict[str, int] = defaultdict(int)
         for key in self._patterns:
@@ -39,7 +49,7 @@ class Catalogue:
                 counts[word] += 1
         for key in self._patterns:
             words = WORD.findall(PLACE.sub(" ", key))
-            rarest = min(words, key=lambda word: (counts[word], word), default="")
+            rarest = min(words, key=lambda word: (counts[word], word))
             self._by_word[rarest].append(key)
         self.translated = lru_cache(maxsize=20_000)(self._translated)
 
@@ -58,11 +68,26 @@ class Catalogue:
             return found
         if core[-1] in FULL_STOP and len(core) > 1 and (found := self._whole(core[:-1].rstrip())) is not None:
             return found + FULL_STOP[core[-1]]
-        parts = next(([*core.split(mark, 1), mark] for mark in BREAKS if mark in core.strip(mark)), None)
-        if parts is None:
-            return core
-        first, second, mark = parts
-        return f"{self.translated(first)}{_mark(mark)}{self.translated(second)}"
+        for mark in ("\n", ". "):
+            if mark in core.strip(mark):
+                first, second = core.split(mark, 1)
+                return f"{self.translated(first)}{BREAKS[mark]}{self.translated(second)}"
+        taken_apart = self._taken_apart(core)
+        left, words = len(PLAIN.findall(taken_apart)), len(PLAIN.findall(core))
+        return core if left > 1 and 3 * left > words else taken_apart  # half a sentence is worse than none
+
+    def _taken_apart(self, core: str) -> str:
+        """Return a sentence with its parts translated, each by itself."""
+        bracket = BRACKET.fullmatch(core)
+        if bracket is not None:
+            before, inside, after = bracket.groups()
+            return f"{self.translated(before)}（{self.translated(inside)}）{self.translated(after)}"
+        for mark in BREAKS:
+            if mark in core.strip(mark):
+                first, second = core.split(mark, 1)
+                return f"{self.translated(first)}{BREAKS[mark]}{self.translated(second)}"
+        number = NUMBER.fullmatch(core)
+        return f"{self.translated(number[1])} {self.translated(number[2])}" if number else core
 
     def _whole(self, core: str) -> str | None:
         """Return the translation of a text that one entry of the catalogue matches as a whole, or None."""
@@ -76,15 +101,17 @@ class Catalogue:
             if match is None:
                 continue
             values = [self.translated(value) for value in match.groups()]
-            left = sum(len(word) for value in values for word in WORD.findall(value))
+            left = sum(len(PLAIN.findall(value)) for value in values)
             own = len(WORD.findall(PLACE.sub(" ", key)))
+            if left > own:  # it matches by chance
+                continue
             result = PLACE.sub(lambda place, values=values: values[int(place[1])], translation)  # type: ignore[misc]
             if best is None or (-left, own) > best[:2]:
                 best = (-left, own, result)
         return best[2] if best else None
 
     def _candidates(self, core: str) -> Iterator[str]:
-        for word in ["", *dict.fromkeys(WORD.findall(core))]:
+        for word in dict.fromkeys(WORD.findall(core)):
             yield from self._by_word.get(word, ())
 
 
@@ -103,5 +130,27 @@ def _pattern(key: str) -> re.Pattern[str]:
     return re.compile(text, re.DOTALL)
 
 
-def _mark(mark: str) -> str:
-    return {". ": "。", "; ": "；", ": ": "：", " (": "（", ", ": "，", " and ": "、", " or ": "或"}.get(mark, mark)
+def sentences_of(entries: Mapping[str, str]) -> dict[str, str]:
+    """Return an entry for each sentence of the entries that have several, where both languages have as many.
+
+    A page may show some of the sentences of a text alone.
+
+    >>> sentences_of({"{0} is on. {1} is off.": "{0}开。{1}关。"})
+    {'{0} is on': '{0}开', '{0} is off': '{0}关'}
+    """
+    found = {}
+    for key, value in entries.items():
+        english = [part for part in re.split(r"\.(?:\s+|$)", key) if part]
+        other = [part for part in value.split("。") if part]
+        if len(english) != len(other) or len(english) < 2:
+            continue
+        for sentence, translation in zip(english, other, strict=True):
+            numbers = PLACE.findall(sentence)
+            if sorted(numbers) == sorted(PLACE.findall(translation)) and WORD.search(PLACE.sub(" ", sentence)):
+                new = {old: f"{{{k}}}" for k, old in enumerate(numbers)}
+                turned = [
+                    PLACE.sub(lambda place, new=new: new[place[1]], text)  # type: ignore[misc]
+                    for text in (sentence.strip(), translation.strip())
+                ]
+                found[turned[0]] = turned[1]
+    return found
