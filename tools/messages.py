@@ -12,6 +12,7 @@ import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
@@ -93,14 +94,14 @@ def template_of(node: ast.JoinedStr) -> str:
     )
 
 
-def numbered(text: str) -> str:
-    """Return a text for ``str.format`` with its places numbered.
+def numbered(text: str, places: str = r"\{[a-z_]*(?::[^{}]*)?\}") -> str:
+    """Return a text with its places numbered: those of ``str.format``, or those that an expression matches.
 
     >>> numbered("{} of {name} is {:+.2f}")
     '{0} of {1} is {2}'
     """
     numbers = itertools.count()
-    return re.sub(r"\{[a-z_]*(?::[^{}]*)?\}", lambda _: f"{{{next(numbers)}}}", text)
+    return re.sub(places, lambda _: f"{{{next(numbers)}}}", text)
 
 
 def template_texts(source: str) -> Iterator[str]:
@@ -109,9 +110,7 @@ def template_texts(source: str) -> Iterator[str]:
     source = re.sub(r"\{%-?\s*(?!if|elif|else|endif)[^%]*%\}", "<>", source)
     for piece in re.split(r"<(?!wbr)[^>]*>", source):
         for text in _alternatives(piece.strip()):
-            numbers = itertools.count()
-            text = re.sub(r"\{\{.*?\}\}", lambda _, numbers=numbers: f"{{{next(numbers)}}}", text)
-            text = " ".join(text.split())
+            text = " ".join(numbered(text, r"\{\{.*?\}\}").split())
             if re.search(r"[A-Za-z]{2,}", re.sub(r"\{\d+\}", "", text)):
                 yield text
 
@@ -139,7 +138,8 @@ def updated(language: str) -> Catalog:
             known = {str(entry.id): str(entry.string) for entry in read_po(file) if entry.id}
     catalogue = Catalog(locale=language, project="poolcal", fuzzy=False, creation_date=None, revision_date=None)
     for text, place in sorted(program_texts().items(), key=lambda item: (item[1].partition(":")[0], item[0])):
-        catalogue.add(text, known.get(text, ""), locations=[(place.partition(":")[0], None)])
+        source: Any = (place.partition(":")[0], None)
+        catalogue.add(text, known.get(text, ""), locations=[source])
     return catalogue
 
 

@@ -139,7 +139,7 @@ def in_crs(ecef_m: Array, crs: str, lift_m: float = 0.0) -> Array:
         return ecef_m
     x, y, z = ecef_m.T
     places = Transformer.from_crs("EPSG:4978", target.to_3d(), always_xy=True).transform(x, y, z)
-    return np.stack(places, axis=1) + np.array([0.0, 0.0, lift_m])
+    return np.asarray(np.stack(places, axis=1) + np.array([0.0, 0.0, lift_m]), dtype=np.float64)
 
 
 def write_points(path: Path, points: Array, decimals: int, geographic: bool = False, header: str = "") -> None:

@@ -56,7 +56,8 @@ def draw_faces(axis: Axes, model: TargetModel) -> None:
         axis.add_patch(Polygon(corners, fc=light(face.family), ec=INK, lw=0.7))
         middle = face.vertices_m.mean(axis=0)
         if not face.level and face.family != "P2":
-            axis.text(*(flat @ middle), face.name, ha="center", va="center", fontsize=7, color=INK)
+            right, up = flat @ middle
+            axis.text(right, up, face.name, ha="center", va="center", fontsize=7, color=INK)
 
 
 def draw_water(axis: Axes, water_m: float) -> None:
@@ -87,7 +88,8 @@ def oblique_view(axis: Axes, model: TargetModel, letters: Letters) -> None:
     draw_faces(axis, model)
     draw_water(axis, letters.water_level_m)
     flat = projection()
-    axis.text(*(flat @ np.array([0, 0, 0.7 * a / 2])), "P2", ha="center", va="center", fontsize=10, color=INK)
+    right, up = flat @ np.array([0, 0, 0.7 * a / 2])
+    axis.text(right, up, "P2", ha="center", va="center", fontsize=10, color=INK)
     measure(axis, (0, -b / 2 - 2.0, -a / 2), (0, -b / 2 - 2.0, a / 2), "a", (9, 0))
     measure(axis, (0, -b / 2, a / 2 + 0.35), (0, b / 2, a / 2 + 0.35), "b", (0, 9))
     top = max(float(face.vertices_m[:, 2].max()) for face in model.faces if face.family == "P1")

@@ -149,7 +149,7 @@ def sentences_of(entries: Mapping[str, str]) -> dict[str, str]:
             if sorted(numbers) == sorted(PLACE.findall(translation)) and WORD.search(PLACE.sub(" ", sentence)):
                 new = {old: f"{{{k}}}" for k, old in enumerate(numbers)}
                 turned = [
-                    PLACE.sub(lambda place, new=new: new[place[1]], text)  # type: ignore[misc]
+                    PLACE.sub(lambda place, new=new: new[place[1]], text)
                     for text in (sentence.strip(), translation.strip())
                 ]
                 found[turned[0]] = turned[1]
