@@ -30,7 +30,7 @@ PLACES = (  # where texts for people are made
 PROSE = re.compile(r"[A-Za-z]{2,}[,;:.]? +\(?[A-Za-z{]|\} [A-Za-z]{2,}")
 CODE = re.compile(r"[\w.*/{}\[\]:=-]*|(?:application|text)/.*|.*%[sd].*|<.*>|.*\.parquet.*|\^.*|.*\\\w.*", re.DOTALL)
 MOST_CONDITIONS = 4  # of one text of a template
-WORDS = LANGUAGE / "words.txt"  # single words that tables and charts show, one a line
+WORDS = ROOT / "tools" / "message_words.txt"  # single words that tables and charts show, one a line
 
 
 def program_texts() -> dict[str, str]:

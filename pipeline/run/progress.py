@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TextIO
 
-from pipeline.console import say
+from pipeline.language.speaking import say
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import pipeline
-from pipeline.console import say
+from pipeline.language.speaking import say
 
 app = typer.Typer(
     name="poolcal",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.console import say
+from pipeline.language.speaking import say
 
 if TYPE_CHECKING:
     from stages.commands.one_drawing import DrawingFailure

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.atomic_files import write_text, writing
-from pipeline.console import say
+from pipeline.language.speaking import say
 from pipeline.results.diff import run_difference
 from pipeline.results.diff_text import difference_text
 from pipeline.results.finished_run import FinishedRun

@@ -10,8 +10,8 @@ from typing import Any
 
 import typer
 
-from pipeline.console import say
 from pipeline.errors import PoolcalError
+from pipeline.language.speaking import say
 from stages.commands.usage import usage_message
 
 INTERRUPTED = 130  # the exit status that typer returns after Ctrl-C

@@ -9,7 +9,7 @@ from pipeline.artefacts.catalogue.target import TARGET_POSE
 from pipeline.artefacts.from_tables import target_frame
 from pipeline.atomic_files import write_text
 from pipeline.config.session import Calibrated
-from pipeline.console import plural, say
+from pipeline.console import plural
 from pipeline.errors import ConfigError
 from pipeline.exports.cloud import CLOUDS, write_cloud
 from pipeline.exports.cloud_frame import cloud_frame
@@ -19,6 +19,7 @@ from pipeline.exports.registry import list_text, target_named
 from pipeline.exports.source import mounting_of
 from pipeline.exports.target import Options
 from pipeline.exports.writing import export_text
+from pipeline.language.speaking import say
 from pipeline.mount import Mounted, mount_of
 from pipeline.results.finished_run import FinishedRun
 from pipeline.run.output_files import refuse_output

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from pipeline.config.fill_in import unfilled
 from pipeline.config.yaml_file import SESSION_YAML, text_of
-from pipeline.console import say
 from pipeline.errors import ConfigError
+from pipeline.language.speaking import say
 
 WAY: tuple[tuple[str, str, str], ...] = (  # command, its arguments, what it does
     ("init", "FOLDER", "begin: session.yaml and pool.yaml from the raw files"),

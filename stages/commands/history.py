@@ -4,7 +4,8 @@ import sys
 from datetime import date
 from pathlib import Path
 
-from pipeline.console import plural, say
+from pipeline.console import plural
+from pipeline.language.speaking import say
 from pipeline.results.history import History, SessionFilter, read_history
 from pipeline.results.pages.history import write_history
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from pipeline.atomic_files import write_text
 from pipeline.config.fill_in import unfilled
 from pipeline.config.yaml_file import SESSION_YAML
-from pipeline.console import plural, say
+from pipeline.console import plural
 from pipeline.errors import ConfigError
+from pipeline.language.speaking import say
 from pipeline.starting.folder_survey import FolderSurvey, survey_folder
 from pipeline.starting.next_steps import found_text, steps_text
 from pipeline.starting.pool_text import pool_text

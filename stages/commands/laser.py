@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from pipeline.console import say
+from pipeline.language.speaking import say
 from stages.commands import laser_mount, run
 from stages.commands.run import RunOptions
 

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.config.fleet import load_fleet
-from pipeline.console import say
 from pipeline.errors import PoolcalError
 from pipeline.fleet.answer import BUG, COULD_NOT_RUN, Answer, answer_of_ended, overall_status
 from pipeline.fleet.logs import write_log
 from pipeline.fleet.processes import Command, Reply, ask_all
 from pipeline.fleet.session_list import HISTORY, FleetSession, list_sessions, shown
 from pipeline.fleet.table import Outcome, count_line, movements, outcome_table
+from pipeline.language.speaking import say
 from pipeline.results.history import History, SessionFilter, read_history
 from pipeline.run.settings import holds_run
 from pipeline.run.workers import default_jobs, workers

@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from pipeline.console import say
 from pipeline.errors import ArtefactError
+from pipeline.language.speaking import say
 from pipeline.run.output_files import refuse_output
 from pipeline.run.results import PAGE, agreeing, calibration
 from pipeline.run.settings import read_settings

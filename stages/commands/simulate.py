@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 
 from pipeline.atomic_files import writing
-from pipeline.console import say
 from pipeline.errors import ConfigError
+from pipeline.language.speaking import say
 from pipeline.simulation.session import simulate_to_folder
 
 

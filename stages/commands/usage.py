@@ -18,7 +18,7 @@ MEANT = {  # words that other programs have, or that one would try: the commands
     "adjust": ("run",), "calibrate": ("run",), "calibration": ("run",), "process": ("run",), "solve": ("run",),
     "patch-test": ("run",), "patchtest": ("run",),
     "inspect": ("check",), "qc": ("check",), "test": ("check",), "validate": ("check",), "survey": ("coarse",),
-    "marks": ("coarse",), "mount": ("coarse",), "boresight": ("laser",), "lidar": ("laser",), "scanner": ("laser",),
+    "marks": ("coarse",), "boresight": ("laser",), "lidar": ("laser",), "scanner": ("laser",),
     "demo": ("simulate",), "simulation": ("simulate",), "predict": ("plan",), "hash": ("verify",),
     "difference": ("diff",), "moved": ("diff",), "trend": ("history",), "sessions": ("history",),
     "open": ("view",), "show": ("view",), "rerun": ("view",), "recording": ("view",), "recordings": ("view",),

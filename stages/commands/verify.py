@@ -3,7 +3,8 @@
 import sys
 from pathlib import Path
 
-from pipeline.console import plural, say
+from pipeline.console import plural
+from pipeline.language.speaking import say
 from pipeline.run.settings import calibrated_in
 from pipeline.run.verify import problems_of_run
 from pipeline.run.workers import workers

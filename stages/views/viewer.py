@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from pipeline.atomic_files import temporary_folder
-from pipeline.console import say
 from pipeline.errors import ArtefactError
+from pipeline.language.speaking import say
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 NO_WINDOW = ("winit", "EventLoop", "DISPLAY")  # one of these is in the viewer's message if it cannot open a window

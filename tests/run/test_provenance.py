@@ -20,7 +20,7 @@ from tests.support.roots import ROOT
 from tests.support.toy_run import Pool
 
 # Settings are in the key as values.
-NO_DIGIT = {"rerun-sdk", "typer", "pydantic", "PyYAML", "ruamel.yaml", "jinja2", "matplotlib"}
+NO_DIGIT = {"Babel", "rerun-sdk", "typer", "pydantic", "PyYAML", "ruamel.yaml", "jinja2", "matplotlib"}
 
 
 # --- files of the program --------------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ def test_every_view_of_every_tab_shows_something(client: Any, tab: str, tmp_path
 def test_a_scrub_through_the_iteration_closes_the_planes(client: Any, tmp_path: Path) -> None:
     """The sonar's planes and points move from step to step, and come to rest."""
     show_tab(client, "Iteration")
-    (scene,) = (view.view_id for view in client.get_state().views if view.name.startswith("Step by step"))
+    (scene,) = (view.view_id for view in client.get_state().views if view.name.startswith("The patent"))
     end = next(t.end for t in client.get_state().recordings[0].timelines if t.name == "iteration")
     frames = []
     for step in (0, 1, 2, end - 1, end):

@@ -1,0 +1,43 @@
+"""Printing of text for people, in the language of this process."""
+
+import sys
+from typing import TextIO
+
+from pipeline.console import printable
+from pipeline.errors import ArtefactError
+from pipeline.language.chosen import translated
+from pipeline.language.letters import has_wide
+
+
+def say(text: str, stream: TextIO, as_is: bool = False) -> None:
+    """Print lines of text to a stream, in the language of this process.
+
+    A line that has words of that language already is not translated again: a table, whose cells were.
+
+    The program goes on if the reader of a pipe has ended. It also goes on if standard error cannot be written, because
+    an error message would go to the same place.
+
+    Parameters
+    ----------
+    text
+        The lines.
+    stream
+        Standard output or standard error.
+    as_is
+        Whether the text is data, such as JSON, which is never translated.
+
+    Raises
+    ------
+    ArtefactError
+        Standard output, which takes the program's answer, cannot be written.
+    """
+    lines = "\n".join(printable(line if as_is or has_wide(line) else translated(line)) for line in text.split("\n"))
+    try:
+        print(lines, file=stream, flush=True)
+    except BrokenPipeError:
+        return
+    except OSError as error:
+        if stream is sys.stdout:
+            raise ArtefactError(
+                f"standard output: cannot be written ({error.strerror}); make room, or send it elsewhere"
+            ) from error
