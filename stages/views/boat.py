@@ -52,6 +52,7 @@ def log_boats(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
     trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
     mounts = {"laser": mount_of(session.laser.mount)}
     mounts[session.calibrated] = _calibrated(tables, mount_of((session.mbes or session.laser).mount))
+    first = residuals["pass"].min()  # the boat of this pass has names at its sensors; more would hide the scene
     for number, of_pass in residuals.groupby("pass", sort=True):
         epochs = {}
         for sensor, rows in of_pass.groupby("sensor", sort=True):
@@ -60,9 +61,13 @@ def log_boats(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
             _fan(recording, trajectory, rows, (str(sensor), int(str(number))), epochs[str(sensor)], mounts)
         epoch = epochs.get(session.calibrated, next(iter(epochs.values())))
         position, R_target_from_body = (values[0] for values in trajectory.poses_at(np.array([epoch])))
-        _boat(recording, f"boat/pass_{number}", position, R_target_from_body, settings.pool.target.water_level_m)
+        path, named = f"boat/pass_{number}", number == first
+        _boat(recording, path, position, R_target_from_body, settings.pool.target.water_level_m)
+        _axes(recording, f"{path}/axes", 0.8, "INS" if named else "")
         for sensor, mount in mounts.items():
-            _sensor(recording, f"boat/pass_{number}/{NAMES[sensor]}", mount, BOXES_M[sensor])
+            place, name = f"{path}/{NAMES[sensor]}", NAMES[sensor]
+            _sensor(recording, place, mount, BOXES_M[sensor])
+            _axes(recording, f"{place}/axes", 0.45, name if named else "")
 
 
 def _fan(
@@ -83,35 +88,34 @@ def _fan(
 
 
 def _boat(recording: Any, path: str, position: Array, R_target_from_body: Array, water_level_m: float) -> None:
-    """Log the body frame, its axes at the INS, and a sketch of the hull in the water."""
+    """Log the body frame, and a sketch of the hull in the water."""
     import rerun as rr
 
     recording.log(path, rr.Transform3D(translation=position, mat3x3=R_target_from_body), static=True)
     middle = (0.0, 0.0, water_level_m - position[2] + 0.3 * HULL_M[2])
     hull = rr.Boxes3D(centers=[middle], half_sizes=[HULL_M], colors=[GREY], radii=0.01)
     recording.log(f"{path}/hull", hull, static=True)
-    _axes(recording, f"{path}/axes", 0.8, "INS")
 
 
 def _sensor(recording: Any, path: str, mount: Mounted, half_sizes_m: tuple[float, float, float]) -> None:
-    """Log a sensor's frame on the boat, its box and its axes."""
+    """Log a sensor's frame on the boat, and its box."""
     import rerun as rr
 
     placed = rr.Transform3D(translation=mount.lever_arm_body_m, mat3x3=mount.R_body_from_sensor)
     recording.log(path, placed, static=True)
     box = rr.Boxes3D(half_sizes=[half_sizes_m], colors=[GREY], radii=0.008)
     recording.log(f"{path}/box", box, static=True)
-    _axes(recording, f"{path}/axes", 0.45, path.rpartition("/")[2])
 
 
 def _axes(recording: Any, path: str, length_m: float, name: str) -> None:
-    """Log three axes of a frame as arrows, with their letters, and the name of what stands at its origin."""
+    """Log the axes of a frame as arrows, x red, y green, z blue; with a name at its origin, unless it is empty."""
     import rerun as rr
 
-    arrows = rr.Arrows3D(
-        vectors=length_m * np.eye(3), radii=0.012, colors=AXIS_COLOURS, labels=[f"{name} {axis}" for axis in "xyz"]
-    )
+    arrows = rr.Arrows3D(vectors=length_m * np.eye(3), radii=0.012, colors=AXIS_COLOURS)
     recording.log(path, arrows, static=True)
+    if name:  # a label has the colour of its point, and a grey ground
+        point = rr.Points3D([[0.0, 0.0, length_m]], radii=0.001, colors=(255, 255, 255), labels=name)
+        recording.log(f"{path}/name", point, static=True)
 
 
 def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:

@@ -85,7 +85,7 @@ def _listed_twice(place: Place) -> None:
 RXP = b"\x00\x01\x0e\xf5\x00\x00\x00\x00RieglLMS-VZ1000" + bytes(5000)
 FILES: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "session folder missing": (_session_is_gone, ("session", "is no folder", "session.yaml")),
-    "session.yaml missing": (_unlink("session/session.yaml"), ("session.yaml", "there is no such file", "poolcal init")),
+    "session.yaml missing": (_unlink("session/session.yaml"), ("there is no such file", "poolcal init")),
     "config missing": (_unlink("pool.yaml"), ("pool.yaml", "cannot be read", "check the path")),
     "no INS file": (_remove("ins"), ("session.yaml", "ins/*.gps", "matches no file")),
     "no laser file": (_remove("laser"), ("session.yaml", "laser/*.las", "matches no file")),
