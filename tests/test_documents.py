@@ -4,6 +4,7 @@ import re
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer.main
@@ -46,6 +47,12 @@ def test_every_page_is_in_the_site_once() -> None:
     assert sorted(nav) == sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
 
 
+def _commands_of_the_program() -> Any:
+    """Return the program's commands by name; typer's types do not say that its group has them."""
+    group: Any = typer.main.get_command(app)
+    return group.commands
+
+
 def _commands(page: Path) -> Iterator[str]:
     text = page.read_text(encoding="utf-8")
     yield from COMMAND.findall(text)
@@ -55,8 +62,7 @@ def _commands(page: Path) -> Iterator[str]:
 @pytest.mark.parametrize("page", PAGES_AND_README, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_commands_are_the_programs(page: Path) -> None:
     """Each command that a page shows exists, and has the options that the page gives it."""
-    group: object = typer.main.get_command(app)
-    known = group.commands  # type: ignore[attr-defined]
+    known = _commands_of_the_program()
     for line in _commands(page):
         words = shlex.split(re.split(r"\s{3,}|\s#", line)[0].replace("…", "").replace("'", ""))
         name = words[0]
@@ -90,6 +96,6 @@ def test_the_first_words_say_what_it_has_been_proven_on() -> None:
 
 
 def test_help_of_every_command_ends_well(capsys: pytest.CaptureFixture[str]) -> None:
-    for name in typer.main.get_command(app).commands:  # type: ignore[attr-defined]
+    for name in _commands_of_the_program():
         assert call([name, "--help"]) == 0
         assert f"poolcal {name}" in capsys.readouterr().out

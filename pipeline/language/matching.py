@@ -10,7 +10,7 @@ sentence of which a third would remain English stays English.
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
 PLACE = re.compile(r"\{(\d+)\}")
@@ -105,7 +105,7 @@ class Catalogue:
             own = len(WORD.findall(PLACE.sub(" ", key)))
             if left > own:  # it matches by chance
                 continue
-            result = PLACE.sub(lambda place, values=values: values[int(place[1])], translation)  # type: ignore[misc]
+            result = _with_values(translation, values)
             if best is None or (-left, own) > best[:2]:
                 best = (-left, own, result)
         return best[2] if best else None
@@ -113,6 +113,11 @@ class Catalogue:
     def _candidates(self, core: str) -> Iterator[str]:
         for word in dict.fromkeys(WORD.findall(core)):
             yield from self._by_word.get(word, ())
+
+
+def _with_values(translation: str, values: Sequence[str]) -> str:
+    """Return a translation with its values in their places."""
+    return PLACE.sub(lambda place: values[int(place[1])], translation)
 
 
 def _pattern(key: str) -> re.Pattern[str]:

@@ -1,11 +1,11 @@
 """Every mistake's rotation and lever arm, against scipy."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
 
-from pipeline.entry_check.hypotheses import RIGHT, lever_arms, rotations, starts
+from pipeline.entry_check.hypotheses import RIGHT, Entered, lever_arms, rotations, starts
 from tests.support.entered import ANGLES, COARSE, COARSE_LEVER, LASER, LEVER, SOURCE, rotation
 
 CHANGE = {name: ANGLES[name] - COARSE[name] for name in ANGLES}
@@ -52,8 +52,8 @@ EXPECTED_ARMS = {
 }
 
 
-def values(entered: Iterator[object], key: str) -> list[np.ndarray]:
-    return [one.value for one in entered if one.key == key]  # type: ignore[attr-defined]
+def values(entered: Iterable[Entered], key: str) -> list[np.ndarray]:
+    return [one.value for one in entered if one.key == key]
 
 
 @pytest.mark.parametrize("key", EXPECTED_ROTATIONS)

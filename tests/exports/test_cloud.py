@@ -97,7 +97,7 @@ def made_up(run: Path, rows: int) -> tuple[CalibratedPoints, dict[str, dict[str,
         "laser": stream(run, LASER_LABELLED, "laser", rows),
         "mbes": stream(run, SOUNDINGS_LABELLED, "mbes", rows // 4),
     }
-    return CalibratedPoints.of(Tables(run), MOUNTS, {"top 水": 0.004}), points  # type: ignore[arg-type]
+    return CalibratedPoints.of(Tables(run), MOUNTS, {"top 水": 0.004}), points
 
 
 def expected(columns: dict[str, np.ndarray], sensor: str) -> tuple[np.ndarray, np.ndarray]:
