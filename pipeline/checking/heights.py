@@ -22,6 +22,7 @@ from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
 REACH_M = 0.5  # distance from a face beyond which a point counts 0
+AT_ONCE = 200_000  # shifted points in memory
 FARTHEST_M, STEP_M = 50.0, 0.25  # largest shift that is tried, and the step between shifts
 SHIFTS_M = np.arange(-FARTHEST_M, FARTHEST_M + STEP_M / 2, STEP_M)
 HERE = len(SHIFTS_M) // 2  # index of the shift 0
@@ -159,8 +160,8 @@ class SideOfWater:
     water_m: float
 
     def visible(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask (n,): true for each of the points (n, 3) m, target frame, on that side."""
-        return points[:, 2] > self.water_m if self.sensor == "laser" else points[:, 2] < self.water_m
+        """Return a mask (...): true for each of the points (..., 3) m, target frame, on that side."""
+        return points[..., 2] > self.water_m if self.sensor == "laser" else points[..., 2] < self.water_m
 
 
 def profile(
@@ -188,16 +189,17 @@ def profile(
     reach_m : float
         Distance from a face beyond which a point counts 0.
     """
-    scores = []
-    for shift in shifts_m:
-        moved = points + np.array([0.0, 0.0, shift])
+    sums = np.zeros(len(shifts_m))
+    for some in np.array_split(np.arange(len(shifts_m)), 1 + len(shifts_m) * len(points) // AT_ONCE):
+        moved = points + shifts_m[some, None, None] * np.array([0.0, 0.0, 1.0])
+        use = closest.around(moved, reach_m)
         if side is not None:
-            moved = moved[side.visible(moved)]
-        moved = moved[closest.around(moved, reach_m)]
-        on, _ = closest(moved)
-        squares = np.sum((moved - on) ** 2, axis=1) / reach_m**2
-        scores.append(float(np.sum(np.maximum(0.0, 1.0 - squares))) / len(points))
-    return np.array(scores)
+            use &= side.visible(moved)
+        near = moved[use]
+        on, _ = closest(near)
+        squares = np.sum((near - on) ** 2, axis=1) / reach_m**2
+        sums[some] = np.bincount(np.nonzero(use)[0], np.maximum(0.0, 1.0 - squares), len(some))
+    return sums / len(points)
 
 
 def _fit(track: InsTrack, sample: PointSample, closest: ClosestSurface, water_m: float) -> Fit | None:

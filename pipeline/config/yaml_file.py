@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from yaml.composer import Composer
 
 from pipeline.atomic_files import read_regular
 from pipeline.errors import ConfigError
@@ -14,8 +15,16 @@ MAX_YAML_BYTES = 1_000_000
 MAX_INTEGER = 2**63
 
 
-class _StrictLoader(yaml.SafeLoader):
-    """Load safe YAML; refuse repeated keys (YAML would silently take the last) and aliases (they may expand hugely)."""
+class _StrictLoader(Composer, yaml.CSafeLoader):
+    """Load safe YAML; refuse repeated keys (YAML would silently take the last) and aliases (they may expand hugely).
+
+    libyaml scans and parses, five times faster than PyYAML's own scanner; PyYAML composes the events, so that every
+    node can be refused.
+    """
+
+    def __init__(self, text: str) -> None:
+        yaml.CSafeLoader.__init__(self, text)
+        Composer.__init__(self)
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.events.AliasEvent):

@@ -36,9 +36,9 @@ class ClosestSurface:
         return ClosestSurface, (self._model,)
 
     def around(self, points_m: Array, reach_m: float) -> NDArray[np.bool_]:
-        """Return a mask (n,): true for points (n, 3) m in the surface's box, enlarged by ``reach_m`` on each side."""
+        """Return a mask (...): true for points (..., 3) m in the surface's box, enlarged by ``reach_m`` all round."""
         low, high = self._model.bounds()
-        return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=1))
+        return np.asarray(np.all((points_m >= low - reach_m) & (points_m <= high + reach_m), axis=-1))
 
     def __call__(self, points_m: Array) -> tuple[Array, NDArray[np.int64]]:
         """Return the nearest points (n, 3) m on the surface, and the numbers of their faces (n,)."""
