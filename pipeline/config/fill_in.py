@@ -32,7 +32,7 @@ WHAT: Mapping[str, str] = {  # by key, or by the block that holds it: what to fi
     "target.c": "legs of a block's right-angled triangle, m",
     "target.e": "a block's height, and the gap to the next above, m",
     "target.low_side": "south or north: the side, -y or +y, whose lowest block stands at the wall's foot",
-    "target.water_level_m": "height of the water above the centre of the wall, m; below it is -",
+    "target.water_level_m": "height of the water less that of the wall's centre, m: both above the ellipsoid",
     "target.origin": "the centre of the wall's front face, in the datum of the INS's positions",
     "latitude_deg": "degrees; north is +",
     "longitude_deg": "degrees; east is +",

@@ -13,7 +13,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
 from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
-from pipeline.config.yaml_file import read_yaml
+from pipeline.config.yaml_file import SESSION_YAML, read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.readers.casts import with_cast
@@ -37,6 +37,14 @@ class Settings:
     def resolved(self) -> dict[str, Any]:
         """Return every setting by the name under which a stage's Config asks for it."""
         return settings_by_name(self.pool, self.session)
+
+    def is_session_changed(self) -> bool:
+        """Return whether session.yaml is no longer the file that was read; False if it is out of reach."""
+        digest = self.files.get("session")
+        try:
+            return digest is not None and sha256(self.session_folder / SESSION_YAML) != digest
+        except ArtefactError:
+            return False
 
     def as_json(self) -> dict[str, Any]:
         """Return the settings as plain values, defaults filled in."""
@@ -66,11 +74,11 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
     elif calibrated == "mbes" and session.calibrated == "laser":
-        where = session_folder / "session.yaml"
+        where = session_folder / SESSION_YAML
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
-        refuse_shallow_cast(pool.target, session.mbes, session_folder / "session.yaml")
-    files = {"session": sha256(session_folder / "session.yaml"), "config": sha256(config_path)}
+        refuse_shallow_cast(pool.target, session.mbes, session_folder / SESSION_YAML)
+    files = {"session": sha256(session_folder / SESSION_YAML), "config": sha256(config_path)}
     return Settings(session_folder.resolve(), pool, session, files)
 
 

@@ -32,7 +32,7 @@ def found_text(survey: FolderSurvey) -> str:
 
 def _row(group: FileGroup, is_choice: bool) -> list[str]:
     kind = f"{group.kind.title}{' (one of several)' if is_choice else ''}"
-    return [group.sensor, kind, str(len(group.files)), span_words(group), group.instrument or "-"]
+    return [group.sensor, kind, str(len(group.files)), span_words(group), group.instrument or "not named"]
 
 
 def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path, Sequence[Unfilled]]]) -> str:
@@ -60,6 +60,11 @@ def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path,
     check = command("check", session, "--config", config)
     steps.append(f"See whether the files are good, best while the boat is still in the water\n     {check}")
     steps.append(f"Calibrate\n     {command('run', session, '--config', config, '--run', 'RUN')}")
+    steps.append(
+        "Enter the values in the survey's software, prove that they are right there, and print the certificate (its\n"
+        f"   names: about in session.yaml)\n     {command('export', 'RUN', '--to', 'NAME')}\n"
+        f"     {command('check-entry', 'RUN', 'SOUNDINGS')}\n     {command('report', 'RUN', '--pdf', 'FILE.pdf')}"
+    )
     return "\n".join(["Left to be done:", *(f"{number}. {step}" for number, step in enumerate(steps, 1))])
 
 

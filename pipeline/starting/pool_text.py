@@ -7,7 +7,7 @@ from pipeline.starting.yaml_words import comment, to_fill_in
 _HEAD = (
     f"The pool's config, begun by poolcal init. {MARK} marks what only a person knows. Every other key, with its "
     "default and its meaning: configs/defaults.yaml. A target of another shape has faces in place of a, b, c, e and "
-    'low_side: docs/target.md.'
+    "low_side: docs/target.md."
 )
 _AZIMUTH = "  azimuth_deg: null             # of the target's +y, clockwise from north; null: by the boat's heading"
 _AS_BUILT = """\
@@ -51,6 +51,6 @@ def _azimuth(track: BoatTrack | None) -> list[str]:
     return comment(
         f"To compare: the boat sailed {track.along_m:.0f} m toward azimuth {ahead:.1f}° and "
         f"{track.against_m:.0f} m toward {back:.1f}°. azimuth_deg is the direction in which it passes the target to "
-        "starboard.",
+        "starboard. (Ways before and after the passes count too.)",
         "  ",
     )

@@ -7,6 +7,7 @@ from pipeline.config.instruments import Sensor
 from pipeline.console import plural
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.readers.crs import LASER_FRAME
+from pipeline.starting.assumed import about, assumed
 from pipeline.starting.file_groups import FileGroup
 from pipeline.starting.folder_survey import FolderSurvey
 from pipeline.starting.presets import preset_of, presets_for
@@ -17,7 +18,7 @@ MOST_LEFT_OUT = 40  # files that are listed with their reasons
 _NAMES = {"ins": "the INS", "laser": "the laser", "mbes": "the sonar"}
 _HEAD = (
     f"A session of poolcal, begun by poolcal init from the files in this folder. {MARK} marks what only a person "
-    'knows: poolcal says what is still to be filled in. All keys, and their defaults: docs/reference/session.md.'
+    "knows: poolcal says what is still to be filled in. All keys, and their defaults: docs/reference/session.md."
 )
 _BEGINNING_OF_MBES = (
     "No sonar file was found. To calibrate the sonar add a block mbes with files, format and mount; without it poolcal "
@@ -30,7 +31,7 @@ def session_text(survey: FolderSurvey) -> str:
     lines = [*comment(_HEAD), *_name(survey)]
     for sensor in ("ins", "laser", "mbes"):
         lines += ["", *_sensor(sensor, survey)]
-    return "\n".join([*lines, *_left_out(survey)]) + "\n"
+    return "\n".join([*lines, "", *about(), *_left_out(survey)]) + "\n"
 
 
 def _name(survey: FolderSurvey) -> Iterator[str]:
@@ -51,12 +52,15 @@ def _sensor(sensor: Sensor, survey: FolderSurvey) -> Iterator[str]:
         yield from _open(sensor, groups)
     if sensor == "ins":
         yield from _accuracy(survey)
+        yield from assumed(sensor, has_preset=False)
         return
     if sensor == "laser" and survey.frame is not None:
         yield from _frame(survey)
     if sensor == "mbes":
         yield from _casts(survey)
     yield from _mount(sensor)
+    group = survey.chosen(sensor)
+    yield from assumed(sensor, has_preset=group is not None and preset_of(group.instrument) != "")
 
 
 def _chosen(group: FileGroup, survey: FolderSurvey) -> Iterator[str]:
@@ -85,7 +89,8 @@ def _instrument(group: FileGroup) -> Iterator[str]:
         return
     named = f"The files name {group.instrument}, for which there is no preset. " if group.instrument else ""
     known = ", ".join(presets_for(group.sensor))
-    yield from comment(f"{named}If it is one of these instruments, name it: {known}", "  ")
+    known_if = f"If it is one of these instruments, name it; if not, leave this out: {known}"
+    yield from comment(f"{named}{known_if}", "  ")
     yield "  # instrument: NAME"
 
 

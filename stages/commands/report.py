@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+from pipeline.config.yaml_file import SESSION_YAML
 from pipeline.errors import ArtefactError
 from pipeline.language.speaking import say
 from pipeline.run.output_files import refuse_output
@@ -26,6 +27,14 @@ def command(run: Path, pdf: Path | None) -> int:
     settings = read_settings(run)
     refuse_output("--pdf", pdf, run, settings.session_folder, begins=b"%PDF")
     calibration(run)
+    if settings.is_session_changed():
+        again = (
+            f"{settings.session_folder / SESSION_YAML}: has changed since the run: its about, and the digest on the "
+            "certificate, are not those of the page; poolcal run again (it computes only what changed)"
+        )
+        if pdf is not None:
+            raise ArtefactError(f"{again}, then poolcal report")
+        say(f"Note: {again}", sys.stderr)
     done = agreeing(run, names_in(run))
     for stage in names_in(run):
         if stage not in done:

@@ -14,7 +14,7 @@ import yaml
 from pipeline.results.pages.limiting_errors import IN_WORDS
 from stages.commands.draw import Drawings, draw_missing
 from tests.support.pages import Page, assert_self_contained
-from tests.support.places import Place, Told, digests, poolcal, result_of
+from tests.support.places import Place, Told, digests, edit, poolcal, result_of
 from tests.support.weak_sessions import only_the_wall
 
 ABOUT: dict[str, Any] = {
@@ -226,6 +226,22 @@ def test_report_refuses_what_is_not_finished(done: Place, tmp_path: Path) -> Non
     shutil.rmtree(done.run / "report")
     assert poolcal("report", done.run).status == 2
     assert not pdf.exists()
+
+
+def test_names_that_came_after_the_run_are_not_left_out_in_silence(done: Place, tmp_path: Path) -> None:
+    """session.yaml got its block about after the run: the page would show none of it."""
+    pdf = tmp_path / "out.pdf"
+    edit(done.run / "run.yaml", "", session_folder=str(done.session))
+    assert poolcal("report", done.run).err == ""
+    done.edit_session("about", client="Port of Qingdao")
+    told = poolcal("report", done.run)
+    assert told.status == 0
+    assert "session.yaml: has changed since the run" in told.err
+    told = poolcal("report", done.run, "--pdf", pdf)
+    assert (told.status, len(told.err.splitlines()), pdf.exists()) == (2, 1, False)
+    assert "poolcal run again" in told.err
+    (done.session / "session.yaml").unlink()  # the disk with the raw files is elsewhere
+    assert poolcal("report", done.run).err == ""
 
 
 def test_a_run_yaml_that_was_edited_is_refused(done: Place) -> None:

@@ -1,12 +1,20 @@
 """YAML that init writes: patterns and names of every kind come back as they were; comments stay comments."""
 
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
+from pipeline.config.about import About
+from pipeline.config.instruments import Sensor
+from pipeline.config.session import Ins, Laser, Mbes
 from pipeline.config.yaml_file import content_of
+from pipeline.config.yaml_models import parse
+from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.readers.session_files import files_matching
+from pipeline.starting.assumed import about, assumed
 from pipeline.starting.file_patterns import patterns_for
 from pipeline.starting.pool_text import pool_text
 from pipeline.starting.yaml_words import capped, comment, file_list, scalar
@@ -63,3 +71,23 @@ def test_a_pools_config_without_a_track() -> None:
     )
     assert set(target["origin"].values()) == {"FILL_IN"}
     assert "To compare" not in pool_text(None)
+
+
+def test_what_is_assumed_is_what_the_program_takes() -> None:
+    """With their comment signs taken away, the lines change no setting; a preset's figures are not overridden."""
+    files: dict[str, Any] = {"files": ["a"]}
+    sensors: list[tuple[Sensor, type[Ins | Laser | Mbes], dict[str, Any]]] = [
+        ("ins", Ins, {"format": "sbet"}),
+        ("laser", Laser, {"format": "las", "mount": dict.fromkeys(SETTINGS, 0.0)}),
+        ("mbes", Mbes, {"format": "r2sonic", "mount": dict.fromkeys(SETTINGS, 0.0)}),
+    ]
+    for sensor, block, given in sensors:
+        lines = [line.removeprefix("  # ") for line in assumed(sensor, has_preset=False)]
+        stated = yaml.safe_load("\n".join(line for line in lines if re.match(r"\w+: [{\[\d]", line)))
+        without = block(**files, **given).model_dump(mode="json")
+        source = {"drift_from": "settings"} if sensor == "ins" else {}  # what is written overrides the files
+        assert parse(block, files | given | stated, "a").model_dump(mode="json") == without | source
+        assert "".join(assumed(sensor, has_preset=True)).count("range_sigma_m") == 0
+    keys = yaml.safe_load("\n".join(line.removeprefix("# ") for line in about() if line.endswith(":")))
+    assert About(**keys["about"]) == About()
+    assert len(keys["about"]) == 6
