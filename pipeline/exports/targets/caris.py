@@ -7,7 +7,6 @@ angles of SVP and of Transducer 1.
 
 from pipeline.exports.convention import SFD, Convention
 from pipeline.exports.sheet import Sheet
-from pipeline.exports.target import Target
 
 CONVENTION = Convention(
     SFD,
@@ -40,13 +39,4 @@ _SHEET = Sheet(
         "one of Roll and Pitch; offsets X, Y, Z of the transducer: sigma of X, Y, Z.",
     ),
 )
-TARGET = Target(
-    name="caris",
-    title="CARIS HIPS vessel editor",
-    writes="entry sheet",
-    suffix=".txt",
-    convention=CONVENTION,
-    write=_SHEET.write,
-    read=_SHEET.read,
-    sensor="mbes",
-)
+TARGET = _SHEET.target("caris", "CARIS HIPS vessel editor", CONVENTION)

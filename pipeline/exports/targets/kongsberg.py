@@ -91,22 +91,13 @@ _SHEET = Sheet(
     extra=_extra,
     of=_receiver,
 )  # fmt: skip
-TARGET = Target(
-    name="kongsberg",
-    title="Kongsberg SIS",
-    writes="entry sheet, #IIP and .all text",
-    suffix=".txt",
-    convention=Convention(
-        FRD,
-        (1, 1, -1),
-        "YPR",
-        "secondary",
-        "Kongsberg .kmall format, rev. J (axes, signs); the order is that of Kluster's and MB-System's code, not of "
-        "the "
-        "maker's text",
-        zero_to_360=True,
-    ),
-    write=_SHEET.write,
-    read=_read,
-    sensor="mbes",
+CONVENTION = Convention(
+    FRD,
+    (1, 1, -1),
+    "YPR",
+    "secondary",
+    "Kongsberg .kmall format, rev. J (axes, signs); the order is that of Kluster's and MB-System's code, not of the "
+    "maker's text",
+    zero_to_360=True,
 )
+TARGET = _SHEET.target("kongsberg", "Kongsberg SIS", CONVENTION, writes="entry sheet, #IIP and .all text", read=_read)
