@@ -14,7 +14,7 @@ from pipeline.errors import ConfigError
 from pipeline.exports.convention import Convention
 from pipeline.exports.explanation import explanation, heading, sigmas_of
 from pipeline.exports.mounting import Mounting, sigma_text
-from pipeline.exports.reading import ROLES, number, numbers_of, whole_lines, written
+from pipeline.exports.reading import ROLES, number, numbers_of, whole_lines, written_for
 from pipeline.exports.target import Options, Read, Target
 from pipeline.mount import Mounted
 
@@ -90,7 +90,9 @@ class Sheet:
                 unit = "m" if role in ("x", "y", "z") else "°"
                 label = f"{name} ({senses[role]}):"
                 in_words = self.not_known[role](mounting, options) if role in self.not_known else None
-                value = f"{written(values[role], DECIMALS):>10} {unit}" if in_words is None else f"  {in_words}"
+                value = f"{written_for(target.convention, role, values[role], DECIMALS):>10} {unit}"
+                if in_words is not None:
+                    value = f"  {in_words}"
                 lines.append(f"  {label:<58}{value}   {sigma_text(sigmas, role)}".rstrip())
         if self.extra is not None:
             lines += ["", *self.extra(target, mounting, options)]

@@ -9,7 +9,8 @@ from pipeline.exports.sheet import Sheet
 
 ORDER_SOURCE = "QPS, How-to Qinsy sign conventions and How-to Qinsy rotation matrices (signs, order)"
 AXES_SOURCE = (
-    "the axes are shown there in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, Y+ forward, Z+ up"
+    "heights are up there in words, X and Y in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, "
+    "Y+ forward, Z+ up"
 )
 CONVENTION = Convention(SFU, (1, 1, -1), "YPR", "secondary", f"{ORDER_SOURCE}; {AXES_SOURCE}")
 POSITION = {"x": "X", "y": "Y", "z": "Z"}
