@@ -6,7 +6,6 @@ twice turned x: R_reference_from_sensor = Rz(Z) · Ry(Y) · Rx(X) in forward, st
 
 from pipeline.exports.convention import FRD, Convention
 from pipeline.exports.sheet import Sheet
-from pipeline.exports.target import Target
 
 _SHEET = Sheet(
     groups=(
@@ -27,18 +26,11 @@ _SHEET = Sheet(
         "Order in the dialog: X, Y, Z of the angles are roll, pitch, heading; they turn about Z first.",
     ),
 )
-TARGET = Target(
-    name="posmv",
-    title="Applanix POS MV",
-    writes="entry sheet, sensor 1",
-    suffix=".txt",
-    convention=Convention(
-        FRD,
-        (1, 1, -1),
-        "YPR",
-        "official",
-        "POS MV V5 guide, pp. 2-27 and 2-31; Applanix ICD 004089, messages 20 and 120",
-    ),
-    write=_SHEET.write,
-    read=_SHEET.read,
+CONVENTION = Convention(
+    FRD,
+    (1, 1, -1),
+    "YPR",
+    "official",
+    "POS MV V5 guide, pp. 2-27 and 2-31; Applanix ICD 004089, messages 20 and 120",
 )
+TARGET = _SHEET.target("posmv", "Applanix POS MV", CONVENTION, writes="entry sheet, sensor 1", sensor=None)

@@ -6,11 +6,11 @@ starboard.
 
 from pipeline.exports.convention import SFU, Convention
 from pipeline.exports.sheet import Sheet
-from pipeline.exports.target import Target
 
 ORDER_SOURCE = "QPS, How-to Qinsy sign conventions and How-to Qinsy rotation matrices (signs, order)"
 AXES_SOURCE = (
-    "the axes are shown there in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, Y+ forward, Z+ up"
+    "heights are up there in words, X and Y in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, "
+    "Y+ forward, Z+ up"
 )
 CONVENTION = Convention(SFU, (1, 1, -1), "YPR", "secondary", f"{ORDER_SOURCE}; {AXES_SOURCE}")
 POSITION = {"x": "X", "y": "Y", "z": "Z"}
@@ -38,23 +38,5 @@ _QIMERA = Sheet(
         "A head of two arrays has a transmitter and a receiver: enter the same angles in both.",
     ),
 )
-QINSY = Target(
-    name="qinsy",
-    title="QPS Qinsy",
-    writes="entry sheet",
-    suffix=".txt",
-    convention=CONVENTION,
-    write=_QINSY.write,
-    read=_QINSY.read,
-    sensor="mbes",
-)
-QIMERA = Target(
-    name="qimera",
-    title="QPS Qimera",
-    writes="entry sheet",
-    suffix=".txt",
-    convention=CONVENTION,
-    write=_QIMERA.write,
-    read=_QIMERA.read,
-    sensor="mbes",
-)
+QINSY = _QINSY.target("qinsy", "QPS Qinsy", CONVENTION)
+QIMERA = _QIMERA.target("qimera", "QPS Qimera", CONVENTION)
