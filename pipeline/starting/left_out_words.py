@@ -10,7 +10,7 @@ from pipeline.starting.folder_files import LeftOut
 ALIKE = 3  # files of one suffix, left out for one reason in one folder; more than these are one line
 
 
-def left_out_lines(left_out: Sequence[LeftOut], most: int, more_words: str = "") -> list[str]:
+def left_out_lines(left_out: Sequence[LeftOut], most: int) -> list[str]:
     """Return at most ``most`` lines with names and reasons, and one that says how many files more there are.
 
     Parameters
@@ -19,12 +19,10 @@ def left_out_lines(left_out: Sequence[LeftOut], most: int, more_words: str = "")
         The files.
     most
         The largest number of lines.
-    more_words
-        Words behind that number.
     """
     lines = list(_lines(sorted(left_out)))
     more = sum(number for number, _ in lines[most:])
-    last = [f"and {plural(more, 'file')} more{more_words}"] if more else []
+    last = [f"and {plural(more, 'file')} more"] if more else []
     return [*(line for _, line in lines[:most]), *last]
 
 
@@ -34,14 +32,13 @@ def _lines(left_out: Sequence[LeftOut]) -> Iterator[tuple[int, str]]:
     for one in left_out:
         first.setdefault(_kind(one), one)
     together = sorted(left_out, key=lambda one: (first[_kind(one)], one))
-    for (folder, suffix, why), group in groupby(together, _kind):
+    for _, group in groupby(together, _kind):
         files = list(group)
         if len(files) <= ALIKE:
             yield from ((1, f"{one.name}: {one.why}") for one in files)
         else:
-            where = "" if folder == "." else f" in {folder}"
-            ends = f" that end in {suffix}" if suffix else ""
-            yield len(files), f"{files[0].name} and {plural(len(files) - 1, 'file')} more{where}{ends}: {why}"
+            others = plural(len(files) - 1, "file")
+            yield len(files), f"{files[0].name} and {others} more of its folder and suffix: {files[0].why}"
 
 
 def _kind(one: LeftOut) -> tuple[str, str, str]:

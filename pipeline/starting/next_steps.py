@@ -25,7 +25,7 @@ def found_text(survey: FolderSurvey) -> str:
     lines += [f"Look: {doubt}" for doubt in survey.doubts]
     if survey.left_out:
         lines += ["", f"Not used: {plural(len(survey.left_out), 'file')}"]
-        lines += [f"  {line}" for line in left_out_lines(survey.left_out, MOST_LINES, ", in session.yaml")]
+        lines += [f"  {line}" for line in left_out_lines(survey.left_out, MOST_LINES)]
     return "\n".join(lines)
 
 

@@ -58,14 +58,14 @@ def test_files_alike_are_one_line_and_long_lists_say_how_much_is_left_out() -> N
     pictures = [LeftOut(f"照片/{number}.jpg", "is no raw data") for number in range(9999)]
     cut = LeftOut("照片/pass_0.las", "is cut off")
     assert left_out_lines([*pictures, cut], 2) == [
-        "照片/0.jpg and 9998 files more in 照片 that end in .jpg: is no raw data",
+        "照片/0.jpg and 9998 files more of its folder and suffix: is no raw data",
         "照片/pass_0.las: is cut off",
     ]
-    assert left_out_lines([cut, *pictures], 1, ", in session.yaml")[1:] == ["and 1 file more, in session.yaml"]
+    assert left_out_lines([cut, *pictures], 1)[1:] == ["and 1 file more"]
     few = [LeftOut(name, "is empty") for name in ("a/2.las", "a/1.las", "a/3.las", "4", "5", "6", "7")]
     others = [LeftOut("a/0.las", "is cut off"), LeftOut("b/1.las", "is empty")]
     assert left_out_lines([*few, *others], 9) == [
-        "4 and 3 files more: is empty",
+        "4 and 3 files more of its folder and suffix: is empty",
         "a/0.las: is cut off",
         "a/1.las: is empty",
         "a/2.las: is empty",
